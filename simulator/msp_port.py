@@ -117,7 +117,7 @@ class MspReceiver:
         self._buffer[: len(data)] = data
 
     def forget(self) -> None:
-        """Drop a frame that has begun (the patched firmware's inter-byte time-out)."""
+        """Drop a frame that has begun (the patched firmware's inter-byte timeout)."""
         self._state = 0
 
     def push(self, byte: int) -> tuple[int, bytes] | None:

@@ -2,9 +2,9 @@
 """A ground station writes a mission: the vehicle's side of MAVLink's upload (docs/mission-rules.md).
 
 Uploads run one at a time, in the order of their MISSION_COUNT, unless slow or numerous lists would lock out the
-others: then they are received in parallel, and only written one at a time. Mission Planner loses
-some packets, and any ack to MISSION_COUNT means "continue" to it; most special cases below respond to a behaviour listed
-in docs/ground-stations.md.
+others: then they are received in parallel, and only written one at a time. Mission Planner loses some packets, and any
+ack to MISSION_COUNT means "continue" to it; most special cases below respond to a behaviour listed in
+docs/ground-stations.md.
 """
 
 from collections.abc import Callable

@@ -10,7 +10,7 @@
  * The power can be cut at any flash operation (an erase of one page, a program of one half-word). The operation is then not
  * done, half done (only some bits changed) or done, and everything but the flash is lost.
  *
- * Around the core is a byte receiver with the patched firmware's rules (INBUF_SIZE, inter-byte time-out).
+ * Around the core is a byte receiver with the patched firmware's rules (INBUF_SIZE, inter-byte timeout).
  */
 #ifndef SIM_BOARD_H
 #define SIM_BOARD_H

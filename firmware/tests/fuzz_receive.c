@@ -27,7 +27,7 @@ typedef struct {
 
 static sim_t board;
 static uint8_t reply[SIM_FRAME_SIZE];
-static bool may_change; /* the list, by what happens now */
+static bool may_change; /* true if the current step may change the list */
 
 static void expect(bool condition)
 {

@@ -200,7 +200,7 @@ static void test_an_interrupted_upload_keeps_the_stored_list(void)
         new_chip(stored, 9);
         upload(2, 7);
         upload_open = false;
-        MissionLoad(); /* the upload's time-out */
+        MissionLoad(); /* the upload's timeout */
         CHECK(has(stored, 9));
         serve_scheduled_write();
         power_up();
