@@ -15,7 +15,7 @@ from benchmarks.figure import Figure, Floor
 from benchmarks.missions import COUNT
 from benchmarks.processes import daemon, floor_program, free_udp_port, simulated_naze, wait_for
 from protocols.mission_item import MissionResult
-from protocols.wp_record import RECORD_SIZE
+from protocols.msp.mission import RECORD_SIZE
 from tests.support.mission_planner import MissionPlanner
 from tests.support.plan import plain_plan
 

@@ -5,7 +5,7 @@ import random
 
 from bridge.controllers.harakiri.rules import items_from_records
 from protocols.mission_item import MissionItem
-from protocols.wp_record import WpCommand, WpRecord
+from protocols.msp.mission import WpCommand, WpRecord
 
 COUNT = 146
 _COMMANDS = (WpCommand.WAYPOINT, WpCommand.LOITER_TURNS, WpCommand.LOITER_TIME)

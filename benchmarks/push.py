@@ -25,8 +25,7 @@ from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.line.conversation import Conversation, LinkLost, Send
 from bridge.missions.fc_mission_store import PushResult
 from bridge.missions.list_check import check_list
-from protocols.msp.mission import MissionCommand
-from protocols.wp_record import RECORD_SIZE, WpRecord
+from protocols.msp.mission import RECORD_SIZE, MissionCommand, WpRecord
 from service.daemon.daemon import Daemon
 from service.settings import Settings
 from service.settings.addresses import GcsAddress, SerialFc

@@ -12,8 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from protocols.msp.mission import ReplyStatus
-from protocols.wp_record import RECORD_SIZE
+from protocols.msp.mission import RECORD_SIZE, ReplyStatus
 from simulator.flash import FlashError, NorFlash, PowerCutError
 from simulator.mission_slots import flash_size, slot_pages
 from simulator.missions import Board, BootMissions

@@ -10,8 +10,7 @@ from math import ceil
 
 from protocols.mavlink.codec import Packed
 from protocols.mavlink.frame import MavlinkSplitter
-from protocols.msp.mission import MissionCommand
-from protocols.wp_record import RECORD_SIZE
+from protocols.msp.mission import RECORD_SIZE, MissionCommand
 from simulator import frsky
 from simulator.flash import FlashError, NorFlash
 from simulator.flight import Craft, FlightState, fly

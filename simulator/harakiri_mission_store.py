@@ -13,7 +13,7 @@ from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.mission_record import pack_records
-from protocols.wp_record import WpCommand, WpRecord, unpack_records
+from protocols.msp.mission import WpCommand, WpRecord, unpack_records
 from simulator.flash import NorFlash
 from simulator.mission_slots import MissionSlots
 from simulator.missions import Board, Missions

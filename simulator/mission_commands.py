@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from protocols.mission_record import ListIdentity
 from protocols.msp.mission import (
     MAX_RADIUS_CM,
+    RECORD_SIZE,
     VERSION,
     Info,
     InfoFlag,
@@ -15,9 +16,9 @@ from protocols.msp.mission import (
     ReplyStatus,
     Staged,
     Stored,
+    WpCommand,
     unmask,
 )
-from protocols.wp_record import RECORD_SIZE, WpCommand
 from simulator.flash import FlashError, NorFlash
 from simulator.mission_slots import MissionSlots
 from simulator.missions import Board

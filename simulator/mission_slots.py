@@ -9,7 +9,7 @@ import struct
 import zlib
 
 from protocols.mission_record import ListIdentity
-from protocols.wp_record import RECORD_SIZE
+from protocols.msp.mission import RECORD_SIZE
 from simulator.flash import ERASED, PAGE_SIZE, FlashError, NorFlash
 from simulator.options import SimOptions
 

@@ -7,7 +7,7 @@ late call changes only the time at which bytes are collected.
 
 from math import inf
 
-from protocols.wp_record import RECORD_SIZE
+from protocols.msp.mission import RECORD_SIZE
 from simulator.firmware import Firmware, Protocol, ResetError
 from simulator.flash import ERASED, NorFlash, PowerCutError
 from simulator.flight import Craft

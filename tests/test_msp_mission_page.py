@@ -6,7 +6,7 @@ from pathlib import Path
 
 from protocols.mission_record import identify, pack_records
 from protocols.msp import mission as ext
-from protocols.wp_record import WpCommand, WpRecord
+from protocols.msp.mission import WpCommand, WpRecord
 from tests.support.naze_bench import Bench
 
 PAGE = Path(__file__).parent.parent / "docs" / "msp-mission.md"

@@ -21,8 +21,8 @@ from bridge.line.pending_replies import PendingReplies, byte_time_s
 from protocols.frsky import FRSKY_SPEED, FrskyParser
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.mavlink.heartbeat import is_plausible_heartbeat
+from protocols.msp.command_line import EchoWatch
 from protocols.msp.commands import Msp
-from protocols.msp.echo import EchoWatch
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser
 
 #: Tried in this order; 115200, Harakiri's default, comes twice, for a board that was still booting.
@@ -167,7 +167,7 @@ class Autosense:
         if self._visit.probes % 2 and not is_typed and room >= RESYNC_REPLY_SIZE:
             return self._ask(RESYNC, RESYNC_REPLY_SIZE, now) + interval_s
         if room >= _ANSWER_SIZE:
-            self._visit.echo.sent(PROBE)
+            self._visit.echo.sent.append(PROBE)
             return self._ask(PROBE, _ANSWER_SIZE, now) + interval_s
         return interval_s
 

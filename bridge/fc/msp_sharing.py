@@ -11,8 +11,8 @@ from dataclasses import replace
 from bridge.fc.session import FcSession
 from bridge.line.conversation import Conversation, LinkLost, receive, send
 from bridge.line.runner import Runner
+from protocols.msp.command_line import is_clean
 from protocols.msp.frame import MAX_REPLY, Direction, MspFrame, request
-from protocols.msp.hazards import is_clean
 
 #: Never forwarded: commands that move the craft or stand in for its transmitter and sensors, that cut off its receiver,
 #: or that disconnect everyone. V2_FRAME is a v2 frame inside a v1 frame, which would hide one of them.

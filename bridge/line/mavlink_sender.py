@@ -2,7 +2,7 @@
 """MAVLink frames that are safe to send to a Harakiri. Sans-IO."""
 
 from protocols.mavlink.codec import FrameWriter, Packed
-from protocols.msp.hazards import HAZARDS, RUN_LENGTH
+from protocols.msp.command_line import HAZARDS, RUN_LENGTH
 
 #: The ids of an ordinary ground station; Harakiri answers any sender.
 _SYSID, _COMPID = 255, 190

@@ -15,9 +15,9 @@ from math import inf
 from bridge.line.conversation import Send
 from bridge.line.pending_replies import LONGEST_STALL_S, MAX_OUTSTANDING_BYTES, PendingReplies, byte_time_s
 from protocols.frsky import FRSKY_SPEED
+from protocols.msp.command_line import is_clean
 from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, request
-from protocols.msp.hazards import is_clean
 
 #: The limit at the speed of FrSky telemetry, which an armed Harakiri puts into the same ring: 13 bytes eight times a
 #: second, up to 85 with GPS, barometer and time. Two of these frames may join the ring while the replies leave it.
@@ -151,7 +151,7 @@ class MspLink:
     def send(self, message: Send, now: float) -> None:
         """Send a request as soon as the flight controller has room for its reply."""
         if not (self.any_byte or is_clean(message.frame)):
-            # Impossible by construction (protocols.msp.hazards); if it did happen, sending nothing is safe.
+            # Impossible by construction (protocols.msp.command_line); if it did happen, sending nothing is safe.
             raise AssertionError(f"frame with a hazard byte: {message.frame.hex()}")
         self._waiting.append(message)
         self._flush(now)

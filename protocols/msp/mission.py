@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The mission extension's messages, both directions (docs/msp-mission.md is the specification)."""
+"""Harakiri's mission extension: its records and messages, both directions (docs/msp-mission.md)."""
 
 import struct
 from collections.abc import Sequence
@@ -8,9 +8,8 @@ from enum import IntEnum, IntFlag
 from typing import Any
 
 from protocols.mission_record import ListIdentity, pack_records
+from protocols.msp.command_line import HAZARDS, is_clean
 from protocols.msp.frame import request
-from protocols.msp.hazards import apply_mask, find_mask, is_clean
-from protocols.wp_record import WpRecord, unpack_records
 
 VERSION = 1
 MAX_RADIUS_CM = 2000
@@ -57,6 +56,7 @@ class InfoFlag(IntFlag):
     WRITES_SPENT = 8
 
 
+_RECORD = struct.Struct("<iihhBBbB")
 _INFO = struct.Struct("<BBBBBBHHIHHHI")
 _PROGRESS = struct.Struct("<BHI")
 _STORED = struct.Struct("<BHI")
@@ -66,6 +66,58 @@ _SHORT = struct.Struct("<BH")
 
 #: Payload size of an INFO reply of version 1.
 INFO_SIZE = _INFO.size
+RECORD_SIZE = _RECORD.size
+
+
+class WpCommand(IntEnum):
+    """The command of a record (MavlnkCommand in floppy.c)."""
+
+    WAYPOINT = 0
+    LOITER_UNLIM = 1
+    LOITER_TURNS = 2
+    LOITER_TIME = 3
+    RETURN_TO_LAUNCH = 4
+    LAND = 5
+    TAKEOFF = 6
+    SETROI = 7
+
+
+@dataclass(frozen=True, slots=True)
+class WpRecord:
+    """One record, `wp_t` in mw.h; its number is its position in the list, record 0 is the home point.
+
+    lat_e7, lon_e7: degrees * 1e7. height_m: above the launch point. roi_heading: 1 = nose to the region of interest.
+    time: LOITER_TIME seconds 1..255, WAYPOINT 1 = brake. radius_m: hit radius. turns: LOITER_TURNS, negative CCW.
+    `command` is a plain int because a flight controller may have an unknown number.
+    """
+
+    lat_e7: int
+    lon_e7: int
+    height_m: int
+    roi_heading: int
+    time: int
+    radius_m: int
+    turns: int
+    command: int
+
+    def pack(self) -> bytes:
+        """Return the 16 bytes; struct.error if a field does not fit, which is a bug in the caller."""
+        return _RECORD.pack(
+            self.lat_e7,
+            self.lon_e7,
+            self.height_m,
+            self.roi_heading,
+            self.time,
+            self.radius_m,
+            self.turns,
+            self.command,
+        )
+
+
+def unpack_records(data: bytes) -> list[WpRecord]:
+    """Read every complete record in `data`; a shorter rest is ignored."""
+    whole = len(data) - len(data) % RECORD_SIZE
+    return [WpRecord(*fields) for fields in _RECORD.iter_unpack(data[:whole])]
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,6 +238,31 @@ def _reply(layout: struct.Struct, payload: bytes) -> tuple[Any, ...] | None:
         return None
     status, *fields = layout.unpack_from(payload)
     return ReplyStatus(status), *fields
+
+
+def find_mask(body: bytes, fixed_xor: int) -> int | None:
+    """Find the smallest mask that keeps mask, masked body and checksum free of hazards.
+
+    `body` has an even length; `fixed_xor` is the XOR of the frame's other checksummed bytes (size and command).
+    None if there is no such mask, which cannot happen for bodies of up to 83 bytes.
+    """
+    present = set(body)
+    checksum_without_mask = fixed_xor
+    for byte in body:
+        checksum_without_mask ^= byte
+    for mask in range(256):
+        if (
+            mask not in HAZARDS
+            and checksum_without_mask ^ mask not in HAZARDS
+            and all(hazard ^ mask not in present for hazard in HAZARDS)
+        ):
+            return mask
+    return None
+
+
+def apply_mask(body: bytes, mask: int) -> bytes:
+    """XOR every byte of `body` with `mask`; the same call removes the mask."""
+    return bytes(byte ^ mask for byte in body)
 
 
 def _masked_request(command: MissionCommand, body: bytes) -> bytes | None:

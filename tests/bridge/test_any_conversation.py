@@ -10,7 +10,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 from bridge.fc.states.msp import Polling
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
-from protocols.wp_record import WpRecord
+from protocols.msp.mission import WpRecord
 from simulator.options import SimOptions
 from tests.support.conversations import (
     Upload,

@@ -12,8 +12,7 @@ import pytest
 
 from bridge.fc.autosense import SPEEDS
 from bridge.line.msp_link import PROBE, RESYNC
-from protocols.msp.echo import RUB_OUT_LINE, typed_and_rubbed_out
-from protocols.msp.hazards import HAZARDS, RUN_LENGTH, is_clean
+from protocols.msp.command_line import HAZARDS, RUB_OUT_LINE, RUN_LENGTH, is_clean, typed_and_rubbed_out
 from simulator.line import garble
 from simulator.options import SimOptions
 from simulator.traps import HazardWatch

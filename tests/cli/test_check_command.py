@@ -11,7 +11,7 @@ from click.testing import CliRunner, Result
 
 from protocols.mission_file import read_mission_file, write_qgc_wpl
 from protocols.mission_item import MissionItem
-from protocols.wp_record import unpack_records
+from protocols.msp.mission import unpack_records
 from service.cli.main import main
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -16,8 +16,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 from protocols.mission_record import ListIdentity, identify, pack_records
 from protocols.msp import mission as ext
 from protocols.msp.frame import request
-from protocols.msp.mission import Info, InfoFlag, MissionCommand, Records, ReplyStatus, Staged, Stored
-from protocols.wp_record import WpRecord
+from protocols.msp.mission import Info, InfoFlag, MissionCommand, Records, ReplyStatus, Staged, Stored, WpRecord
 from tests.support.c_core import CCore, PowerCut
 from tests.support.mission_devices import Device, model, simulated_core
 

@@ -14,8 +14,7 @@ from bridge.line.msp_link import MspLink
 from bridge.line.runner import Runner
 from bridge.missions.fc_mission_store import PushResult
 from protocols.mission_record import pack_records
-from protocols.msp.mission import MissionCommand, decode_info
-from protocols.wp_record import WpRecord
+from protocols.msp.mission import MissionCommand, WpRecord, decode_info
 from tests.support.c_core import CCore, PowerCut
 
 _BAUD = 115200

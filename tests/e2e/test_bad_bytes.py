@@ -11,9 +11,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from protocols.mavlink.dialect import messages
+from protocols.msp.command_line import is_clean
 from protocols.msp.commands import Msp
 from protocols.msp.frame import request
-from protocols.msp.hazards import is_clean
 from tests.support.benches import Bench, Starter
 from tests.support.mission_planner import MissionPlanner
 from tests.support.plain_station import PlainStation, udp_station

@@ -7,21 +7,25 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from protocols.mission_record import ListIdentity
+from protocols.msp.command_line import HAZARDS, is_clean
 from protocols.msp.frame import MspFrame, MspParser
-from protocols.msp.hazards import HAZARDS, apply_mask, find_mask, is_clean
 from protocols.msp.mission import (
     ABORT_REQUEST,
     INFO_REQUEST,
     MAX_RADIUS_CM,
+    RECORD_SIZE,
     MissionCommand,
+    WpRecord,
+    apply_mask,
     encode_begin,
     encode_chunk,
     encode_commit,
     encode_radius,
     encode_read,
+    find_mask,
     unmask,
+    unpack_records,
 )
-from protocols.wp_record import RECORD_SIZE, WpRecord, unpack_records
 from simulator.msp_port import MspReceiver
 
 #: Bytes a third of which are hazards, the worst case for masking.

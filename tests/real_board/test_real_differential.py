@@ -8,13 +8,13 @@ from protocols.msp.frame import MspFrame, request
 from protocols.msp.mission import (
     ABORT_REQUEST,
     INFO_REQUEST,
+    WpRecord,
     encode_begin,
     encode_chunk,
     encode_commit,
     encode_radius,
     encode_read,
 )
-from protocols.wp_record import WpRecord
 from simulator.emulated_naze.image import Image
 from simulator.msp_port import HarakiriCommand as Msp
 from simulator.options import SimOptions, Tree

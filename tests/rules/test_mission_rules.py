@@ -12,7 +12,7 @@ from bridge.missions.list_check import check_count, check_list
 from bridge.model.finding import CLEARED, DROPPED, REJECTED, News
 from bridge.model.verdict import Result, Verdict
 from protocols.mission_item import MissionItem, MissionResult
-from protocols.wp_record import WpCommand, WpRecord
+from protocols.msp.mission import WpCommand, WpRecord
 from tests.support.rule_items import (
     HERE,
     HOME,

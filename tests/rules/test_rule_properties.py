@@ -13,7 +13,7 @@ from bridge.missions.list_check import check_list
 from bridge.model.finding import DROPPED, REJECTED
 from bridge.model.verdict import Result
 from protocols.mission_item import MissionItem
-from protocols.wp_record import WpRecord, unpack_records
+from protocols.msp.mission import WpRecord, unpack_records
 from tests.support.rule_oracle import expected
 
 KNOWN = [16, 17, 18, 19, 20, 21, 22, 80, 195, 197, 201]

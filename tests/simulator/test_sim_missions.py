@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from protocols.mission_record import ListIdentity, identify, pack_records
 from protocols.msp.frame import request
-from protocols.msp.hazards import apply_mask
 from protocols.msp.mission import (
     ABORT_REQUEST,
     INFO_REQUEST,
@@ -20,6 +19,8 @@ from protocols.msp.mission import (
     ReplyStatus,
     Staged,
     Stored,
+    WpRecord,
+    apply_mask,
     decode_info,
     decode_radius,
     decode_records,
@@ -29,7 +30,6 @@ from protocols.msp.mission import (
     encode_radius,
     encode_read,
 )
-from protocols.wp_record import WpRecord
 from simulator.options import Faults, SimOptions
 from simulator.simulated_board import Power
 from tests.support.naze_bench import BOOT_SECONDS, Bench, mission

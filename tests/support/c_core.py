@@ -7,7 +7,7 @@ from ctypes import POINTER, c_bool, c_int, c_uint8, c_uint16, c_uint32, c_void_p
 from functools import cache
 from pathlib import Path
 
-from protocols.wp_record import RECORD_SIZE
+from protocols.msp.mission import RECORD_SIZE
 from simulator.compiled_core import open_library
 
 FIRMWARE = Path(__file__).parents[2] / "firmware"

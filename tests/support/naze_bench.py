@@ -9,6 +9,7 @@ from protocols.msp.mission import (
     ReplyStatus,
     Staged,
     Stored,
+    WpRecord,
     decode_progress,
     decode_records,
     decode_stored,
@@ -17,7 +18,6 @@ from protocols.msp.mission import (
     encode_commit,
     encode_read,
 )
-from protocols.wp_record import WpRecord
 from simulator.far_end import FarEnd
 from simulator.naze import SimulatedNaze
 from simulator.options import Faults, SimOptions

@@ -11,7 +11,7 @@ from bridge.model.verdict import Verdict
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import Command, Frame, MissionItem, degrees_to_e7
 from protocols.mission_record import pack_records
-from protocols.wp_record import WpRecord
+from protocols.msp.mission import WpRecord
 
 PROFILE = HarakiriRules(capacity=146, wp_radius_cm=200)
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from protocols.mission_record import ListIdentity, identify, pack_records
 from protocols.msp.frame import request
-from protocols.wp_record import WpRecord
+from protocols.msp.mission import WpRecord
 from simulator.emulated_naze.board import EmulatedNaze
 from simulator.emulated_naze.image import Image
 from simulator.msp_port import HarakiriCommand

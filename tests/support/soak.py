@@ -18,7 +18,7 @@ from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mission_item import MissionResult
-from protocols.wp_record import unpack_records
+from protocols.msp.mission import unpack_records
 from tests.support.plain_station import tcp_station, udp_station
 from tests.support.plan import judge, plain_plan, records_of
 from tests.support.programs import Board, Daemon

@@ -36,9 +36,9 @@ from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MAGIC_V1, MavlinkSplitter
 from protocols.mission_record import identify
+from protocols.msp.command_line import is_clean
 from protocols.msp.frame import MspParser
-from protocols.msp.hazards import is_clean
-from protocols.wp_record import WpRecord, unpack_records
+from protocols.msp.mission import WpRecord, unpack_records
 from simulator.flash import ERASED, PAGE_SIZE, NorFlash
 from simulator.line import garble
 from simulator.mission_slots import MissionSlots, flash_size, slot_pages

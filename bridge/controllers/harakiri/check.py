@@ -30,7 +30,7 @@ from bridge.missions.list_check import (
 from bridge.model.finding import CLEARED, DROPPED, Finding, News, RejectingFinding, reject
 from bridge.model.verdict import Result, Verdict
 from protocols.mission_item import Command, MissionItem, MissionResult
-from protocols.wp_record import WpCommand, WpRecord
+from protocols.msp.mission import WpCommand, WpRecord
 
 _METRES_PER_E7 = 0.0111
 

@@ -24,7 +24,7 @@ from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.mission_item import Command, Frame, MissionItem
-from protocols.wp_record import WpRecord
+from protocols.msp.mission import WpRecord
 
 #: Harakiri's ids; it does not check the target itself.
 _TARGET = (1, 200)

@@ -33,8 +33,17 @@ from protocols.mission_item import MissionItem
 from protocols.mission_record import ListIdentity, identify
 from protocols.msp import mission as ext
 from protocols.msp.frame import FRAME_OVERHEAD, MspFrame
-from protocols.msp.mission import Info, InfoFlag, MissionCommand, Radius, ReplyStatus, Staged, Stored
-from protocols.wp_record import RECORD_SIZE, WpRecord
+from protocols.msp.mission import (
+    RECORD_SIZE,
+    Info,
+    InfoFlag,
+    MissionCommand,
+    Radius,
+    ReplyStatus,
+    Staged,
+    Stored,
+    WpRecord,
+)
 
 _SHORT_REPLY_SIZE = 7
 #: Records per read request: two replies fit the flight controller's send ring.

@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 from bridge.missions.list_check import UNUSED, Range
 from protocols.mission_item import Command, Frame, MissionItem
-from protocols.wp_record import WpCommand, WpRecord
+from protocols.msp.mission import WpCommand, WpRecord
 
 MAV_COMMANDS: Mapping[int, Command] = {
     WpCommand.WAYPOINT: Command.NAV_WAYPOINT,

@@ -5,7 +5,7 @@ from bridge.fc.autosense import Found
 from bridge.fc.states.base import Event, Lost, Port, State
 from bridge.line.msp_link import PROBE
 from protocols.mavlink.frame import MavlinkSplitter
-from protocols.msp.echo import RUB_OUT_LINE, typed_and_rubbed_out
+from protocols.msp.command_line import RUB_OUT_LINE, typed_and_rubbed_out
 from protocols.msp.frame import Direction, MspParser
 
 #: A person may be typing: nothing is sent until the line has been quiet for this long, and then once in this time.

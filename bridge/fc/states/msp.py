@@ -16,7 +16,7 @@ from bridge.model.refusal import Refusal
 from protocols.frsky import FRSKY_SPEED
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.mavlink.heartbeat import is_disarmed_heartbeat
-from protocols.msp.echo import EchoWatch
+from protocols.msp.command_line import EchoWatch
 from protocols.msp.frame import MspFrame
 
 #: A flight controller that sends no reply for this long is gone: unplugged, reset, or switched to another protocol.
@@ -82,8 +82,7 @@ class MspLine(State):
 
     def take_output(self) -> list[bytes]:
         requests = self.link.take_output()
-        for frame in requests:
-            self._echo.sent(frame)
+        self._echo.sent.extend(requests)
         return requests
 
     def unanswered(self) -> PendingReplies:

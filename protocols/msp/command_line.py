@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command line that shares the port with MSP: the bytes that open it, and how a board in it is recognised.
+
+Harakiri acts on three equal bytes in a row anywhere in the stream, inside frames and across their boundaries (serial.c,
+serialCom): 0x0D enters the command line; in AUTOSENSE '#' does so too, and 'R' resets the board. See
+docs/msp-mission.md, "Masked bodies".
+
+In its command line a board echoes requests, without unprintable bytes: IDENT comes back as `$M<dd`; a looped-back line
+returns it whole. DEL erases a character of the typed line. This applies to Harakiri (cli.c, tree TestCode3), Baseflight
+and INAV; HarakiriWebstore1 ignores DEL.
+"""
+
+from collections import deque
+
+HAZARDS = frozenset((0x0D, 0x23, 0x52))
+RUN_LENGTH = 3
+
+_DEL = b"\x7f"
+_UNPRINTABLE = bytes(byte for byte in range(256) if not ord(" ") <= byte <= ord("~"))
+#: Exactly two requests: noise cannot produce that.
+_EVIDENCE = 10
+_FRAMES_KEPT = 64
+#: The longest line that can be typed: 64 characters on INAV, 48 on Harakiri.
+RUB_OUT_LINE = _DEL * 64
+
+
+def is_clean(frame: bytes) -> bool:
+    """True if `frame` contains no hazard byte, so that no run can form, not even across frames or after a loss."""
+    return HAZARDS.isdisjoint(frame)
+
+
+def typed_and_rubbed_out(frame: bytes) -> bytes:
+    """The frame, and the bytes that erase it from a command line."""
+    return frame + _DEL * len(_printable(frame))
+
+
+def _printable(data: bytes) -> bytes:
+    return data.translate(None, _UNPRINTABLE)
+
+
+class EchoWatch:
+    """Compares received bytes with sent ones. `sent`: the last requests."""
+
+    def __init__(self) -> None:
+        self.sent: deque[bytes] = deque(maxlen=_FRAMES_KEPT)
+        self._heard = b""
+
+    def feed(self, data: bytes) -> None:
+        """Take received bytes."""
+        self._heard = (self._heard + data)[-_EVIDENCE:]
+
+    def is_echo(self, size: int = _EVIDENCE) -> bool:
+        """True if the last `size` bytes are our own requests."""
+        return len(self._heard) >= size and self._heard[-size:] in _printable(b"".join(self.sent))
