@@ -16,11 +16,9 @@ from dataclasses import dataclass, field
 from enum import Enum
 from itertools import cycle, islice
 
-from bridge.line.msp_link import PROBE, RESYNC, RESYNC_REPLY_SIZE
-from bridge.line.pending_replies import PendingReplies, byte_time_s
+from bridge.line.msp_link import PROBE, RESYNC, RESYNC_REPLY_SIZE, PendingReplies, byte_time_s
 from protocols.frsky import FRSKY_SPEED, FrskyParser
-from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
-from protocols.mavlink.heartbeat import is_plausible_heartbeat
+from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter, is_plausible_heartbeat
 from protocols.msp.command_line import EchoWatch
 from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser

@@ -10,18 +10,22 @@ loss.
 from bisect import bisect_left
 from collections import deque
 from dataclasses import dataclass
+from enum import Enum, auto
 from math import inf
 
 from bridge.line.conversation import Send
-from bridge.line.pending_replies import LONGEST_STALL_S, MAX_OUTSTANDING_BYTES, PendingReplies, byte_time_s
 from protocols.frsky import FRSKY_SPEED
 from protocols.msp.command_line import is_clean
 from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, request
 
+#: Harakiri's ring, less one heartbeat (25 bytes) that it may send unasked in AUTOSENSE, and a margin.
+MAX_OUTSTANDING_BYTES = 224
 #: The limit at the speed of FrSky telemetry, which an armed Harakiri puts into the same ring: 13 bytes eight times a
 #: second, up to 85 with GPS, barometer and time. Two of these frames may join the ring while the replies leave it.
 _OUTSTANDING_BESIDE_FRSKY = 140
+#: After a longer stall, pending requests are assumed lost: the board was reset or lost power.
+_LONGEST_STALL_S = 3.0
 MIN_TIMEOUT_S = 0.06
 MAX_TIMEOUT_S = 1.0
 #: BEGIN and COMMIT erase and write flash: the board stalls for 100 ms and more.
@@ -57,20 +61,73 @@ _QUESTION = Send(request(Msp.API_VERSION), Msp.API_VERSION, FRAME_OVERHEAD)
 BOUNDS_S = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 
 
+def byte_time_s(baud: int | None) -> float:
+    """A byte's time on a line, with its start and stop bits; 0 where the line has no speed."""
+    return 10 / baud if baud else 0.0
+
+
+class PendingReplies:
+    """Replies that a silent board may send all at once when it resumes, in bytes, by the speed of their requests.
+
+    While it is searched for, the replies to probes and to earlier requests must fit its ring together. At another speed
+    it understood nothing.
+    """
+
+    def __init__(self) -> None:
+        self._owed: dict[int | None, list[tuple[float, int]]] = {}  # until when, bytes; the oldest first
+
+    def add(self, speed: int | None, size: int, asked_at: float) -> None:
+        """Add a request whose reply has `size` bytes."""
+        self._owed.setdefault(speed, []).append((asked_at + _LONGEST_STALL_S, size))
+
+    def room(self, speed: int | None, now: float) -> int:
+        """The largest reply that still fits, bytes."""
+        return MAX_OUTSTANDING_BYTES - self.size(speed, now)
+
+    def size(self, speed: int | None, now: float) -> int:
+        """The bytes that may still arrive."""
+        return sum(size for _, size in self._present(speed, now))
+
+    def questions(self, speed: int | None, now: float) -> int:
+        """The number of requests that may still be answered."""
+        return len(self._present(speed, now))
+
+    def heard(self, speed: int | None, size: int, now: float) -> None:
+        """The board has resumed with a reply of `size` bytes (0: with other data), so the rest is on its way."""
+        rest: list[tuple[float, int]] = []
+        left_ring_at = now
+        for until, owed in self._present(speed, now):
+            paid = min(owed, size)
+            size -= paid
+            if owed > paid:
+                left_ring_at += (owed - paid) * byte_time_s(speed)
+                rest.append((min(until, left_ring_at), owed - paid))
+        self._owed = {speed: rest}
+
+    def _present(self, speed: int | None, now: float) -> list[tuple[float, int]]:
+        owed = [entry for entry in self._owed.get(speed, ()) if now < entry[0]]
+        self._owed[speed] = owed
+        return owed
+
+
+class _Reply(Enum):
+    """What is known of a request's reply. In the last two states it may still arrive, until the deadline."""
+
+    AWAITED = auto()
+    LOST = auto()  # it did not arrive in time
+    DOUBTFUL = auto()  # this request or an equal one before it was answered
+
+
 @dataclass(slots=True)
 class _Request:
-    """A request that was sent. Once it is no longer `awaited`, a reply may still arrive until the deadline.
-
-    `is_lost`: it was not answered in time. If it is neither, this one or an equal one before it was answered.
-    """
+    """A request that was sent."""
 
     command: int
     reply_size: int
     sent_at: float
     deadline: float
     exclusive: bool
-    awaited: bool = True
-    is_lost: bool = False
+    reply: _Reply = _Reply.AWAITED
 
 
 class MspLink:
@@ -84,16 +141,17 @@ class MspLink:
         #: A byte's time on the line.
         self.byte_s = byte_time_s(baud)
         self._ring_size = _OUTSTANDING_BESIDE_FRSKY if baud == FRSKY_SPEED else MAX_OUTSTANDING_BYTES
-        self._parser = MspParser()
+        #: It counts damaged frames, and bytes outside frames.
+        self.parser = MspParser()
         self._waiting: deque[Send] = deque()
         self._sent: list[_Request] = []  # in sending order
         if owed:
-            self._sent.append(
-                _Request(_NO_COMMAND, owed, now, now + owed * self.byte_s, exclusive=False, awaited=False, is_lost=True)
-            )
+            left_ring_at = now + owed * self.byte_s
+            self._sent.append(_Request(_NO_COMMAND, owed, now, left_ring_at, exclusive=False, reply=_Reply.LOST))
         self._output: list[bytes] = []
         self._line_free_at = now
-        self._round_trip_s = _FIRST_GUESS_S
+        #: The smoothed time from a request's last byte on the wire to its reply.
+        self.round_trip_s = _FIRST_GUESS_S
         self._backoff = 1.0
         self._losses_in_a_row = 0
         self._resync_due = False
@@ -123,24 +181,10 @@ class MspLink:
             pending.add(self._baud, sent.reply_size, sent.sent_at)
         return pending
 
-    @property
-    def round_trip_s(self) -> float:
-        """The smoothed time from a request's last byte on the wire to its reply."""
-        return self._round_trip_s
-
-    @property
-    def skipped_bytes(self) -> int:
-        """Bytes outside any frame."""
-        return self._parser.skipped_bytes
-
-    @property
-    def bad_checksums(self) -> int:
-        return self._parser.bad_checksums
-
-    def awaits(self, commands: frozenset[int]) -> bool:
-        """True if a reply to one of `commands` is awaited, or its request is queued."""
-        return any(sent.awaited and sent.command in commands for sent in self._sent) or any(
-            message.command in commands for message in self._waiting
+    def awaits(self, command: int) -> bool:
+        """True if a reply to `command` is awaited, or its request is queued."""
+        return any(sent.command == command and sent.reply is _Reply.AWAITED for sent in self._sent) or any(
+            message.command == command for message in self._waiting
         )
 
     @property
@@ -164,7 +208,7 @@ class MspLink:
     def receive(self, data: bytes, now: float) -> list[MspFrame]:
         """Take bytes from the port; return the replies, matched with their requests."""
         self._last_byte_at = now
-        return self._take(self._parser.feed(data), now)
+        return self._take(self.parser.feed(data), now)
 
     def tick(self, now: float) -> list[MspFrame]:
         """Time out requests; return replies that were hidden behind a false header."""
@@ -172,13 +216,12 @@ class MspLink:
             self._ask(_QUESTION, now)
         if not any(now >= sent.deadline for sent in self._sent):
             return []
-        hidden = self._parser.reset() if now >= self._last_byte_at + _LINE_SILENCE_S else []
+        hidden = self.parser.reset() if now >= self._last_byte_at + _LINE_SILENCE_S else []
         replies = self._take(hidden, now)
-        self._sent = [sent for sent in self._sent if sent.awaited or now < sent.deadline]
+        self._sent = [sent for sent in self._sent if sent.reply is _Reply.AWAITED or now < sent.deadline]
         lost = [sent for sent in self._sent if now >= sent.deadline]
         for sent in lost:
-            sent.awaited, sent.is_lost = False, True
-            sent.deadline = sent.sent_at + LONGEST_STALL_S
+            sent.reply, sent.deadline = _Reply.LOST, sent.sent_at + _LONGEST_STALL_S
         if lost:
             self.requests_lost += len(lost)
             self._losses_in_a_row += 1
@@ -190,9 +233,9 @@ class MspLink:
 
     def reply_deadline(self, commands: frozenset[int], now: float) -> float:
         """When a reply to one of `commands` counts as lost."""
-        deadlines = [sent.deadline for sent in self._sent if sent.awaited and sent.command in commands]
+        awaited = [sent for sent in self._sent if sent.command in commands and sent.reply is _Reply.AWAITED]
         queued = any(message.command in commands for message in self._waiting)
-        return max(deadlines, default=now + self._timeout_s() if queued else now)
+        return max([sent.deadline for sent in awaited], default=now + self._timeout_s() if queued else now)
 
     def next_deadline(self) -> float:
         """The time of the next `tick`; infinity while nothing is pending."""
@@ -200,10 +243,7 @@ class MspLink:
 
     def _timeout_s(self) -> float:
         floor = max(MIN_TIMEOUT_S, self.receiver_timeout_s + 0.02 if self.receiver_timeout_s else 0.0)
-        return min(max(2 * self._round_trip_s, floor) * self._backoff, MAX_TIMEOUT_S)
-
-    def _is_exclusive(self) -> bool:
-        return any(sent.awaited and sent.exclusive for sent in self._sent)
+        return min(max(2 * self.round_trip_s, floor) * self._backoff, MAX_TIMEOUT_S)
 
     def _room_in_ring(self) -> int:
         if not self._sent:
@@ -211,7 +251,7 @@ class MspLink:
         pending, limit = 0, self._ring_size
         for sent in self._sent:
             pending += sent.reply_size
-            if not sent.awaited:
+            if sent.reply is not _Reply.AWAITED:
                 limit = min(self._ring_size, _OUTSTANDING_IN_DOUBT)
             elif sent.exclusive:
                 return 0
@@ -221,12 +261,12 @@ class MspLink:
         return self.outstanding_bytes + reply_size <= self._ring_size
 
     def _flush(self, now: float) -> None:
-        if self._resync_due and not self._is_exclusive() and self._fits_ring(RESYNC_REPLY_SIZE):
+        if self._resync_due and self._fits_ring(RESYNC_REPLY_SIZE):
             self._resync(now)
         while self._waiting:
             message = self._waiting[0]
             if message.reply_size > self._room_in_ring():
-                if all(sent.is_lost for sent in self._sent) and self._fits_ring(_QUESTION.reply_size):
+                if all(sent.reply is _Reply.LOST for sent in self._sent) and self._fits_ring(_QUESTION.reply_size):
                     # Only lost requests block this one: the reply to a short request behind them clears them.
                     self._ask(_QUESTION, now)
                 return
@@ -246,6 +286,8 @@ class MspLink:
         )
 
     def _resync(self, now: float) -> None:
+        if any(sent.exclusive and sent.reply is _Reply.AWAITED for sent in self._sent):
+            return
         self._resync_due = False
         self._write(RESYNC, now)
         reply_time = (self.outstanding_bytes + RESYNC_REPLY_SIZE) * self.byte_s
@@ -280,23 +322,23 @@ class MspLink:
         if command == self._risky:
             self._follow_up_at = inf
         if earlier:
-            self.requests_lost += sum([sent.awaited for sent in self._sent[:earlier]])
+            self.requests_lost += sum([sent.reply is _Reply.AWAITED for sent in self._sent[:earlier]])
         del self._sent[: earlier + 1]
         answered: _Request | None = oldest
-        if not oldest.awaited:
-            answered = next((sent for sent in self._sent if sent.awaited and sent.command == command), None)
+        if oldest.reply is not _Reply.AWAITED:
+            equal = (sent for sent in self._sent if sent.command == command and sent.reply is _Reply.AWAITED)
+            answered = next(equal, None)
         if answered is None:
             return
         self._losses_in_a_row = 0
         self._backoff = 1.0
         if answered is not oldest:
-            # Either of them may have been answered: this one is no longer awaited, but its reply may follow.
-            answered.awaited = False
-            answered.deadline = min(answered.deadline, now + self.outstanding_bytes * self.byte_s + self._round_trip_s)
+            answered.reply = _Reply.DOUBTFUL
+            answered.deadline = min(answered.deadline, now + self.outstanding_bytes * self.byte_s + self.round_trip_s)
         elif not answered.exclusive:
             measured = max(now - answered.sent_at, 0.0)
             self.round_trips.add(measured)
-            self._round_trip_s += (measured - self._round_trip_s) / 8
+            self.round_trip_s += (measured - self.round_trip_s) / 8
 
 
 class RoundTrips:

@@ -82,7 +82,6 @@ class _Slot:
     """
 
     poll: Poll
-    commands: frozenset[int]
     size: int
     least_cost: float
     wanted_s: float = inf
@@ -110,7 +109,7 @@ class _Slot:
 
     def may_be_asked_at(self, link: MspLink, room: int) -> float:
         """When the link would take it; infinity if the link must change first."""
-        if self.is_asked and link.awaits(self.commands):
+        if self.is_asked and link.awaits(self.poll.command):
             return inf
         if self.size <= room:
             return self.due
@@ -145,9 +144,7 @@ class PollSchedule:
         self._quality = 1.0
         self._lost_before = 0
         self._slots = {
-            poll.command: _Slot(
-                poll, frozenset((poll.command,)), frame_size(poll.command, poll.reply_payload), turn_s * bytes_per_s
-            )
+            poll.command: _Slot(poll, frame_size(poll.command, poll.reply_payload), turn_s * bytes_per_s)
             for poll in polls
         }
         self._fit()

@@ -18,6 +18,8 @@ _HEADER_V2 = 10
 _CRC_SIZE = 2
 _SIGNATURE_SIZE = 13
 _SIGNED = 0x01
+_HEARTBEAT, _HEARTBEAT_SIZE = 0, 9
+_BASE_MODE, _SAFETY_ARMED = 6, 0x80
 
 _MAGIC = re.compile(rb"[\xfd\xfe]")
 #: CRC_EXTRA by header fields. MAVLink 2: by the message id's bytes; its payload may be shorter than the message,
@@ -79,6 +81,23 @@ class MavlinkFrame:
         """The message's bytes; MAVLink 2 omits trailing zeros."""
         start = _HEADER_V2 if self.raw[0] == MAGIC_V2 else _HEADER_V1
         return self.raw[start : start + self.raw[1]]
+
+
+def is_plausible_heartbeat(frame: MavlinkFrame) -> bool:
+    """True for a HEARTBEAT as evidence of MAVLink: its length, and the fields that have few legal values, are right.
+
+    These are type, autopilot, state and MAVLink version (https://mavlink.io/en/messages/common.html#HEARTBEAT).
+    """
+    payload = frame.payload
+    if frame.msgid != _HEARTBEAT or len(payload) != _HEARTBEAT_SIZE:
+        return False
+    vehicle_type, autopilot, _, state, version = payload[4:]
+    return version == 3 and vehicle_type <= 45 and autopilot <= 20 and state <= 8 and frame.sysid != 0
+
+
+def is_disarmed_heartbeat(frame: MavlinkFrame) -> bool:
+    """True for a HEARTBEAT whose base_mode lacks the bit SAFETY_ARMED."""
+    return is_plausible_heartbeat(frame) and not frame.payload[_BASE_MODE] & _SAFETY_ARMED
 
 
 class MavlinkSplitter:

@@ -7,8 +7,7 @@ from itertools import pairwise
 import pytest
 
 from bridge.line.conversation import Send
-from bridge.line.msp_link import RESYNC, MspLink
-from bridge.line.pending_replies import MAX_OUTSTANDING_BYTES
+from bridge.line.msp_link import MAX_OUTSTANDING_BYTES, RESYNC, MspLink
 from bridge.model.vehicle import Orientation
 from protocols.mavlink.dialect import messages
 from protocols.msp.commands import Msp
@@ -139,7 +138,7 @@ def test_a_timed_out_request_counts_until_its_reply_can_no_longer_come() -> None
     for _ in range(2):
         now = link.next_deadline()
         link.tick(now)
-    assert not link.awaits(frozenset((195,)))
+    assert not link.awaits(195)
     assert link.outstanding_bytes == 210
     link.send(question(195, 99), now)
     # There is no room for it; the reply to a short request shows that those two will not be answered.

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from bridge.line.msp_link import MspLink
-from bridge.line.pending_replies import MAX_OUTSTANDING_BYTES
+from bridge.line.msp_link import MAX_OUTSTANDING_BYTES, MspLink
 from bridge.line.poll_schedule import POLLS, PollSchedule
 from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser

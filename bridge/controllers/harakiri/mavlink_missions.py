@@ -3,7 +3,7 @@
 
 It accepts only MISSION_ITEM, with coordinates in single precision, one item at a time, and drops a transfer after
 500 ms. A second later it writes the partial list in its RAM to flash. But any error in between makes it reload the old
-list: so after a failure the bridge sends an item that is out of sequence. `bridge.line.mavlink_sender` avoids the traps
+list: so after a failure the bridge sends an item that is out of sequence. `bridge.fc.states.mavlink` avoids the traps
 of its serial port; an item that cannot be sent safely rejects the list.
 
 A written list is read back, item by item. The rules round coordinates so that they survive single precision unchanged.

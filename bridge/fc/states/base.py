@@ -14,8 +14,7 @@ from typing import ClassVar
 
 from bridge.fc.autosense import Found
 from bridge.fc.profile import FlightController, Profile
-from bridge.line.msp_link import MspLink
-from bridge.line.pending_replies import PendingReplies
+from bridge.line.msp_link import MspLink, PendingReplies
 from bridge.line.poll_schedule import PollSchedule
 from bridge.line.runner import Runner
 from bridge.model.autopilot import Autopilot

@@ -7,27 +7,30 @@ from bridge.fc.autosense import Found, Spoken
 from bridge.fc.mavlink_telemetry import MavlinkTelemetry
 from bridge.fc.profile import FlightController, Profile
 from bridge.fc.states.base import Event, Lost, Port, State
-from bridge.line.mavlink_sender import HarakiriSender
-from bridge.line.msp_link import PROBE
-from bridge.line.pending_replies import byte_time_s
+from bridge.line.msp_link import PROBE, byte_time_s
 from bridge.model.autopilot import Autopilot
 from bridge.model.vehicle import Source
-from protocols.mavlink.codec import Packed
+from protocols.mavlink.codec import FrameWriter, Packed
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+from protocols.msp.command_line import HAZARDS, RUN_LENGTH
 from protocols.msp.frame import MspParser
 
 #: Two lost heartbeats.
 _SILENCE_S = 2.5
 #: An armed Harakiri sends its attitude 30 times a second: when that ends, it has disarmed and changed its speed.
 _HARAKIRI_ARMED_SILENCE_S = 0.8
-#: Its stream of 1600 bytes a second overruns its own send ring on a slow line, so most frames are torn. At 2400 baud
-#: whole ones come up to 3.5 s apart. At 1200 baud there is one in 40 s: no deadline would help.
-_TORN_BYTES = 1000
+#: Its stream of 1600 bytes a second overruns its own send ring on a slow line, so most frames are torn: before it
+#: counts as lost, this many bytes may pass without a whole one. At 2400 baud whole ones come up to 3.5 s apart. At 1200
+#: baud there is one in 40 s: no deadline would help.
+_BYTES_BEFORE_LOSS = 1000
 #: Harakiri is probed for MSP, which it answers again once it is disarmed.
 _PROBE_INTERVAL_S = 1.0
 #: After this long without a byte, an incomplete frame is given up.
 _LINE_SILENCE_S = 0.1
+#: The ids of an ordinary ground station; Harakiri answers any sender.
+_SYSID, _COMPID = 255, 190
+_RUNS = tuple(bytes((hazard,)) * RUN_LENGTH for hazard in sorted(HAZARDS))
 
 
 class Mavlink(State):
@@ -47,7 +50,7 @@ class Mavlink(State):
         port.meet(self.controller)
         self._is_harakiri = not profile.is_passed_through
         self.telemetry = MavlinkTelemetry(port.vehicle, is_harakiri=self._is_harakiri)
-        self._splitter, self._msp, self._sender = MavlinkSplitter(), MspParser(), HarakiriSender()
+        self._splitter, self._msp, self._sender = MavlinkSplitter(), MspParser(), _HarakiriSender()
         self._heard_at = self._last_byte_at = now
         self._look_at = now + _LINE_SILENCE_S
         self._probe_due = now + _PROBE_INTERVAL_S if self._is_harakiri else inf
@@ -113,7 +116,7 @@ class Mavlink(State):
     def _timeout_s(self) -> float:
         if not (self._is_harakiri and self.port.vehicle.armed):
             return _SILENCE_S
-        return _HARAKIRI_ARMED_SILENCE_S + _TORN_BYTES * byte_time_s(self.speed)
+        return _HARAKIRI_ARMED_SILENCE_S + _BYTES_BEFORE_LOSS * byte_time_s(self.speed)
 
     def _profile(self, heard: MavlinkFrame) -> Profile:
         """A board met over MSP on this port stays in its family; otherwise the sender decides."""
@@ -127,3 +130,26 @@ class Mavlink(State):
         sender = (heard.version, heard.sysid, heard.compid)
         known = (p for p in ours if p.family == self.port.met_family or p.mavlink_sender == sender)
         return next(known, other)
+
+
+class _HarakiriSender:
+    """Makes frames without three equal hazard bytes in a row, also across the boundary to the previous frame.
+
+    Three 0x0D enter the CLI in any protocol; '#' and 'R' count only in AUTOSENSE, but it can fall back to that at any
+    moment. MAVLink has no masking as our MSP extension has: only the sequence number may be chosen, and with it
+    changes the CRC. A run within the payload cannot be avoided.
+    """
+
+    def __init__(self) -> None:
+        self._writer = FrameWriter(_SYSID, _COMPID)
+        self._tail = b""
+
+    def frame(self, packed: Packed) -> bytes | None:
+        """Return a frame that is safe to send now; None if there is none."""
+        for _ in range(256):
+            frame = self._writer.frame(packed, 1)
+            on_wire = self._tail + frame
+            if not any(run in on_wire for run in _RUNS):
+                self._tail = on_wire[1 - RUN_LENGTH :]
+                return frame
+        return None

@@ -10,21 +10,19 @@ from bridge.fc.msp_telemetry import hear_msp
 from bridge.fc.profile import FlightController, Profile
 from bridge.fc.states.base import Event, Identified, Lost, Port, State
 from bridge.line.conversation import Conversation, LinkLost
-from bridge.line.msp_link import MspLink
-from bridge.line.pending_replies import PendingReplies
+from bridge.line.msp_link import MspLink, PendingReplies
 from bridge.model.refusal import Refusal
 from protocols.frsky import FRSKY_SPEED
-from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
-from protocols.mavlink.heartbeat import is_disarmed_heartbeat
+from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter, is_disarmed_heartbeat
 from protocols.msp.command_line import EchoWatch
 from protocols.msp.frame import MspFrame
 
 #: A flight controller that sends no reply for this long is gone: unplugged, reset, or switched to another protocol.
 MSP_SILENCE_S = 2.0
 #: The same while bytes arrive that are not MSP: it was armed, and sends telemetry now. On a slow line a Harakiri's
-#: MAVLink is torn, and a whole frame takes longer to come.
+#: MAVLink is torn: before the change is believed, this many bytes may pass without a whole frame.
 _FOREIGN_SILENCE_S = 0.5
-_TORN_BYTES = 300
+_BYTES_BEFORE_CHANGE = 300
 _FOREIGN_SIZE = 16
 #: Identification must be done by then; on a line at 1200 baud it takes 8 s.
 _IDENTIFY_TIMEOUT_S = 15.0
@@ -52,7 +50,7 @@ class MspLine(State):
 
     @property
     def bad_checksums(self) -> int | None:
-        return self.link.bad_checksums
+        return self.link.parser.bad_checksums
 
     def receive(self, data: bytes, now: float) -> Event | None:
         frames = self.link.receive(data, now)
@@ -99,7 +97,7 @@ class MspLine(State):
     def _silence_s(self) -> float:
         if not self._is_foreign:
             return MSP_SILENCE_S
-        return min(_FOREIGN_SILENCE_S + _TORN_BYTES * self.link.byte_s, MSP_SILENCE_S)
+        return min(_FOREIGN_SILENCE_S + _BYTES_BEFORE_CHANGE * self.link.byte_s, MSP_SILENCE_S)
 
     @property
     def _is_foreign(self) -> bool:
@@ -205,12 +203,12 @@ class _ForeignBytes:
     def __init__(self, link: MspLink) -> None:
         self.mavlink: MavlinkFrame | None = None
         self._link = link
-        self._skipped_before = link.skipped_bytes
+        self._skipped_before = link.parser.skipped_bytes
         self._splitter = MavlinkSplitter()
 
     @property
     def size(self) -> int:
-        return self._link.skipped_bytes - self._skipped_before
+        return self._link.parser.skipped_bytes - self._skipped_before
 
     def note(self, data: bytes) -> None:
         for frame in self._splitter.feed(data) if self.size else ():
