@@ -167,8 +167,10 @@ class Runner:
 
     def _advance(self, answer: object, now: float) -> None:
         """Resume the current conversation, and start the next ones when it ends."""
-        self._run(answer, now)
-        self._begin_next(now)
+        try:
+            self._run(answer, now)
+        finally:
+            self._begin_next(now)
 
     def _run(self, answer: object, now: float) -> None:
         assert self._current is not None
@@ -205,14 +207,17 @@ class Runner:
                 self._awaited, self._deadline = effect, deadline
                 return
         except StopIteration as stop:
-            result = stop.value
+            self._end(task, stop.value, now)
         except LinkLost as lost:
-            result = lost
+            self._end(task, lost, now)
         except Exception:
-            self._current = None
+            # A bug, which the caller logs: the requester still needs a result.
+            self._end(task, LinkLost("internal error"), now)
             raise
+
+    def _end(self, task: Task[Any], result: object, now: float) -> None:
+        """Report the result. Conversations started by on_done run after it has returned: it sees a consistent state."""
         self._current = None
-        # Conversations started by on_done run after it has returned, so that it sees a consistent state.
         self._busy = True
         try:
             task.on_done(result, now)
