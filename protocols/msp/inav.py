@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from protocols.msp.telemetry import Sensor
 
 _STATUS = struct.Struct("<HHHHBI")
-_ANALOG = struct.Struct("<BHHIIIIBH")
+_ANALOG = struct.Struct("<BHhiiiIBH")
 _AIRSPEED = struct.Struct("<I")
 _RTC = struct.Struct("<IH")
 _PLATFORM_AT = 3
@@ -61,7 +61,7 @@ class InavStatus:
 
 @dataclass(frozen=True, slots=True)
 class InavAnalog:
-    """MSP2_INAV_ANALOG. rssi: 0..1023. cells: 0 without a battery."""
+    """MSP2_INAV_ANALOG. rssi: 0..1023. cells: 0 without a battery. Current and consumption may be negative."""
 
     cells: int
     battery_cv: int
@@ -77,7 +77,7 @@ def decode_inav_status(payload: bytes) -> InavStatus | None:
         return None
     cycle_us, i2c_errors, sensors, load, _, flags = _STATUS.unpack_from(payload)
     blockers = tuple(name for bit, name in ARMING_BLOCKERS.items() if flags >> bit & 1)
-    return InavStatus(cycle_us, i2c_errors, Sensor(sensors & _ALL_SENSORS), load, blockers)
+    return InavStatus(cycle_us, i2c_errors, Sensor(sensors & _ALL_SENSORS), min(load, 100), blockers)
 
 
 def decode_inav_analog(payload: bytes) -> InavAnalog | None:

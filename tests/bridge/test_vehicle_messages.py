@@ -10,12 +10,15 @@ import pytest
 from bridge.controllers import other
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.controllers.inav import profile as inav
+from bridge.controllers.table import PROFILES
+from bridge.fc.autosense import Spoken
 from bridge.fc.msp_telemetry import hear_msp
-from bridge.fc.profile import FlightController
+from bridge.fc.profile import FlightController, Profile
 from bridge.model.airframe import Airframe, airframe
 from bridge.model.vehicle import Vehicle
 from bridge.vehicle import vehicle_messages as make
 from bridge.vehicle.telemetry_table import TELEMETRY
+from protocols.mavlink.codec import pack
 from protocols.mavlink.dialect import messages as m
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame
@@ -70,6 +73,23 @@ def test_errors_and_short_replies_change_nothing() -> None:
         hear_msp(state, MspFrame(Direction.ERROR, poll, bytes(40)), HARAKIRI, 0.0)
         hear_msp(state, MspFrame(Direction.REPLY, poll, b"\x01"), HARAKIRI, 0.0)
     assert (state.take_news(), state.home) == (frozenset(), None)
+
+
+@pytest.mark.parametrize("fill", [0x00, 0x01, 0x7F, 0x80, 0xFF])
+@pytest.mark.parametrize("profile", [each for each in PROFILES if each.spoken is Spoken.MSP], ids=lambda it: it.name)
+def test_every_message_can_be_packed_whatever_a_board_replies(profile: Profile, fill: int) -> None:
+    who = FlightController(profile, profile.name, None, HARAKIRI_BOXES)
+    state = told(Vehicle(), who, **{poll.name: bytes((fill,)) * 68 for poll in Msp if poll is not Msp.BOX})
+    for row in TELEMETRY:
+        for message in at(state, boot_ms=0xFFFFFFFF).made(row.makers):
+            assert pack(message).payload_v2
+
+
+def test_a_current_sensor_below_zero_is_no_huge_consumption() -> None:
+    """INAV's current and consumption are signed: a wrong offset makes both negative."""
+    analog = struct.pack("<BHhiiiIBH", 3 << 4, 1200, -40, -480, -7, -80, 0, 90, 800)
+    (message,) = at(told(Vehicle(), INAV, INAV_ANALOG=analog)).made((make.battery_status,))
+    assert (message.current_battery, message.current_consumed) == (-40, -7)
 
 
 def test_without_a_fix_there_is_no_position() -> None:
