@@ -34,8 +34,8 @@ from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame
 from protocols.msp.telemetry import Sensor
 
 _HEARTBEAT = m.MAVLINK_MSG_ID_HEARTBEAT
-#: The autopilot field of a heartbeat's payload. Cameras and gimbals send INVALID.
-_AUTOPILOT_AT = 5
+#: The autopilot field of a heartbeat's payload, and its value from cameras and gimbals. MAVLink 2 may omit it.
+_AUTOPILOT_AT, _NO_AUTOPILOT = 5, bytes((m.MAV_AUTOPILOT_INVALID,))
 _UNKNOWN_U16, _UNKNOWN_U8 = 0xFFFF, 0xFF
 _MAX_RSSI, _HARAKIRI_MAX_RSSI = 254, 255
 _STICKS, _CHANNELS = 4, 18
@@ -101,7 +101,7 @@ class MavlinkTelemetry:
     def _recognise(self, frames: Sequence[MavlinkFrame]) -> None:
         for frame in frames:
             is_heartbeat = frame.msgid == _HEARTBEAT
-            if self._is_harakiri or (is_heartbeat and frame.payload[_AUTOPILOT_AT] != m.MAV_AUTOPILOT_INVALID):
+            if self._is_harakiri or (is_heartbeat and frame.payload[_AUTOPILOT_AT:][:1] != _NO_AUTOPILOT):
                 sender = bytes((frame.sysid, frame.compid))
                 for msgid in self._readers:
                     self._known[sender + msgid.to_bytes(3, "little")] = msgid

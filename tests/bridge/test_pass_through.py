@@ -26,6 +26,7 @@ class Autopilot(QuietLine):
         self.version = version
         self.received = bytearray()
         self.sent: list[bytes] = []
+        self.heartbeat = mavlink.MAVLink_heartbeat_message(2, 12, 81, 0, 3, 3)
         self._due = 0.3
 
     def pack(self, message: mavlink.MAVLink_message) -> bytes:
@@ -45,7 +46,7 @@ class Autopilot(QuietLine):
     def advance(self, now: float) -> bytes:
         while self._due <= now:
             self._due += 1.0
-            self.say(mavlink.MAVLink_heartbeat_message(2, 12, 81, 0, 3, 3))
+            self.say(self.heartbeat)
         return super().advance(now)
 
     def next_wakeup(self, now: float) -> float:
@@ -92,6 +93,15 @@ def test_every_station_gets_every_frame_unchanged(version: int, signed: bool) ->
     world.run(2)
     for station in stations:
         assert station.frames_heard == autopilot.sent
+
+
+def test_a_heartbeat_whose_last_fields_are_0_is_passed_on() -> None:
+    """MAVLink 2 omits them, the autopilot's kind included."""
+    autopilot = Autopilot()
+    autopilot.heartbeat = mavlink.MAVLink_heartbeat_message(2, 0, 0, 0, 0, 0)
+    world, autopilot, (station, _) = passing(autopilot)
+    world.run(5)
+    assert station.frames_heard == autopilot.sent != []
 
 
 def test_the_bridge_sends_no_messages_of_its_own() -> None:
