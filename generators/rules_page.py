@@ -4,7 +4,6 @@
 import sys
 
 from bridge.controllers.harakiri.rules import (
-    ROI_COMMANDS,
     TAKEOFF_MAX_M,
     USUAL_WP_RADIUS_CM,
     CommandRule,
@@ -13,7 +12,7 @@ from bridge.controllers.harakiri.rules import (
 )
 from bridge.missions.list_check import UNUSED, Range
 from protocols.mavlink.command import command_name
-from protocols.mission_item import Command
+from protocols.mission_item import ROI_COMMANDS, Command
 
 _PLACES = {
     InList.ANY: "any",

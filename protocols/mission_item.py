@@ -25,6 +25,10 @@ class Command(IntEnum):
     DO_SET_ROI = 201
 
 
+#: Commands that set a region of interest.
+ROI_COMMANDS = (Command.NAV_ROI, Command.DO_SET_ROI_LOCATION, Command.DO_SET_ROI)
+
+
 class Frame(IntEnum):
     """MAV_FRAME numbers used by the rules."""
 

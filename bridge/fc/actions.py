@@ -10,14 +10,13 @@ from dataclasses import dataclass
 from enum import Enum
 
 from bridge.fc.session import FcSession
-from bridge.line.conversation import Conversation, LinkLost, ask
+from bridge.line.conversation import Conversation, LinkLost, ask, ask_status
 from bridge.line.runner import Runner
 from bridge.missions.mission_service import MissionService
-from protocols.msp.commands import Msp, MspAction
+from protocols.msp.commands import MspAction
 from protocols.msp.frame import Direction, request
-from protocols.msp.telemetry import Sensor, decode_status
+from protocols.msp.telemetry import Sensor
 
-_STATUS_PAYLOAD = 11
 _STATUS_CHECKS = 2
 
 
@@ -92,8 +91,7 @@ class FcActions:
 
 def _act(action: FcAction, arm_mask: int) -> Conversation[ActionResult]:
     for _ in range(_STATUS_CHECKS):
-        reply = yield from ask(request(Msp.STATUS), Msp.STATUS, _STATUS_PAYLOAD)
-        status = None if reply is None else decode_status(reply.payload)
+        status = yield from ask_status()
         if status is None:
             return ActionResult.NO_ANSWER
         if status.box_flags & arm_mask:

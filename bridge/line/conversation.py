@@ -13,7 +13,9 @@ from typing import Any, TypeVar
 from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission
 from protocols.mavlink.codec import Packed
 from protocols.mission_record import ListIdentity
-from protocols.msp.frame import MspFrame, frame_size
+from protocols.msp.commands import Msp
+from protocols.msp.frame import MspFrame, frame_size, request
+from protocols.msp.telemetry import STATUS_SIZE, StatusReport, decode_status
 
 
 class LinkLost(Exception):
@@ -155,6 +157,12 @@ def ask_surely(
             return reply
         before = reply
     return None
+
+
+def ask_status(*, tries: int = 3) -> Conversation[StatusReport | None]:
+    """STATUS as of now, which telemetry may not show yet; None if it was not answered."""
+    reply = yield from ask(request(Msp.STATUS), Msp.STATUS, STATUS_SIZE, tries=tries)
+    return None if reply is None else decode_status(reply.payload)
 
 
 def _lasting(reply: MspFrame, size: int | None) -> MspFrame:

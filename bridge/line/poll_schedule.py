@@ -16,6 +16,7 @@ from bridge.line.conversation import Send
 from bridge.line.msp_link import MspLink
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame, frame_size, request
+from protocols.msp.telemetry import STATUS_SIZE
 
 #: Telemetry's share of the line, both directions added.
 _LINE_SHARE = 0.6
@@ -57,7 +58,7 @@ class Poll:
 
 #: STATUS comes most often: arming must be noticed during a mission transfer.
 POLLS = (
-    Poll(Msp.STATUS, request(Msp.STATUS), 11, 0.25),
+    Poll(Msp.STATUS, request(Msp.STATUS), STATUS_SIZE, 0.25),
     Poll(Msp.ATTITUDE, request(Msp.ATTITUDE), 8, 1.0),
     Poll(Msp.RAW_GPS, request(Msp.RAW_GPS), 18, 1.0),
     Poll(Msp.ALTITUDE, request(Msp.ALTITUDE), 10, 1.0),

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 _IDENT = struct.Struct("<BBBI")
 _STATUS = struct.Struct("<HHHIB")
+STATUS_SIZE = _STATUS.size
 _MOTORS = struct.Struct("<8H")
 _RAW_IMU = struct.Struct("<9h")
 _RAW_GPS = struct.Struct("<BBiihH")

@@ -61,10 +61,6 @@ def _msp_store(controller: FlightController, _vehicle: Vehicle, settings: RuleSe
     return HarakiriMissions(controller.info, settings.takeoff_max_m)
 
 
-def _mavlink_store(_controller: FlightController, vehicle: Vehicle, settings: RuleSettings) -> AnyFcMissionStore:
-    return HarakiriMavlinkMissions(vehicle, rules(settings))
-
-
 PATCHED = Profile(
     "Harakiri with the mission extension",
     _FAMILY,
@@ -87,7 +83,7 @@ MAVLINK = Profile(
     "Harakiri in MAVLink mode",
     _FAMILY,
     Spoken.MAVLINK,
-    missions=_mavlink_store,
+    missions=lambda _, vehicle, settings: HarakiriMavlinkMissions(vehicle, rules(settings)),
     mavlink_sender=(1, 1, 200),  # baseflight_mavlink.c; other autopilots send as component 1
 )
 FRSKY = Profile(

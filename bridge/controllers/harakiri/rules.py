@@ -8,7 +8,7 @@ from enum import Enum, auto
 from types import MappingProxyType
 
 from bridge.missions.list_check import UNUSED, Range
-from protocols.mission_item import Command, Frame, MissionItem
+from protocols.mission_item import ROI_COMMANDS, Command, Frame, MissionItem
 from protocols.msp.mission import WpCommand, WpRecord
 
 MAV_COMMANDS: Mapping[int, Command] = {
@@ -23,7 +23,6 @@ MAV_COMMANDS: Mapping[int, Command] = {
 }
 _UNKNOWN_COMMAND = 0
 _NONE_KNOWN: Mapping[int, int] = MappingProxyType({})
-ROI_COMMANDS = (Command.NAV_ROI, Command.DO_SET_ROI_LOCATION, Command.DO_SET_ROI)
 
 #: The capacity with default settings; patched boards report theirs.
 USUAL_CAPACITY = 146

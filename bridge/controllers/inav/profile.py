@@ -6,13 +6,11 @@ from bridge.controllers.inav.telemetry import INAV_DECODERS, INAV_POLLS
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import INAV_CAPACITY, inav_profile
 from bridge.fc.interview import Interview
-from bridge.fc.profile import FlightController, Profile, RuleSettings
+from bridge.fc.profile import FlightController, Profile
 from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import NAV_POLL, POLLS
-from bridge.missions.fc_mission_store import AnyFcMissionStore
 from bridge.model.airframe import Airframe
 from bridge.model.flight_mode import FAILSAFE_BOX
-from bridge.model.vehicle import Vehicle
 from protocols.msp.inav import MIXER, MIXER_SIZE, decode_platform
 from protocols.msp.nav import INFO_SIZE, Nav, decode_info
 
@@ -51,14 +49,6 @@ def _recognise(board: Interview) -> Conversation[FlightController | None]:
     return FlightController(PROFILE, PROFILE.name, airframe, boxes, capacity=info.capacity, version=version)
 
 
-def _rules(settings: RuleSettings) -> NavRules:
-    return NavRules(inav_profile(settings.capacity or INAV_CAPACITY))
-
-
-def _open_store(controller: FlightController, vehicle: Vehicle, _settings: RuleSettings) -> AnyFcMissionStore:
-    return InavMissions(inav_profile(controller.capacity), controller, vehicle)
-
-
 PROFILE = Profile(
     "INAV",
     "INAV",
@@ -70,7 +60,7 @@ PROFILE = Profile(
     accepts_any_byte=True,
     # Its serial task runs 100 times a second (fc_tasks.c).
     turn_s=0.01,
-    missions=_open_store,
+    missions=lambda board, vehicle, _: InavMissions(inav_profile(board.capacity), board, vehicle),
     check_kind="inav",
-    rules=_rules,
+    rules=lambda settings: NavRules(inav_profile(settings.capacity or INAV_CAPACITY)),
 )

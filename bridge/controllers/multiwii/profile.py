@@ -5,12 +5,10 @@ from bridge.controllers.multiwii.mission_store import MultiwiiMissions
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import MULTIWII_CAPACITY, multiwii_profile
 from bridge.fc.interview import Interview
-from bridge.fc.profile import FlightController, Profile, RuleSettings
+from bridge.fc.profile import FlightController, Profile
 from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import NAV_POLL, POLLS
-from bridge.missions.fc_mission_store import AnyFcMissionStore
 from bridge.model.airframe import airframe
-from bridge.model.vehicle import Vehicle
 from protocols.msp.nav import NAV_CONFIG_SIZE, Nav, decode_nav_config
 
 #: IDENT's capability bit of boards that fly missions.
@@ -31,21 +29,13 @@ def _recognise(board: Interview) -> Conversation[FlightController | None]:
     return FlightController(PROFILE, name, airframe(ident.mixer), boxes, capacity=capacity, version=ident.release)
 
 
-def _rules(settings: RuleSettings) -> NavRules:
-    return NavRules(multiwii_profile(settings.capacity or MULTIWII_CAPACITY))
-
-
-def _open_store(controller: FlightController, vehicle: Vehicle, _settings: RuleSettings) -> AnyFcMissionStore:
-    return MultiwiiMissions(multiwii_profile(controller.capacity), controller, vehicle)
-
-
 PROFILE = Profile(
     "MultiWii NAV",
     "MultiWii",
     recognise=_recognise,
     polls=(*POLLS, NAV_POLL),
     accepts_any_byte=True,
-    missions=_open_store,
+    missions=lambda board, vehicle, _: MultiwiiMissions(multiwii_profile(board.capacity), board, vehicle),
     check_kind="multiwii",
-    rules=_rules,
+    rules=lambda settings: NavRules(multiwii_profile(settings.capacity or MULTIWII_CAPACITY)),
 )

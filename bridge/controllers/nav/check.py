@@ -17,7 +17,6 @@ from bridge.controllers.nav.rules import (
     LEAST_HEIGHT_M,
     NAV_RULES,
     REPEATS,
-    ROI_COMMANDS,
     AltitudeUse,
     NavProfile,
     NavRule,
@@ -37,7 +36,7 @@ from bridge.missions.list_check import (
 from bridge.model.finding import DROPPED, Finding, News, RejectingFinding, reject, reject_list
 from bridge.model.verdict import Result, Verdict
 from protocols.float32 import is_single
-from protocols.mission_item import Command, MissionItem, MissionResult
+from protocols.mission_item import ROI_COMMANDS, Command, MissionItem, MissionResult
 from protocols.msp.nav import LAST, LEGS, TURNS, NavAction, NavRecord
 
 #: The greatest height at which single precision still resolves a centimetre.

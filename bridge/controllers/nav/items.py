@@ -9,8 +9,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import accumulate
 from types import MappingProxyType
 
-from bridge.controllers.nav.rules import ENDLESS_S, LEAST_SPEED_CMS, ROI_COMMANDS
-from protocols.mission_item import Command, Frame, MissionItem
+from bridge.controllers.nav.rules import ENDLESS_S, LEAST_SPEED_CMS
+from protocols.mission_item import ROI_COMMANDS, Command, Frame, MissionItem
 from protocols.msp.nav import NavAction, NavRecord
 
 _NONE_KNOWN: Mapping[int, int] = MappingProxyType({})

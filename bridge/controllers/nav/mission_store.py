@@ -15,7 +15,7 @@ from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.items import home_item, item_seqs, items_from_records
 from bridge.controllers.nav.rules import NavProfile
 from bridge.fc.profile import FlightController
-from bridge.line.conversation import Conversation, LinkLost, Stopped, ask, receive, send
+from bridge.line.conversation import Conversation, LinkLost, Stopped, ask, ask_status, receive, send
 from bridge.missions.fc_mission_store import (
     FcMissionStore,
     PushFailed,
@@ -27,8 +27,7 @@ from bridge.missions.fc_mission_store import (
 )
 from bridge.model.vehicle import Vehicle
 from protocols.mission_item import MissionItem
-from protocols.msp.commands import Msp
-from protocols.msp.frame import Direction, request
+from protocols.msp.frame import Direction
 from protocols.msp.nav import (
     LAST,
     WP_SIZE,
@@ -40,11 +39,9 @@ from protocols.msp.nav import (
     encode_read_wp,
     encode_set_wp,
 )
-from protocols.msp.telemetry import decode_status
 
 #: The replacement for an empty list, which cannot be written.
 NOTHING = (NavRecord(NavAction.RTH, flag=LAST),)
-_STATUS_PAYLOAD = 11
 _TRIES = 5
 #: A list is compared within this many checks, a quarter of a second each if the board answers fast enough.
 _CHECKS = 6
@@ -268,8 +265,7 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
             raise PushFailed(PushFailure.ARMED)
 
     def _ask_armed(self) -> Conversation[bool | None]:
-        reply = yield from ask(request(Msp.STATUS), Msp.STATUS, _STATUS_PAYLOAD, tries=_TRIES)
-        status = None if reply is None else decode_status(reply.payload)
+        status = yield from ask_status(tries=_TRIES)
         return None if status is None else bool(status.box_flags & self._arm_mask)
 
 

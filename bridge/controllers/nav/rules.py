@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import Enum, auto
 
 from bridge.missions.list_check import UNUSED, Range
-from protocols.mission_item import Command
+from protocols.mission_item import ROI_COMMANDS, Command
 from protocols.msp.nav import NavAction
 
 #: The time of a POSHOLD_TIME that replaces an endless hold, which INAV lacks: nine hours.
@@ -19,7 +19,6 @@ LEAST_SPEED_CMS = 50
 #: The height above home that replaces 0, metres.
 LEAST_HEIGHT_M = 2
 HOLD = Range(0, ENDLESS_S - 1, f"seconds 0..{ENDLESS_S - 1}")
-ROI_COMMANDS = (Command.NAV_ROI, Command.DO_SET_ROI_LOCATION, Command.DO_SET_ROI)
 
 
 @dataclass(frozen=True, slots=True)
