@@ -26,6 +26,15 @@ class StoreState(Enum):
     BUSY = "busy"  # a configuration write is scheduled or running
 
 
+class Loading(Enum):
+    """What became of the saved mission of a flight controller that may have none loaded."""
+
+    NOT_NEEDED = "not needed"
+    LOADED = "loaded"
+    ARMED = "armed"  # not loaded: it is armed
+    NO_ANSWER = "no answer"
+
+
 @dataclass(frozen=True, slots=True)
 class StoreReport:
     """The flight controller's report on its mission store. `stored` None: not known without reading the list."""
@@ -134,10 +143,10 @@ class FcMissionStore(ABC, Generic[RecordT]):
         yield from ()
         return True
 
-    def reload(self) -> Conversation[bool | None]:
-        """Make it load its saved mission if it holds none. True: done, False: no need, None: not while armed."""
+    def load(self) -> Conversation[Loading]:
+        """Make it load its saved mission if it holds none."""
         yield from ()
-        return False
+        return Loading.NOT_NEEDED
 
 
 #: The mission store of any flight controller.

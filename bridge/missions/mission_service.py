@@ -14,6 +14,7 @@ from bridge.line.conversation import Conversation, Pause, conclude, find_pending
 from bridge.missions.fc_mission_store import (
     LIST_IS_GONE,
     AnyFcMissionStore,
+    Loading,
     PushFailure,
     PushProgress,
     PushResult,
@@ -110,6 +111,8 @@ class MissionService:
         self._closed = False
         #: False until the current flight controller's list was read, and after an interrupted push.
         self.is_settled = False
+        #: The saved mission's loading since the last `catch_up`, which reports it.
+        self._loading = Loading.NOT_NEEDED
         self._told_unloaded = False
         #: Missions to compare with the list when it is next read.
         self._pending: list[PendingMission] = []
@@ -124,7 +127,7 @@ class MissionService:
         """Switch to another flight controller; a Refusal becomes the reply to every attempt."""
         self.fc_store, self._refusal = (None, store) if isinstance(store, Refusal) else (store, NO_LINK)
         self.former_home = self.home_item()
-        self.held = None
+        self.held, self._loading = None, Loading.NOT_NEEDED
         self.is_settled = self._told_unloaded = False
 
     @property
@@ -186,9 +189,9 @@ class MissionService:
         while True:
             if self.fc_store is None:
                 return self._refusal
-            yield from self.fc_store.reload()
+            loading = yield from self.fc_store.load()
             report = yield from self.fc_store.report()
-            if report is None:
+            if report is None or loading is Loading.NO_ANSWER:
                 return NO_LINK
             if report.state is StoreState.READY:
                 return report
@@ -276,10 +279,19 @@ class MissionService:
             self.writing = None
 
     def read_back(self) -> Conversation[HeldMission | Refusal]:
-        """The flight controller's list; a cached copy is used only if the checksum is the same."""
+        """The flight controller's list; a cached copy is used only if the checksum is the same.
+
+        After connecting or an interrupted push, the flight controller first loads its saved mission if it holds none.
+        """
         fc_store = self.fc_store
         if fc_store is None:
             return self._refusal
+        if not self.is_settled:
+            loading = yield from fc_store.load()
+            if loading is Loading.NO_ANSWER:
+                return NO_LINK
+            if self._loading is not Loading.LOADED:
+                self._loading = loading
         report = yield from fc_store.report()
         if report is None:
             return NO_LINK
@@ -310,26 +322,24 @@ class MissionService:
         return not self.is_settled or bool(self._pending) or not (yield from self.fc_store.is_current())
 
     def catch_up(self) -> Conversation[MissionChange | None]:
-        """Read the list; returns the text for the pilot if it is another one.
-
-        After connecting or an interrupted push, the flight controller loads its saved mission if it holds none.
-        """
-        fc_store, is_first, before = self.fc_store, not self.is_settled, self.held
-        if fc_store is None:
+        """Read the list; returns the text for the pilot if it is another one."""
+        if self.fc_store is None:
             return None
-        is_reloaded = (yield from fc_store.reload()) if is_first else False
+        is_first, before = not self.is_settled, self.held
         held = yield from self.read_back()
         if held is NO_LINK:
             return None
-        self.is_settled = is_reloaded is not None
+        loading, self._loading = self._loading, Loading.NOT_NEEDED
+        self.is_settled = loading is not Loading.ARMED
         if isinstance(held, HeldMission) and (news := (yield from self._settle(held))) is not None:
             return news
-        if is_reloaded is None:
+        if loading is Loading.ARMED:
             is_news, self._told_unloaded = not self._told_unloaded, True
             return _NOT_LOADED if is_news else None
-        if isinstance(held, Refusal) or (is_first and not (is_reloaded and held.records)):
+        is_loaded = loading is Loading.LOADED
+        if isinstance(held, Refusal) or (is_first and not (is_loaded and held.records)):
             return None
-        if is_reloaded:
+        if is_loaded:
             is_ours = (yield from recall(held.identity)) is not None
             again = "loaded again" if is_ours else "loaded, not written by naze-bridge"
             return MissionChange(f"Saved mission {again}: {held.identity.count} records")

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """INAV with several stored missions, and lists changed on the board by other programs."""
 
+from collections import Counter
 from dataclasses import replace
 
 import pytest
@@ -9,7 +10,9 @@ from bridge.controllers.nav.stored_missions import erased, flown, split_missions
 from bridge.missions.list_check import check_list
 from bridge.missions.mission_service import HeldMission
 from bridge.model.mission_log import Outcome
+from bridge.model.refusal import Refusal
 from protocols.mavlink.dialect import messages
+from protocols.msp.commands import Msp
 from protocols.msp.frame import MspParser
 from protocols.msp.nav import LAST, Nav
 from simulator.fc_kinds import make_board, new_eeprom
@@ -33,7 +36,7 @@ NOTHING_MORE = NavWaypoint().pack(0)[1:]
 class Bench:
     """A board whose EEPROM has missions of the given sizes from another planner."""
 
-    def __init__(self, *sizes: int, faults: Faults | None = None, is_loaded: bool = True) -> None:
+    def __init__(self, *sizes: int, faults: Faults | None = None) -> None:
         records = [record for mission in sets(*sizes) for record in mission]
         filled = records + [NOTHING_MORE] * (CAPACITY - len(records))
         self.eeprom = bytearray(b"".join(bytes((number,)) + record for number, record in enumerate(filled, 1)))
@@ -199,6 +202,41 @@ def test_while_armed_the_missing_mission_is_reported_but_not_loaded() -> None:
     bench.faults.armed = False
     bench.world.run(3)
     assert without_home(Download(bench.station).run()) == without_home(plan(5, 1))
+
+
+def pulled(bench: Bench) -> HeldMission | Refusal:
+    answers: list[HeldMission | Refusal] = []
+    bench.world.bridge.local.pull(answers.append, bench.world.now)
+    bench.world.wait_until(lambda _: bool(answers), 30)
+    return answers[0]
+
+
+@pytest.mark.parametrize("command", [Msp.STATUS, Nav.GETINFO, Nav.LOAD])
+@pytest.mark.parametrize("lost", [3, 5, 12])
+def test_a_list_that_is_not_loaded_yet_is_not_read_as_empty(command: int, lost: int) -> None:
+    """Until the board has answered and loaded its saved mission, reading fails."""
+    bench = Bench(4)
+    bench.board.power_off(bench.world.now)
+    bench.world.run(3)
+    requests = Counter[int]()
+    receive, frames = bench.board.receive, MspParser()
+
+    def receive_others(data: bytes, now: float) -> None:
+        for frame in frames.feed(data):
+            requests[frame.command] += 1
+            if not bench.world.is_found or frame.command != command or requests[command] > lost:
+                receive(frame.encode(), now)
+
+    bench.board.receive = receive_others  # type: ignore[method-assign]
+    bench.board.power_on(bench.world.now)
+    bench.world.wait_until(lambda world: world.is_found, 30)
+    requests.clear()
+    held = pulled(bench)
+    while isinstance(held, Refusal):
+        held = pulled(bench)
+    assert [record.pack() for record in held.records] == sets(4)[0]
+    bench.world.run(2)
+    assert "Saved mission loaded, not written by naze-bridge: 4 records" in bench.told()
 
 
 @pytest.mark.parametrize("armed", [False, True])

@@ -13,7 +13,7 @@ from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.mission_store import NOTHING, NavMissions
 from bridge.controllers.nav.stored_missions import Mission, erased, flown, split_missions
 from bridge.line.conversation import Conversation, LinkLost, Pause, ask
-from bridge.missions.fc_mission_store import PushFailed, PushFailure, PushProgress, PushResult
+from bridge.missions.fc_mission_store import Loading, PushFailed, PushFailure, PushProgress, PushResult
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, request
 from protocols.msp.nav import (
@@ -117,16 +117,20 @@ class InavMissions(NavMissions):
         before = 0 if self._vehicle.armed else self._before_loaded
         return (yield from self._has_same_records(self._known or (), before))
 
-    def reload(self) -> Conversation[bool | None]:
+    def load(self) -> Conversation[Loading]:
         """Load the saved mission: INAV's list in RAM is empty after a restart."""
         info = yield from self._info()
-        if info is None or info.is_valid:
-            return False
-        if (yield from self._ask_armed()) is not False:
-            return None
-        yield from ask(LOAD_REQUEST, Nav.LOAD, 0)
+        if info is not None and info.is_valid:
+            return Loading.NOT_NEEDED
+        armed = None if info is None else (yield from self._ask_armed())
+        if armed:
+            return Loading.ARMED
+        if armed is None or (yield from ask(LOAD_REQUEST, Nav.LOAD, 0)) is None:
+            return Loading.NO_ANSWER
         info = yield from self._info()
-        return info is not None and info.is_valid
+        if info is None:
+            return Loading.NO_ANSWER
+        return Loading.LOADED if info.is_valid else Loading.NOT_NEEDED
 
     def _take_over(self, missions: list[Mission], seen: tuple[NavInfo, int]) -> None:
         self._seen = seen
