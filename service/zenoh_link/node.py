@@ -9,7 +9,6 @@ Anything that may wait takes the session's thread:
 """
 
 import asyncio
-import threading
 from collections.abc import Callable, Mapping
 from functools import partial
 
@@ -34,6 +33,7 @@ from service.zenoh_link.history import History
 from service.zenoh_link.keys import ZenohKey
 from service.zenoh_link.liveliness import Liveliness
 from service.zenoh_link.mavlink_link import MavlinkLink
+from service.zenoh_link.outage_log import OutageLog
 from service.zenoh_link.overview import overview_of
 from service.zenoh_link.payload import Payloads, plain
 from service.zenoh_link.publisher import Publisher
@@ -44,8 +44,6 @@ from service.zenoh_link.time_source import SampleClock
 from service.zenoh_link.vehicle_data import VehicleData
 
 _STATE_INTERVAL_S = 1.0
-#: The interval of endpoint checks while no session is connected.
-_ENDPOINT_CHECK_S = 5.0
 _GROUPS = {key.suffix: group for group, key in keys.TELEMETRY.items()}
 
 _log = structlog.get_logger()
@@ -58,9 +56,10 @@ class Node(Follower):
         self._settings = settings
         self._daemon = daemon
         self._loop = asyncio.get_running_loop()
-        self._config = make_config(settings)
-        self._endpoints = connect_endpoints(self._config)
-        self._thread = SessionThread(self._config, self._declare)
+        config = make_config(settings)
+        endpoints, files = connect_endpoints(config), tls_files(config)
+        self._outage = OutageLog(lambda: endpoint_trouble(endpoints, files)) if endpoints else None
+        self._thread = SessionThread(config, self._declare)
         clock = SampleClock(self._loop.time)
         self._payloads = Payloads(settings.encoding, clock.unix_s)
         self._publisher = Publisher(self._payloads, self._readers_changed)
@@ -76,8 +75,6 @@ class Node(Follower):
         if settings.commands:
             self._answerers |= CommandQueries(api, self._rates).answerers
         self._held: HeldMission | None = None
-        self._next_check_at = self._loop.time() + _ENDPOINT_CHECK_S
-        self._diagnosis = ""
         self._pending_publish: asyncio.Handle | None = None
         self._tick: asyncio.TimerHandle | None = None
 
@@ -165,24 +162,9 @@ class Node(Follower):
 
     def _every_second(self) -> None:
         self._publish_whole()
-        self._check_endpoints()
+        if self._outage is not None:
+            self._outage.look(self._presence.is_alone, self._loop.time())
         self._tick = self._loop.call_later(_STATE_INTERVAL_S, self._every_second)
-
-    def _check_endpoints(self) -> None:
-        """Log why no session is connected: zenoh keeps trying without a message."""
-        now = self._loop.time()
-        if not self._presence.is_alone or not self._endpoints:
-            self._next_check_at = now + _ENDPOINT_CHECK_S
-        elif now >= self._next_check_at:
-            self._next_check_at = now + _ENDPOINT_CHECK_S
-            # A separate thread: an endpoint that drops all packets takes seconds to time out.
-            threading.Thread(target=self._diagnose_endpoints, name="zenoh why", daemon=True).start()
-
-    def _diagnose_endpoints(self) -> None:
-        why = endpoint_trouble(self._endpoints, tls_files(self._config))
-        if why != self._diagnosis:
-            self._diagnosis = why
-            _log.warning("zenoh.alone", why=why)
 
     def _publish_whole(self) -> None:
         self._pending_publish = None

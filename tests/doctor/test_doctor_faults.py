@@ -116,6 +116,18 @@ def test_without_a_named_port_every_port_is_checked(pi: FaultyMachine, tmp_path:
     assert_problem(checked()["port"], "/dev/serial0 is missing", "sudo naze-bridge setup")
 
 
+def test_without_a_named_port_the_daemons_own_is_checked(pi: FaultyMachine, tmp_path: Path) -> None:
+    """It runs on the port or simulator of its --fc."""
+    pi.path("/dev/serial0").unlink()
+    running = STATUS | {"where": "sim:"}
+    found = {each.check: each for each in examine(pi, Settings(AutoFc(), GCS, tmp_path), lambda: running, no_answer)}
+    assert_ok(found["port"], "sim:, no serial port")
+    assert_ok(found["flight controller"], "Harakiri")
+    searching = running | {"where": "the serial ports", "port": None, "ports_passed_over": []}
+    found = {each.check: each for each in examine(pi, Settings(AutoFc(), GCS, tmp_path), lambda: searching, no_answer)}
+    assert_problem(found["port"], "there is no serial port", "plug the flight controller")
+
+
 def test_a_port_without_group_access_is_a_problem(pi: FaultyMachine) -> None:
     pi.path("/dev/ttyAMA0").chmod(0o600)
     assert_problem(check_permission(pi, PORT), "-rw-------", "sudo chmod g+rw /dev/ttyAMA0")
@@ -190,26 +202,26 @@ def test_modem_manager_is_a_note_unless_it_ignores_the_port(pi: FaultyMachine) -
 
 
 def test_a_silent_flight_controller_is_a_problem() -> None:
-    assert_problem(check_flight_controller(PORT, no_answer, no_answer), "no flight controller answers", "TX goes to RX")
+    assert_problem(check_flight_controller(PORT, None, no_answer), "no flight controller answers", "TX goes to RX")
     silent = STATUS | {"flight_controller": None, "state": "searching"}
-    (_, found) = check_flight_controller(PORT, lambda: silent, None)
+    (_, found) = check_flight_controller(PORT, silent, None)
     assert_problem(found, "no reply on /dev/serial0: searching", "TX goes to RX")
-    (_, found) = check_flight_controller(PORT, lambda: silent | {"state": "no port"}, None)
+    (_, found) = check_flight_controller(PORT, silent | {"state": "no port"}, None)
     assert_note(found, "/dev/serial0 cannot be opened yet")
 
 
 def test_a_flight_controller_in_its_command_line_is_recognised() -> None:
-    (_, found) = check_flight_controller(PORT, lambda: STATUS | {"flight_controller": None, "state": Cli.name}, None)
+    (_, found) = check_flight_controller(PORT, STATUS | {"flight_controller": None, "state": Cli.name}, None)
     assert_problem(found, "in its command line: type exit there, or unplug it", "naze-bridge doctor` again")
 
     def listened() -> Json:
         raise ControlError(Cli.trouble)
 
-    assert_problem(check_flight_controller(PORT, no_answer, listened), Cli.trouble, "naze-bridge doctor` again")
+    assert_problem(check_flight_controller(PORT, None, listened), Cli.trouble, "naze-bridge doctor` again")
 
 
 def test_a_daemon_is_asked_and_the_port_left_alone() -> None:
-    (daemon, found) = check_flight_controller(PORT, lambda: STATUS, no_answer)
+    (daemon, found) = check_flight_controller(PORT, STATUS, no_answer)
     assert_ok(daemon, "running")
     assert_ok(found, "Harakiri, MSP at 115200 baud, disarmed")
 

@@ -22,10 +22,11 @@ from service.cli.doctor.port import (
     holder_of_port,
 )
 from service.cli.doctor.zenoh import check_zenoh
+from service.daemon.client import ControlError
 from service.daemon.mission_data import Json
 from service.machine.host import Host
 from service.settings import Settings
-from service.settings.addresses import AutoFc, FcAddress
+from service.settings.addresses import AutoFc, FcAddress, parse_fc
 
 _ON_PORT = (check_port, check_permission, check_console, check_holder)
 
@@ -34,7 +35,10 @@ def examine(
     host: Host, settings: Settings, ask_running: Callable[[], Json], ask_port: Callable[[], Json]
 ) -> Iterator[Checked]:
     """Yield the result of each check. The port is listened to only if the checks before found no problem with it."""
+    running = _status(ask_running)
     fc = settings.fc
+    if isinstance(fc, AutoFc) and running is not None and "port" not in running:
+        fc = parse_fc(running["where"])  # the daemon was started with --fc
     ports: Sequence[FcAddress] = check_candidates(host) if isinstance(fc, AutoFc) else [fc]
     told = [found for port in ports for check in _ON_PORT if (found := check(host, port)) is not None]
     if len(ports) > 1:
@@ -45,7 +49,7 @@ def examine(
     yield from told
     is_free = not any(found.grade is Grade.PROBLEM for found in told)
     is_free = is_free and all(holder_of_port(host, port) is None for port in ports)
-    yield from check_flight_controller(fc, ask_running, ask_port if is_free else None)
+    yield from check_flight_controller(fc, running, ask_port if is_free else None)
     yield from check_wifi(host, settings.gcs)
     yield from check_ports(host, settings.gcs)
     yield check_zenoh(settings.zenoh)
@@ -53,3 +57,10 @@ def examine(
     state_dir = settings.state_dir or Path()
     yield check_disk(state_dir)
     yield from check_database(state_dir)
+
+
+def _status(ask_running: Callable[[], Json]) -> Json | None:
+    try:
+        return ask_running()
+    except ControlError:
+        return None

@@ -15,24 +15,13 @@ _WIRING = "is it powered? TX goes to RX, RX to TX, GND to GND; a Naze's USB sock
 _AGAIN = "then run `sudo naze-bridge doctor` again"
 
 
-def check_flight_controller(
-    fc: FcAddress, ask_running: Callable[[], Json], ask_port: Callable[[], Json] | None
-) -> list[Checked]:
-    """Find the flight controller. Both callables return a status or raise ControlError; `ask_port` may be None."""
-    try:
-        status = ask_running()
-    except ControlError:
-        pass
-    else:
-        return [ok("daemon", "running"), _who(fc, status)]
+def check_flight_controller(fc: FcAddress, running: Json | None, ask_port: Callable[[], Json] | None) -> list[Checked]:
+    """Find the flight controller. `running`: a daemon's status; `ask_port` returns one or raises ControlError."""
+    if running is not None:
+        return [ok("daemon", "running"), _who(fc, running)]
     if ask_port is None:
-        return [
-            note(
-                "flight controller",
-                f"{fc} was not checked",
-                "fix its port first, then run `sudo naze-bridge doctor`",
-            )
-        ]
+        remedy = "fix its port first, then run `sudo naze-bridge doctor`"
+        return [note("flight controller", f"{fc} was not checked", remedy)]
     try:
         return [_who(fc, ask_port())]
     except ControlError as error:
