@@ -38,7 +38,7 @@ class Range:
             return "not a number"
         whole = _whole(value)
         if whole == 0 and self.instead_of_zero:
-            return "0 not allowed"
+            return "less than 1" if value else "0 not allowed"
         return "whole numbers only" if self.low != self.high and self.fit(value) == whole else self.why
 
 

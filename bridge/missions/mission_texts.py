@@ -25,7 +25,7 @@ def summary(sent: int, verdict: Verdict[Any]) -> str | None:
     raised = sum(finding.field == "alt_m" and finding.becomes != finding.was for finding in kept)
     home = sum(finding.seq == 0 for finding in kept)
     differing = len(kept) - relative - raised - home
-    counts = {"dropped": dropped, "heights relative": relative, "raised from 0": raised, "flown differently": differing}
+    counts = {"dropped": dropped, "Alt now relative": relative, "Alt raised": raised, "flown differently": differing}
     news = [f"{count} {what}" for what, count in counts.items() if count]
     return f"{len(verdict.items)} of {sent} stored: {', '.join(news) or 'check home'}"
 

@@ -113,13 +113,13 @@ KEYS = (
     ),
     Key(
         "zenoh.prefix",
-        text(parse=partial(check_name, "prefix")),
+        text(parse=partial(check_name, "zenoh.prefix")),
         "First chunk of all zenoh keys.",
         f'"{DEFAULT_PREFIX}"',
     ),
     Key(
         "zenoh.vehicle",
-        text(parse=partial(check_name, "vehicle")),
+        text(parse=partial(check_name, "zenoh.vehicle")),
         "This vehicle's name, the second chunk; unique within a fleet. By default the host's name.",
         example='"naze-1"',
     ),

@@ -79,8 +79,8 @@ def check_rates(rates: object) -> dict[str, float]:
     return {name: float(hz) for name, hz in rates.items()}
 
 
-def check_name(setting: str, name: str) -> str:
-    """The name; ZenohSettingsError if it cannot be one chunk of a key."""
+def check_name(what: str, name: str) -> str:
+    """The name; ZenohSettingsError, which begins with `what`, if it cannot be one chunk of a key."""
     bad = _FORBIDDEN.search(name)
     if not name:
         wrong = "empty"
@@ -92,4 +92,4 @@ def check_name(setting: str, name: str) -> str:
         wrong = f"longer than {_MAX_NAME} letters"
     else:
         return name
-    raise ZenohSettingsError(f'zenoh.{setting} is {wrong}: make a name of letters, digits and dashes, as "naze-1"')
+    raise ZenohSettingsError(f'{what} is {wrong}: make a name of letters, digits and dashes, as "naze-1"')

@@ -923,7 +923,7 @@ def test_the_summary_comes_first_and_goes_only_to_the_writer() -> None:
     world.run(0.1)
     texts = [(text.severity, text.text) for text in station.said("STATUSTEXT") if "naze" not in text.text]
     assert texts == [
-        (4, "20 of 40 stored: 20 dropped, 1 heights relative"),
+        (4, "20 of 40 stored: 20 dropped, 1 Alt now relative"),
         (4, "20 items: DO_CHANGE_SPEED dropped, not supported"),
         (4, "WP 30: Alt flown above home, not above sea level"),
     ]

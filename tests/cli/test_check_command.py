@@ -121,7 +121,7 @@ def test_a_person_sees_sent_and_stored_values_with_reasons() -> None:
     output = run(FIELD).stdout
     for words in ("naze-field.waypoints", "20->15", "6->5", "5->-", "18.5->18", "DO_CHANGE_SPEED", "400->255"):
         assert words in output
-    assert "WP 1: Alt changed from 20 to 15 m (take-off 2..15)" in output
+    assert "WP 1: Alt changed from 20 to 15 m (take-off 2..15 m)" in output
     assert "ACCEPTED: 13 of 14 items stored, 1 dropped, values changed: 6; 13 records, checksum " in output
 
 

@@ -178,7 +178,7 @@ async def test_long_texts_arrive_whole_and_once(shared: Bench) -> None:
     changes = [text for text in texts if text.startswith(("WP 6", "WP 7"))]
     assert changes == [
         "WP 6: Time s changed from 700 to 255 (seconds 1..255)",
-        "WP 6: Hit Rad changed from 1 to 2 m (2..255)",
+        "WP 6: Hit Rad changed from 1 to 2 m (2..255 m)",
         "WP 6: Alt changed from 19.5 to 19 m (whole numbers only)",
         "WP 7: DO_SET_ROI_NONE dropped, no ROI from here on",
     ]

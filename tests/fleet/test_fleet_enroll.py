@@ -106,7 +106,8 @@ def test_logins_are_secret_and_kept(enrolled: Enrolled) -> None:
     assert enrolled.enroll("kite").returncode == 0
     assert (enrolled.folder / "kite.json5").read_text() == before
     assert "kite is a vehicle already" in enrolled.enroll("kite", "--role", "pilot").stderr
-    assert "zenoh.vehicle is 'a/b'" in enrolled.enroll("a/b").stderr
+    assert "naze-bridge: the name is 'my plane', with ' ' in it" in enrolled.enroll("my plane").stderr
+    assert "--prefix is 'a/b'" in enrolled.enroll("crow", "--prefix", "a/b").stderr
 
 
 def test_a_wrong_and_a_missing_login_are_told_apart(enrolled: Enrolled, tmp_path: Path) -> None:

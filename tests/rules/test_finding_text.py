@@ -73,6 +73,7 @@ def test_every_warning_and_rejection_fits_a_statustext() -> None:
         [item(TAKEOFF), item(WAYPOINT)],
         [item(WAYPOINT), item(SET_ROI)],
         [item(ROI), item(SPEED)],
+        [item(WAYPOINT, alt_m=-0.5)],
     ):
         verdict = check_list(mission(*before, *tail), HarakiriRules())
         texts += [each.text() for each in verdict.findings if each.news is News.WARNING or each.becomes == REJECTED]
@@ -98,7 +99,7 @@ def test_no_value_is_reported_as_changed_to_itself() -> None:
 def test_equal_findings_are_one_line_and_warnings_come_first() -> None:
     items = [item(WAYPOINT, p1=3)] * 4 + [item(SPEED)] * 3 + [item(WAYPOINT, frame=0), item(WAYPOINT, p2=0)]
     verdict = check_list(mission(*items), HarakiriRules())
-    assert summary(10, verdict) == "7 of 10 stored: 3 dropped, 1 heights relative"
+    assert summary(10, verdict) == "7 of 10 stored: 3 dropped, 1 Alt now relative"
     assert finding_lines(verdict.findings) == [
         (News.WARNING, "3 items: DO_CHANGE_SPEED dropped, not supported"),
         (News.WARNING, "WP 8: Alt flown above home, not above sea level"),
@@ -134,4 +135,13 @@ def test_a_list_without_home_reports_its_first_item_as_home() -> None:
 
 def test_a_leg_below_home_is_not_counted_as_raised() -> None:
     verdict = check_list(mission(item(WAYPOINT, alt_m=-5.0), item(WAYPOINT, alt_m=0.0)), NavRules(inav_profile()))
-    assert summary(3, verdict) == "3 of 3 stored: 1 raised from 0, 1 flown differently"
+    assert summary(3, verdict) == "3 of 3 stored: 1 Alt raised, 1 flown differently"
+
+
+def test_an_altitude_below_one_metre_is_raised_with_that_reason() -> None:
+    verdict = check_list(mission(item(WAYPOINT, alt_m=0.5), item(WAYPOINT, alt_m=0.0)), HarakiriRules())
+    assert finding_lines(verdict.findings) == [
+        (News.WARNING, "WP 1: Alt raised from 0.5 to 2 m (less than 1)"),
+        (News.WARNING, "WP 2: Alt raised from 0 to 2 m (0 not allowed)"),
+    ]
+    assert summary(3, verdict) == "3 of 3 stored: 2 Alt raised"

@@ -544,7 +544,7 @@ def test_losses_of_a_changed_leg_are_reported(record: NavRecord, lost: str) -> N
     items = list(items_from_records(held, home_item((LAT, LON))))
     items[2] = replace(items[2], alt_m=40.0)
     verdict = check_list(items, NavRules(inav_profile(), held))
-    expected = [(News.WARNING, f"Lost from the old list, which items cannot show: {lost}")] if lost else []
+    expected = [(News.WARNING, f"Lost with the old list, as no MAVLink item can show it: {lost}")] if lost else []
     assert [(finding.news, finding.text()) for finding in verdict.findings] == expected
     assert verdict.records[1].alt_cm == 4000
     assert (verdict.records[1].p3 >> 1, verdict.records[1].flag) == (0, 0)

@@ -39,12 +39,12 @@ def test_every_change_is_explained(lasting_web: WebBench) -> None:
     mission = lasting_web.ask("/api/missions/1").data
     changes = {row["left"]["seq"]: row["changes"] for row in mission["rows"] if row["changes"]}
     assert changes == {
-        0: {"p2": "2..255"},
-        1: {"alt_m": "take-off 2..15"},
+        0: {"p2": "2..255 m"},
+        1: {"alt_m": "take-off 2..15 m"},
         5: {"command": "not supported"},
         6: {"alt_m": "whole numbers only"},
         7: {"p1": "0 = fly through, 1 = brake; to hold use LOITER_TIME"},
-        8: {"p2": "2..255"},
+        8: {"p2": "2..255 m"},
         9: {"alt_m": "0 not allowed"},
         10: {"p1": "seconds 1..255"},
     }

@@ -104,7 +104,7 @@ def test_the_last_upload_is_shown_as_sent_and_as_stored(page: Browser) -> None:
     assert "dropped: not stored\nnot supported" in dropped
     assert page.text("#upload tr:nth-child(2) td:nth-child(2) .is-changed") == "Alt 20 m"
     assert page.text("#upload tr:nth-child(2) td:nth-child(3) .is-changed") == "Alt 15 m"
-    assert page.text("#upload tr:nth-child(2) .why") == "Alt: take-off 2..15"
+    assert page.text("#upload tr:nth-child(2) .why") == "Alt: take-off 2..15 m"
     assert "Delay 3" in page.text("#upload")  # as in Mission Planner
     colours = [page.run("return getComputedStyle(document.querySelector(arguments[0])).backgroundColor", selector)
                for selector in ("#upload tr.changed .is-changed", "#upload tr.dropped", "#upload tr.same")]  # fmt: skip

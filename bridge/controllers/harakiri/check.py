@@ -214,7 +214,7 @@ class HarakiriCheck(ListCheck):
         """Apply the rules for `last` and `alone` to the kept list; dropping items does not change first and last."""
         last, last_rule = self._kept[-1]
         if last_rule.place is InList.NOT_LAST:
-            return reject(MissionResult.INVALID, last, "command", f"{last_rule.name} is last of the items kept")
+            return reject(MissionResult.INVALID, last, "command", f"{last_rule.name} would be last: rest dropped")
         commands = [kept for kept in self._kept[1:] if kept[1].record is not WpCommand.SETROI]
         if len(commands) == 1 and not commands[0][1].alone:
             item, rule = commands[0]

@@ -46,7 +46,7 @@ TURNS = Range(-127, 127, "turns -127..127", instead_of_zero=1)
 SECONDS = Range(1, 255, "seconds 1..255")
 NOSE_ON_ROI = Range(0, 1, "1 = nose on the ROI")
 NO_ROI_KNOWN = Range(0, 0, "no ROI is known")
-CRUISE = Range(-32767, 32767, "-32767..32767", instead_of_zero=2)
+CRUISE = Range(-32767, 32767, "-32767..32767 m", instead_of_zero=2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,8 +83,8 @@ def command_rules(wp_radius_cm: int, takeoff_max_m: int) -> Mapping[int, Command
     gps_wp_radius is rounded up to whole metres, so that no stored radius is smaller than it.
     """
     least = min(math.ceil(wp_radius_cm / 100), _MAX_RADIUS_M)
-    radius = Range(least, _MAX_RADIUS_M, f"{least}..{_MAX_RADIUS_M}")
-    climb = Range(2, takeoff_max_m, f"take-off 2..{takeoff_max_m}")
+    radius = Range(least, _MAX_RADIUS_M, f"{least}..{_MAX_RADIUS_M} m")
+    climb = Range(2, takeoff_max_m, f"take-off 2..{takeoff_max_m} m")
     # fmt: off
     rows = (
         #           record                      p1       p2      p4           position height  place           alone

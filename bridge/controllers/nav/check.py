@@ -275,7 +275,7 @@ class NavCheck(ListCheck):
         records = (*kept[:-1], replace(kept[-1], flag=LAST))
         items = items_from_records(records, self._home, self._sent_as)
         if lost:
-            why = f"Lost from the old list, which items cannot show: {lost}"
+            why = f"Lost with the old list, as no MAVLink item can show it: {lost}"
             self._findings.append(Finding(None, "count", len(self._rules.former), len(records), why, news=News.WARNING))
         for mission in erased(self._rules.others, self._profile.capacity - len(records)):
             _, unshown = keep_unshown((), mission)
@@ -308,7 +308,7 @@ class NavCheck(ListCheck):
             self._note(item, "alt_m", item.alt_m, alt_cm / 100, "whole cm, at most 32767 m")
         if rule.height is AltitudeUse.RTH:
             if alt_cm < 0:
-                self._note(item, "alt_m", item.alt_m, 0, "the flight controller's own height", News.WARNING)
+                self._note(item, "alt_m", item.alt_m, 0, "0 = its own RTH altitude", News.WARNING)
             return max(alt_cm, 0), 0
         above_sea = item.frame in SEA_LEVEL_FRAMES
         counts_from_sea = above_sea and self._profile.sea_level

@@ -63,7 +63,8 @@ class FleetFolder:
 
     def enroll(self, name: str, role: Role) -> list[Path]:
         """Add a member and write the router's configuration; returns the member's own files. ZenohSettingsError."""
-        check_name("vehicle", name)
+        check_name("the name", name)
+        check_name("--prefix", self.prefix)
         members = self.members()
         if members.get(name, role) is not role:
             raise EnrolmentError(f"{name} is a {members[name].value} already: choose another name")

@@ -73,7 +73,7 @@ def fleet_session(where: dict[str, Any]) -> Iterator[tuple[zenoh.Session, str]]:
     """
     try:
         daemon = ZenohSettings() if where["config"] is None else _daemon_settings(where["config"])
-        check_name("prefix", prefix := where["prefix"] or daemon.prefix)
+        prefix = check_name("--prefix", where["prefix"] or daemon.prefix)
     except ZenohSettingsError as error:
         raise click.UsageError(str(error)) from error
     try:

@@ -50,7 +50,7 @@ def bridge_of(key: str, prefix: str) -> BridgeState | None:
     match key.split("/"):
         case [first, name, *middle, session_id] if first == prefix and "/".join(middle) == ALIVE:
             try:
-                check_name("vehicle", name)
+                check_name("the name", name)
             except ZenohSettingsError:
                 return None
             return BridgeState(name, session_id)
