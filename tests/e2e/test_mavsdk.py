@@ -147,6 +147,19 @@ async def test_writing_and_reading_while_armed_are_refused(bench: Bench) -> None
         assert bench.board.records() == records_of(judge(plan))
 
 
+async def test_fences_and_rally_points_are_refused_as_unsupported(shared: Bench, kept: list[str]) -> None:
+    items = raw_items(plain_plan(4, start=20))
+    async with vehicle_at(shared.daemon.port) as vehicle:
+        missions = MissionRawAsync(vehicle)
+        for upload, mission_type in ((missions.upload_geofence, 1), (missions.upload_rally_points, 2)):
+            for item in items:
+                item.mission_type = mission_type
+            with pytest.raises(MissionRawError) as refused:
+                await upload(items)
+            assert refused.value.result == MissionRawResult.UNSUPPORTED
+    assert shared.board.records() == kept
+
+
 async def test_clear_mission_and_clear_all_clear_the_board(shared: Bench) -> None:
     """Its clear_mission sends an ArduPilot a list of one item of zeros."""
     async with vehicle_at(shared.daemon.port) as vehicle:
