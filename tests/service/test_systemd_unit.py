@@ -5,6 +5,8 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import pytest
+
 _UNIT = Path(__file__).resolve().parents[2] / "systemd" / "naze-bridge.service"
 #: Maximum exposure found by `systemd-analyze security`, in tenths.
 _BAR = 15
@@ -52,6 +54,13 @@ def test_the_units_exposure_is_low() -> None:
 
 def test_it_may_open_only_serial_ports() -> None:
     assert {line.removeprefix("DeviceAllow=") for line in settings() if line.startswith("DeviceAllow=")} == _SERIAL
+
+
+@pytest.mark.parametrize("driver", ["usbserial", "cdc_acm"])
+def test_a_board_may_be_plugged_in_after_the_start(driver: str) -> None:
+    """systemd looks up the DeviceAllow= names in /proc/devices at the start: the USB drivers must be loaded by then."""
+    for order in ("Wants=", "After="):
+        assert any(line.startswith(order) and f"modprobe@{driver}.service" in line for line in settings())
 
 
 def test_each_permission_has_its_reason() -> None:
