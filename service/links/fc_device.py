@@ -14,6 +14,8 @@ import serial
 from service.links.port_holder import explain_port_error, find_console
 from service.settings.addresses import UNKNOWN_HOST_HINT, AutoFc, FcAddress, SerialFc, TcpFc, family_of
 
+#: Errors of an open port: pyserial raises the last two if it is unplugged, or its driver refuses the speed.
+DEVICE_ERRORS = (OSError, termios.error, ValueError)
 _TCP_TIMEOUT_S = 3.0
 
 
@@ -63,12 +65,20 @@ def open_serial(path: str) -> serial.Serial:
         # VMIN 1, which pyserial calls inter_byte_timeout: with 0 an empty read returns as if the other end had closed
         # the line.
         port = serial.Serial(path, 115200, timeout=0, write_timeout=0, inter_byte_timeout=0, exclusive=True)
+        _keep_dtr(port.fileno())
     except (serial.SerialException, OSError) as error:
         raise PortError(explain_port_error(path, error)) from error
     except termios.error as error:
         raise PortError(f"{path} is not a serial port") from error
     os.set_blocking(port.fileno(), False)
     return port
+
+
+def _keep_dtr(descriptor: int) -> None:
+    """Let DTR stay on when the port closes: an Arduino with MultiWii resets when it comes on again, in flight, too."""
+    attributes = termios.tcgetattr(descriptor)
+    attributes[2] &= ~termios.HUPCL
+    termios.tcsetattr(descriptor, termios.TCSANOW, attributes)
 
 
 async def _open_tcp(address: TcpFc) -> socket.socket:

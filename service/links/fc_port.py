@@ -4,14 +4,13 @@
 import asyncio
 import os
 import socket
-import termios
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
 
 import serial
 import structlog
 
-from service.links.fc_device import Device, PortError
+from service.links.fc_device import DEVICE_ERRORS, Device, PortError
 
 #: The reason given to `on_close` at the end of the daemon.
 STOPPED = "the daemon stops"
@@ -74,20 +73,21 @@ class FcPort:
                     self._device = await self._open()
                 except (PortError, OSError) as error:
                     self._complain(str(error))
-                    await asyncio.sleep(_RETRY_S)
-                    continue
-                self._descriptor = self._device.fileno()
-                self._is_tcp = isinstance(self._device, socket.socket) and self._device.family != socket.AF_UNIX
-                self.trouble = ""
-                self._closed.clear()
-                self._loop.add_reader(self._descriptor, self._readable)
-                self._on_open()
-                await self._closed.wait()
+                else:
+                    self._descriptor = self._device.fileno()
+                    self._is_tcp = isinstance(self._device, socket.socket) and self._device.family != socket.AF_UNIX
+                    self.trouble = ""
+                    self._closed.clear()
+                    self._loop.add_reader(self._descriptor, self._readable)
+                    self._on_open()
+                    await self._closed.wait()
+                # Also after a loss: a TCP adapter in use accepts each connection and closes it at once.
+                await asyncio.sleep(_RETRY_S)
         finally:
             self._shut(STOPPED)
 
     def move_on(self) -> None:
-        """Close the port. It is reopened at once, and `open_device` may choose another one."""
+        """Close the port. It is reopened, and `open_device` may choose another one."""
         self._shut(MOVED_ON)
 
     def set_speed(self, baud: int | None) -> None:
@@ -99,7 +99,7 @@ class FcPort:
         try:
             self._device.reset_output_buffer()
             self._device.baudrate = baud
-        except (OSError, serial.SerialException, termios.error) as error:
+        except DEVICE_ERRORS as error:
             self._shut(str(error))
 
     def write(self, data: bytes) -> None:

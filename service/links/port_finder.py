@@ -16,7 +16,7 @@ import serial
 import structlog
 
 from bridge.fc.port_listener import OtherDeviceWatch, PortListener
-from service.links.fc_device import PortError, open_serial
+from service.links.fc_device import DEVICE_ERRORS, PortError, open_serial
 from service.links.port_holder import find_user
 from service.links.port_memory import PortMemory
 from service.links.serial_ports import SerialPort, serial_ports
@@ -129,8 +129,8 @@ class PortFinder:
             unless_used.callback(device.close)
             try:
                 what = "" if port.key == self._memory.flight_controller else await self._listen(device)
-            except OSError as error:
-                raise PortError(error.strerror or str(error)) from error
+            except DEVICE_ERRORS as error:
+                raise PortError(getattr(error, "strerror", None) or str(error)) from error
             if what:
                 self._memory.found_other(port.key, what)
                 raise PortError(f"{what} was heard there")

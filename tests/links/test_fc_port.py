@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The flight controller's port on a pty: batched reads at high rates, and writes faster than a UART."""
+"""The flight controller's port on a pty: batched reads, writes faster than a UART, errors and losses."""
 
 import asyncio
 import os
+import socket
+import termios
 import tty
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
 import pytest
+import serial
 
 from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import messages as m
@@ -225,3 +228,54 @@ async def test_queued_frames_are_dropped_when_the_speed_changes(line: Line) -> N
 
     await until_async(has_come, "the frame written afterwards")
     assert bytes(came) == b"for the new speed"
+
+
+async def test_dtr_stays_on_when_the_port_closes(line: Line) -> None:
+    """Boards with an Arduino's reset circuit restart when it comes on again."""
+    attributes = termios.tcgetattr(line._terminal)
+    attributes[2] |= termios.HUPCL
+    termios.tcsetattr(line._terminal, termios.TCSANOW, attributes)
+    port = line.start()
+    await until_async(lambda: line.opened, "the port")
+    port.set_speed(57600)
+    await line.stop()
+    assert not termios.tcgetattr(line._terminal)[2] & termios.HUPCL
+
+
+@pytest.mark.parametrize("error", [OSError("unplugged"), termios.error(5, "unplugged"), ValueError("unplugged")])
+async def test_a_port_that_takes_no_speed_counts_as_lost(
+    line: Line, error: Exception, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    port = line.start()
+    await until_async(lambda: line.opened, "the port")
+
+    def refuse(*_args: object) -> None:
+        raise error
+
+    monkeypatch.setattr(serial.Serial, "baudrate", property(refuse, refuse))
+    port.set_speed(57600)
+    assert "unplugged" in line.lost[0]
+    await line.stop()
+
+
+async def test_after_each_loss_there_is_a_pause(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A TCP adapter that is in use accepts a connection and closes it at once."""
+    monkeypatch.setattr("service.links.fc_port._RETRY_S", 3600)
+    opened = 0
+    lost: list[str] = []
+
+    async def open_device() -> socket.socket:
+        nonlocal opened
+        opened += 1
+        near, far = socket.socketpair()
+        far.close()
+        return near
+
+    port = FcPort(open_device, lambda: None, lambda _data: None, lost.append)
+    running = asyncio.get_running_loop().create_task(port.run())
+    await until_async(lambda: lost, "the loss")
+    for _ in range(50):
+        await asyncio.sleep(0)
+    assert opened == 1
+    running.cancel()
+    await asyncio.wait([running])
