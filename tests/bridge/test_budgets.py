@@ -8,14 +8,13 @@ from bridge.gcs.cost import LIMITS, Cost
 from bridge.gcs.station import Peer
 from protocols.mavlink.dialect import messages as m
 from protocols.msp.frame import MspParser
-from tests.support.world import GroundStation, World
+from tests.support.world import GroundStation, ready_world
 
 _SAVE = b"$M<\x00\xfa"
 
 
 def test_texts_are_limited() -> None:
-    world = World(speeds=(115200,))
-    world.wait_ready()
+    world = ready_world()
     station = GroundStation(world)
     banner = m.MAVLink_command_long_message(1, 1, 42428, 0, 0, 0, 0, 0, 0, 0, 0)
     for number in range(1000):
@@ -26,8 +25,7 @@ def test_texts_are_limited() -> None:
 
 def test_flash_writes_are_limited() -> None:
     """A flash page endures 10,000 erases."""
-    world = World(speeds=(115200,))
-    world.wait_ready()
+    world = ready_world()
     station = GroundStation(world)
     save = m.MAVLink_command_long_message(1, 1, 245, 0, 1, 0, 0, 0, 0, 0, 0)
     for number in range(300):
@@ -69,8 +67,7 @@ def test_a_newcomer_gets_the_same_share_as_each_busy_host() -> None:
 
 
 def test_a_flood_of_counts_is_not_logged() -> None:
-    world = World(speeds=(115200,))
-    world.wait_ready()
+    world = ready_world()
     station = GroundStation(world)
     world.faults.armed = True
     world.wait_until(lambda world: bool(world.bridge.session.vehicle.armed), 5)
@@ -84,8 +81,7 @@ def test_a_flood_of_counts_is_not_logged() -> None:
 
 def test_requests_from_strangers_are_not_passed_to_an_armed_board() -> None:
     """MISSION_CLEAR_ALL while armed once made it send eight times as much as telemetry does."""
-    world = World(speeds=(115200,))
-    world.wait_ready()
+    world = ready_world()
     stranger = GroundStation(world)
     stranger.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
     world.faults.armed = True

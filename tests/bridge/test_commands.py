@@ -10,7 +10,7 @@ from bridge.missions.fc_mission_store import PushFailure
 from bridge.vehicle.telemetry_table import TELEMETRY
 from protocols.mavlink.dialect import Message, messages
 from simulator.options import Faults
-from tests.support.world import GroundStation, World
+from tests.support.world import GroundStation, World, ready_world
 
 m = messages
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
@@ -25,8 +25,7 @@ TELEMETRY_TYPES = {"HEARTBEAT", "MISSION_CURRENT", "CURRENT_MODE"} | {
 @pytest.fixture(scope="module")
 def flying() -> tuple[World, GroundStation]:
     """A world whose board has a fix and a home."""
-    world = World(speeds=(115200,))
-    world.wait_ready()
+    world = ready_world()
     world.run(7)
     station = GroundStation(world)
     # A new station gets HOME_POSITION within a second: that is not a reply.
@@ -156,8 +155,7 @@ def test_a_mode_change_is_refused_with_a_text(flying: tuple[World, GroundStation
     ids=lambda message: message.get_type(),
 )
 def test_only_the_sender_gets_the_refusal(refused: Message) -> None:
-    world = World(speeds=(115200,))
-    world.wait_ready()
+    world = ready_world()
     asking, other = GroundStation(world, "asking"), GroundStation(world, "other", sysid=254)
     for station in (asking, other):
         station.send(m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3))
@@ -248,8 +246,7 @@ def values(heard: list[Message]) -> list[tuple[str, float, int, int]]:
 
 
 def radius_world() -> tuple[World, GroundStation]:
-    world = World(speeds=(115200,))
-    world.wait_ready()
+    world = ready_world()
     return world, GroundStation(world)
 
 

@@ -25,7 +25,7 @@ from tests.support.conversations import (
     waypoints,
 )
 from tests.support.fake_controllers import HARAKIRI_CAPABILITY, MspFake, ident
-from tests.support.world import Air, GroundStation, World, flash_holding
+from tests.support.world import Air, GroundStation, World, flash_holding, ready_world
 
 OLD = waypoints(20, seed=77)
 OLD_RECORDS = records_of(OLD)
@@ -138,8 +138,7 @@ def test_an_empty_list_is_count_0_until_home_is_known() -> None:
 
 @pytest.mark.parametrize("as_int", [True, False])
 def test_item_0_of_an_empty_list_is_the_flight_controllers_home(as_int: bool) -> None:
-    world = World(speeds=(115200,))
-    world.wait_ready()
+    world = ready_world()
     world.run(6)
     station = GroundStation(world)
     (item,) = ask(station, request_message(0, as_int=as_int))

@@ -11,7 +11,7 @@ from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import Command
 from simulator.flight import FIELD_LAT_E7, FIELD_LON_E7
-from tests.support.world import GroundStation, World
+from tests.support.world import GroundStation, World, ready_world
 
 _TIMEOUT_S = 30.0
 _GAP_REQUESTED_AFTER_S = 0.2
@@ -110,8 +110,7 @@ def command(number: int, lat: float, lon: float, height_m: float) -> Message:
 
 
 def test_a_mission_is_added_to_the_home_of_an_empty_board() -> None:
-    world = World(speeds=(115200,))
-    world.wait_ready()
+    world = ready_world()
     vehicle = DroneKit(world)
     vehicle.connect()
     assert vehicle.parameters["SYSID_THISMAV"] == 1

@@ -14,7 +14,7 @@ from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import MissionResult
 from simulator.options import SimOptions
 from tests.support.conversations import Upload, records_of, waypoints
-from tests.support.world import Air, GroundStation, World
+from tests.support.world import Air, GroundStation, World, ready_world
 
 HOUR_S = 3600.0
 PILOT = Peer("udp", ("10.0.0.1", 14550))
@@ -120,8 +120,7 @@ def test_a_single_pilot_leaves_a_reserve_to_newcomers() -> None:
 
 
 def test_an_unchanged_list_is_not_counted() -> None:
-    world = World(speeds=(115200,))
-    world.wait_ready()
+    world = ready_world()
     pilot = GroundStation(world)
     for _ in range(40):
         assert Upload(pilot, waypoints(3)).run(2) is MissionResult.ACCEPTED

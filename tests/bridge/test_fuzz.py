@@ -25,7 +25,7 @@ from storage.mission_store import open_store
 from storage.store_error import StoreError
 from tests.support.fuzz_inputs import FuzzInputs
 from tests.support.sample_missions import mission
-from tests.support.world import GroundStation, World
+from tests.support.world import GroundStation, World, ready_world
 
 REPOSITORY = Path(__file__).parents[2]
 EXAMPLES = int(os.environ.get("FUZZ_EXAMPLES", "15"))
@@ -49,8 +49,7 @@ def _fuzz(test: Callable[..., Any]) -> Callable[..., Any]:
 @_fuzz
 def test_no_input_from_ground_stations_raises(seed: int) -> None:
     inputs = FuzzInputs(seed)
-    world = World(speeds=(115200,))
-    world.wait_ready()
+    world = ready_world()
     stations = [GroundStation(world, str(number), sysid=250 + number) for number in range(4)]
     for number in range(AT_ONCE):
         station = inputs.random.choice(stations)

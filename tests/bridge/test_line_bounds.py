@@ -14,7 +14,7 @@ from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, request
 from simulator.options import Faults, SimOptions
 from tests.support.conversations import Download, records_of, waypoints
-from tests.support.world import GroundStation, World, flash_holding
+from tests.support.world import GroundStation, World, flash_holding, ready_world
 
 FULL_RECORDS = records_of(waypoints(146, 3))
 FULL_FLASH = flash_holding(FULL_RECORDS)
@@ -106,8 +106,7 @@ def test_the_backlog_of_a_stalled_board_fits_its_ring(hang_s: float, baud: int, 
 
 
 def test_polls_keep_their_rate() -> None:
-    world = World(speeds=(115200,))
-    world.wait_ready()
+    world = ready_world()
     world.written.clear()
     world.run(20)
     times = [at for at, _, data in world.written if data == request(101)]

@@ -15,7 +15,7 @@ from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import MissionResult
 from tests.support.conversations import Upload, count_message, records_of, waypoints
-from tests.support.world import Air, GroundStation, World
+from tests.support.world import Air, GroundStation, World, ready_world
 
 HELLO = m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
 SECONDS, PER_S = 4, 2000
@@ -61,8 +61,7 @@ def longest_gap_s(pilot: GroundStation, since: float) -> float:
 
 
 def test_a_flood_does_not_affect_a_pilot_who_connected_before_it() -> None:
-    world = World(speeds=(115200,))
-    world.wait_ready()
+    world = ready_world()
     pilot = GroundStation(world, "pilot", air=Air(delay_s=0.01))
     pilot.send(HELLO)
     world.run(1)
@@ -92,8 +91,7 @@ def test_refused_addresses_are_not_remembered() -> None:
 @pytest.mark.parametrize("addresses", [new_hosts, new_ports, same_again, many_hosts])
 def test_a_pilot_who_arrives_later_can_write(addresses: Callable[[random.Random], Callable[[], Address]]) -> None:
     """The flood announces 500 lists a second, sixty times the limit for all newcomers together."""
-    world = World(speeds=(115200,))
-    world.wait_ready()
+    world = ready_world()
     pilot = GroundStation(world, "pilot", air=Air(delay_s=0.01))
     attack(world, [count_message(9)], addresses(random.Random(7)), 500, 6.0)
     world.run(0.5)
@@ -110,8 +108,7 @@ def test_a_pilot_who_arrives_later_can_write(addresses: Callable[[random.Random]
 
 def test_a_pilot_on_a_slow_radio_can_write_during_a_flood() -> None:
     """Between two of the pilot's items a hundred lists are announced, more than are received at once."""
-    world = World(speeds=(115200,))
-    world.wait_ready()
+    world = ready_world()
     pilot = GroundStation(world, "pilot", air=Air(delay_s=0.7))
     for beat in range(4):
         world.after(beat, lambda: pilot.send(HELLO))
@@ -123,8 +120,7 @@ def test_a_pilot_on_a_slow_radio_can_write_during_a_flood() -> None:
 
 
 def test_a_sender_over_its_limit_is_not_read() -> None:
-    world = World(speeds=(115200,))
-    world.wait_ready()
+    world = ready_world()
     stranger = GroundStation(world)
     data = stranger.pack(HELLO)
     for number in range(10_000):

@@ -11,7 +11,7 @@ from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.mode_messages import AVAILABLE_MODES
 from protocols.msp.commands import Msp
 from protocols.msp.frame import MspParser
-from tests.support.world import GroundStation, World
+from tests.support.world import GroundStation, World, ready_world
 
 m = messages
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
@@ -22,9 +22,7 @@ MISSION_PLANNER = ((2, 2), (6, 2), (10, 4), (11, 4), (12, 2), (1, 2), (3, 2))
 
 @pytest.fixture
 def world() -> World:
-    world = World(speeds=(115200,))
-    world.wait_ready()
-    return world
+    return ready_world()
 
 
 def station_of(world: World, name: str) -> GroundStation:

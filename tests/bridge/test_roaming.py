@@ -9,18 +9,12 @@ from bridge.gcs.stations import EXPIRY_S, MOVED_S
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import MissionResult
 from tests.support.conversations import Download, Upload, count_message, item_message, records_of, waypoints
-from tests.support.world import Air, GroundStation, World
+from tests.support.world import Air, GroundStation, World, ready_world
 
 m = messages
 PLAN = waypoints(40)
 #: Enough items for a long upload.
 WIFI = Air(delay_s=0.02)
-
-
-def start() -> World:
-    world = World(speeds=(115200,))
-    world.wait_ready()
-    return world
 
 
 def beat(station: GroundStation, is_there: list[GroundStation]) -> None:
@@ -69,7 +63,7 @@ class Roamer:
 
 
 def test_the_new_address_is_served_at_once_and_the_old_one_dropped() -> None:
-    world = start()
+    world = ready_world()
     roamer = Roamer(world)
     old = roamer.station
     world.run(3)
@@ -84,7 +78,7 @@ def test_the_new_address_is_served_at_once_and_the_old_one_dropped() -> None:
 
 
 def test_a_station_may_move_away_and_back() -> None:
-    world = start()
+    world = ready_world()
     roamer = Roamer(world)
     home = roamer.station
     for _ in range(3):
@@ -103,7 +97,7 @@ def test_a_station_may_move_away_and_back() -> None:
 
 def test_two_stations_with_the_same_ids_stay_separate() -> None:
     """Two Mission Planners with their default ids."""
-    world = start()
+    world = ready_world()
     both = [GroundStation(world, name) for name in ("one", "other")]
     for station in both:
         beat(station, both)
@@ -117,7 +111,7 @@ def test_two_stations_with_the_same_ids_stay_separate() -> None:
 
 
 def test_a_silent_station_with_shared_ids_is_kept_for_a_minute() -> None:
-    world = start()
+    world = ready_world()
     station, other = GroundStation(world), GroundStation(world, "other", sysid=250)
     station.send(heartbeat())
     beat(other, [other])
@@ -126,7 +120,7 @@ def test_a_silent_station_with_shared_ids_is_kept_for_a_minute() -> None:
 
 
 def test_behind_a_router_a_station_moves_only_with_all_others() -> None:
-    world = start()
+    world = ready_world()
     router, away = GroundStation(world, "router"), GroundStation(world, "away")
     behind = GroundStation(world, "router", sysid=250)
     for station in (router, behind):
@@ -145,7 +139,7 @@ def test_behind_a_router_a_station_moves_only_with_all_others() -> None:
 def test_an_upload_continues_from_a_new_address(seed: int) -> None:
     """Moving once or twice at any moment, also after the last item and while the list is written."""
     chance = random.Random(seed)
-    world = start()
+    world = ready_world()
     roamer = Roamer(world)
     upload = Upload(roamer.station, PLAN)
     for _ in range(chance.choice((1, 1, 2))):
@@ -157,7 +151,7 @@ def test_an_upload_continues_from_a_new_address(seed: int) -> None:
 
 
 def test_requests_follow_a_station_that_only_sends_items() -> None:
-    world = start()
+    world = ready_world()
     roamer = Roamer(world)
     upload = Upload(roamer.station, PLAN, repeat_s=100)
     world.wait_until(lambda _: len(upload.requested) > 20, 5)
@@ -168,7 +162,7 @@ def test_requests_follow_a_station_that_only_sends_items() -> None:
 
 def test_an_upload_restarted_from_a_new_address_replaces_the_old_one() -> None:
     for count in (40, 30):
-        world = start()
+        world = ready_world()
         roamer = Roamer(world)
         old = Upload(roamer.station, PLAN)
         world.wait_until(lambda _, old=old: len(old.requested) > 20, 5)  # type: ignore[misc]
@@ -181,7 +175,7 @@ def test_an_upload_restarted_from_a_new_address_replaces_the_old_one() -> None:
 
 
 def test_the_result_of_an_upload_goes_to_the_new_address() -> None:
-    world = start()
+    world = ready_world()
     roamer = Roamer(world)
     upload = Upload(roamer.station, PLAN)
     world.wait_until(lambda _: len(upload.requested) > 20, 5)
@@ -194,7 +188,7 @@ def test_the_result_of_an_upload_goes_to_the_new_address() -> None:
 
 def test_a_second_station_with_the_same_ids_cannot_join_an_upload() -> None:
     """It was known before, or the first one is still active: its list waits, and its items are ignored."""
-    world = start()
+    world = ready_world()
     first, second = GroundStation(world, "first", air=WIFI), GroundStation(world, "second")
     second.send(heartbeat())
     world.run(0.5)
@@ -214,7 +208,7 @@ def test_a_second_station_with_the_same_ids_cannot_join_an_upload() -> None:
 
 def test_a_refused_station_is_not_mistaken_for_one_that_moved() -> None:
     """Mission Planner sends its items even after its COUNT was refused, when the first station is silent."""
-    world = start()
+    world = ready_world()
     first = GroundStation(world, "first", air=WIFI)
     upload = Upload(first, PLAN, repeat_s=100)
     world.wait_until(lambda _: len(upload.requested) > 10, 5)
@@ -233,7 +227,7 @@ def test_a_refused_station_is_not_mistaken_for_one_that_moved() -> None:
 
 
 def test_a_download_continues_from_a_new_address() -> None:
-    world = start()
+    world = ready_world()
     roamer = Roamer(world)
     assert Upload(roamer.station, PLAN).run() is MissionResult.ACCEPTED
     download = Download(roamer.station)

@@ -14,7 +14,7 @@ from bridge.gcs.stations import EXPIRY_S, MAX_PEERS
 from protocols.mavlink.dialect import CRC_EXTRA, Message, messages
 from protocols.mission_item import MissionResult
 from tests.support.conversations import Upload, waypoints
-from tests.support.world import GroundStation, World
+from tests.support.world import GroundStation, World, ready_world
 
 m = messages
 
@@ -31,15 +31,9 @@ def versions(station: GroundStation, *, heartbeats: bool = True) -> set[int]:
     return {1 if magic == 0xFE else 2 for magic, msgid in ids if heartbeats or (magic, msgid) not in heartbeat_ids}
 
 
-def start() -> World:
-    world = World(speeds=(115200,))
-    world.wait_ready()
-    return world
-
-
 @pytest.mark.parametrize("version", [1, 2])
 def test_each_station_is_answered_in_its_own_version(version: int) -> None:
-    world = start()
+    world = ready_world()
     station = GroundStation(world, version=version)
     other = GroundStation(world, "other", sysid=250, version=3 - version)
     for one in (station, other):
@@ -55,7 +49,7 @@ def test_each_station_is_answered_in_its_own_version(version: int) -> None:
 
 
 def test_a_station_that_switches_to_mavlink_2_is_answered_in_it() -> None:
-    world = start()
+    world = ready_world()
     station = GroundStation(world, version=1)
     station.send(gcs_heartbeat())
     world.run(1.5)
@@ -72,7 +66,7 @@ def test_a_station_that_switches_to_mavlink_2_is_answered_in_it() -> None:
 
 def test_a_new_station_gets_faster_heartbeats_for_three_seconds() -> None:
     """Mission Planner needs two heartbeats before it continues connecting."""
-    world = start()
+    world = ready_world()
     old, new = GroundStation(world, "old"), GroundStation(world, "new", sysid=254)
     old.send(gcs_heartbeat())
     world.run(5)
@@ -86,7 +80,7 @@ def test_a_new_station_gets_faster_heartbeats_for_three_seconds() -> None:
 
 
 def test_a_heartbeat_is_sent_once_a_second() -> None:
-    world = start()
+    world = ready_world()
     station = GroundStation(world)
     station.send(gcs_heartbeat())
     world.run(4)
@@ -118,7 +112,7 @@ def test_the_heartbeat_reflects_the_flight_controller_and_arming() -> None:
 
 
 def test_a_station_silent_for_a_minute_gets_no_more_messages() -> None:
-    world = start()
+    world = ready_world()
     station = GroundStation(world)
     station.send(gcs_heartbeat())
     world.run(EXPIRY_S - 1)
@@ -134,7 +128,7 @@ def test_a_station_silent_for_a_minute_gets_no_more_messages() -> None:
 
 
 def test_an_active_station_is_kept() -> None:
-    world = start()
+    world = ready_world()
     station = GroundStation(world)
     for second in range(0, 200, 20):
         world.after(second, lambda: station.send(gcs_heartbeat()))
@@ -144,7 +138,7 @@ def test_an_active_station_is_kept() -> None:
 
 
 def test_a_default_peer_always_gets_messages_in_both_versions() -> None:
-    world = start()
+    world = ready_world()
     station = GroundStation(world, "fixed")
     world.bridge.ground.add_default_peer(station.peer, until_answered=False)
     world.run(5)
@@ -162,7 +156,7 @@ def test_a_default_peer_always_gets_messages_in_both_versions() -> None:
 
 
 def test_a_broadcast_address_is_used_until_a_station_answers() -> None:
-    world = start()
+    world = ready_world()
     everyone = GroundStation(world, "broadcast")
     world.bridge.ground.add_default_peer(everyone.peer, until_answered=True)
     world.run(3)
@@ -179,7 +173,7 @@ def test_a_broadcast_address_is_used_until_a_station_answers() -> None:
 
 
 def test_hundreds_of_strangers_leave_room_for_a_new_station() -> None:
-    world = start()
+    world = ready_world()
     station = GroundStation(world)
     frame = GroundStation(world, "pack", sysid=9).pack(gcs_heartbeat())
     for number in range(500):
@@ -196,7 +190,7 @@ def test_hundreds_of_strangers_leave_room_for_a_new_station() -> None:
 
 
 def test_thirty_stations_that_request_everything_share_2400_messages_a_second() -> None:
-    world = start()
+    world = ready_world()
     stations = [GroundStation(world, str(number), sysid=number) for number in range(1, 31)]
     for station in stations:
         station.send(gcs_heartbeat())
@@ -210,7 +204,7 @@ def test_thirty_stations_that_request_everything_share_2400_messages_a_second() 
 
 
 def test_a_stream_may_be_split_over_reads_and_is_forgotten_at_its_end() -> None:
-    world = start()
+    world = ready_world()
     station = GroundStation(world, "tcp")
     data = station.pack(gcs_heartbeat()) + station.pack(
         m.MAVLink_command_long_message(1, 1, 511, 0, 0, 0, 0, 0, 0, 0, 0)
@@ -231,7 +225,7 @@ def test_a_stream_may_be_split_over_reads_and_is_forgotten_at_its_end() -> None:
 
 
 def test_a_truncated_datagram_does_not_affect_the_next() -> None:
-    world = start()
+    world = ready_world()
     station = GroundStation(world)
     command = station.pack(m.MAVLink_command_long_message(1, 1, 511, 0, 0, 0, 0, 0, 0, 0, 0))
     for datagram in (command[:10], b"\xfd\xff" + command, command + command, b"\xfe\x09" + command[:5]):
@@ -241,7 +235,7 @@ def test_a_truncated_datagram_does_not_affect_the_next() -> None:
 
 
 def test_our_own_frames_are_not_taken_for_a_station() -> None:
-    world = start()
+    world = ready_world()
     station = GroundStation(world)
     station.send(gcs_heartbeat())
     world.run(2)
@@ -279,7 +273,7 @@ def test_pieces_joined_without_a_space_have_the_same_words(sizes: list[int]) -> 
 
 
 def test_the_pieces_of_a_long_text_can_be_joined_or_read_alone() -> None:
-    world = start()
+    world = ready_world()
     stations = [GroundStation(world, "new"), GroundStation(world, "old", version=1, sysid=254)]
     for station in stations:
         station.send(gcs_heartbeat())
@@ -303,7 +297,7 @@ def test_the_pieces_of_a_long_text_can_be_joined_or_read_alone() -> None:
 @pytest.mark.parametrize("seed", range(6))
 def test_any_payload_in_any_message_raises_nothing(seed: int) -> None:
     """Valid checksums around arbitrary contents: too short, too long, not a number, not text."""
-    world = start()
+    world = ready_world()
     station = GroundStation(world)
     draw = random.Random(seed)
     understood = [msgid for msgid in CRC_EXTRA if world.bridge._incoming._router.understands(msgid)]

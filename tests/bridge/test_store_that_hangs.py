@@ -8,7 +8,7 @@ from bridge.model.mission_log import ArrivedMission, Outcome
 from bridge.model.verdict import CLEARED_LIST
 from protocols.mission_item import MissionResult
 from tests.support.conversations import Download, Upload, records_of, waypoints
-from tests.support.world import GroundStation, World, flash_holding
+from tests.support.world import GroundStation, World, flash_holding, ready_world
 
 NEVER = 1e9
 
@@ -51,8 +51,7 @@ def test_the_flight_controller_is_still_found_and_read() -> None:
 
 def test_identification_delayed_by_many_missions_is_repeated() -> None:
     """Each mission waits 3 s for the store, and identification waits behind them in the queue."""
-    world = World(speeds=(115200,))
-    world.wait_ready()
+    world = ready_world()
     world.store.delay_s = NEVER
     for _ in range(10):
         world.bridge.runner.start(save(ArrivedMission("", (), CLEARED_LIST)), lambda *_: None, world.now)

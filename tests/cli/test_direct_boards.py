@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from protocols.mission_file import read_mission_file, write_qgc_wpl
+from protocols.mission_file import read_mission_file
 from protocols.mission_item import Command
 from simulator.fc_kinds import KINDS
 from simulator.inav_mission import CAPACITY
 from simulator.nav_waypoint import FLAG_LAST, NavWaypoint
 from tests.support.benches import Starter
-from tests.support.plan import HOME, PlanRow, waypoint
+from tests.support.plan import HOME, PlanRow, plan_text, waypoint
 from tests.support.programs import Board, run_naze_bridge
 
 STORES_MISSIONS = ("naze", "inav", "multiwii")
@@ -39,7 +39,7 @@ def other_board(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPat
 @pytest.fixture
 def plan_file(tmp_path: Path) -> Path:
     file = tmp_path / "plan.waypoints"
-    file.write_text(write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(PLAN)]))
+    file.write_text(plan_text(PLAN))
     return file
 
 

@@ -17,7 +17,7 @@ from click.testing import CliRunner
 from protocols.mission_file import write_qgc_wpl
 from service.cli.main import main
 from tests.support.benches import Starter
-from tests.support.plan import judge, plain_plan, records_of
+from tests.support.plan import judge, plain_plan, plan_text, records_of
 from tests.support.programs import Board, run_naze_bridge
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -39,7 +39,7 @@ def assert_one_sentence(ended: subprocess.CompletedProcess[str], code: int, *par
 def test_a_round_trip_of_a_mission(board: Board, tmp_path: Path) -> None:
     plan = plain_plan(5)
     file = tmp_path / "plan"
-    file.write_text(write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(plan)]))
+    file.write_text(plan_text(plan))
     assert run_naze_bridge("push", file, "--fc", board.link).returncode == 0
     assert board.records() == records_of(judge(plan))
     assert run_naze_bridge("pull", tmp_path / "held", "--fc", board.link).returncode == 0

@@ -16,10 +16,10 @@ from typing import Any
 
 import pytest
 
-from protocols.mission_file import read_mission_file, write_qgc_wpl
+from protocols.mission_file import read_mission_file
 from protocols.mission_item import Command
 from tests.support.benches import Starter
-from tests.support.plan import HOME, PlanRow, judge, plain_plan, records_of, waypoint
+from tests.support.plan import HOME, PlanRow, judge, plain_plan, plan_text, records_of, waypoint
 from tests.support.programs import Daemon, run_naze_bridge
 
 
@@ -60,7 +60,7 @@ def strict(text: str) -> Any:
 
 
 def write_plan(path: Path, plan: list[PlanRow]) -> Path:
-    path.write_text(write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(plan)]))
+    path.write_text(plan_text(plan))
     return path
 
 

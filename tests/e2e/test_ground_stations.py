@@ -43,17 +43,10 @@ def test_every_kind_of_link_works_at_once(start: Starter) -> None:
             assert station.upload(plan) is MissionResult.ACCEPTED
             assert station.download() == expected_fields(plan)
             assert bench.board.records() == records_of(judge(plan))
-        until(lambda: len(_stations(bench)) == 4, "four ground stations")
+        until(lambda: len(bench.daemon.ground_stations()) == 4, "four ground stations")
         # Once a station has answered, only it gets messages, and no longer the whole network.
-        assert not [peer for peer in _stations(bench) if "127.255.255.255'" in peer]
-    until(lambda: len(_stations(bench)) == 3, "the end of the TCP connection")
-
-
-def _stations(bench: Bench) -> list[str]:
-    status = bench.daemon.status()
-    assert status is not None
-    stations: list[str] = status["ground_stations"]
-    return stations
+        assert not [peer for peer in bench.daemon.ground_stations() if "127.255.255.255'" in peer]
+    until(lambda: len(bench.daemon.ground_stations()) == 3, "the end of the TCP connection")
 
 
 def test_a_tcp_client_that_disconnects_during_an_upload_blocks_no_one(start: Starter) -> None:

@@ -17,7 +17,7 @@ from protocols.msp.nav import NavRecord
 from tests.e2e.test_mavsdk import fields, raw_items, refusal_of, vehicle_at
 from tests.support.benches import Bench, Starter
 from tests.support.mavproxy import MavProxy
-from tests.support.plan import HOME, PlanRow, stored_fields, waypoint
+from tests.support.plan import HOME, PlanRow, as_items, stored_fields, waypoint
 from tests.support.programs import until
 
 RULES = NavRules(inav_profile())
@@ -41,7 +41,7 @@ def nav_plan(records: int) -> list[PlanRow]:
 
 
 def judged(plan: list[PlanRow]) -> Verdict[NavRecord]:
-    return check_list([row.as_sent(seq, use_int=True) for seq, row in enumerate(plan)], RULES)
+    return check_list(as_items(plan), RULES)
 
 
 def expected(plan: list[PlanRow]) -> list[tuple[float, ...]]:

@@ -16,13 +16,6 @@ from tests.support.programs import PATIENCE, Daemon, free_port, until
 PLAN = plain_plan(40)
 
 
-def ground_stations(bench: Bench) -> list[str]:
-    status = bench.daemon.status()
-    assert status is not None
-    stations: list[str] = status["ground_stations"]
-    return stations
-
-
 def has_lost_port(daemon: Daemon, times: int) -> bool:
     return len([entry for entry in daemon.events() if entry["event"] == "fc.port_lost"]) == times
 
@@ -109,7 +102,7 @@ def test_an_upload_continues_from_another_address(bench: Bench) -> None:
 
         def is_alone() -> bool:
             here.say_hello()
-            return len(ground_stations(bench)) == 1
+            return len(bench.daemon.ground_stations()) == 1
 
         until(is_alone, "the end of the old address")
 

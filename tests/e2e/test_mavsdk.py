@@ -24,7 +24,17 @@ from mavsdk.asyncio.plugins.telemetry.telemetry import TelemetryAsync
 
 from protocols.mission_item import Command
 from tests.support.benches import Bench
-from tests.support.plan import HOME, PlanRow, expected_fields, judge, mixed_plan, plain_plan, records_of, waypoint
+from tests.support.plan import (
+    HOME,
+    PlanRow,
+    as_items,
+    expected_fields,
+    judge,
+    mixed_plan,
+    plain_plan,
+    records_of,
+    waypoint,
+)
 from tests.support.programs import PATIENCE, until
 
 T = TypeVar("T")
@@ -41,7 +51,7 @@ async def vehicle_at(port: int, *, listen: bool = False) -> AsyncIterator[Any]:
 
 
 def raw_items(plan: Sequence[PlanRow]) -> list[Any]:
-    items = [row.as_sent(seq, use_int=True) for seq, row in enumerate(plan)]
+    items = as_items(plan)
     return [
         MissionItem(
             item.seq,

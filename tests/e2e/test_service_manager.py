@@ -21,7 +21,7 @@ from service.settings import Settings
 from service.settings.addresses import parse_fc, parse_gcs
 from tests.support.benches import Starter
 from tests.support.plain_station import udp_station
-from tests.support.plan import judge, plain_plan, records_of
+from tests.support.plan import as_items, judge, plain_plan, records_of
 from tests.support.programs import PATIENCE, free_port, run_naze_bridge, until, until_async
 from tests.support.programs import Daemon as DaemonProgram
 
@@ -138,7 +138,7 @@ def push_begun(daemon: DaemonProgram) -> socket.socket:
     connection = socket.socket(socket.AF_UNIX)
     connection.settimeout(PATIENCE)
     connection.connect(str(daemon.state_dir / "control.sock"))
-    items = [asdict(row.as_sent(seq, use_int=True)) for seq, row in enumerate(_LONG)]
+    items = [asdict(item) for item in as_items(_LONG)]
     connection.sendall(json.dumps({"do": "push", "source": "test", "items": items}).encode() + b"\n")
     while b"progress" not in connection.recv(4096):
         pass

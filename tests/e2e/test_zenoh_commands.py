@@ -11,10 +11,9 @@ from typing import Any
 import pytest
 import zenoh
 
-from protocols.mission_file import write_qgc_wpl
 from service.zenoh_link.keys import COMMANDS
 from tests.support.benches import Bench, Starter
-from tests.support.plan import judge, plain_plan, records_of
+from tests.support.plan import judge, plain_plan, plan_text, records_of
 from tests.support.programs import until
 from tests.support.zenoh_bench import I_KNOW, ask, ask_surely, endpoint, key, session, write_config, zenoh_bench
 
@@ -24,7 +23,7 @@ UPLOAD, CHECK, CLEAR, RESTORE, STATUS = (
 
 
 def mission_file(count: int, start: int = 0) -> bytes:
-    return write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(plain_plan(count, start))]).encode()
+    return plan_text(plain_plan(count, start)).encode()
 
 
 @pytest.fixture(scope="module")

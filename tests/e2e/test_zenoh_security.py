@@ -12,19 +12,18 @@ from typing import Any
 import pytest
 import trustme
 
-from protocols.mission_file import write_qgc_wpl
 from service.settings.key import SettingsError
 from service.settings.load import load_settings
 from service.zenoh_link.keys import COMMANDS
 from tests.support.benches import Bench, Starter
-from tests.support.plan import judge, plain_plan, records_of
+from tests.support.plan import judge, plain_plan, plan_text, records_of
 from tests.support.programs import until
 from tests.support.secured_fleet import Fleet, password_fleet, tls_fleet
 from tests.support.zenoh_bench import Reader, ask, ask_surely, body, key, write_config, zenoh_bench
 
 UPLOAD = f"{COMMANDS}/mission/upload"
 EXPIRED: dict[str, Any] = {"not_before": datetime.datetime(2020, 1, 1), "not_after": datetime.datetime(2021, 1, 1)}
-MISSION = write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(plain_plan(12))]).encode()
+MISSION = plan_text(plain_plan(12)).encode()
 
 
 @pytest.fixture(scope="module")

@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from protocols.mission_file import read_mission_file, write_qgc_wpl
+from protocols.mission_file import read_mission_file
 from protocols.mission_item import Command
 from service.cli.fleet.session import open_session
 from tests.support.fleet_bench import Fleet
-from tests.support.plan import HOME, PlanRow, judge, plain_plan, records_of, waypoint
+from tests.support.plan import HOME, PlanRow, judge, plain_plan, plan_file, records_of, waypoint
 from tests.support.programs import run_naze_bridge, until
 from tests.support.zenoh_router import EXAMPLES
 
@@ -34,12 +34,6 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fleet]:
         fleet.start("swift", fc=str(board.link))
         fleet.wait(*NAMES)
         yield fleet
-
-
-def plan_file(folder: Path, plan: list[PlanRow]) -> Path:
-    path = folder / "plan.waypoints"
-    path.write_text(write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(plan)]))
-    return path
 
 
 def test_list_shows_what_each_daemon_reports(fleet: Fleet) -> None:

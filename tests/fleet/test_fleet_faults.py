@@ -15,12 +15,11 @@ from typing import Any
 
 import pytest
 
-from protocols.mission_file import write_qgc_wpl
 from service.cli.fleet.roll_call import roll_call
 from service.cli.fleet.session import FleetError
 from service.zenoh_link.keys import UPLOAD
 from tests.support.fleet_bench import I_KNOW, Fleet
-from tests.support.plan import judge, plain_plan, records_of
+from tests.support.plan import judge, plain_plan, plan_text, records_of
 from tests.support.programs import NAZE_BRIDGE, PATIENCE, until
 from tests.support.zenoh_bench import ask_surely
 
@@ -77,7 +76,7 @@ class Command:
 def long_push(fleet: Fleet, *options: str) -> Command:
     """Start to push the long mission to all; return while the slow vehicle is receiving it."""
     file = fleet.folder / "long.waypoints"
-    file.write_text(write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(plain_plan(_COUNT))]))
+    file.write_text(plan_text(plain_plan(_COUNT)))
 
     def pushes() -> int:
         return sum(event["event"] == "mission.push_started" for event in fleet.daemons["snail"].events())

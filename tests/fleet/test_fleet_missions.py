@@ -8,10 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from protocols.mission_file import write_qgc_wpl
 from protocols.mission_item import Command
 from tests.support.fleet_bench import Fleet
-from tests.support.plan import HOME, PlanRow, plain_plan, waypoint
+from tests.support.plan import HOME, PlanRow, plain_plan, plan_file, waypoint
 from tests.support.programs import run_naze_bridge, until
 
 NAMES = ("kite", "owl", "swift")
@@ -25,12 +24,6 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fleet]:
             fleet.start(name)
         fleet.wait(*NAMES)
         yield fleet
-
-
-def plan_file(folder: Path, plan: list[PlanRow]) -> Path:
-    path = folder / "plan.waypoints"
-    path.write_text(write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(plan)]))
-    return path
 
 
 def test_a_dry_run_reports_the_corrections_and_writes_nothing(fleet: Fleet, tmp_path: Path) -> None:

@@ -10,10 +10,9 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from protocols.mission_file import write_qgc_wpl
 from service.cli.fleet.watch import watching
 from tests.support.fleet_bench import Fleet
-from tests.support.plan import plain_plan
+from tests.support.plan import plain_plan, plan_text
 from tests.support.programs import until
 from tests.support.zenoh_router import client
 from tests.support.zenoh_storage import storage
@@ -51,7 +50,7 @@ def test_dead_vehicles_are_stored_but_not_listed(stored: tuple[Fleet, zenoh.Sess
 def test_pull_and_push_ignore_the_storage(stored: tuple[Fleet, zenoh.Session], tmp_path: Path) -> None:
     fleet, looking = stored
     file = tmp_path / "plan.waypoints"
-    file.write_text(write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(plain_plan(7))]))
+    file.write_text(plan_text(plain_plan(7)))
     assert list(fleet.pushed(file, "--all", code=0)) == ["kite"]
     until(lambda: "kite" in stored_names(looking, "mission/current"), "the mission in the storage")
     pulled = json.loads(fleet.ask("pull", "--json").stdout)["vehicles"]

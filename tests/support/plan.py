@@ -4,11 +4,13 @@
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.missions.list_check import check_list
 from bridge.model.verdict import Verdict
 from protocols.mavlink.dialect import Message, messages
+from protocols.mission_file.qgc_wpl import write_qgc_wpl
 from protocols.mission_item import Command, Frame, MissionItem, degrees_to_e7
 from protocols.mission_record import pack_records
 from protocols.msp.mission import WpRecord
@@ -58,9 +60,26 @@ def single(value: float) -> float:
     return number
 
 
+def as_items(rows: Sequence[PlanRow], *, use_int: bool = True) -> list[MissionItem]:
+    """The items as the ground station sends them."""
+    return [row.as_sent(seq, use_int=use_int) for seq, row in enumerate(rows)]
+
+
+def plan_text(rows: Sequence[PlanRow]) -> str:
+    """The list as a QGC WPL file."""
+    return write_qgc_wpl(as_items(rows))
+
+
+def plan_file(folder: Path, rows: Sequence[PlanRow]) -> Path:
+    """Write the list to a file."""
+    path = folder / "plan.waypoints"
+    path.write_text(plan_text(rows))
+    return path
+
+
 def judge(rows: Sequence[PlanRow], *, use_int: bool = True, profile: HarakiriRules = PROFILE) -> Verdict[WpRecord]:
     """The rules' verdict on a list: the board's records and the items that read back."""
-    return check_list([row.as_sent(seq, use_int=use_int) for seq, row in enumerate(rows)], profile)
+    return check_list(as_items(rows, use_int=use_int), profile)
 
 
 def stored_fields(item: MissionItem) -> tuple[float, ...]:

@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 
 from service.daemon.client import ControlError, ask_daemon
 from tests.support.forked import Forked
-from tests.support.plan import PlanRow
+from tests.support.plan import PlanRow, as_items
 
 #: The general timeout, s, for anything that a test waits for.
 PATIENCE = 50.0
@@ -194,6 +194,11 @@ class Daemon(Program):
         except (ControlError, OSError):
             return None
 
+    def ground_stations(self) -> list[str]:
+        """The connected ground stations, as in the status."""
+        stations: list[str] = self.ask({"do": "status"})["ground_stations"]
+        return stations
+
     def wait(self, state: str = "MSP") -> None:
         """Wait until the flight controller is found."""
 
@@ -231,7 +236,7 @@ class Daemon(Program):
         return False
 
     def _pushes(self, plan: Sequence[PlanRow]) -> dict[str, Any]:
-        items = [asdict(row.as_sent(seq, use_int=True)) for seq, row in enumerate(plan)]
+        items = [asdict(item) for item in as_items(plan)]
         return self.ask({"do": "push", "source": "test", "items": items})
 
     def kill_and_restart(self) -> None:

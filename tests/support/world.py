@@ -323,6 +323,13 @@ class World:
         self.log_event.append(Event(self.now, level, event, facts))
 
 
+def ready_world() -> World:
+    """A world at 115200 baud whose board has been found."""
+    world = World(speeds=(115200,))
+    world.wait_ready()
+    return world
+
+
 def flash_holding(records: Sequence[WpRecord], options: SimOptions | None = None) -> bytes:
     """Flash of a board in use: one slot has a list, the other the remains of an earlier one."""
     options = options or SimOptions()
