@@ -31,7 +31,7 @@ from protocols.msp.frame import MspFrame
 
 #: A failing SD card may hang forever, and the flight controller's conversations wait behind it. Mission Planner waits
 #: 5 s for its final ack.
-_STORE_PATIENCE_S = 3.0
+_STORE_TIMEOUT_S = 3.0
 
 
 T = TypeVar("T")
@@ -203,7 +203,7 @@ class Runner:
                         deadline = now + seconds
                     case Save() | Conclude() | Recall() | FindPending():
                         self._store_effects.append(effect)
-                        deadline = now + _STORE_PATIENCE_S
+                        deadline = now + _STORE_TIMEOUT_S
                 self._awaited, self._deadline = effect, deadline
                 return
         except StopIteration as stop:

@@ -14,11 +14,11 @@ from service.settings import Settings, takeoff_limit_m
 from service.settings.addresses import AutoFc, FcAddress
 
 #: An unknown speed is found within 8 s.
-_SEARCH_PATIENCE_S = 12.0
+_SEARCH_TIMEOUT_S = 12.0
 #: With `auto`: the header and two on USB.
 _PORTS_SEARCHED = 3
 #: A round of telemetry takes a second; at 9600 baud two.
-_TELEMETRY_PATIENCE_S = 3.0
+_TELEMETRY_TIMEOUT_S = 3.0
 _INTERVAL_S = 0.05
 _UNCONFIRMED = "interrupted; the flight controller has not confirmed that it keeps its mission: see `naze-bridge pull`"
 _TOLD_LATER = ("armed", "battery_v", "satellites", "mission_records")
@@ -35,8 +35,8 @@ async def ask_directly(fc: FcAddress, request: Json, progress: Callable[[int], N
     running = asyncio.create_task(daemon.run())
     job: asyncio.Future[Json] | None = None
     try:
-        patience_s = _SEARCH_PATIENCE_S * (_PORTS_SEARCHED if isinstance(fc, AutoFc) else 1)
-        await _wait(lambda: bool(daemon.fc.trouble or daemon.bridge.session.state.controller), patience_s)
+        timeout_s = _SEARCH_TIMEOUT_S * (_PORTS_SEARCHED if isinstance(fc, AutoFc) else 1)
+        await _wait(lambda: bool(daemon.fc.trouble or daemon.bridge.session.state.controller), timeout_s)
         if daemon.fc.trouble:
             raise ControlError(daemon.fc.trouble)
         if daemon.bridge.session.state.controller is None:
@@ -44,7 +44,7 @@ async def ask_directly(fc: FcAddress, request: Json, progress: Callable[[int], N
             raise ControlError(f"no flight controller answers on {where}: check its power, the wiring and the speed")
         # The controller is identified before its telemetry arrives, and some never send all of it.
         if request == STATUS:
-            await _wait(lambda: None not in map(api.status().get, _TOLD_LATER), _TELEMETRY_PATIENCE_S)
+            await _wait(lambda: None not in map(api.status().get, _TOLD_LATER), _TELEMETRY_TIMEOUT_S)
         job = asyncio.ensure_future(api.do(request, lambda answer: progress(answer["progress"])))
         return await asyncio.shield(job)
     except asyncio.CancelledError:

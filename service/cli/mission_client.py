@@ -62,19 +62,19 @@ class MissionClient:
 
 
 @contextmanager
-def connect(host: str, port: int, patience_s: float) -> Iterator[MissionClient]:
+def connect(host: str, port: int, timeout_s: float) -> Iterator[MissionClient]:
     """Connect to the vehicle on a UDP port; ClientError if no heartbeat arrives in time."""
     from pymavlink import mavutil  # with numpy and every dialect: --help does without
 
     link = mavutil.mavlink_connection(f"udpout:{host}:{port}", source_system=255, source_component=190)
     try:
-        for _ in range(max(int(patience_s / 0.2), 1)):
+        for _ in range(max(int(timeout_s / 0.2), 1)):
             link.mav.heartbeat_send(messages.MAV_TYPE_GCS, messages.MAV_AUTOPILOT_INVALID, 0, 0, 0)
             heartbeat = link.recv_match(type="HEARTBEAT", blocking=True, timeout=0.2)
             linked = heartbeat is not None and heartbeat.system_status != messages.MAV_STATE_UNINIT
             if linked:
                 yield MissionClient(link, heartbeat.get_srcSystem(), heartbeat.get_srcComponent())
                 return
-        raise ClientError(f"no vehicle with a flight controller on UDP port {port} within {patience_s:.0f} s")
+        raise ClientError(f"no vehicle with a flight controller on UDP port {port} within {timeout_s:.0f} s")
     finally:
         link.close()

@@ -10,7 +10,7 @@ from simulator.emulated_naze.clock import Clock
 #: The time of an access while the number of instructions since the last pause is unknown.
 _ACCESS_NS = 150
 #: The number of accesses without a change that do not yet count as a busy-wait loop.
-_PATIENCE = 24
+_NORMAL_ACCESSES = 24
 _SKIP_NS = 500
 _LONGEST_SKIP_NS = 50_000
 
@@ -43,6 +43,6 @@ class Pace:
         """Note that the firmware is about to read the time."""
         self.charge_access()
         self._nothing_new += 1
-        skip_ns = min((self._nothing_new - _PATIENCE) * _SKIP_NS, _LONGEST_SKIP_NS)
+        skip_ns = min((self._nothing_new - _NORMAL_ACCESSES) * _SKIP_NS, _LONGEST_SKIP_NS)
         if skip_ns > 0:
             self._clock.advance(min(self._clock.now_ns + skip_ns, self._clock.next_ns))

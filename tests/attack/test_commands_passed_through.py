@@ -13,7 +13,7 @@ import pytest
 from tests.support.attack_pilot import HELLO, m, sign
 from tests.support.benches import Starter
 from tests.support.plain_station import udp_station
-from tests.support.programs import PATIENCE, Daemon, comes, free_port, until
+from tests.support.programs import TIMEOUT_S, Daemon, comes, free_port, until
 
 COMMANDS = {
     "forced disarm": m.MAVLink_command_long_message(1, 1, 400, 0, 0, 21196, 0, 0, 0, 0, 0),
@@ -66,7 +66,7 @@ class Autopilot(threading.Thread):
 
     def end(self) -> None:
         self._over.set()
-        self.join(PATIENCE)
+        self.join(TIMEOUT_S)
         self._server.close()
 
 

@@ -31,7 +31,7 @@ from tests.support.world import GroundStation, World
 
 ACCEPTED, DENIED = MissionResult.ACCEPTED, MissionResult.DENIED
 #: MultiWii takes 70 ms per record, a Harakiri in MAVLink mode several seconds for its flash.
-PATIENCE_S, TRIES = 60.0, 100
+TIMEOUT_S, TRIES = 60.0, 100
 
 
 @dataclass(frozen=True)
@@ -48,15 +48,15 @@ class Craft:
         return [replace(item, p2=self.radius_m) for item in waypoints(count, seed)]
 
     def upload(self, items: Sequence[MissionItem]) -> MissionResult | None:
-        return Upload(self.station, items, tries=TRIES).run(PATIENCE_S)
+        return Upload(self.station, items, tries=TRIES).run(TIMEOUT_S)
 
     def download(self) -> list[MissionItem]:
-        return Download(self.station).run(PATIENCE_S)
+        return Download(self.station).run(TIMEOUT_S)
 
     def pull(self) -> HeldMission:
         held: list[Any] = []
         self.world.bridge.local.pull(held.append, self.world.now)
-        self.world.wait_until(lambda _: bool(held), PATIENCE_S)
+        self.world.wait_until(lambda _: bool(held), TIMEOUT_S)
         assert isinstance(held[0], HeldMission), held[0]
         return held[0]
 
@@ -137,7 +137,7 @@ def test_an_accepted_list_is_stored_and_read_back_by_all(craft: Craft) -> None:
     assert all(isinstance(record.pack(), bytes) for record in held.records)
     assert [item.seq for item in held.items] == list(range(25))
     another = GroundStation(craft.world, "other", sysid=254)
-    assert Download(another).run(PATIENCE_S) == craft.download()
+    assert Download(another).run(TIMEOUT_S) == craft.download()
 
 
 def test_writing_a_read_list_again_changes_nothing(craft: Craft) -> None:

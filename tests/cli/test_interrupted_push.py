@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.benches import Starter
-from tests.support.programs import NAZE_BRIDGE, PATIENCE, REPOSITORY, Board, run_naze_bridge
+from tests.support.programs import NAZE_BRIDGE, REPOSITORY, TIMEOUT_S, Board, run_naze_bridge
 
 EXAMPLES = REPOSITORY / "examples"
 LONG = EXAMPLES / "long-146.waypoints"
@@ -65,7 +65,7 @@ class Terminal:
             while True:
                 self.printed += self._read()
         os.close(self._master)
-        return self._process.wait(PATIENCE)
+        return self._process.wait(TIMEOUT_S)
 
     def _read(self) -> str:
         return os.read(self._master, 4096).decode(errors="replace")

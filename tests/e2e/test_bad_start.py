@@ -15,7 +15,7 @@ import pytest
 from tests.support.benches import Starter
 from tests.support.plain_station import udp_station
 from tests.support.plan import judge, plain_plan, records_of
-from tests.support.programs import PATIENCE, free_port, run_naze_bridge, until
+from tests.support.programs import TIMEOUT_S, free_port, run_naze_bridge, until
 
 UNKNOWN = {
     "no such device name": (["--fc", "naze"], "/dev/serial0"),
@@ -181,10 +181,10 @@ def test_a_tcp_flight_controller_is_found_once_it_is_up(start: Starter) -> None:
     event = until(lambda: daemon.has_logged("fc.port_unavailable"), "a complaint")
     assert f"tcp:127.0.0.1:{port} cannot be reached" in event["why"]
     with socket.create_server(("127.0.0.1", port)) as server:
-        server.settimeout(PATIENCE)
+        server.settimeout(TIMEOUT_S)
         connection, _ = server.accept()
         with connection:
-            connection.settimeout(PATIENCE)
+            connection.settimeout(TIMEOUT_S)
             assert connection.recv(100)
     assert daemon.is_alive
 

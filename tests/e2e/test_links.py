@@ -11,7 +11,7 @@ from tests.support.benches import Bench, Starter
 from tests.support.mission_planner import MissionPlanner
 from tests.support.plain_station import PlainStation, tcp_station, udp_station
 from tests.support.plan import PlanRow, judge, plain_plan, records_of
-from tests.support.programs import PATIENCE, Daemon, free_port, until
+from tests.support.programs import TIMEOUT_S, Daemon, free_port, until
 
 PLAN = plain_plan(40)
 
@@ -133,7 +133,7 @@ def test_links_on_ipv6_and_on_a_host_name_work(start: Starter) -> None:
     bench = start.bench(gcs=[f"udpin:[::1]:{udp}", f"tcpin:[::1]:{tcp}", f"udpout:localhost:{named}"])
     by_udp = socket.socket(socket.AF_INET6, socket.SOCK_DGRAM)
     by_udp.connect(("::1", udp))
-    for number, connection in enumerate((by_udp, socket.create_connection(("::1", tcp), PATIENCE))):
+    for number, connection in enumerate((by_udp, socket.create_connection(("::1", tcp), TIMEOUT_S))):
         with PlainStation(connection) as station:
             plan = plain_plan(12 + number)
             assert station.upload(plan) is MissionResult.ACCEPTED

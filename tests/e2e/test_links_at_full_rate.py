@@ -16,7 +16,7 @@ from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from tests.support.benches import Starter
 from tests.support.plain_station import PlainStation
-from tests.support.programs import PATIENCE, free_port
+from tests.support.programs import TIMEOUT_S, free_port
 
 m = messages
 DEAF = 251
@@ -87,7 +87,7 @@ class Reader(threading.Thread):
         assert len(self.data) - len(whole) < 64
 
     def run(self) -> None:
-        self._socket.settimeout(PATIENCE)
+        self._socket.settimeout(TIMEOUT_S)
         splitter = MavlinkSplitter()
         while True:
             try:
@@ -112,8 +112,8 @@ def test_nothing_is_lost_at_any_rate_and_a_stalled_client_gets_its_acks(start: S
     udp, tcp = free_port(), free_port(socket.SOCK_STREAM)
     daemon = start.daemon(str(autopilot.path), gcs=[f"udpin:127.0.0.1:{udp}", f"tcpin:127.0.0.1:{tcp}"])
     daemon.wait("MAVLink")
-    stalled_socket = socket.create_connection(("127.0.0.1", tcp), PATIENCE)
-    reading_socket = socket.create_connection(("127.0.0.1", tcp), PATIENCE)
+    stalled_socket = socket.create_connection(("127.0.0.1", tcp), TIMEOUT_S)
+    reading_socket = socket.create_connection(("127.0.0.1", tcp), TIMEOUT_S)
     by_udp_socket = connected_udp(udp)
     with (
         PlainStation(stalled_socket, sysid=DEAF) as stalled,
@@ -132,7 +132,7 @@ def test_nothing_is_lost_at_any_rate_and_a_stalled_client_gets_its_acks(start: S
             autopilot.say(m.MAVLink_command_ack_message(400 + number, 0, 0, 0, DEAF, 191))
             autopilot.say_attitudes(count, rate_hz)
         for reader in readers:
-            reader.join(PATIENCE)
+            reader.join(TIMEOUT_S)
             reader.assert_frames_are_whole()
         by_tcp, by_datagrams = readers
         assert by_tcp.numbers == list(range(total))

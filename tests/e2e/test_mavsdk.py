@@ -35,7 +35,7 @@ from tests.support.plan import (
     records_of,
     waypoint,
 )
-from tests.support.programs import PATIENCE, until
+from tests.support.programs import TIMEOUT_S, until
 
 T = TypeVar("T")
 
@@ -45,7 +45,7 @@ async def vehicle_at(port: int, *, listen: bool = False) -> AsyncIterator[Any]:
     """Connect MAVSDK, or let it wait for the vehicle there (`listen`); return the vehicle it finds."""
     async with Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION)) as mavsdk:
         await mavsdk.add_any_connection(f"{'udpin' if listen else 'udpout'}://127.0.0.1:{port}")
-        system = await mavsdk.first_autopilot(timeout_s=PATIENCE)
+        system = await mavsdk.first_autopilot(timeout_s=TIMEOUT_S)
         assert system is not None
         yield system
 
@@ -191,7 +191,7 @@ async def test_clear_mission_and_clear_all_clear_the_board(shared: Bench) -> Non
 async def test_long_texts_arrive_whole_and_once(shared: Bench) -> None:
     """MAVSDK joins the pieces of a STATUSTEXT, like QGroundControl."""
     texts: list[str] = []
-    async with vehicle_at(shared.daemon.port) as vehicle, asyncio.timeout(PATIENCE):
+    async with vehicle_at(shared.daemon.port) as vehicle, asyncio.timeout(TIMEOUT_S):
         upload = asyncio.ensure_future(MissionRawAsync(vehicle).upload_mission(raw_items(mixed_plan(20))))
         async for text in TelemetryAsync(vehicle).subscribe_status_text():
             texts.append(" ".join(text.text.split()))

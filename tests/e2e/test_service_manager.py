@@ -22,7 +22,7 @@ from service.settings.addresses import parse_fc, parse_gcs
 from tests.support.benches import Starter
 from tests.support.plain_station import udp_station
 from tests.support.plan import as_items, judge, plain_plan, records_of
-from tests.support.programs import PATIENCE, free_port, run_naze_bridge, until, until_async
+from tests.support.programs import TIMEOUT_S, free_port, run_naze_bridge, until, until_async
 from tests.support.programs import Daemon as DaemonProgram
 
 _LONG = plain_plan(146)
@@ -110,7 +110,7 @@ def test_a_service_manager_in_the_abstract_namespace_is_notified(tmp_path: Path)
     name = f"naze-bridge-test-{tmp_path}"
     with closing(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)) as systemd:
         systemd.bind(f"\0{name}")
-        systemd.settimeout(PATIENCE)
+        systemd.settimeout(TIMEOUT_S)
         notifier = Notifier({"NOTIFY_SOCKET": f"@{name}"})
         assert notifier.watchdog_s is None
         notifier.reloading()
@@ -136,7 +136,7 @@ def test_a_missing_service_manager_is_ignored(start: Starter, monkeypatch: pytes
 def push_begun(daemon: DaemonProgram) -> socket.socket:
     """Push a long list like the command line; return the connection once the board has part of it."""
     connection = socket.socket(socket.AF_UNIX)
-    connection.settimeout(PATIENCE)
+    connection.settimeout(TIMEOUT_S)
     connection.connect(str(daemon.state_dir / "control.sock"))
     items = [asdict(item) for item in as_items(_LONG)]
     connection.sendall(json.dumps({"do": "push", "source": "test", "items": items}).encode() + b"\n")

@@ -25,7 +25,7 @@ from tests.e2e.test_mavsdk import vehicle_at
 from tests.support import dronekit
 from tests.support.benches import Bench
 from tests.support.mavproxy import MavProxy
-from tests.support.programs import PATIENCE, comes
+from tests.support.programs import TIMEOUT_S, comes
 
 POSITION_M = 1.5
 HEIGHT_M = 1.0
@@ -69,7 +69,7 @@ async def agrees(values: AsyncIterator[Any], check: Callable[[Any], None], times
     """Check values until `times` in a row pass: the first ones may be from before the flight."""
     agreed, failure = 0, None
     try:
-        async with asyncio.timeout(PATIENCE):
+        async with asyncio.timeout(TIMEOUT_S):
             async for value in values:
                 try:
                     check(value)

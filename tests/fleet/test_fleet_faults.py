@@ -20,14 +20,14 @@ from service.cli.fleet.session import FleetError
 from service.zenoh_link.keys import UPLOAD
 from tests.support.fleet_bench import I_KNOW, Fleet
 from tests.support.plan import judge, plain_plan, plan_text, records_of
-from tests.support.programs import NAZE_BRIDGE, PATIENCE, until
+from tests.support.programs import NAZE_BRIDGE, TIMEOUT_S, until
 from tests.support.zenoh_bench import ask_surely
 
 #: At this speed 146 records take seconds, enough time to inject a fault.
 _SLOW_BAUD = 9600
 _COUNT = 146
 #: On a metered link a hung vehicle is considered alive for 30 s instead of 10.
-_PATIENT = f'{I_KNOW}profile = "metered"\n'
+_METERED = f'{I_KNOW}profile = "metered"\n'
 _FLEET = [*NAZE_BRIDGE, "fleet"]
 
 
@@ -37,8 +37,8 @@ def lasting_fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fleet]:
     with ExitStack() as stack:
         fleet = Fleet(tmp_path_factory.mktemp("fleet"), stack)
         board = fleet.board("snail", "--baud", str(_SLOW_BAUD))
-        fleet.start("kite", commands=_PATIENT)
-        fleet.start("snail", fc=f"{board.link},{_SLOW_BAUD}", commands=_PATIENT)
+        fleet.start("kite", commands=_METERED)
+        fleet.start("snail", fc=f"{board.link},{_SLOW_BAUD}", commands=_METERED)
         yield fleet
 
 
@@ -207,10 +207,10 @@ class Terminal:
     def end(self) -> int:
         self.process.send_signal(signal.SIGINT)
         try:
-            return self.process.wait(PATIENCE)
+            return self.process.wait(TIMEOUT_S)
         finally:
             self.process.kill()
-            self._reader.join(PATIENCE)
+            self._reader.join(TIMEOUT_S)
             os.close(self._near)
 
 

@@ -19,7 +19,7 @@ from protocols.mavlink.frame import MavlinkSplitter
 from service.links.fc_device import device_opener
 from service.links.fc_port import FcPort
 from service.settings.addresses import SerialFc
-from tests.support.programs import PATIENCE, until_async
+from tests.support.programs import TIMEOUT_S, until_async
 
 _writer = FrameWriter(1, 1)
 
@@ -92,7 +92,7 @@ class Line:
 
     async def feed_until_gathered(self, first: int = 0) -> int:
         """Send frames without a pause until there are fewer reads than frames; a busy machine needs several tries."""
-        async with asyncio.timeout(PATIENCE):
+        async with asyncio.timeout(TIMEOUT_S):
             while True:
                 before = self.reads
                 first = await self.feed(first, 500, 1_000_000)

@@ -10,7 +10,7 @@ import termios
 from service.links.fc_device import device_opener
 from service.links.fc_port import FcPort
 from service.settings.addresses import TcpFc
-from tests.support.programs import PATIENCE
+from tests.support.programs import TIMEOUT_S
 
 
 def unacknowledged(connection: socket.socket) -> int:
@@ -31,13 +31,13 @@ async def test_received_bytes_are_acknowledged_at_once() -> None:
             lambda _: None,
         )
         task = loop.create_task(port.run())
-        board, _ = await asyncio.wait_for(loop.sock_accept(listener), PATIENCE)
+        board, _ = await asyncio.wait_for(loop.sock_accept(listener), TIMEOUT_S)
         with board:
             left = []
             # Linux delays acknowledgements only on connections that carry traffic both ways.
             for _ in range(30):
                 board.send(b"$")
-                left.append(await asyncio.wait_for(heard.get(), PATIENCE))
+                left.append(await asyncio.wait_for(heard.get(), TIMEOUT_S))
                 port.write(b"?")
                 board.setblocking(True)
                 assert board.recv(1) == b"?"

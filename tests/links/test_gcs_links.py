@@ -16,7 +16,7 @@ from service.links import tcp_link, udp_link
 from service.links.fc_device import device_opener
 from service.links.gcs_links import GcsLink, open_link
 from service.settings.addresses import AddressError, GcsAddress, TcpFc, parse_fc, parse_gcs, split_gcs
-from tests.support.programs import PATIENCE, free_port, until_async
+from tests.support.programs import TIMEOUT_S, free_port, until_async
 
 FRAME = bytes.fromhex("fe09000101000000000002030000030346f1")
 
@@ -81,7 +81,7 @@ def links() -> Iterator[Links]:
 
 
 async def received(end: socket.socket, size: int = 4096) -> bytes:
-    async with asyncio.timeout(PATIENCE):
+    async with asyncio.timeout(TIMEOUT_S):
         return await asyncio.get_running_loop().sock_recv(end, size)
 
 

@@ -16,7 +16,7 @@ from service.daemon.daemon import Daemon
 from service.settings import Settings
 from service.settings.addresses import SimulatedFc, parse_gcs
 from service.settings.share import ShareSettings, parse_share
-from tests.support.programs import PATIENCE, free_port
+from tests.support.programs import TIMEOUT_S, free_port
 
 #: Repeat like configurators, because the bridge also gives up late replies.
 _ASKED_AGAIN_S = 2.0
@@ -36,7 +36,7 @@ class Program:
         """Send requests at once and wait for as many replies. Unanswered ones are repeated."""
         frame = MspFrame(Direction.REQUEST, command, payload, is_v2=is_v2).encode()
         replies: list[MspFrame] = []
-        async with asyncio.timeout(PATIENCE):
+        async with asyncio.timeout(TIMEOUT_S):
             while len(replies) < times:
                 self._writer.write(frame * (times - len(replies)))
                 with suppress(TimeoutError):
@@ -51,7 +51,7 @@ async def sharing(address: str, *, write: bool = False) -> AsyncIterator[Daemon]
     daemon = Daemon(Settings(SimulatedFc(), share=[ShareSettings(parse_gcs(address), write)]))
     task = asyncio.create_task(daemon.run())
     try:
-        async with asyncio.timeout(PATIENCE):
+        async with asyncio.timeout(TIMEOUT_S):
             bridge = daemon.bridge
             while bridge.session.vehicle.armed is None or bridge.runner.is_busy:  # noqa: ASYNC110
                 await asyncio.sleep(0.01)
@@ -79,7 +79,7 @@ async def test_requests_are_answered_alongside_telemetry(is_v2: bool) -> None:
         replies = await program.ask(IDENT, is_v2=is_v2, times=10)
         seen = {(reply.direction, reply.payload[0], reply.is_v2) for reply in replies}
         assert seen == {(Direction.REPLY, 211, is_v2)}
-        async with asyncio.timeout(PATIENCE):
+        async with asyncio.timeout(TIMEOUT_S):
             while daemon.traffic["fc"].pieces_received < polled + 30:  # noqa: ASYNC110
                 await asyncio.sleep(0.01)
         assert daemon.bridge.session.state.controller is not None
@@ -124,7 +124,7 @@ async def test_a_mission_transfer_is_not_disturbed() -> None:
     async with shared() as (daemon, program):
         items = load_mission(Path(__file__).parents[2] / "examples" / "long-146.waypoints")
         pushing = asyncio.create_task(DaemonApi(daemon).push(items, "test", lambda _: None))
-        async with asyncio.timeout(PATIENCE):
+        async with asyncio.timeout(TIMEOUT_S):
             while not daemon.bridge.runner.is_busy:  # noqa: ASYNC110
                 await asyncio.sleep(0)
             (reply,) = await program.ask(IDENT)
@@ -139,7 +139,7 @@ async def test_over_udp_each_program_gets_its_own_replies() -> None:
 
     async def ask(program: socket.socket, request: bytes) -> MspFrame:
         await loop.sock_sendto(program, request, ("127.0.0.1", port))
-        async with asyncio.timeout(PATIENCE):
+        async with asyncio.timeout(TIMEOUT_S):
             (reply,) = MspParser().feed(await loop.sock_recv(program, 4096))
         return reply
 

@@ -17,7 +17,7 @@ from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from service.links import tcp_link
 from service.links.tcp_link import TcpLink
 from service.settings.addresses import GcsAddress
-from tests.support.programs import PATIENCE, free_port
+from tests.support.programs import TIMEOUT_S, free_port
 
 
 class Listener:
@@ -64,7 +64,7 @@ async def read_to(client: socket.socket, last: int) -> list[MavlinkFrame]:
     """Read up to the attitude with that number; only whole frames may be received."""
     loop, splitter, data = asyncio.get_running_loop(), MavlinkSplitter(), b""
     frames: list[MavlinkFrame] = []
-    async with asyncio.timeout(PATIENCE):
+    async with asyncio.timeout(TIMEOUT_S):
         while not frames or number_of(frames[-1]) != last:
             piece = await loop.sock_recv(client, 65536)
             assert piece

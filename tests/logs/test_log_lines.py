@@ -6,7 +6,7 @@ import os
 import subprocess
 import sys
 
-from tests.support.programs import PATIENCE, REPOSITORY
+from tests.support.programs import REPOSITORY, TIMEOUT_S
 
 BEGIN = """
 import sys, time
@@ -21,7 +21,7 @@ log = structlog.get_logger()
 
 def run(script: str, *shell: str) -> subprocess.CompletedProcess[str]:
     command = [*shell, sys.executable, "-c", BEGIN + script]
-    return subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, timeout=PATIENCE, check=True)
+    return subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, timeout=TIMEOUT_S, check=True)
 
 
 def test_suppressed_lines_are_reported_even_without_a_repeat() -> None:

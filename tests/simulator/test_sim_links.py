@@ -21,7 +21,7 @@ from protocols.msp.mission import INFO_REQUEST, decode_info, encode_begin, encod
 from simulator.naze import SimulatedNaze
 from simulator.pipe_link import SimLink
 from tests.support.naze_bench import mission
-from tests.support.programs import PATIENCE, control, until
+from tests.support.programs import TIMEOUT_S, control, until
 
 IDENT = request(100)
 #: After this much silence no answer is expected.
@@ -31,7 +31,7 @@ SILENCE_S = 1.0
 async def ask_socket(far: socket.socket, frame: bytes) -> MspFrame:
     loop, parser = asyncio.get_running_loop(), MspParser()
     await loop.sock_sendall(far, frame)
-    async with asyncio.timeout(PATIENCE):
+    async with asyncio.timeout(TIMEOUT_S):
         while True:
             if frames := parser.feed(await loop.sock_recv(far, 4096)):
                 return frames[0]
@@ -86,7 +86,7 @@ class Simulator:
 
     def end(self, number: signal.Signals = signal.SIGTERM) -> int:
         self.process.send_signal(number)
-        code = self.process.wait(PATIENCE)
+        code = self.process.wait(TIMEOUT_S)
         assert self.process.stdout is not None
         self.process.stdout.close()
         return code
@@ -105,7 +105,7 @@ def start(tmp_path: Path) -> Iterator[Callable[..., Simulator]]:
         simulator.end(signal.SIGKILL)  # also closes the pipe of one that has already ended
 
 
-def ask(port: serial.Serial, frame: bytes, seconds: float = PATIENCE) -> MspFrame | None:
+def ask(port: serial.Serial, frame: bytes, seconds: float = TIMEOUT_S) -> MspFrame | None:
     """Ask once; None after this many seconds of real time."""
     parser, deadline = MspParser(), time.monotonic() + seconds
     port.write(frame)
@@ -245,12 +245,15 @@ def test_the_link_of_a_running_simulator_is_not_replaced(start: Callable[..., Si
     with serial.Serial(str(first.link), 115200, timeout=0.05, exclusive=True) as port:
         program = "from simulator.command import sim; sim()"
         second = subprocess.run(
-            [sys.executable, "-c", program, "--link", str(first.link)], capture_output=True, text=True, timeout=PATIENCE
+            [sys.executable, "-c", program, "--link", str(first.link)],
+            capture_output=True,
+            text=True,
+            timeout=TIMEOUT_S,
         )
         assert second.returncode == 1
         assert f"{first.link} belongs to a running simulator" in second.stderr
         assert "Traceback" not in second.stderr
         # Checking the lock does not release it.
-        again = subprocess.run([sys.executable, "-c", program, "--link", str(first.link)], timeout=PATIENCE)
+        again = subprocess.run([sys.executable, "-c", program, "--link", str(first.link)], timeout=TIMEOUT_S)
         assert again.returncode == 1
         assert ask(port, IDENT) is not None

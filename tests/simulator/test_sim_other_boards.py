@@ -14,7 +14,7 @@ import serial
 from protocols.msp.frame import request
 from simulator.nav_waypoint import FLAG_LAST, Action
 from tests.support.msp_bench import Frame, take_apart, waypoint
-from tests.support.programs import NAZE_BRIDGE, PATIENCE, REPOSITORY, control, free_port, run_naze_bridge, until
+from tests.support.programs import NAZE_BRIDGE, REPOSITORY, TIMEOUT_S, control, free_port, run_naze_bridge, until
 
 
 class Simulator:
@@ -37,14 +37,14 @@ class Simulator:
 
     def end(self) -> int:
         self.process.send_signal(signal.SIGTERM)
-        return self.process.wait(PATIENCE)
+        return self.process.wait(TIMEOUT_S)
 
 
 class Client:
     """A TCP client that sends one request at a time."""
 
     def __init__(self, port: int) -> None:
-        self.socket = socket.create_connection(("127.0.0.1", port), PATIENCE)
+        self.socket = socket.create_connection(("127.0.0.1", port), TIMEOUT_S)
 
     def __enter__(self) -> "Client":
         return self
@@ -52,7 +52,7 @@ class Client:
     def __exit__(self, *_: object) -> None:
         self.socket.close()
 
-    def ask(self, command: int, payload: bytes = b"", timeout: float = PATIENCE) -> Frame | None:
+    def ask(self, command: int, payload: bytes = b"", timeout: float = TIMEOUT_S) -> Frame | None:
         """The reply; None after the timeout, ConnectionError if disconnected."""
         self.socket.sendall(request(command, payload))
         self.socket.settimeout(timeout)
@@ -100,7 +100,7 @@ def test_an_inav_runs_on_a_socket(start: Callable[..., Simulator]) -> None:
 def test_a_multiwii_runs_on_a_pseudo_terminal(start: Callable[..., Simulator], tmp_path: Path) -> None:
     simulator = start("--kind", "multiwii", "--baud", "57600", link=tmp_path / "tty")
     assert simulator.greeting == f"Simulated MultiWii at {tmp_path / 'tty'}, 57600 baud. Ctrl-C ends it.\n"
-    with serial.Serial(str(tmp_path / "tty"), 57600, timeout=PATIENCE) as port:
+    with serial.Serial(str(tmp_path / "tty"), 57600, timeout=TIMEOUT_S) as port:
         port.write(request(100))
         assert port.read(13)[:6] == bytes((*b"$M>", 7, 100, 241))
 

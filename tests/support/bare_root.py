@@ -11,7 +11,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-_PATIENCE_S = 300
+_TIMEOUT_S = 300
 #: On a separate tmpfs, because an overlay cannot be on an overlay. /run is empty: no systemd runs here.
 _MAKE = """
 set -e
@@ -53,7 +53,7 @@ class BareRoot:
     def run(self, script: str, status: int = 0, stdin: bytes = b"") -> str:
         """Run a shell script; return its output."""
         command = (*self._inside, "env", "-i", "PATH=/usr/sbin:/usr/bin:/sbin:/bin", "HOME=/root", "sh", "-c", script)
-        ended = subprocess.run(command, input=stdin, capture_output=True, timeout=_PATIENCE_S, check=False)
+        ended = subprocess.run(command, input=stdin, capture_output=True, timeout=_TIMEOUT_S, check=False)
         printed = ended.stdout.decode() + ended.stderr.decode()
         assert ended.returncode == status, f"{script}: {ended.returncode}\n{printed}"
         return printed

@@ -12,7 +12,7 @@ from selenium.webdriver import Chrome, ChromeOptions, ChromeService
 from selenium.webdriver.common.by import By
 from selenium.webdriver.remote.webelement import WebElement
 
-from tests.support.programs import PATIENCE, until
+from tests.support.programs import TIMEOUT_S, until
 
 PHONE = (360, 740)
 LAPTOP = (1280, 900)
@@ -135,6 +135,6 @@ def _start(*, dark: bool) -> Chrome:
         options.add_argument("--blink-settings=preferredColorScheme=0")
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
     driver = Chrome(options, ChromeService(str(programs["chromedriver"])))
-    driver.set_page_load_timeout(PATIENCE * 2)
-    driver.set_script_timeout(PATIENCE)
+    driver.set_page_load_timeout(TIMEOUT_S * 2)
+    driver.set_script_timeout(TIMEOUT_S)
     return driver

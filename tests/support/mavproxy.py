@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import Self
 
 from tests.support.plan import PlanRow
-from tests.support.programs import PATIENCE, comes
+from tests.support.programs import TIMEOUT_S, comes
 
 _LISTED = re.compile(
     r"^(?P<command>\d+) (?P<frame>\d+) (?P<lat>\S+) (?P<lon>\S+) (?P<alt>\S+) "
@@ -51,7 +51,7 @@ class MavProxy:
         assert self._process.stdin is not None
         self._process.kill()
         self._process.stdin.close()
-        self._process.wait(PATIENCE)
+        self._process.wait(TIMEOUT_S)
 
     def type(self, line: str) -> None:
         """Type a line; earlier output is ignored from now on."""
@@ -61,7 +61,7 @@ class MavProxy:
 
     def wait_for(self, part: str) -> str:
         """Wait until `part` is printed; return all output since the last typed line."""
-        text = self._answer(part, PATIENCE)
+        text = self._answer(part, TIMEOUT_S)
         assert part in text, f"{part!r} was not printed, but:\n{text}"
         return text
 
@@ -83,7 +83,7 @@ class MavProxy:
         """
         for _ in range(3):
             self.type("wp list")
-            text = self._answer(f"Saved {count} waypoints", PATIENCE / 2)
+            text = self._answer(f"Saved {count} waypoints", TIMEOUT_S / 2)
             if f"Saved {count} waypoints" in text:
                 break
         items = []

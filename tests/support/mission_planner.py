@@ -19,7 +19,7 @@ from pymavlink.dialects.v10 import ardupilotmega as mavlink_1
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import MissionResult
 from tests.support.plan import PlanRow
-from tests.support.programs import PATIENCE
+from tests.support.programs import TIMEOUT_S
 
 SYSID, COMPID = 255, 190
 _DATAGRAM_SIZE = 2048
@@ -189,7 +189,7 @@ class MissionPlanner:
         self.wait_until(lambda: self.armed is armed, f"armed {armed}")
 
     def wait_until(self, condition: Callable[[], bool], what: str) -> None:
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + TIMEOUT_S
         while not condition():
             assert self._receive(deadline), f"timed out waiting for {what}; received {self.texts}, {self.acks()}"
 
@@ -198,7 +198,7 @@ class MissionPlanner:
     def meet(self) -> None:
         """Wait for two heartbeats of an autopilot's component 1; until then nothing is sent to a vehicle."""
         seen = 0
-        for message in self._packets(PATIENCE / self._pace):
+        for message in self._packets(TIMEOUT_S / self._pace):
             if message.get_type() == "HEARTBEAT" and message.get_srcComponent() == 1 and message.type != 6:
                 seen += 1
                 self.vehicle = message.get_srcSystem(), message.get_srcComponent()
@@ -261,7 +261,7 @@ class MissionPlanner:
 
     def _request_parameters(self) -> None:
         """Request the list every 4 s until it arrives; then missing parameters by index."""
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + TIMEOUT_S
         while not self._parameter_count:
             assert time.monotonic() < deadline, "it would request parameters forever"
             self.send(messages.MAVLink_param_request_list_message(*self._target))

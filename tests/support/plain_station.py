@@ -11,7 +11,7 @@ from typing import Any, Self
 from protocols.mavlink.dialect import messages as v20
 from protocols.mission_item import MissionResult
 from tests.support.plan import PlanRow
-from tests.support.programs import PATIENCE
+from tests.support.programs import TIMEOUT_S
 
 SYSID, COMPID = 250, 191
 _RETRY_S = 0.5
@@ -61,7 +61,7 @@ class PlainStation:
 
     def wait_for(self, *kinds: str) -> Any:
         """The next message of one of these types."""
-        for message in self._messages(PATIENCE):
+        for message in self._messages(TIMEOUT_S):
             if message.get_type() in kinds:
                 return message
         raise AssertionError(f"no {kinds} received")
@@ -134,4 +134,4 @@ def udp_station(
 
 def tcp_station(port: int) -> PlainStation:
     """A station on a daemon's tcpin."""
-    return PlainStation(socket.create_connection(("127.0.0.1", port), PATIENCE))
+    return PlainStation(socket.create_connection(("127.0.0.1", port), TIMEOUT_S))

@@ -19,7 +19,7 @@ from tests.support.forked import Forked
 from tests.support.plan import PlanRow, as_items
 
 #: The general timeout, s, for anything that a test waits for.
-PATIENCE = 50.0
+TIMEOUT_S = 50.0
 REPOSITORY = Path(__file__).resolve().parents[2]
 NAZE_BRIDGE = [sys.executable, "-c", "from service.cli.main import main; main(prog_name='naze-bridge')"]
 T = TypeVar("T")
@@ -32,7 +32,7 @@ def until(condition: Callable[[], T | None], what: str) -> T:
     return found
 
 
-def comes(condition: Callable[[], T | None], seconds: float = PATIENCE) -> T | None:
+def comes(condition: Callable[[], T | None], seconds: float = TIMEOUT_S) -> T | None:
     """Wait for a true value; return the last value after a timeout."""
     deadline = time.monotonic() + seconds
     while True:
@@ -44,7 +44,7 @@ def comes(condition: Callable[[], T | None], seconds: float = PATIENCE) -> T | N
 
 async def until_async(condition: Callable[[], T | None], what: str) -> T:
     """`until` in a running event loop."""
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + TIMEOUT_S
     while not (found := condition()):
         assert time.monotonic() < deadline, f"timed out waiting for {what}"
         await asyncio.sleep(0.01)
@@ -65,13 +65,13 @@ def run_naze_bridge(*arguments: str | Path, **options: Any) -> subprocess.Comple
     ended: subprocess.CompletedProcess[str]
     if options:
         usual: dict[str, Any] = {"cwd": REPOSITORY, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-        ended = subprocess.run([*NAZE_BRIDGE, *words], timeout=PATIENCE, check=False, **usual | options)
+        ended = subprocess.run([*NAZE_BRIDGE, *words], timeout=TIMEOUT_S, check=False, **usual | options)
         return ended
     with TemporaryDirectory() as folder:
         output, error = Path(folder, "output"), Path(folder, "error")
         process = Forked(words, REPOSITORY, output, error)
         try:
-            code = process.wait(PATIENCE)
+            code = process.wait(TIMEOUT_S)
         finally:
             process.kill()
         return subprocess.CompletedProcess(words, code, output.read_text(), error.read_text())
@@ -102,7 +102,7 @@ class Program:
         if self.is_alive:
             self.process.send_signal(number)
         try:
-            return self.process.wait(PATIENCE)
+            return self.process.wait(TIMEOUT_S)
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()

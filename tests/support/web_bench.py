@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.support.benches import Starter
-from tests.support.programs import PATIENCE, Board, Daemon, free_port, run_naze_bridge, until
+from tests.support.programs import TIMEOUT_S, Board, Daemon, free_port, run_naze_bridge, until
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "naze-field.waypoints"
 
@@ -48,7 +48,7 @@ class WebBench:
 
     def ask_once(self, path: str, method: str = "GET", **headers: str) -> Answer | None:
         """Send a request; None if the server is at its connection limit."""
-        connection = HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE)
+        connection = HTTPConnection("127.0.0.1", self.port, timeout=TIMEOUT_S)
         try:
             connection.request(method, path, None, headers)
             response = connection.getresponse()
@@ -71,7 +71,7 @@ class WebBench:
         return ended
 
     def connect(self) -> socket.socket:
-        return socket.create_connection(("127.0.0.1", self.port), PATIENCE)
+        return socket.create_connection(("127.0.0.1", self.port), TIMEOUT_S)
 
     def push_example(self) -> None:
         """Write a list with many changed items."""

@@ -13,7 +13,7 @@ import zenoh
 from service.zenoh_link.keys import VERSION
 from service.zenoh_link.payload import decoded
 from tests.support.benches import Bench, Starter
-from tests.support.programs import PATIENCE, free_port, until
+from tests.support.programs import TIMEOUT_S, free_port, until
 
 VEHICLE = "naze-1"
 I_KNOW = 'commands = true\ncommands_without_authentication = "I know"\n'
@@ -78,7 +78,7 @@ def ask(
     opened: zenoh.Session, suffix: str, payload: bytes | None = None, *, vehicle: str = VEHICLE, **options: Any
 ) -> list[Any]:
     """Return all replies, errors included."""
-    replies = opened.get(key(suffix, vehicle), payload=payload, timeout=PATIENCE, **options)
+    replies = opened.get(key(suffix, vehicle), payload=payload, timeout=TIMEOUT_S, **options)
     return [body(reply.ok or reply.err) for reply in replies]
 
 

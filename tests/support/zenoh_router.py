@@ -13,7 +13,7 @@ from pathlib import Path
 
 import zenoh
 
-from tests.support.programs import PATIENCE, Program, free_port, until
+from tests.support.programs import TIMEOUT_S, Program, free_port, until
 
 ZENOHD = os.environ.get("ZENOHD")
 _UP = "is up" if ZENOHD is None else "can be reached at"
@@ -45,7 +45,7 @@ class Router(Program):
         if self.is_alive:
             self.process.send_signal(signal.SIGCONT)
             self.process.terminate()
-            self.process.wait(PATIENCE)
+            self.process.wait(TIMEOUT_S)
 
     def start_again(self) -> None:
         self.process = self._start()

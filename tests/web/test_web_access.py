@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.benches import Starter
-from tests.support.programs import PATIENCE, until
+from tests.support.programs import TIMEOUT_S, until
 from tests.support.web_bench import WebBench, web_daemon
 
 pytest_plugins = ("tests.support.web_fixtures",)
@@ -179,9 +179,9 @@ def resident_kb(pid: int) -> int:
 
 def test_one_address_does_not_lock_out_another(web: WebBench) -> None:
     """Dozens of silent connections, then a pilot from another address."""
-    silent = [socket.create_connection(("127.0.0.1", web.port), PATIENCE) for _ in range(60)]
+    silent = [socket.create_connection(("127.0.0.1", web.port), TIMEOUT_S) for _ in range(60)]
     try:
-        with socket.create_connection(("127.0.0.1", web.port), PATIENCE, ("127.0.0.2", 0)) as pilot:
+        with socket.create_connection(("127.0.0.1", web.port), TIMEOUT_S, ("127.0.0.2", 0)) as pilot:
             pilot.sendall(b"GET /api/state HTTP/1.1\r\nHost: 10.42.0.1\r\n\r\n")
             assert pilot.recv(100).startswith(b"HTTP/1.1 200")
     finally:

@@ -8,7 +8,7 @@ import pytest
 from service.web.access import MAX_FILE
 from service.web.telemetry_logs import PIECE, TelemetryLogs
 from tests.support.plan import plain_plan
-from tests.support.programs import PATIENCE
+from tests.support.programs import TIMEOUT_S
 from tests.support.web_bench import EXAMPLE, Answer, WebBench
 
 pytest_plugins = ("tests.support.web_fixtures",)
@@ -17,7 +17,7 @@ BINARY = "application/octet-stream"
 
 
 def post(bench: WebBench, path: str, body: bytes, **headers: str) -> Answer:
-    connection = HTTPConnection("127.0.0.1", bench.port, timeout=PATIENCE)
+    connection = HTTPConnection("127.0.0.1", bench.port, timeout=TIMEOUT_S)
     try:
         connection.request("POST", path, body, {"Content-Type": BINARY} | headers)
         response = connection.getresponse()
