@@ -5,7 +5,7 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
-from typing import Any
+from typing import Any, NamedTuple
 
 from protocols.mission_record import ListIdentity, pack_records
 from protocols.msp.command_line import HAZARDS, is_clean
@@ -58,8 +58,8 @@ class InfoFlag(IntFlag):
 
 _RECORD = struct.Struct("<iihhBBbB")
 _INFO = struct.Struct("<BBBBBBHHIHHHI")
+#: Of BEGIN, CHUNK and COMMIT.
 _PROGRESS = struct.Struct("<BHI")
-_STORED = struct.Struct("<BHI")
 _LIST = struct.Struct("<HI")
 #: Of READ, ahead of the records: the first one's number. Of RADIUS: the radius.
 _SHORT = struct.Struct("<BH")
@@ -82,8 +82,7 @@ class WpCommand(IntEnum):
     SETROI = 7
 
 
-@dataclass(frozen=True, slots=True)
-class WpRecord:
+class WpRecord(NamedTuple):
     """One record, `wp_t` in mw.h; its number is its position in the list, record 0 is the home point.
 
     lat_e7, lon_e7: degrees * 1e7. height_m: above the launch point. roi_heading: 1 = nose to the region of interest.
@@ -102,16 +101,7 @@ class WpRecord:
 
     def pack(self) -> bytes:
         """Return the 16 bytes; struct.error if a field does not fit, which is a bug in the caller."""
-        return _RECORD.pack(
-            self.lat_e7,
-            self.lon_e7,
-            self.height_m,
-            self.roi_heading,
-            self.time,
-            self.radius_m,
-            self.turns,
-            self.command,
-        )
+        return _RECORD.pack(*self)
 
 
 def unpack_records(data: bytes) -> list[WpRecord]:
@@ -120,8 +110,7 @@ def unpack_records(data: bytes) -> list[WpRecord]:
     return [WpRecord(*fields) for fields in _RECORD.iter_unpack(data[:whole])]
 
 
-@dataclass(frozen=True, slots=True)
-class Info:
+class Info(NamedTuple):
     """The flight controller's state and limits. Radius in cm, timeout in ms."""
 
     version: int
@@ -137,25 +126,10 @@ class Info:
     flash_writes: int
 
     def encode(self) -> bytes:
-        return _INFO.pack(
-            ReplyStatus.OK,
-            self.version,
-            self.flags,
-            self.chunk_records,
-            self.chunk_window,
-            self.read_records,
-            self.capacity,
-            self.stored.count,
-            self.stored.checksum,
-            self.wp_radius_cm,
-            self.inter_byte_timeout_ms,
-            self.staged,
-            self.flash_writes,
-        )
+        return _INFO.pack(ReplyStatus.OK, *self[:6], self.stored.count, self.stored.checksum, *self[7:])
 
 
-@dataclass(frozen=True, slots=True)
-class Staged:
+class Staged(NamedTuple):
     """Reply to BEGIN and CHUNK: the next expected record, and the checksum of those staged before it."""
 
     status: ReplyStatus
@@ -163,22 +137,20 @@ class Staged:
     checksum: int
 
     def encode(self) -> bytes:
-        return _PROGRESS.pack(self.status, self.next, self.checksum)
+        return _PROGRESS.pack(*self)
 
 
-@dataclass(frozen=True, slots=True)
-class Stored:
+class Stored(NamedTuple):
     """Reply to COMMIT: the list now in flash."""
 
     status: ReplyStatus
     stored: ListIdentity
 
     def encode(self) -> bytes:
-        return _STORED.pack(self.status, self.stored.count, self.stored.checksum)
+        return _PROGRESS.pack(self.status, self.stored.count, self.stored.checksum)
 
 
-@dataclass(frozen=True, slots=True)
-class Records:
+class Records(NamedTuple):
     """Reply to READ."""
 
     status: ReplyStatus
@@ -189,15 +161,14 @@ class Records:
         return _SHORT.pack(self.status, self.first) + pack_records(self.records)
 
 
-@dataclass(frozen=True, slots=True)
-class Radius:
+class Radius(NamedTuple):
     """Reply to RADIUS: the gps_wp_radius in force, cm."""
 
     status: ReplyStatus
     wp_radius_cm: int
 
     def encode(self) -> bytes:
-        return _SHORT.pack(self.status, self.wp_radius_cm)
+        return _SHORT.pack(*self)
 
 
 def decode_info(payload: bytes) -> Info | None:
@@ -218,7 +189,7 @@ def decode_progress(payload: bytes) -> Staged | None:
 
 
 def decode_stored(payload: bytes) -> Stored | None:
-    reply = _reply(_STORED, payload)
+    reply = _reply(_PROGRESS, payload)
     return None if reply is None else Stored(reply[0], ListIdentity(*reply[1:]))
 
 

@@ -115,7 +115,7 @@ def test_a_region_of_interest_reads_back_as_it_was_sent(remembered: bool) -> Non
 
 
 def test_an_unknown_record_is_not_shown_as_a_flight_command() -> None:
-    strange = flash_holding([*OLD_RECORDS[:3], replace(OLD_RECORDS[3], command=99), *OLD_RECORDS[4:]])
+    strange = flash_holding([*OLD_RECORDS[:3], OLD_RECORDS[3]._replace(command=99), *OLD_RECORDS[4:]])
     _, station = holding(flash=strange)
     item = Download(station).run()[3]
     assert (item.command, item.p1) == (0, 99.0)

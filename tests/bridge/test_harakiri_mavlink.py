@@ -57,7 +57,7 @@ RULES = HarakiriRules(is_single_precision=True)
 
 def holds(world: World, items: list[MissionItem]) -> bool:
     """True if the board's list equals these items after the rules."""
-    read = [replace(each, lat_e7=readable_e7(each.lat_e7), lon_e7=readable_e7(each.lon_e7)) for each in world.stored]
+    read = [each._replace(lat_e7=readable_e7(each.lat_e7), lon_e7=readable_e7(each.lon_e7)) for each in world.stored]
     return tuple(read) == check_list(items, RULES).records
 
 
