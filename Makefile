@@ -11,7 +11,7 @@
 #   make real-board IMAGE=X.elf  run Harakiri with the patch, built by you, on the emulated board (CUTS=20: fewer power cuts)
 #   make soak           kill -9 and damaged stores by the hundred, then the daemon through all kinds of events and attacks
 #                       for 30 min (MINUTES=10: for ten; SOAK_SEED=7: others)
-#   make fuzz           10,400,000 random inputs over UDP, TCP and UART and in files: hours (EXAMPLES=500: a 26th of them)
+#   make fuzz           10,500,000 random inputs over UDP, TCP and UART and in files: hours (EXAMPLES=500: a 26th of them)
 #   make deb            build the Debian packages for amd64, arm64 and armhf in dist/ (ARCH=arm64: only that one)
 #   make image-check    the first hour in a bare Debian with systemd: install, setup, a verified mission (root)
 #   make deb-trial      install, use and purge it in a bare Debian with systemd (root; SUITE=trixie: Debian 13)

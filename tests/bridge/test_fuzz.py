@@ -7,6 +7,7 @@
 import os
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,13 +18,21 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from hypothesis.database import DirectoryBasedExampleDatabase
 
+from bridge.model.vehicle_groups import Group
+from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.tlog import read_tlog, tlog_record
 from protocols.uart_capture import read_capture
+from service.daemon.mission_data import to_json
+from simulator.fc_kinds import KINDS, make_board
+from simulator.naze import SimulatedNaze
+from simulator.options import Faults, SimOptions, TelemetryProtocol
+from simulator.simulated_board import SimulatedBoard
 from storage.mission_store import open_store
 from storage.store_error import StoreError
 from tests.support.fuzz_inputs import FuzzInputs
+from tests.support.lying_board import LyingBoard, RandomAutopilot
 from tests.support.sample_missions import mission
 from tests.support.world import GroundStation, World, ready_world
 
@@ -73,6 +82,24 @@ def test_no_input_from_the_uart_raises(seed: int) -> None:
 
 
 @_fuzz
+def test_no_reply_raises(seed: int) -> None:
+    """Frames in place of a board's own: a right checksum around wrong contents."""
+    inputs = FuzzInputs(seed)
+    faults = Faults()
+    world = World(peer=_lying_board(inputs, faults), faults=faults, speeds=(115200, 9600, 57600))
+    world.bridge.report.watch(Group)
+    station = GroundStation(world)
+    for _ in range(AT_ONCE // 20):
+        station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
+        station.send(messages.MAVLink_mission_request_list_message(1, 1))
+        world.run(0.5)
+        faults.armed = inputs.random.random() < 0.5
+        for group in world.bridge.report.take_fresh():
+            to_json(asdict(world.bridge.report.group(group)))
+    world.run(1)
+
+
+@_fuzz
 def test_no_mission_file_raises(seed: int) -> None:
     inputs = FuzzInputs(seed)
     for _ in range(AT_ONCE):
@@ -88,6 +115,16 @@ def test_no_log_or_capture_raises(seed: int) -> None:
         log = b"".join(tlog_record(frame.raw, number) for number, frame in enumerate(frames))
         list(read_tlog(inputs.damaged(log), {0, 30} if inputs.random.random() < 0.5 else None))
         read_capture(inputs.like(captures()))
+
+
+def _lying_board(inputs: FuzzInputs, faults: Faults) -> LyingBoard | RandomAutopilot:
+    kind = inputs.random.choice(("harakiri", "harakiri", "autopilot", *KINDS))
+    if kind == "autopilot":
+        return RandomAutopilot(inputs)
+    board: SimulatedBoard = SimulatedNaze(SimOptions(tele_prot=inputs.random.choice(tuple(TelemetryProtocol))), faults)
+    if kind != "harakiri":
+        board = make_board(kind, faults=faults)
+    return LyingBoard(board, inputs, inputs.random.choice((0.02, 0.3)))
 
 
 @pytest.fixture(scope="module")

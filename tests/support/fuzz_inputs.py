@@ -36,7 +36,7 @@ class FuzzInputs:
     def from_a_ground_station(self) -> bytes:
         """A MAVLink frame of any known message (ids above 255 included), or something similar."""
         msgid = self.random.choice(_OURS if self.random.random() < 0.5 else list(MESSAGE_FORMATS))
-        payload = self._payload(MESSAGE_FORMATS[msgid].full_size)
+        payload = self.contents(MESSAGE_FORMATS[msgid].full_size)
         sysid, version = self.random.choice((1, 250, 255, self.random.randrange(256))), self.random.choice((1, 2, 2))
         frame = FrameWriter(sysid, 190).frame(Packed(msgid, payload, payload or b"\0"), 2 if msgid > 255 else version)
         return self.damaged(frame)
@@ -46,7 +46,7 @@ class FuzzInputs:
         if self.random.random() < 0.2:
             return self.from_a_ground_station()
         reply = MspFrame(
-            self.random.choice((Direction.REPLY, *Direction)), self.random.randrange(256), self._payload(255)
+            self.random.choice((Direction.REPLY, *Direction)), self.random.randrange(256), self.contents(255)
         )
         return self.damaged(reply.encode())
 
@@ -76,7 +76,8 @@ class FuzzInputs:
                 return draw.randbytes(draw.randrange(300))
         return data
 
-    def _payload(self, size: int) -> bytes:
+    def contents(self, size: int) -> bytes:
+        """Contents of any size, but often of this one."""
         size = self.random.choice((size, self.random.randrange(256), self.random.randrange(size + 1)))
         if self.random.random() < 0.5:
             return self.random.randbytes(size)
