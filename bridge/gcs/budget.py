@@ -2,8 +2,8 @@
 """Rate limits for each ground station and for all of them together. Sans-IO: the time is passed in."""
 
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Iterable
-from math import exp
+from collections.abc import Callable, Hashable
+from math import exp, inf
 
 from bridge.gcs.cost import LIMITS, Cost, Rate
 from bridge.gcs.station import Peer
@@ -23,12 +23,17 @@ class TokenBucket:
         self.rate = rate
         self._tokens = rate.burst
         self._counted_at = 0.0
+        #: If there was none left: when there is one again.
+        self.next_at = -inf
 
     def has(self, now: float) -> bool:
         """True if one more is allowed now."""
         self._tokens = min(self.rate.burst, self._tokens + max(0.0, now - self._counted_at) * self.rate.per_s)
         self._counted_at = now
-        return self._tokens >= 1.0
+        if self._tokens >= 1.0:
+            return True
+        self.next_at = now + (1.0 - self._tokens) / self.rate.per_s
+        return False
 
     def spend(self, amount: float = 1.0) -> None:
         """Count one; a negative amount takes it back."""
@@ -119,9 +124,7 @@ class Budgets:
         self._accounts[host] = account
         return account
 
-    def keep(self, peers: Iterable[Peer]) -> None:
-        """Forget peers that are gone."""
-        present = set(peers)
-        gone = [key for key in self._buckets if isinstance(key[1], Peer) and key[1] not in present]
-        for key in gone:
-            del self._buckets[key]
+    def forget(self, peer: Peer) -> None:
+        """A peer is gone."""
+        for cost in Cost:
+            self._buckets.pop((cost, peer), None)

@@ -94,11 +94,10 @@ class Ground:
         """All peers that receive broadcasts."""
         if self._everyone is None:
             heard = self.stations.peers()
-            answered = {peer.link for peer in heard}
             unheard = (
                 peer
-                for peer, until_answered in self._default_peers.items()
-                if peer not in heard and not (until_answered and peer.link in answered)
+                for peer in self.unheard()
+                if not (self._default_peers[peer] and any(peer.link == other.link for other in heard))
             )
             self._everyone = [*heard, *unheard]
         return self._everyone
@@ -117,14 +116,12 @@ class Ground:
         silent = self.stations.expire(now)
         for peer in silent:
             self._forget(peer)
-        if silent:
-            self.budgets.keep(self.stations.peers())
-        for peer in silent:
             self._log_event("info", "gcs.silent", peer=str(peer))
         return silent
 
     def _forget(self, peer: Peer) -> None:
         self._everyone = None
+        self.budgets.forget(peer)
         self._splitters.pop(peer, None)
         self._writers.pop(peer, None)
 

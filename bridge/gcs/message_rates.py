@@ -17,66 +17,81 @@ _EARLY = 0.25
 _UNWATCHED_S = 0.1
 
 
+class _Follower:
+    """A peer's requests and schedule, by message id, and its share of all messages."""
+
+    def __init__(self, share: Rate) -> None:
+        self.requested: dict[int, float] = {}
+        self.due: dict[int, float] = {}
+        self.share = TokenBucket(share)
+
+
 class MessageRates:
     """Intervals in seconds; infinity: never. `defaults` holds every known message id."""
 
     def __init__(self, defaults: Mapping[int, float]) -> None:
         self._defaults = defaults
-        self._requested: dict[Peer, dict[int, float]] = {}
-        self._due: dict[tuple[Peer, int], float] = {}
-        self._shares: dict[Peer, TokenBucket] = {}
+        self._followers: dict[Peer, _Follower] = {}
         self._newcomers_share = Rate(_MOST_PER_S, _MOST_PER_S)
         #: Peers at whose end there may be no station. They get no message more than ten times a second.
         self.unwatched: Collection[Peer] = ()
 
     def request(self, peer: Peer, msgid: int, interval_s: float | None) -> None:
         """Set the interval that a ground station requests; None: the default."""
-        self._due.pop((peer, msgid), None)
+        follower = self._follower(peer)
+        follower.due.pop(msgid, None)
         if interval_s is None:
-            self._requested.get(peer, {}).pop(msgid, None)
+            follower.requested.pop(msgid, None)
         else:
-            self._requested.setdefault(peer, {})[msgid] = interval_s
+            follower.requested[msgid] = interval_s
 
     def interval_s(self, peer: Peer, msgid: int) -> float:
         """The interval requested by a ground station, or the default."""
-        requested = self._requested.get(peer)
-        interval_s = self._defaults[msgid] if requested is None else requested.get(msgid, self._defaults[msgid])
+        follower = self._followers.get(peer)
+        interval_s = None if follower is None else follower.requested.get(msgid)
+        interval_s = self._defaults[msgid] if interval_s is None else interval_s
         return max(interval_s, _UNWATCHED_S) if peer in self.unwatched else interval_s
 
-    def fastest_s(self, msgid: int, peers: Iterable[Peer]) -> float:
-        """The shortest interval of `peers`."""
-        return min((self.interval_s(peer, msgid) for peer in peers), default=inf)
+    def fastest_s(self, peers: Iterable[Peer]) -> dict[int, float]:
+        """The shortest interval of `peers` for each message."""
+        # Those without requests are alike.
+        alike = {peer if peer in self.unwatched or self._has_requests(peer) else None: peer for peer in peers}.values()
+        return {msgid: min((self.interval_s(peer, msgid) for peer in alike), default=inf) for msgid in self._defaults}
 
     def take_due(self, msgid: int, peers: Sequence[Peer], now: float) -> list[Peer]:
         """The peers for which the message is due now; schedules the next one for each."""
         taken = []
         for peer in peers:
+            follower = self._followers.get(peer) or self._follower(peer)
+            share = follower.share
+            if now < share.next_at:
+                continue
             interval_s = self.interval_s(peer, msgid)
-            due = self._due.get((peer, msgid), -inf)
-            if interval_s == inf or now < due - interval_s * _EARLY:
+            due = follower.due.get(msgid, -inf)
+            if interval_s == inf or now < due - interval_s * _EARLY or not share.has(now):
                 continue
-            bucket = self._shares.get(peer)
-            if bucket is None:
-                bucket = self._shares[peer] = TokenBucket(self._newcomers_share)
-            if not bucket.has(now):
-                continue
-            bucket.spend()
+            share.spend()
             # Counted from the due time to keep the rate, but missed messages are not caught up.
-            self._due[peer, msgid] = (due if now < due + interval_s else now) + interval_s
+            follower.due[msgid] = (due if now < due + interval_s else now) + interval_s
             taken.append(peer)
         return taken
 
     def keep(self, peers: Iterable[Peer], with_standing: Collection[Peer]) -> None:
         """Forget all other peers. `with_standing`: those whose share does not depend on the number of the others."""
-        present = set(peers)
-        for peer in (self._requested.keys() | self._shares) - present:
-            self._requested.pop(peer, None)
-            self._shares.pop(peer, None)
-        for key in [key for key in self._due if key[0] not in present]:
-            del self._due[key]
-        share, self._newcomers_share = _share(len(with_standing)), _share(len(present) - len(with_standing))
-        for peer, bucket in self._shares.items():
-            bucket.rate = share if peer in with_standing else self._newcomers_share
+        self._followers = {peer: self._follower(peer) for peer in peers}
+        newcomers = len(self._followers) - len(with_standing)
+        share, self._newcomers_share = _share(len(with_standing)), _share(newcomers)
+        for peer, follower in self._followers.items():
+            follower.share.rate = share if peer in with_standing else self._newcomers_share
+
+    def _follower(self, peer: Peer) -> _Follower:
+        follower = self._followers.get(peer)
+        if follower is None:
+            follower = self._followers[peer] = _Follower(self._newcomers_share)
+        return follower
+
+    def _has_requests(self, peer: Peer) -> bool:
+        return peer in self._followers and bool(self._followers[peer].requested)
 
 
 def _share(peers: int) -> Rate:

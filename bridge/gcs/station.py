@@ -2,7 +2,6 @@
 """Ground stations and their addresses."""
 
 from collections.abc import Hashable
-from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -27,8 +26,7 @@ class Peer(NamedTuple):  # hashed several times for each message: as a tuple, in
 RECORDER = Peer("log", "flight")
 
 
-@dataclass(frozen=True, slots=True)
-class Station:
+class Station(NamedTuple):
     """A ground station: its ids (sysid, compid) and its address."""
 
     peer: Peer

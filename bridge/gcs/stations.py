@@ -2,10 +2,11 @@
 """The connected ground stations, and the MAVLink version for each."""
 
 from array import array
-from collections import Counter, defaultdict
+from collections import Counter, OrderedDict
 from collections.abc import Collection, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
 from math import inf
+from operator import itemgetter
 from zlib import crc32
 
 from bridge.gcs.station import Peer, Station
@@ -14,6 +15,8 @@ from bridge.gcs.station import Peer, Station
 EXPIRY_S = 60.0
 #: The same for a peer whose ids are all heard at another address now, as after Wi-Fi roaming.
 MOVED_S = 5.0
+#: How often silent peers are searched for, at most.
+_EXPIRY_INTERVAL_S = 1.0
 #: Peers on one link: as many as a network has hosts whose addresses differ in the last byte.
 MAX_PEERS = 256
 #: The number of these that have precedence.
@@ -33,14 +36,19 @@ _MAX_SPEAKERS = 16
 
 @dataclass(slots=True)
 class _Known:
+    places: "_Places"
     version: int
-    is_listener: bool
     came_at: float
     heard_at: float
     beats: int = 0
     beat_at: float = -inf
     #: When each (sysid, compid) was last heard from there.
     speakers: dict[tuple[int, int], float] = field(default_factory=dict)
+
+    @property
+    def is_steady(self) -> bool:
+        """True if the peer has been heard for a while."""
+        return self.beats >= _STEADY_BEATS
 
 
 def displaced(peers: Mapping[Peer, float], steady: Collection[Peer] = ()) -> Peer:
@@ -52,22 +60,79 @@ def displaced(peers: Mapping[Peer, float], steady: Collection[Peer] = ()) -> Pee
     """
     hosts = Counter(peer.host for peer in peers)
     later = _by_precedence(peers, steady)[min(PRECEDENCE, len(peers) // 2) :]
-    return min(later, key=lambda peer: (-hosts[peer.host], peers[peer]))
+    return min(later, key=lambda entry: (-hosts[entry[2].host], peers[entry[2]]))[2]
 
 
-def _by_precedence(peers: Iterable[Peer], steady: Collection[Peer]) -> list[Peer]:
-    """Steady peers first; within each kind one peer of each host, then the second of each; then by arrival."""
+def _by_precedence(peers: Iterable[Peer], steady: Collection[Peer]) -> list[tuple[bool, int, Peer]]:
+    """Steady peers first; within each kind one peer of each host, then the second of each; then by arrival.
+
+    Each as (is not steady, its number among its host's peers of that kind, peer).
+    """
     rounds: Counter[tuple[bool, Hashable]] = Counter()
     order: list[tuple[bool, int, Peer]] = []
     for peer in peers:
         group = peer not in steady, peer.host
         rounds[group] += 1
         order.append((group[0], rounds[group], peer))
-    return [peer for _, _, peer in sorted(order, key=lambda entry: entry[:2])]
+    return sorted(order, key=itemgetter(0, 1))
 
 
-def _slots(*, is_listener: bool) -> int:
-    return MAX_LISTENERS if is_listener else MAX_PEERS
+class _Places:
+    """The places of a link's listeners, or of its other peers. A packet costs as much on a full link as on another."""
+
+    def __init__(self, *, is_listener: bool) -> None:
+        self.is_listener = is_listener
+        self.size = MAX_LISTENERS if is_listener else MAX_PEERS
+        self.known: OrderedDict[Peer, _Known] = OrderedDict()  # the longest-silent first
+        self._hosts: Counter[Hashable] = Counter()
+        self._first: dict[Peer, None] | None = None  # recomputed after a change
+        self._rank_of_last: tuple[bool, float, float] = (True, inf, inf)
+
+    @property
+    def is_full(self) -> bool:
+        """True if a newcomer displaces another peer."""
+        return len(self.known) >= self.size
+
+    @property
+    def first(self) -> Mapping[Peer, None]:
+        """The peers that are never displaced, in order of precedence."""
+        if self._first is None:
+            arrived = sorted(self.known, key=lambda peer: self.known[peer].came_at)
+            steady = {peer for peer, known in self.known.items() if known.is_steady}
+            most = min(PRECEDENCE, self.size // 2)
+            order = _by_precedence(arrived, steady)[:most]
+            self._first = dict.fromkeys(peer for _, _, peer in order)
+            self._rank_of_last = True, inf, inf
+            if len(order) == most:
+                unsteady, number, last = order[-1]
+                self._rank_of_last = unsteady, number, self.known[last].came_at
+        return self._first
+
+    def add(self, peer: Peer, known: _Known) -> None:
+        """Give a newcomer a place."""
+        self.known[peer] = known
+        self._hosts[peer.host] += 1
+        self.ranked(known)
+
+    def ranked(self, known: _Known) -> None:
+        """A peer has arrived or become steady."""
+        if (not known.is_steady, 1, known.came_at) < self._rank_of_last:
+            self._first = None
+
+    def remove(self, peer: Peer) -> None:
+        """Free a place. If it is not one of the first, their order stays: those behind it only move up behind them."""
+        del self.known[peer]
+        self._hosts[peer.host] -= 1
+        if not self._hosts[peer.host]:
+            del self._hosts[peer.host]
+        if self._first is not None and peer in self._first:
+            self._first = None
+
+    def displaced(self) -> Peer:
+        """Like the function of that name, if not all peers of the host with most are among the first."""
+        first, most = self.first, max(self._hosts.values())
+        silent = (peer for least in (most, 0) for peer in self.known if self._hosts[peer.host] >= least)
+        return next(peer for peer in silent if peer not in first)
 
 
 class Stations:
@@ -79,14 +144,14 @@ class Stations:
 
     def __init__(self) -> None:
         self._known: dict[Peer, _Known] = {}  # in order of arrival
-        self._orders: dict[tuple[str, bool], list[Peer]] | None = None  # recomputed after each change
+        self._places: dict[tuple[str, bool], _Places] = {}
         self._turned_away = array("I", [0]) * _REMEMBERED
         self._displaced: list[Peer] = []
         self._expiry_due = inf
 
     def has_room_for(self, peer: Peer, *, is_listener: bool) -> bool:
         """False if a newcomer's link is full, and it is heard for the first time."""
-        if len(self._order(peer.link, is_listener=is_listener)) < _slots(is_listener=is_listener):
+        if not self._places_on(peer.link, is_listener=is_listener).is_full:
             return True
         mark = crc32(repr(peer).encode())
         has_come_before = self._turned_away[mark % _REMEMBERED] == mark
@@ -97,54 +162,48 @@ class Stations:
         """Note a frame from a station; True if its peer is new."""
         known = self._known.get(station.peer)
         is_new = known is None
-        if known is None or known.is_listener != is_listener:
+        if known is None or known.places.is_listener != is_listener:
             known = self._add(station.peer, version, is_listener, now)
         known.heard_at = now
+        known.places.known.move_to_end(station.peer)
         known.version = max(known.version, version)
         if known.beats < _STEADY_BEATS and now >= known.beat_at + _BEAT_S:
             known.beats, known.beat_at = known.beats + 1, now
-            self._orders = None
+            if known.is_steady:
+                known.places.ranked(known)
         self._note_speaker(station, known, now)
         return is_new
 
     def _add(self, peer: Peer, version: int, is_listener: bool, now: float) -> _Known:
-        self._known.pop(peer, None)
-        self._orders = None
-        rivals = {
-            other: known.heard_at
-            for other, known in self._known.items()
-            if other.link == peer.link and known.is_listener == is_listener
-        }
-        if len(rivals) >= _slots(is_listener=is_listener):
-            other = displaced(rivals, self.steady)
-            del self._known[other]
-            self._displaced.append(other)
-        added = self._known[peer] = _Known(version, is_listener, now, now)
+        self.gone(peer)
+        places = self._places_on(peer.link, is_listener=is_listener)
+        if places.is_full:
+            self._displaced.append(places.displaced())
+            self.gone(self._displaced[-1])
+        added = self._known[peer] = _Known(places, version, now, now)
+        places.add(peer, added)
         return added
 
     @property
     def steady(self) -> set[Peer]:
         """The peers that have been heard for a while."""
-        return {peer for peer, known in self._known.items() if known.beats >= _STEADY_BEATS}
+        return {peer for peer, known in self._known.items() if known.is_steady}
 
     def hosts_with_precedence(self) -> dict[Hashable, None]:
         """The hosts of all links' first peers by precedence, in that order."""
-        links = dict.fromkeys(peer.link for peer in self._known)
-        return {peer.host: None for link in links for peer in self._order(link, is_listener=False)[:PRECEDENCE]}
+        links = (places for places in self._places.values() if not places.is_listener)
+        return {peer.host: None for places in links for peer in places.first}
 
     def has_standing(self, peer: Peer) -> bool:
         """True for the first peers of a link by precedence."""
-        return peer in self._order(peer.link, is_listener=False)[:PRECEDENCE]
+        known = self._known.get(peer)
+        return known is not None and not known.places.is_listener and peer in known.places.first
 
-    def _order(self, link: str, *, is_listener: bool) -> list[Peer]:
-        """A link's peers by precedence."""
-        if self._orders is None:
-            kinds = defaultdict(list)
-            for peer, known in self._known.items():
-                kinds[peer.link, known.is_listener].append(peer)
-            steady = self.steady
-            self._orders = {kind: _by_precedence(peers, steady) for kind, peers in kinds.items()}
-        return self._orders.get((link, is_listener), [])
+    def _places_on(self, link: str, *, is_listener: bool) -> _Places:
+        places = self._places.get((link, is_listener))
+        if places is None:
+            places = self._places[link, is_listener] = _Places(is_listener=is_listener)
+        return places
 
     def is_unknown(self, peer: Peer) -> bool:
         return peer not in self._known
@@ -155,8 +214,9 @@ class Stations:
         return 2 if known is None else known.version
 
     def gone(self, peer: Peer) -> None:
-        self._known.pop(peer, None)
-        self._orders = None
+        known = self._known.pop(peer, None)
+        if known is not None:
+            known.places.remove(peer)
 
     def expire(self, now: float) -> list[Peer]:
         """Forget silent peers; returns them and those displaced by others."""
@@ -166,9 +226,9 @@ class Stations:
             due = self._expiry_times()
             silent += [peer for peer in due if now >= due[peer]]
             for peer in silent:
-                self._known.pop(peer, None)
-            self._orders = None
-            self._expiry_due = min(self._expiry_times().values(), default=inf)
+                self.gone(peer)
+            later = (at for at in due.values() if now < at)
+            self._expiry_due = max(min(later, default=inf), now + _EXPIRY_INTERVAL_S)
         return silent
 
     def next_deadline(self) -> float:
@@ -181,7 +241,7 @@ class Stations:
     def is_listener(self, peer: Peer) -> bool:
         """True if a connected peer may only read."""
         known = self._known.get(peer)
-        return known is not None and known.is_listener
+        return known is not None and known.places.is_listener
 
     def moved_to(self, station: Station, now: float) -> list[Station]:
         """The new addresses of a station that fell silent at its old one: usually none."""
@@ -203,8 +263,7 @@ class Stations:
         return (
             now >= old.heard_at + _STILL_S
             and to.peer != station.peer
-            and to.peer.link == station.peer.link
-            and new.is_listener == old.is_listener
+            and new.places is old.places
             and speaker in new.speakers
             and new.came_at >= old.heard_at
         )
@@ -219,14 +278,14 @@ class Stations:
         known.speakers[speaker] = now
 
     def _expiry_times(self) -> dict[Peer, float]:
-        latest: dict[tuple[str, bool, tuple[int, int]], float] = {}
-        for peer, known in self._known.items():
+        latest: dict[tuple[_Places, tuple[int, int]], float] = {}
+        for known in self._known.values():
             for speaker, heard_at in known.speakers.items():
-                key = peer.link, known.is_listener, speaker
+                key = known.places, speaker
                 latest[key] = max(heard_at, latest.get(key, -inf))
         times = {}
         for peer, known in self._known.items():
             # Heard later at another address: the station has moved there.
-            moved = all(latest[peer.link, known.is_listener, ids] > at for ids, at in known.speakers.items())
+            moved = all(latest[known.places, ids] > at for ids, at in known.speakers.items())
             times[peer] = known.heard_at + (MOVED_S if moved else EXPIRY_S)
         return times

@@ -7,6 +7,7 @@ ack to MISSION_COUNT means "continue" to it; most special cases below respond to
 docs/ground-stations.md.
 """
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -84,6 +85,9 @@ class MissionUploads:
         self._ground = context.ground
         self._flash = context.ground.flash
         self._uploads: list[_Upload] = []  # in the order of their MISSION_COUNT
+        self._states: Counter[type[UploadState]] = Counter()  # of the uploads
+        #: No state ends and no request is repeated before this time.
+        self._states_due = inf
         self._answers = RecentAnswers(context.ground.stations.has_moved)
         self._reminders: list[tuple[float, Station, str]] = []
         self._is_asking = False
@@ -169,6 +173,7 @@ class MissionUploads:
             self._end([upload], _cancelled(f"cancelled (result {result})"), now)
         else:
             upload.state.close(now)
+            self._states_due = now  # the deadline may be sooner
 
     # From the rest of the bridge.
 
@@ -192,13 +197,15 @@ class MissionUploads:
 
     def tick(self, now: float) -> None:
         """Repeat a request, end a state at its deadline, begin the next upload."""
-        for upload in self._uploads[:]:
-            state = upload.state
-            if now >= state.deadline:
-                self._end([upload], state.timeout, now)
-            elif isinstance(state, Receiving) and now >= state.request.due:
-                state.request.lost()
-                self._request(upload, now)
+        if now >= self._states_due:
+            for upload in self._uploads[:]:
+                state = upload.state
+                if now >= state.deadline:
+                    self._end([upload], state.timeout, now)
+                elif isinstance(state, Receiving) and now >= state.request.due:
+                    state.request.lost()
+                    self._request(upload, now)
+            self._states_due = min((upload.state.next_tick() for upload in self._uploads), default=inf)
         for reminder in [reminder for reminder in self._reminders if now >= reminder[0]]:
             self._reminders.remove(reminder)
             _, station, text = reminder
@@ -210,15 +217,15 @@ class MissionUploads:
         if not (self._uploads or self._reminders):
             return inf
         # Asked after each datagram of a flood.
-        states = {type(upload.state) for upload in self._uploads}
-        arriving, waiting = states & {Asking, Receiving}, Waiting in states
+        states = self._states
+        arriving, waiting = states[Asking] or states[Receiving], states[Waiting]
         is_free = self._missions.occupied() is not OCCUPIED
-        if is_free and (Complete in states or (waiting and not arriving)):
+        if is_free and (states[Complete] or (waiting and not arriving)):
             return 0.0
-        times = [self._may_ask_at] if Asking in states and not self._is_asking else []
+        times = [self._states_due, *(due for due, _, _ in self._reminders)]
+        times += [self._may_ask_at] if states[Asking] and not self._is_asking else []
         times += [self._arriving_since + _ALONE_S] if is_free and waiting and arriving else []
-        times += [upload.state.next_tick() for upload in self._uploads] + [due for due, _, _ in self._reminders]
-        return min(times, default=inf)
+        return min(times)
 
     # State changes of an upload.
 
@@ -234,6 +241,7 @@ class MissionUploads:
             return
         upload = _Upload(station, count, self._context.incidents.begin("upload"), Waiting(Announced(), now))
         self._uploads.append(upload)
+        self._entered(upload)
         armed = self._missions.armed_refusal()
         if armed is not None:
             self._end([upload], armed, now)
@@ -280,7 +288,9 @@ class MissionUploads:
         if after is None:
             self._forget(upload, now)
         else:
+            self._states[type(before)] -= 1
             upload.state = after(event, now)
+            self._entered(upload)
         match event:
             case Turn() if isinstance(before, Complete):
                 delivered = partial(self._delivered, upload, before.verdict)
@@ -299,9 +309,14 @@ class MissionUploads:
             if upload in self._uploads:
                 self._handle(upload, Ended(refusal), now)
 
+    def _entered(self, upload: _Upload) -> None:
+        self._states[type(upload.state)] += 1
+        self._states_due = min(self._states_due, upload.state.next_tick())
+
     def _forget(self, upload: _Upload, now: float) -> None:
         self._last_end = now
         self._uploads.remove(upload)
+        self._states[type(upload.state)] -= 1
         self._missions.release(upload)
 
     def _is_for(self, upload: _Upload, count: int, now: float) -> bool:
@@ -353,6 +368,7 @@ class MissionUploads:
         state = upload.state
         assert isinstance(state, Receiving)
         state.request.asked(state.wanted, now)
+        self._states_due = min(self._states_due, state.request.due)
         station = upload.station
         request = messages.MAVLink_mission_request_message(station.sysid, station.compid, state.wanted)
         self._ground.to(station, request)
@@ -423,6 +439,8 @@ class MissionUploads:
         return next((upload for upload in reversed(self._uploads) if upload.station == station), None)
 
     def _in(self, *states: type[UploadState]) -> list[_Upload]:
+        if not any(self._states[state] for state in states):
+            return []
         return [upload for upload in self._uploads if type(upload.state) in states]
 
     def _undelivered(self) -> list[_Upload]:

@@ -13,6 +13,7 @@ from bridge.fc.session import FcSession
 from bridge.gcs.ground import Ground
 from bridge.gcs.message_rates import MessageRates
 from bridge.gcs.station import Peer, Severity, Station
+from bridge.gcs.stations import PRECEDENCE
 from bridge.missions.mission_service import MissionService
 from bridge.model.flight_mode import FlightMode
 from bridge.model.mission_progress import FlownMission, MissionProgress
@@ -85,7 +86,8 @@ class OwnVehicle:
     def newcomer(self, peer: Peer) -> None:
         """Send a new ground station faster heartbeats, so that it connects sooner, and HOME_POSITION soon."""
         self._is_news_wanted = True
-        self._newcomers[peer] = self._now + _NEWCOMER_S
+        if len(self._newcomers) < PRECEDENCE:  # to a crowd, one a second
+            self._newcomers[peer] = self._now + _NEWCOMER_S
         self._newcomers_due = min(self._newcomers_due, self._now + _NEWCOMER_INTERVAL_S)
         self.due = min(self.due, self._newcomers_due)
         self._ground.greet(peer, self._heartbeat())
@@ -122,9 +124,10 @@ class OwnVehicle:
     def _greet(self, now: float) -> None:
         self._newcomers = {peer: until for peer, until in self._newcomers.items() if now < until}
         self._newcomers_due = now + _NEWCOMER_INTERVAL_S if self._newcomers else inf
+        heartbeat = self._heartbeat()
         for peer in self._ground.everyone():
             if peer in self._newcomers:
-                self._ground.greet(peer, self._heartbeat())
+                self._ground.greet(peer, heartbeat)
 
     def heard(self, news: Collection[type[Reading]], now: float) -> None:
         """Send the messages that follow from new readings, where due."""
@@ -212,8 +215,9 @@ class OwnVehicle:
         for reading, interval_s in self._also_wanted.items():
             _want(wanted, POLL_FOR.get(reading), interval_s)
         self._rows = {}
+        fastest_s = self._rates.fastest_s(everyone)
         for row in TELEMETRY:
-            interval_s = self._rates.fastest_s(row.msgid, everyone)
+            interval_s = fastest_s[row.msgid]
             if interval_s < inf:
                 self._rows.setdefault(row.reading, []).append(row)
             _want(wanted, row.poll, interval_s)
