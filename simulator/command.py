@@ -69,10 +69,12 @@ def _address(_: click.Context, __: click.Parameter, value: str | None) -> tuple[
 
 
 @click.command()
-@click.option("--kind", type=click.Choice(["naze", *KINDS]), default="naze", help="Which flight controller.")
-@click.option("--inav-version", type=click.Choice(list(BOXES)), default="9.1.0", help="With --kind inav.")
+@click.option("--kind", type=click.Choice(["naze", *KINDS]), default="naze", help="The flight controller to simulate.")
+@click.option(
+    "--inav-version", type=click.Choice(list(BOXES)), default="9.1.0", help="Version of INAV, with --kind inav."
+)
 @click.option("--link", type=_PATH, help="Symbolic link to make to the port.")
-@click.option("--tcp", metavar="HOST:PORT", callback=_address, help="Listen there instead: one client at a time.")
+@click.option("--tcp", metavar="HOST:PORT", callback=_address, help="Listen on TCP instead, for one client at a time.")
 @click.option("--baud", type=_BAUD, default="115200", show_default=True, help="Speed while disarmed.")
 @click.option("--armed", is_flag=True, help="Begin armed.")
 @click.option(

@@ -21,7 +21,7 @@ from service.settings.load import CONFIG_VARIABLE
 )
 @click.option("--state-dir", type=click.Path(path_type=Path), help="Folder for stored missions.")
 @click.option("--record-uart", type=click.Path(path_type=Path), help="File to record the port's traffic into.")
-@click.option("--verbose", is_flag=True, help="Show debug events too.")
+@click.option("--verbose", is_flag=True, help="Also show debug events.")
 @click.option("--check-config", is_flag=True, help="Check the settings and exit.")
 def run(
     fc: str | None,

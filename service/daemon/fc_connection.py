@@ -70,7 +70,7 @@ class FcConnection:
 
     @property
     def dropped_bytes(self) -> int:
-        """Bytes that the line was too slow for."""
+        """Bytes dropped because the line was too slow."""
         return self._port.dropped_bytes
 
     def ports(self) -> dict[str, object]:

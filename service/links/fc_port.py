@@ -14,7 +14,7 @@ from service.links.fc_device import DEVICE_ERRORS, Device, PortError
 
 #: The reason given to `on_close` at the end of the daemon.
 STOPPED = "the daemon stops"
-MOVED_ON = "the flight controller is looked for on another port"
+MOVED_ON = "searching for the flight controller on another port"
 
 _READ_SIZE = 4096
 _RETRY_S = 0.25
@@ -56,7 +56,7 @@ class FcPort:
         self._closed = asyncio.Event()
         #: Why the port cannot be opened; empty if it could be.
         self.trouble = ""
-        #: Bytes that the line was too slow for.
+        #: Bytes dropped because the line was too slow.
         self.dropped_bytes = 0
         #: Reads may be delayed by a few ms at high rates, because no reply is pending.
         self.may_gather = False

@@ -89,7 +89,7 @@ def check_name(what: str, name: str) -> str:
     elif name.startswith("@"):
         wrong = f"{name!r}, with @ in front"
     elif len(name) > _MAX_NAME:
-        wrong = f"longer than {_MAX_NAME} letters"
+        wrong = f"longer than {_MAX_NAME} characters"
     else:
         return name
     raise ZenohSettingsError(f'{what} is {wrong}: make a name of letters, digits and dashes, as "naze-1"')

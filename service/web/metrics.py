@@ -148,7 +148,9 @@ class _State(Collector):
             states.add_metric([each.name], float(type(state) is each))
         yield states
         dropped = self._daemon.fc.dropped_bytes
-        yield _counted("fc_dropped_bytes", "Bytes for the flight controller that its line was too slow for.", dropped)
+        yield _counted(
+            "fc_dropped_bytes", "Bytes to the flight controller dropped because its line was too slow.", dropped
+        )
         # These restart at 0 with each flight controller found, which Prometheus permits for counters.
         damaged = state.bad_checksums or 0
         yield _counted("fc_damaged_frames", "Frames of the flight controller with a wrong checksum.", damaged)

@@ -48,7 +48,9 @@ def _read(path: Path) -> bytes | None:
     except OSError as error:
         raise TokenError(f"the token in {path} cannot be read: {error.strerror}") from error
     if len(secret) < _LEAST_LENGTH:
-        raise TokenError(f"the token in {path} is shorter than {_LEAST_LENGTH} letters: delete the file for a new one")
+        raise TokenError(
+            f"the token in {path} is shorter than {_LEAST_LENGTH} characters: delete the file for a new one"
+        )
     return secret
 
 

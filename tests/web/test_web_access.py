@@ -218,7 +218,7 @@ def test_without_a_token_the_page_is_read_only(start: Starter) -> None:
     token_file.chmod(0o600)
     web = web_daemon(start, web='token_file = "token"')
     event = until(lambda: web.daemon.has_logged("web.no_token"), "a log entry about the token")
-    assert event["why"].startswith(f"the token in {token_file} is shorter than 12 letters")
+    assert event["why"].startswith(f"the token in {token_file} is shorter than 12 characters")
     answer = web.ask(RESTORE, "POST", Authorization="Bearer short")
     assert (answer.status, answer.data["error"]) == (403, f"This page is read-only: {event['why']}.")
     assert web.ask("/api/state").status == 200
