@@ -61,7 +61,7 @@ test: $(VENV)/.test-ready
 	    $$($(BARE_ROOT) || echo --deselect=$(IN_BARE_ROOT)) $(ARGS)
 
 # Turns of phrase that are not English, or say again what a name says; CONTRIBUTING.md has the rule.
-UN_ENGLISH := whoever|whomever|anew|amidst|somebody|anybody|everybody|hung up on|at the most|stands (still|in the way)
+UN_ENGLISH := whoever|whomever|anew|amidst|somebody|anybody|everybody|hung up on|at the most|stands (still|in the way)|patience|(is|are|was|were|be) taken for|looked for on
 UN_ENGLISH := \b($(UN_ENGLISH)|(what|who) (comes|goes|stands)|(Return|Tell)s? (what|when|how|whether|which|who|where|why))\b
 
 lint: $(VENV)/.test-ready

@@ -80,7 +80,7 @@ def _at(rate: str, runs: _Runs) -> Iterator[Figure]:
 
 def _apart(runs: _Runs) -> list[Figure]:
     return [
-        Figure(f"forward at {rate} on a CPU of its own, CPU a message, {name}", _cpu_us(its_runs), "us")
+        Figure(f"forward at {rate} on its own CPU, CPU a message, {name}", _cpu_us(its_runs), "us")
         for (name, rate), its_runs in runs.items()
     ]
 

@@ -239,7 +239,7 @@ def test_an_empty_write_is_refused(shared: Bench, kept: list[str]) -> None:
 BAD_LISTS = {
     "land in the middle": ([HOME, PlanRow(Command.NAV_LAND), waypoint(1)], MissionResult.INVALID, "LAND"),
     "take-off alone": ([HOME, PlanRow(Command.NAV_TAKEOFF, alt=10.0)], MissionResult.INVALID, "alone"),
-    "a frame of its own": ([HOME, waypoint(1), waypoint(2, frame=7)], MissionResult.UNSUPPORTED_FRAME, "frame 7"),
+    "an unsupported frame": ([HOME, waypoint(1), waypoint(2, frame=7)], MissionResult.UNSUPPORTED_FRAME, "frame 7"),
     "beyond the pole": ([HOME, waypoint(1), waypoint(2, lat=91.0)], MissionResult.INVALID_PARAM5_X, "90 deg"),
     "home nowhere": ([PlanRow(80), waypoint(1), waypoint(2)], MissionResult.INVALID, "WAYPOINT"),
 }
