@@ -7,7 +7,7 @@ may stretch it: requests and replies together get a share of its bytes, or of th
 only after its reply has arrived or timed out, so a long round trip slows the fast ones down by itself.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from operator import attrgetter
@@ -127,6 +127,8 @@ class PollSchedule:
     def __init__(self) -> None:
         self._wanted: Mapping[Msp, float] = {}
         self._slots: dict[int, _Slot] = {}
+        #: The commands that are polled.
+        self.commands: Collection[int] = ()
         self._budget = 0.0
         self._line_scale = 1.0
         self._quality = 1.0
@@ -148,6 +150,7 @@ class PollSchedule:
             poll.command: _Slot(poll, frame_size(poll.command, poll.reply_payload), turn_s * bytes_per_s)
             for poll in polls
         }
+        self.commands = self._slots.keys()
         self._fit()
 
     def want(self, wanted: Mapping[Msp, float]) -> None:
@@ -187,11 +190,9 @@ class PollSchedule:
             limit = soon
             near = [slot for slot in near if slot.due <= soon]
 
-    def answered(self, frame: MspFrame) -> bool:
-        """Take a reply; False if its command is not polled."""
-        slot = self._slots.get(frame.command)
-        if slot is None:
-            return False
+    def answered(self, frame: MspFrame) -> None:
+        """Take a reply to a command that is polled."""
+        slot = self._slots[frame.command]
         slot.is_asked = False
         is_bent = slot.misses > _TOLERATED_MISSES or self._quality < 1
         slot.misses = 0
@@ -206,7 +207,6 @@ class PollSchedule:
         elif is_bent:
             # The others follow with their own replies.
             slot.set_interval(self._interval(slot, self._scale))
-        return True
 
     def next_deadline(self, link: MspLink) -> float:
         """The time of the next request; infinity if a reply must arrive first."""

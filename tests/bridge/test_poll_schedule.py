@@ -57,7 +57,8 @@ class Line:
 
     def _settle(self, frames: list[MspFrame]) -> None:
         for frame in frames:
-            self.schedule.answered(frame)
+            if frame.command in self.schedule.commands:
+                self.schedule.answered(frame)
 
     def _take(self, command: int) -> None:
         size: int | None = -1  # the link's own request

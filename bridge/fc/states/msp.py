@@ -172,7 +172,8 @@ class Polling(MspLine):
     def take_frame(self, frame: MspFrame, now: float) -> None:
         """Replies belong to a conversation, to a poll, or to both."""
         super().take_frame(frame, now)
-        if self.port.polls.answered(frame):
+        if frame.command in self.port.polls.commands:
+            self.port.polls.answered(frame)
             hear_msp(self.port.vehicle, frame, self.controller, now)
 
     def tick(self, now: float) -> Event | None:
@@ -186,8 +187,8 @@ class Polling(MspLine):
 
     def deadline(self) -> float:
         """The next poll, or the next deadline of any MSP line."""
-        check_at = inf if self.port.runner.is_busy else self._check_at
-        return min(super().deadline(), check_at, self.port.polls.next_deadline(self.link))
+        deadline = min(super().deadline(), self.port.polls.next_deadline(self.link))
+        return deadline if deadline <= self._check_at or self.port.runner.is_busy else self._check_at
 
     def _checked(self, board: FlightController | LinkLost | None, now: float) -> None:
         if isinstance(board, FlightController) and board.profile is not self.controller.profile:
