@@ -37,7 +37,7 @@ ARMING_BLOCKERS = {
     20: "command line open",
     21: "CMS menu open",
     22: "OSD menu open",
-    23: "sticks not centered",
+    23: "sticks not centred",
     24: "servo autotrim on",
     25: "out of memory",
     26: "invalid setting",

@@ -23,7 +23,7 @@ class TlogRecorder:
     """Offers `on_frames`. Within a file time advances evenly; when the clock is set a new file begins.
 
     A file begins without ground stations' heartbeats: Mission Planner shows the system whose HEARTBEAT comes first in a
-    log, and recognizes only the systems 255 and 253 as ground stations. They are left out until a vehicle's HEARTBEAT.
+    log, and recognises only the systems 255 and 253 as ground stations. They are left out until a vehicle's HEARTBEAT.
 
     `read_clock`: the system's time, nanoseconds since the Unix epoch.
     """

@@ -55,9 +55,9 @@ def push_under(inject: Injection, seed: int, options: SimOptions | None = None) 
     committed = MissionCommand.COMMIT in commands_sent(world)
     if isinstance(result, DeliveryResult) and result.ack is MissionResult.ACCEPTED:
         assert stored == NEW_RECORDS
-        came_to = "ACCEPTED"
+        reported = "ACCEPTED"
     else:
-        came_to = result.text
+        reported = result.text
         # INVALID: the last of three attempts ended with a record whose damage passed the checksum.
         assert result.ack in (MissionResult.DENIED, MissionResult.NO_SPACE, MissionResult.INVALID)
         if result.text == PushFailure.UNCERTAIN.value:
@@ -66,7 +66,7 @@ def push_under(inject: Injection, seed: int, options: SimOptions | None = None) 
         else:
             assert stored == OLD_RECORDS
     works_again(world)
-    return came_to, world
+    return reported, world
 
 
 def works_again(world: World) -> None:
@@ -109,8 +109,8 @@ def switching(fault: str, latest: float, longest: float) -> Injection:
 
 
 def test_a_push_without_faults_is_limited_only_by_the_line() -> None:
-    came_to, world = push_under(lambda world, draw: None, 0)
-    assert came_to == "ACCEPTED"
+    reported, world = push_under(lambda world, draw: None, 0)
+    assert reported == "ACCEPTED"
     world.assert_line_was_clean()
 
 
@@ -151,8 +151,8 @@ def test_a_push_over_a_bad_line_ends_before_mission_planner_times_out(rate: floa
 def test_a_damaged_reply_is_not_trusted() -> None:
     """Seeds with damage that passed the checksum: INFO's radius and COMMIT's reply."""
     for seed in (1073, 1171, 1339, 1540):
-        came_to, _ = push_under(setting(bit_error_rate=1e-3), seed)
-        assert came_to in ("ACCEPTED", PushFailure.OUT_OF_TIME.value)
+        reported, _ = push_under(setting(bit_error_rate=1e-3), seed)
+        assert reported in ("ACCEPTED", PushFailure.OUT_OF_TIME.value)
 
 
 def test_a_pull_over_a_bad_line_is_exact_or_fails() -> None:
@@ -186,8 +186,8 @@ def test_losses_are_recovered_with_any_window_and_chunk_size(window: int, chunk:
 
 
 def test_a_push_waits_for_a_short_stall() -> None:
-    came_to = outcomes(switching("hang", 0.4, 1.0), 15)
-    assert came_to == {"ACCEPTED": 15}
+    reported = outcomes(switching("hang", 0.4, 1.0), 15)
+    assert reported == {"ACCEPTED": 15}
 
 
 def test_replies_pending_during_a_stall_fit_the_ring() -> None:
@@ -197,11 +197,11 @@ def test_replies_pending_during_a_stall_fit_the_ring() -> None:
 
 
 def test_a_push_fails_after_a_long_stall() -> None:
-    came_to = outcomes(
+    reported = outcomes(
         lambda world, draw: world.after(draw.random() * 0.4, lambda: setattr(world.faults, "hang", True)), 15
     )
-    assert set(came_to) <= {"ACCEPTED", PushFailure.NO_ANSWER.value, PushFailure.UNCERTAIN.value}
-    assert came_to["ACCEPTED"] < 8
+    assert set(reported) <= {"ACCEPTED", PushFailure.NO_ANSWER.value, PushFailure.UNCERTAIN.value}
+    assert reported["ACCEPTED"] < 8
 
 
 def test_a_power_cut_at_any_moment_leaves_the_old_list_or_the_new_one() -> None:
@@ -254,14 +254,14 @@ def test_arming_during_a_push_keeps_the_old_list() -> None:
     def inject(world: World, draw: random.Random) -> None:
         world.after(draw.random() * 0.45, lambda: setattr(world.faults, "armed", True))
 
-    came_to = outcomes(inject, 24)
-    assert set(came_to) <= {"ACCEPTED", PushFailure.ARMED.value, ARMED.text}
-    assert came_to[PushFailure.ARMED.value] > 6
+    reported = outcomes(inject, 24)
+    assert set(reported) <= {"ACCEPTED", PushFailure.ARMED.value, ARMED.text}
+    assert reported[PushFailure.ARMED.value] > 6
 
 
 def test_a_brief_arming_during_a_push_damages_no_list() -> None:
-    came_to = outcomes(switching("armed", 0.4, 0.1), 15)
-    assert set(came_to) <= {"ACCEPTED", PushFailure.ARMED.value, ARMED.text}
+    reported = outcomes(switching("armed", 0.4, 0.1), 15)
+    assert set(reported) <= {"ACCEPTED", PushFailure.ARMED.value, ARMED.text}
 
 
 @pytest.mark.parametrize(("busy_s", "expected"), [(0.5, "ACCEPTED"), (3.0, BUSY_TEXT)])
@@ -274,19 +274,19 @@ def test_a_push_waits_up_to_a_second_for_a_busy_board(busy_s: float, expected: s
 
 
 def test_a_board_that_becomes_busy_during_a_push_keeps_the_old_list() -> None:
-    came_to = outcomes(switching("busy", 0.4, 2), 12)
-    assert set(came_to) <= {"ACCEPTED", PushFailure.BUSY.value, BUSY_TEXT}
+    reported = outcomes(switching("busy", 0.4, 2), 12)
+    assert set(reported) <= {"ACCEPTED", PushFailure.BUSY.value, BUSY_TEXT}
 
 
 def test_a_refusal_for_flash_wear_is_not_reported_as_busy() -> None:
     world = holding_the_old_list(0)
-    results = []
+    reported = []
     for seed in range(251):
         outcome = world.push(waypoints(2, seed=1000 + seed))
         world.wait_until(lambda _, outcome=outcome: bool(outcome), 20)  # type: ignore[misc]
-        results.append(outcome[0][0])
-    assert [result.ack for result in results] == [MissionResult.ACCEPTED] * 250 + [MissionResult.DENIED]
-    assert results[-1].text == PushFailure.WRITES_SPENT.value
+        reported.append(outcome[0][0])
+    assert [result.ack for result in reported] == [MissionResult.ACCEPTED] * 250 + [MissionResult.DENIED]
+    assert reported[-1].text == PushFailure.WRITES_SPENT.value
     assert world.stored == records_of(waypoints(2, seed=1249))
 
 

@@ -14,7 +14,7 @@ import pytest
 
 from tests.support.benches import Starter
 from tests.support.programs import free_port, until
-from tests.support.soak import Crowd, Meter, Stalls, Weather, Witness
+from tests.support.soak import BoardEvents, Crowd, Meter, Stalls, Witness
 
 MINUTES = float(os.environ.get("SOAK_MINUTES", "0.5"))
 SEED = int(os.environ.get("SOAK_SEED", "1"))
@@ -39,7 +39,7 @@ def test_a_daemon_survives_events_and_attacks_at_full_rate(
     crowd = Crowd(daemon, udp_port, tcp_port, random.Random(SEED))
     stalls = Stalls()
     witness = Witness(("127.0.0.1", udp_port), stalls, daemon.process.pid)
-    weather: list[Weather] = []
+    board_events: list[BoardEvents] = []
     boards: list[dict[str, Any]] = []
     memory_kb: list[int] = []
     descriptors: list[int] = []
@@ -53,12 +53,12 @@ def test_a_daemon_survives_events_and_attacks_at_full_rate(
             board = Starter(folder, stack).board("--tele-prot", str(tele_prot), "--state", str(tmp_path / "flash"))
             port.unlink(missing_ok=True)
             port.symlink_to(board.link)
-            weather.append(Weather(board, random.Random(SEED + number)))
-            weather[-1].start()
+            board_events.append(BoardEvents(board, random.Random(SEED + number)))
+            board_events[-1].start()
             end = time.monotonic() + 60 * MINUTES / len(TELE_PROTS)
             while time.monotonic() < end:
                 crowd.act(board)
-            weather[-1].end()
+            board_events[-1].end()
             # After the events end, everything works.
             crowd.leave()
             daemon.wait()
@@ -69,7 +69,7 @@ def test_a_daemon_survives_events_and_attacks_at_full_rate(
             descriptors.append(_settled(meter))
             board.end()
         until(lambda: daemon.has_logged("fc.port_lost"), "the loss of the port")
-    happened = sum((each.happened for each in weather), crowd.happened)
+    happened = sum((each.happened for each in board_events), crowd.happened)
     report = (
         f"seed {SEED}, {MINUTES} min: {dict(happened)}; uploads {dict(crowd.uploads)};"
         f" {witness.frames.total()} frames, {witness.frames[30]} attitudes; longest gap {max(witness.gaps_s):.2f} s;"

@@ -20,7 +20,7 @@ IDENT = request(HarakiriCommand.IDENT)
 _DEAF_S = 0.6
 _LONGEST_BOOT_S = 12.0
 _CALIBRATION_S = 15.0
-#: nm_t in harakiri_mission.c (link-time optimization extends the name), and the offset of the stored list's identity.
+#: nm_t in harakiri_mission.c (link-time optimisation extends the name), and the offset of the stored list's identity.
 _CORE, _STORED_AT = "mission", 8
 _CFG_SIZE = 3 * 1024
 _WRITE_PENDING = "ScheduleEEPROMwriteMS"

@@ -125,8 +125,8 @@ class Witness(threading.Thread):
         return waited_s or self._queued_s
 
 
-class Weather(threading.Thread):
-    """Events at the flight controller, drawn like cards from all kinds; each ends after a while."""
+class BoardEvents(threading.Thread):
+    """Events at the flight controller, one of each kind in random order, then again; each ends after a while."""
 
     def __init__(self, board: Board, chance: random.Random) -> None:
         super().__init__(daemon=True)
