@@ -280,13 +280,13 @@ def test_a_board_that_becomes_busy_during_a_push_keeps_the_old_list() -> None:
 
 def test_a_refusal_for_flash_wear_is_not_reported_as_busy() -> None:
     world = holding_the_old_list(0)
-    reported = []
+    results = []
     for seed in range(251):
         outcome = world.push(waypoints(2, seed=1000 + seed))
         world.wait_until(lambda _, outcome=outcome: bool(outcome), 20)  # type: ignore[misc]
-        reported.append(outcome[0][0])
-    assert [result.ack for result in reported] == [MissionResult.ACCEPTED] * 250 + [MissionResult.DENIED]
-    assert reported[-1].text == PushFailure.WRITES_SPENT.value
+        results.append(outcome[0][0])
+    assert [result.ack for result in results] == [MissionResult.ACCEPTED] * 250 + [MissionResult.DENIED]
+    assert results[-1].text == PushFailure.WRITES_SPENT.value
     assert world.stored == records_of(waypoints(2, seed=1249))
 
 
