@@ -23,7 +23,7 @@ class TokenBucket:
         self.rate = rate
         self._tokens = rate.burst
         self._counted_at = 0.0
-        #: If there was none left: when there is one again.
+        #: When one is available again, after `has` has returned False.
         self.next_at = -inf
 
     def has(self, now: float) -> bool:

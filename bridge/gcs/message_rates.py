@@ -54,7 +54,7 @@ class MessageRates:
 
     def fastest_s(self, peers: Iterable[Peer]) -> dict[int, float]:
         """The shortest interval of `peers` for each message."""
-        # Those without requests are alike.
+        # Peers without requests all have the defaults.
         alike = {peer if peer in self.unwatched or self._has_requests(peer) else None: peer for peer in peers}.values()
         return {msgid: min((self.interval_s(peer, msgid) for peer in alike), default=inf) for msgid in self._defaults}
 

@@ -15,7 +15,7 @@ from bridge.gcs.station import Peer, Station
 EXPIRY_S = 60.0
 #: The same for a peer whose ids are all heard at another address now, as after Wi-Fi roaming.
 MOVED_S = 5.0
-#: How often silent peers are searched for, at most.
+#: The minimum interval between searches for silent peers.
 _EXPIRY_INTERVAL_S = 1.0
 #: Peers on one link: as many as a network has hosts whose addresses differ in the last byte.
 MAX_PEERS = 256
@@ -120,7 +120,7 @@ class _Places:
             self._first = None
 
     def remove(self, peer: Peer) -> None:
-        """Free a place. If it is not one of the first, their order stays: those behind it only move up behind them."""
+        """Free a place. The order of the first changes only if the peer is one of them."""
         del self.known[peer]
         self._hosts[peer.host] -= 1
         if not self._hosts[peer.host]:
@@ -129,7 +129,7 @@ class _Places:
             self._first = None
 
     def displaced(self) -> Peer:
-        """Like the function of that name, if not all peers of the host with most are among the first."""
+        """The longest-silent peer of the host with most peers that is not among the first; else of any host."""
         first, most = self.first, max(self._hosts.values())
         silent = (peer for least in (most, 0) for peer in self.known if self._hosts[peer.host] >= least)
         return next(peer for peer in silent if peer not in first)

@@ -111,7 +111,7 @@ class PendingReplies:
 
 
 class _Reply(Enum):
-    """What is known of a request's reply. In the last two states it may still arrive, until the deadline."""
+    """The state of a request's reply. In the last two it may still arrive, until the deadline."""
 
     AWAITED = auto()
     LOST = auto()  # it did not arrive in time

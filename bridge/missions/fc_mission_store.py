@@ -27,7 +27,7 @@ class StoreState(Enum):
 
 
 class Loading(Enum):
-    """What became of the saved mission of a flight controller that may have none loaded."""
+    """The saved mission of a flight controller that may have none loaded."""
 
     NOT_NEEDED = "not needed"
     LOADED = "loaded"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Precedence is kept up to date without sorting for each packet: it is always the one that the rules give."""
+"""Precedence, which is updated without sorting for each packet, always equals the one computed by the rules."""
 
 import random
 from collections import Counter

@@ -14,7 +14,7 @@ DOWN, REJECTED, CONNECTED = "connection refused", "rejected the session", ""
 
 
 async def logged(looks: Sequence[str]) -> list[str]:
-    """The reasons in the log after these looks, 5 s apart, each with its diagnosis."""
+    """The reasons logged after these diagnoses, 5 s apart."""
     reasons = iter(filter(None, looks))
     now = asyncio.get_running_loop().time()
     with capture_logs() as entries:

@@ -27,7 +27,7 @@ READ_MESSAGES = (
 
 
 class LyingBoard:
-    """A `board` of which a `rate` of all frames is changed; FrSky has no frames, so there it is a rate of its bytes."""
+    """Changes a share, `rate`, of a board's frames; FrSky has no frames, so there it changes bytes."""
 
     def __init__(self, board: Any, inputs: FuzzInputs, rate: float) -> None:
         self._board = board
