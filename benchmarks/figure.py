@@ -34,6 +34,5 @@ class Figure:
 
     @property
     def is_missed(self) -> bool:
-        """True if the limit is exceeded."""
         judged = self.ratio if self.times_floor else self.value
         return self.limit is not None and judged is not None and judged > self.limit

@@ -126,7 +126,6 @@ def _ask_all(loop: asyncio.AbstractEventLoop, port: serial.Serial, intervals_s: 
 
 
 def main() -> None:
-    """Run until SIGTERM."""
     loop = asyncio.new_event_loop()
     match sys.argv[1:]:
         case ["echo"]:

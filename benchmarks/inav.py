@@ -38,7 +38,6 @@ _WIRE_S = _BYTES * 10 / _BAUD
 
 
 def measure() -> list[Figure]:
-    """Measure both lines."""
     return [*_over_tcp(), *_over_a_uart()]
 
 

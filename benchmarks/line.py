@@ -71,7 +71,6 @@ class Line:
         self._heartbeat_at_ns = 0
 
     def close(self) -> None:
-        """Close the line."""
         os.close(self._autopilot)
         os.close(self._held_open)
         self._ground.close()

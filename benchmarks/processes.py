@@ -144,7 +144,6 @@ def floor_program(folder: Path, *arguments: str) -> Iterator[tuple[int, Path]]:
 
 
 def free_udp_port() -> int:
-    """A free UDP port of the loopback."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         port: int = probe.getsockname()[1]
@@ -152,7 +151,6 @@ def free_udp_port() -> int:
 
 
 def free_tcp_port() -> int:
-    """A free TCP port of the loopback."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port: int = probe.getsockname()[1]

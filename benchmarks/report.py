@@ -22,7 +22,6 @@ _WIDTH_IN_FILES = 150
 
 
 def print_table(figures: Sequence[Figure]) -> None:
-    """Print one row per figure."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("Figure")
     table.add_column("Measured", justify="right", no_wrap=True)

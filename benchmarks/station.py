@@ -42,7 +42,6 @@ class Station:
         self._socket.settimeout(_TIMEOUT_S)
 
     def close(self) -> None:
-        """Close the socket."""
         self._socket.close()
 
     def upload(self, items: Sequence[MissionItem]) -> Upload:

@@ -65,7 +65,6 @@ _SEED = 1
 
 
 def measure() -> list[Figure]:
-    """Measure all four."""
     with tempfile.TemporaryDirectory() as name:
         return [_cpu(Path(name)), _attitude_cpu(Path(name)), *_latency(Path(name)), *_noise()]
 

@@ -45,7 +45,6 @@ _ANSWERS_A_TURN = 2000
 
 
 def measure() -> list[Figure]:
-    """Measure all four."""
     with tempfile.TemporaryDirectory() as name, running_router(Path(name)) as router:
         folder, endpoint = Path(name), router.endpoint
         return [*_latency_and_memory(folder, endpoint), *asyncio.run(_cpu(folder, endpoint))]

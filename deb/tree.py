@@ -104,7 +104,6 @@ def _copy(source: Path, folder: Path, name: str = "") -> None:
 
 
 def _describe(root: Path, version: str, architecture: str) -> None:
-    """Write dpkg's control files."""
     folder = root / "DEBIAN"
     folder.mkdir(mode=0o755)
     files = sorted(path for path in root.rglob("*") if path.is_file() and not path.is_symlink())

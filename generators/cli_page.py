@@ -18,7 +18,6 @@ an unreadable file, 74 the output cannot be written, 130 interrupted.
 
 
 def page() -> str:
-    """The page."""
     return _HEAD + "".join(f"\n## {name}\n\n```\n{text}\n```\n" for name, text in helps(main))
 
 

@@ -32,7 +32,6 @@ MESSAGE_FORMATS = {
 
 
 def table() -> str:
-    """Return the source of message_table.py."""
     rows = [_row(msgid, message) for msgid, message in sorted(mavlink_2.mavlink_map.items())]
     return f"{_HEAD}{''.join(rows)}}}\n"
 

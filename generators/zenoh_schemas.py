@@ -174,12 +174,10 @@ def _of(hint: Any) -> Json:
 
 
 def text(schema: Json) -> str:
-    """The contents of a file."""
     return json.dumps(schema, indent=2) + "\n"
 
 
 def write() -> None:
-    """Write all files."""
     SCHEMAS.mkdir(exist_ok=True)
     for name, schema in schemas().items():
         (SCHEMAS / f"{name}.json").write_text(text(schema))

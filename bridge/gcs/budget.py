@@ -125,6 +125,5 @@ class Budgets:
         return account
 
     def forget(self, peer: Peer) -> None:
-        """A peer is gone."""
         for cost in Cost:
             self._buckets.pop((cost, peer), None)

@@ -109,7 +109,6 @@ class _Places:
         return self._first
 
     def add(self, peer: Peer, known: _Known) -> None:
-        """Give a newcomer a place."""
         self.known[peer] = known
         self._hosts[peer.host] += 1
         self.ranked(known)
@@ -186,7 +185,6 @@ class Stations:
 
     @property
     def steady(self) -> set[Peer]:
-        """The peers that have been heard for a while."""
         return {peer for peer, known in self._known.items() if known.is_steady}
 
     def hosts_with_precedence(self) -> dict[Hashable, None]:

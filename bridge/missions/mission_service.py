@@ -177,7 +177,6 @@ class MissionService:
         self._closed = True
 
     def release(self, owner: object) -> None:
-        """Release the lock."""
         if self._owner == owner:
             self._owner = None
 

@@ -13,7 +13,6 @@ import trustme
 
 
 def main(folder: Path, hosts: list[str], names: list[str]) -> None:
-    """Make the missing files."""
     folder.mkdir(parents=True, exist_ok=True)
     authority = _authority(folder)
     _issue(authority, folder, "router", hosts)

@@ -46,7 +46,6 @@ class EchoWatch:
         self._heard = b""
 
     def feed(self, data: bytes) -> None:
-        """Take received bytes."""
         self._heard = (self._heard + data)[-_EVIDENCE:]
 
     def is_echo(self, size: int = _EVIDENCE) -> bool:
