@@ -173,7 +173,12 @@ class Ground:
         return displaced(others or peers, self.stations.steady)
 
     def has_standing(self, peer: Peer) -> bool:
-        """True for a peer that has authenticated, or has precedence on its link: strangers cannot use its shares."""
+        """True for a peer that has authenticated, or has precedence on its link: strangers cannot use its shares.
+
+        An address that was never heard may be made up, even if it is listed.
+        """
+        if self.stations.is_unknown(peer):
+            return False
         standing = self._standing(peer)
         return standing is Standing.PROVEN or (standing is Standing.OPEN and self.stations.has_standing(peer))
 

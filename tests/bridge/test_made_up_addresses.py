@@ -88,6 +88,14 @@ def test_refused_addresses_are_not_remembered() -> None:
     assert len(world.bridge.guard._told) <= MAX_PEERS
 
 
+def test_listed_addresses_that_send_no_frame_are_not_remembered() -> None:
+    """Any host of the listed network may use any port."""
+    world = World(speeds=(115200,), links={"udp": LinkAccess(may_write=lambda _peer: True)})
+    for port in range(1024, 3024):
+        world.bridge.gcs_received(Peer("udp", ("192.168.4.9", port)), b"\xfd", port / PER_S, datagram=True)
+    assert not any(isinstance(account, Peer) for _, account in world.bridge.ground.budgets._buckets)
+
+
 @pytest.mark.parametrize("addresses", [new_hosts, new_ports, same_again, many_hosts])
 def test_a_pilot_who_arrives_later_can_write(addresses: Callable[[random.Random], Callable[[], Address]]) -> None:
     """The flood announces 500 lists a second, sixty times the limit for all newcomers together."""

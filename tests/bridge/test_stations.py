@@ -222,6 +222,7 @@ def test_a_stream_may_be_split_over_reads_and_is_forgotten_at_its_end() -> None:
     world.bridge.gcs_gone(station.peer, world.now)
     assert world.bridge.ground.stations.peers() == []
     assert world.bridge.ground._splitters == {}
+    assert not any(isinstance(account, Peer) for _, account in world.bridge.ground.budgets._buckets)
 
 
 def test_a_truncated_datagram_does_not_affect_the_next() -> None:
