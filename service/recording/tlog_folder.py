@@ -105,13 +105,12 @@ class TlogFolder:
     def close(self) -> None:
         """Close the open file, and delete it if it is empty; the next `write` begins another one."""
         if self._file is not None:
+            file, self._file = self._file, None
+            with suppress(OSError), file:
+                os.fdatasync(file.fileno())
             with suppress(OSError):
-                os.fdatasync(self._file.fileno())
-            is_empty = not self._file.tell()
-            self._file.close()
-            self._file = None
-            if is_empty:
-                self._path.unlink(missing_ok=True)
+                if not self._path.stat().st_size:
+                    self._path.unlink()
 
     def _new_path(self, began: datetime) -> Path:
         """Name a file after `began`, or the first free second after it: clocks may be set back."""

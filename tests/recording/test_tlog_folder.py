@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The folder of telemetry logs: its limits, and disk faults."""
 
+import errno
 import resource
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -148,4 +149,22 @@ def test_a_full_disk_is_reported_once_and_complete_records_can_be_read(tmp_path:
     assert (tmp_path / "2026-11-21 12-00-00.tlog").stat().st_size == 250
     folder.write(record(NOON + timedelta(seconds=100)), 100.0)
     assert names(tmp_path) == ["2026-11-21 12-00-00.tlog", "2026-11-21 12-01-40.tlog"]
+    folder.close()
+
+
+def test_a_disk_that_becomes_read_only_does_not_end_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The kernel remounts a failing SD card read-only: then the empty file cannot be deleted either."""
+
+    def refuse(*_args: object, **_kwargs: object) -> None:
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    free = [0]
+    folder = TlogFolder(tmp_path, TlogLimits(), lambda _: free[0])
+    with monkeypatch.context() as failing:
+        failing.setattr(Path, "unlink", refuse)
+        folder.write(record(), 0.0)
+    assert folder.describe().startswith("stopped, ")
+    free[0] = PLENTY
+    folder.write(record(NOON + timedelta(seconds=100)), 100.0)
+    assert names(tmp_path)[-1] == "2026-11-21 12-01-40.tlog"
     folder.close()
