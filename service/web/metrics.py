@@ -31,6 +31,8 @@ _COUNTED = {"zenoh_dropped"}
 _FIXES = {"none": 0, "2D": 2, "3D": 3}
 _BEGINS = {"mission.upload_started", "mission.push_started"}
 _ENDS = {"mission.upload_ended", "mission.refused", "mission.push_ended"}
+#: The transfers that are timed at once. An upload that its ground station replaces by another one never ends.
+_MOST_TIMED = 100
 
 
 class Metrics(Follower):
@@ -64,6 +66,8 @@ class Metrics(Follower):
         incident = facts.get("incident")
         if event in _BEGINS:
             self._begun[incident] = time.monotonic()
+            if len(self._begun) > _MOST_TIMED:
+                del self._begun[next(iter(self._begun))]
         elif event in _ENDS and incident in self._begun:
             elapsed_s = time.monotonic() - self._begun.pop(incident)
             self._durations.labels(facts["ack"]).observe(elapsed_s)

@@ -79,3 +79,12 @@ async def test_the_counters_of_a_daemon(tmp_path: Path) -> None:
             assert after[f"link_{way}_bytes_total", (name,)] > after[f"link_{way}_pieces_total", (name,)] > 0
     running.cancel()
     await asyncio.gather(running, return_exceptions=True)
+
+
+async def test_uploads_that_never_end_are_forgotten() -> None:
+    metrics = Metrics(Daemon(Settings(parse_fc("sim:"))))
+    for number in range(1000):
+        metrics.event("info", "mission.upload_started", {"incident": f"upload-{number}"})
+    metrics.event("info", "mission.upload_ended", {"incident": "upload-999", "ack": "ACCEPTED"})
+    assert read(metrics)["mission_transfer_seconds_count", ("ACCEPTED",)] == 1
+    assert len(metrics._begun) <= 100
