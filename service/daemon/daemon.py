@@ -117,6 +117,11 @@ class Daemon:
         """The files being recorded, or the reasons why recording stopped."""
         return [recorder.describe() for recorder in (self._tlog, self.fc.capture) if recorder is not None]
 
+    @property
+    def is_ticking(self) -> bool:
+        """False after a bug in the bridge that a new search did not cure: then only input wakes it."""
+        return self._timer is not None
+
     async def run(self) -> None:
         """Run until cancelled. LinkError if a port for ground stations or other programs cannot be opened."""
         with ExitStack() as stack:

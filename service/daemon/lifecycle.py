@@ -31,8 +31,10 @@ async def run_until_signal(daemon: Daemon, notifier: Notifier, load: Callable[[]
     stopping: asyncio.Task[None] | None = None
 
     async def stop() -> None:
-        await daemon.finish()
-        running.cancel()
+        try:
+            await daemon.finish()
+        finally:
+            running.cancel()
 
     def signalled(number: signal.Signals) -> None:
         nonlocal stopping
@@ -74,7 +76,8 @@ class _Reporting:
         self._timer.cancel()
 
     def _report(self) -> None:
-        self._notifier.alive()
+        if self._daemon.is_ticking:
+            self._notifier.alive()
         self._notifier.status(link_line(self._daemon))
         self._timer = asyncio.get_running_loop().call_later(self._interval_s, self._report)
 

@@ -28,6 +28,10 @@ from tests.support.programs import Daemon as DaemonProgram
 _LONG = plain_plan(146)
 
 
+class BugError(Exception):
+    """A bug in the bridge itself."""
+
+
 class Systemd:
     """The service manager's end of sd_notify(3)."""
 
@@ -93,6 +97,41 @@ async def test_the_watchdog_is_fed_by_the_event_loop(systemd: Systemd, tmp_path:
     await next_feed(systemd, fed)
     running.cancel()
     await asyncio.wait([running])
+
+
+async def test_a_bridge_that_no_longer_ticks_does_not_feed_the_watchdog(
+    systemd: Systemd, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without a flight controller, no input wakes it again."""
+    daemon = Daemon(Settings(parse_fc(str(tmp_path / "naze")), [], tmp_path / "state"))
+    running = asyncio.create_task(run_until_signal(daemon, Notifier(), lambda: daemon.settings))
+    await next_feed(systemd, 0)
+
+    def bug() -> float:
+        raise BugError
+
+    monkeypatch.setattr(daemon.bridge, "next_deadline", bug)
+    await until_async(lambda: not daemon.is_ticking, "the end of the ticks")
+    fed = systemd.listen().count("WATCHDOG=1")
+    await asyncio.sleep(1.0)
+    assert systemd.listen().count("WATCHDOG=1") == fed
+    running.cancel()
+    await asyncio.wait([running])
+
+
+async def test_a_bug_does_not_prevent_a_stop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    daemon = Daemon(Settings(parse_fc("sim:"), [], tmp_path / "state"))
+    running = asyncio.create_task(run_until_signal(daemon, Notifier({}), lambda: daemon.settings))
+    await daemon.started.wait()
+
+    def bug(_now: float) -> None:
+        raise BugError
+
+    monkeypatch.setattr(daemon.bridge, "stop_missions", bug)
+    signal.raise_signal(signal.SIGTERM)
+    async with asyncio.timeout(TIMEOUT_S):
+        await asyncio.wait([running])
+    assert running.exception() is None
 
 
 def test_a_failed_start_is_never_ready(start: Starter, systemd: Systemd) -> None:
