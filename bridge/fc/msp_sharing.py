@@ -80,7 +80,7 @@ class MspSharing:
         if frame.command in _NEVER:
             return f"{_NEVER[frame.command]} is never forwarded"
         if not may_write and is_change(frame):
-            return f"command {frame.command} changes something: set write = true in its [[share]] to allow that"
+            return "it changes something: set write = true in its [[share]] to allow that"
         if not (link.any_byte or is_clean(request(frame.command, frame.payload))):
             return "its bytes could open this flight controller's command line, or reset it"
         if self._runner.needs_line and not self._pending:

@@ -22,7 +22,8 @@ _KERNEL_BUFFER = 32768
 _STALL_MS = 60000
 #: Each costs a copy of the telemetry.
 _MAX_CLIENTS = 32
-#: The pause after the process has run out of file descriptors.
+#: The pause after the system has run out of file descriptors or memory.
+_EXHAUSTED = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
 _REST_S = 1.0
 
 _log = structlog.get_logger()
@@ -63,7 +64,7 @@ class TcpLink:
         try:
             connection, sender = self._socket.accept()
         except OSError as error:
-            if error.errno in (errno.EMFILE, errno.ENFILE):
+            if error.errno in _EXHAUSTED:
                 # The client stays in the backlog and would wake the loop again at once.
                 self._loop.remove_reader(self._socket.fileno())
                 self._resting = self._loop.call_later(_REST_S, self._listen)
