@@ -6,7 +6,7 @@ port appears with a flight controller on it, and the clock stops with a line of 
 the time to notice the port. "Sensed" (fc.sensed): protocol and speed are known. "Identified" (fc.found): the board has
 also identified itself, everything twice, which takes three seconds of line time at 1200 baud.
 
-Noise needs no port: Autosense gets it directly, in simulated time, at the rate of a full line.
+Noise needs no port: the search gets it directly, in simulated time, at the rate of a full line.
 """
 
 import random
@@ -19,7 +19,10 @@ from pathlib import Path
 
 from benchmarks.figure import Figure
 from benchmarks.processes import BenchmarkError, Board, DaemonProcess, daemon, free_udp_port, logged_at, simulated_naze
-from bridge.fc.autosense import SPEEDS, Autosense
+from bridge.fc.states.base import Port, PortOpened
+from bridge.fc.states.searching import SPEEDS, Searching
+from bridge.line.runner import Runner
+from bridge.model.autopilot import Autopilot
 
 _RUNS = 5
 _RETURNS = 8
@@ -111,15 +114,17 @@ def _noise() -> Figure:
     chance = random.Random(_SEED)
     wrong = fed = 0
     now = 0.0
-    search = Autosense(SPEEDS, (), now)
+    port = Port(SPEEDS, Autopilot.AUTO, (), Runner(), lambda _frames: None)
+    search = Searching(port, PortOpened(), now)
     while fed < _NOISE_BYTES:
         assert search.speed is not None
         now += _READ_BYTES * _BITS_PER_BYTE / search.speed
         search.receive(chance.randbytes(_READ_BYTES), now)
         fed += _READ_BYTES
         search.tick(now)
-        search.take_output()
+        port.output.clear()
         if search.found:
             wrong += 1
-            search = Autosense(SPEEDS, (), now)
+            port.good_speeds.clear()
+            search = Searching(port, PortOpened(), now)
     return Figure(f"wrong verdicts on {fed / 1e6:.0f} MB of noise", wrong, "", None, 0)

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Flight controllers with telemetry only, and autopilots that speak MAVLink themselves."""
 
-from bridge.fc.autosense import Spoken
 from bridge.fc.interview import Interview
-from bridge.fc.profile import FlightController, Profile
+from bridge.fc.profile import FlightController, Profile, Spoken
 from bridge.line.conversation import Conversation
 from bridge.model.airframe import airframe
 from bridge.model.flight_mode import FAILSAFE_BOX

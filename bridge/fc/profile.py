@@ -7,8 +7,8 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from enum import Enum
 
-from bridge.fc.autosense import Spoken
 from bridge.fc.interview import Interview
 from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import POLLS, Poll
@@ -20,6 +20,16 @@ from bridge.model.refusal import Refusal
 from bridge.model.vehicle import Vehicle
 from protocols.mission_item import MissionResult
 from protocols.msp.mission import Info
+
+
+class Spoken(Enum):
+    """The protocols that a flight controller may speak; in its command line it answers none of them."""
+
+    MSP = "MSP"
+    MAVLINK = "MAVLink"
+    FRSKY = "FrSky"
+    CLI = "command line"
+
 
 #: Fills the vehicle from the payload of a reply, heard at a time.
 Decoder = Callable[[Vehicle, bytes, "FlightController", float], None]

@@ -6,9 +6,8 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
-from bridge.fc.autosense import Found, Spoken
-from bridge.fc.profile import FlightController, Profile
-from bridge.fc.states.base import Closed, Event, Identified, Lost, Port, PortClosed, PortOpened, State
+from bridge.fc.profile import FlightController, Profile, Spoken
+from bridge.fc.states.base import Closed, Event, Found, Identified, Lost, Port, PortClosed, PortOpened, State
 from bridge.fc.states.cli import Cli
 from bridge.fc.states.frsky import Frsky
 from bridge.fc.states.mavlink import Mavlink

@@ -7,8 +7,7 @@ loss: Mission Planner reads warnings out loud.
 
 from math import inf
 
-from bridge.fc.autosense import Spoken
-from bridge.fc.profile import FlightController
+from bridge.fc.profile import FlightController, Spoken
 from bridge.gcs.station import Severity
 
 #: Silence that counts as a loss; a switch of protocol takes less.

@@ -14,8 +14,8 @@ import structlog
 
 from bridge.bridge import Bridge
 from bridge.config import BridgeConfig
-from bridge.fc.autosense import SPEEDS
 from bridge.fc.msp_sharing import refused
+from bridge.fc.states.searching import SPEEDS
 from bridge.gcs.guard import LinkAccess
 from bridge.line.conversation import StoreEffect
 from bridge.missions.mission_service import DeliveryResult

@@ -22,7 +22,7 @@ from service.links.port_memory import PortMemory
 from service.links.serial_ports import SerialPort, serial_ports
 from service.machine.host import Host
 
-#: Autosense visits all speeds within this time.
+#: The search visits all speeds within this time.
 _SEARCH_S = 9.0
 #: How long to wait for a lost flight controller: a Harakiri that looks for its GPS boots for 25 s.
 _RETURN_S = 40.0

@@ -8,9 +8,8 @@ import pytest
 
 from bridge.controllers import other
 from bridge.controllers.harakiri import profile as harakiri
-from bridge.fc.autosense import SPEEDS
 from bridge.fc.states.base import Closed
-from bridge.fc.states.searching import Searching
+from bridge.fc.states.searching import SPEEDS, Searching
 from bridge.model.airframe import Airframe
 from protocols.mavlink.dialect import messages
 from protocols.msp.frame import request

@@ -11,7 +11,10 @@ import random
 
 import pytest
 
-from bridge.fc.autosense import SPEEDS, Autosense
+from bridge.fc.states.base import Port, PortOpened
+from bridge.fc.states.searching import SPEEDS, Searching
+from bridge.line.runner import Runner
+from bridge.model.autopilot import Autopilot
 from protocols.mavlink.dialect import messages
 from protocols.msp.frame import Direction, MspFrame, request
 
@@ -29,7 +32,13 @@ ALPHABETS = {
 }
 
 
-def listen(noise: bytes, search: Autosense, chunk: int) -> set[int | None]:
+def begin(*speeds: int, good: tuple[int, ...] = ()) -> Searching:
+    port = Port(speeds, Autopilot.AUTO, (), Runner(), lambda _frames: None)
+    port.good_speeds.extend(good)
+    return Searching(port, PortOpened(), 0.0)
+
+
+def listen(noise: bytes, search: Searching, chunk: int) -> set[int | None]:
     """Feed a search noise at line rate; return the speeds that it tried."""
     now = 0.0
     visited = set()
@@ -38,7 +47,7 @@ def listen(noise: bytes, search: Autosense, chunk: int) -> set[int | None]:
         now += chunk * 10 / (search.speed or 115200)
         search.receive(noise[start : start + chunk], now)
         search.tick(now)
-        search.take_output()
+        search.port.output.clear()
         assert search.found is None, (start, search.found)
     return visited
 
@@ -47,17 +56,17 @@ def listen(noise: bytes, search: Autosense, chunk: int) -> set[int | None]:
 def test_megabytes_of_noise_give_no_verdict(name: str) -> None:
     draw = random.Random(name)
     noise = bytes(draw.choices(ALPHABETS[name], k=MEGABYTE))
-    visited = listen(noise, Autosense(SPEEDS, (), 0.0), 96)
+    visited = listen(noise, begin(*SPEEDS), 96)
     assert visited == set(SPEEDS)
     # At one speed throughout: the one that yields the most frames.
-    listen(noise[MEGABYTE // 2 :], Autosense((115200,), (115200,), 0.0), 512)
+    listen(noise[MEGABYTE // 2 :], begin(115200, good=(115200,)), 512)
 
 
 @pytest.mark.parametrize("preamble", [b"$M>", b"$M!", b"$M<", b"\xfe", b"\xfd", b"\xfe\x09", b"\xfd\x09\x00"])
 def test_noise_full_of_frame_headers_gives_no_verdict(preamble: bytes) -> None:
     draw = random.Random(preamble)
     noise = b"".join(preamble + draw.randbytes(draw.randrange(1, 14)) for _ in range(60_000))
-    listen(noise, Autosense(SPEEDS, (), 0.0), 200)
+    listen(noise, begin(*SPEEDS), 200)
 
 
 def test_damaged_mavlink_and_foreign_msp_requests_give_no_verdict() -> None:
@@ -72,13 +81,13 @@ def test_damaged_mavlink_and_foreign_msp_requests_give_no_verdict() -> None:
         answer = bytearray(MspFrame(Direction.REPLY, 100, bytes((211, 3, 0, 0, 0, 0, 128))).encode())
         answer[draw.randrange(3, len(answer))] ^= 1 << draw.randrange(8)
         noise += heartbeat + answer + request(draw.choice((100, 101, 116)))
-    listen(bytes(noise), Autosense(SPEEDS, (), 0.0), 200)
+    listen(bytes(noise), begin(*SPEEDS), 200)
 
 
 def test_a_single_answer_is_not_enough() -> None:
-    search = Autosense((115200,), (), 0.0)
+    search = begin(115200)
     for number in range(500):
-        now = search.next_deadline()
+        now = search.deadline()
         # Each answer differs.
         answer = MspFrame(Direction.REPLY, 100, bytes((211, 3, 0, number % 256, number // 256, 0, 128)))
         search.receive(answer.encode(), now)
@@ -91,9 +100,9 @@ def test_a_heartbeat_must_be_plausible_in_every_field() -> None:
     good = (2, 3, 81, 0, 3, 3)
     odd = [(250, 3, 81, 0, 3, 3), (2, 99, 81, 0, 3, 3), (2, 3, 81, 0, 77, 3), (2, 3, 81, 0, 3, 2)]
     for fields, found in [(good, True), *((fields, False) for fields in odd)]:
-        search = Autosense((115200,), (), 0.0)
+        search = begin(115200)
         frame = bytes(messages.MAVLink_heartbeat_message(*fields).pack(mavlink))
         search.receive(frame, 0.0)
         for _ in range(6):
-            search.tick(search.next_deadline())
+            search.tick(search.deadline())
         assert (search.found is not None) is found

@@ -11,8 +11,8 @@ from functools import cache
 import pytest
 
 from bridge.controllers.harakiri import profile as harakiri
-from bridge.fc.autosense import SPEEDS
 from bridge.fc.states.msp import Identifying
+from bridge.fc.states.searching import SPEEDS
 from simulator.firmware import Protocol
 from simulator.options import SimOptions, TelemetryProtocol
 from tests.support.world import World

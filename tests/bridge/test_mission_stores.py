@@ -16,7 +16,7 @@ from bridge.controllers.harakiri import profile as harakiri
 from bridge.controllers.inav import profile as inav
 from bridge.controllers.multiwii import profile as multiwii
 from bridge.controllers.table import PROFILES
-from bridge.fc.autosense import SPEEDS
+from bridge.fc.states.searching import SPEEDS
 from bridge.missions.fc_mission_store import LIST_IS_GONE, PushFailure
 from bridge.missions.list_check import check_list
 from bridge.missions.mission_service import DeliveryResult, HeldMission

@@ -10,7 +10,7 @@ import itertools
 
 import pytest
 
-from bridge.fc.autosense import SPEEDS
+from bridge.fc.states.searching import SPEEDS
 from bridge.line.msp_link import PROBE, RESYNC
 from protocols.msp.command_line import HAZARDS, RUB_OUT_LINE, RUN_LENGTH, is_clean, typed_and_rubbed_out
 from simulator.line import garble

@@ -11,9 +11,8 @@ from bridge.controllers import other
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.controllers.inav import profile as inav
 from bridge.controllers.table import PROFILES
-from bridge.fc.autosense import Spoken
 from bridge.fc.msp_telemetry import hear_msp
-from bridge.fc.profile import FlightController, Profile
+from bridge.fc.profile import FlightController, Profile, Spoken
 from bridge.model.airframe import Airframe, airframe
 from bridge.model.vehicle import Vehicle
 from bridge.vehicle import vehicle_messages as make

@@ -21,11 +21,11 @@ from bridge.controllers.harakiri import profile as harakiri
 from bridge.controllers.inav import profile as inav
 from bridge.controllers.multiwii import profile as multiwii
 from bridge.controllers.table import PROFILES
-from bridge.fc.autosense import SPEEDS
 from bridge.fc.profile import Profile
 from bridge.fc.states.cli import Cli
 from bridge.fc.states.mavlink import Mavlink
 from bridge.fc.states.msp import Polling
+from bridge.fc.states.searching import SPEEDS
 from bridge.gcs.ground import FrameListener
 from bridge.gcs.guard import LinkAccess
 from bridge.gcs.pass_through import MAX_DATAGRAM_SIZE

@@ -10,9 +10,8 @@ from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.controllers.harakiri.mavlink_missions import HarakiriMavlinkMissions
 from bridge.controllers.harakiri.mission_store import HarakiriMissions
 from bridge.controllers.harakiri.rules import USUAL_CAPACITY, USUAL_WP_RADIUS_CM
-from bridge.fc.autosense import Spoken
 from bridge.fc.interview import Interview
-from bridge.fc.profile import FlightController, Profile, RuleSettings
+from bridge.fc.profile import FlightController, Profile, RuleSettings, Spoken
 from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import BOX_POLL, POLLS
 from bridge.missions.fc_mission_store import AnyFcMissionStore

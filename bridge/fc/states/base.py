@@ -12,8 +12,7 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import ClassVar
 
-from bridge.fc.autosense import Found
-from bridge.fc.profile import FlightController, Profile
+from bridge.fc.profile import FlightController, Profile, Spoken
 from bridge.line.msp_link import MspLink, PendingReplies
 from bridge.line.poll_schedule import PollSchedule
 from bridge.line.runner import Runner
@@ -36,6 +35,21 @@ class PortClosed:
 
 
 @dataclass(frozen=True, slots=True)
+class Found:
+    """A protocol was heard on the line, and the evidence in words.
+
+    `speed` in baud, None if the line has none; `heard`: a MAVLink frame. `pending`: replies that the board may still
+    owe to the search.
+    """
+
+    spoken: Spoken
+    speed: int | None
+    why: str
+    heard: MavlinkFrame | None = None
+    pending: PendingReplies = field(default_factory=PendingReplies)
+
+
+@dataclass(frozen=True, slots=True)
 class Identified:
     """The board on an MSP link is known."""
 
@@ -53,7 +67,6 @@ class Lost:
     pending: PendingReplies = field(default_factory=PendingReplies)
 
 
-#: Found: a protocol was heard on the line.
 Event = PortOpened | PortClosed | Found | Identified | Lost
 
 

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The flight controller is in its command line, which only a reset leaves."""
 
-from bridge.fc.autosense import Found
-from bridge.fc.states.base import Event, Lost, Port, State
+from bridge.fc.states.base import Event, Found, Lost, Port, State
 from bridge.line.msp_link import PROBE
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.msp.command_line import RUB_OUT_LINE, typed_and_rubbed_out

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The flight controller sends FrSky telemetry."""
 
-from bridge.fc.autosense import Found, Spoken
 from bridge.fc.frsky_telemetry import FrskyTelemetry
-from bridge.fc.profile import FlightController
-from bridge.fc.states.base import Event, Lost, Port, State
+from bridge.fc.profile import FlightController, Spoken
+from bridge.fc.states.base import Event, Found, Lost, Port, State
 from bridge.line.msp_link import PROBE
 from bridge.model.vehicle import Source
 from protocols.frsky import FRSKY_SPEED, FrskyParser

@@ -3,10 +3,9 @@
 
 from math import inf
 
-from bridge.fc.autosense import Found, Spoken
 from bridge.fc.mavlink_telemetry import MavlinkTelemetry
-from bridge.fc.profile import FlightController, Profile
-from bridge.fc.states.base import Event, Lost, Port, State
+from bridge.fc.profile import FlightController, Profile, Spoken
+from bridge.fc.states.base import Event, Found, Lost, Port, State
 from bridge.line.msp_link import PROBE, byte_time_s
 from bridge.model.autopilot import Autopilot
 from bridge.model.vehicle import Source

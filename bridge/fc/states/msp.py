@@ -4,11 +4,10 @@
 from collections.abc import Sequence
 from math import inf
 
-from bridge.fc.autosense import Found, Spoken
 from bridge.fc.interview import Interview, NoAnswer
 from bridge.fc.msp_telemetry import hear_msp
-from bridge.fc.profile import FlightController, Profile
-from bridge.fc.states.base import Event, Identified, Lost, Port, State
+from bridge.fc.profile import FlightController, Profile, Spoken
+from bridge.fc.states.base import Event, Found, Identified, Lost, Port, State
 from bridge.line.conversation import Conversation, LinkLost
 from bridge.line.msp_link import MspLink, PendingReplies
 from bridge.model.refusal import Refusal
