@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fixtures for the attack tests."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack

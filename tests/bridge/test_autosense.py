@@ -29,7 +29,6 @@ BOXES = b"ANGLE;HORIZON;BARO;MAG;CAMSTAB;ARM;GPS HOME;GPS HOLD;"
 
 
 def verdict(world: World) -> bool:
-    """True if protocol and speed are known."""
     return not isinstance(world.bridge.session.state, Closed | Searching)
 
 

@@ -51,7 +51,6 @@ def test_a_download_during_a_configuration_write_is_complete(stall_ms: float) ->
 
 @pytest.mark.parametrize("baud", [115200, 38400, 9600])
 def test_a_push_with_downloads_and_telemetry_fits_the_ring(baud: int) -> None:
-    """A push, downloads, parameters and telemetry."""
     world = World(SimOptions(baud=baud), speeds=(baud,), flash=FULL_FLASH)
     world.wait_ready(40)
     station = GroundStation(world)

@@ -134,7 +134,6 @@ class Screen:
                 assert self.is_true(name, value), (self.world.now, name, value, what.truth(self.past[-1][1]))
 
     def look(self) -> None:
-        """Record the craft's current state."""
         craft = self.world.naze.truth(self.world.now)
         if craft is not None:
             self.past.append((self.world.now, craft))

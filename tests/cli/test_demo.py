@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`naze-bridge demo`."""
 
 import os
 import shutil

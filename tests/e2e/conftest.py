@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fixtures for the end-to-end tests."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack

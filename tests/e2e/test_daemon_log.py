@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The daemon's log."""
 
 import asyncio
 import os

@@ -159,7 +159,7 @@ def test_a_metered_link_is_quiet_unless_more_is_requested(start: Starter) -> Non
         reader.wait("telemetry/status")
         bench.board.set("armed 1")
         reader.wait("telemetry/status", lambda status: status["armed"])
-        # Unchanged groups are sent twice a minute.
+        # Unchanged groups are sent every 30 s.
         assert [status["armed"] for status in reader.of("telemetry/status")].count(True) == 1
         assert reader.of("telemetry/rc") == []
         (granted,) = ask(opened, "@cmd/v1/rates?attitude=5;for_s=30")

@@ -196,7 +196,6 @@ class Terminal:
 
     @property
     def newest(self) -> str:
-        """The last complete screen."""
         return (self.text.split("Ctrl-C ends.")[-2:] or [""])[0]
 
     def shows(self, text: str) -> None:

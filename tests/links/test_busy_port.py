@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A port that another program has open."""
 
 import os
 import subprocess

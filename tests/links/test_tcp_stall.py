@@ -55,7 +55,6 @@ async def connected(listener: Listener, link: TcpLink, port: int) -> tuple[socke
 
 
 def number_of(frame: MavlinkFrame) -> int | None:
-    """The number in an ATTITUDE."""
     is_attitude = frame.msgid == m.MAVLINK_MSG_ID_ATTITUDE
     return int.from_bytes(frame.payload[:4], "little") if is_attitude else None
 

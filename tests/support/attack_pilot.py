@@ -40,7 +40,6 @@ class Stranger:
                 continue
 
     def heard(self) -> list[Any]:
-        """The datagrams received so far."""
         found: list[Any] = []
         self._socket.setblocking(False)
         while True:

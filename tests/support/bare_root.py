@@ -47,7 +47,6 @@ class BareRoot:
         self._process.communicate()
 
     def put(self, source: Path, path: str) -> None:
-        """Copy a file into the root."""
         self.run(f"cat > {path}", stdin=source.read_bytes())
 
     def run(self, script: str, status: int = 0, stdin: bytes = b"") -> str:

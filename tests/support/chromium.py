@@ -85,7 +85,6 @@ class Browser:
         return entries
 
     def picture(self, path: Path) -> None:
-        """Save a picture of the page."""
         assert self.driver.save_screenshot(str(path))
 
 
@@ -119,7 +118,6 @@ class Browsers:
             driver.switch_to.window(before)
 
     def close(self) -> None:
-        """End the programs."""
         for driver in self._drivers.values():
             driver.quit()
 

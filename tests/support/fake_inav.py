@@ -132,6 +132,5 @@ def nav_config(capacity: int, safe_wp_distance: int = 500, nav_max_altitude: int
 
 
 def lossy(rate: float, seed: int) -> Callable[[MspFrame], str]:
-    """Lose requests and answers."""
     draw = random.Random(seed)
     return lambda _frame: draw.choice(("request", "reply")) if draw.random() < rate else ""

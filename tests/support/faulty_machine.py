@@ -30,7 +30,6 @@ class FaultyMachine(Host):
         self.sockets()
 
     def write(self, path: str, text: str = "") -> Path:
-        """Create a file of the machine."""
         file = self.path(path)
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(text)

@@ -82,7 +82,6 @@ class RandomAutopilot(QuietLine):
 
 
 def any_message(msgid: int, inputs: FuzzInputs) -> Packed:
-    """A message with any contents."""
     layout = MESSAGE_FORMATS[msgid]
     contents = inputs.contents(layout.full_size)[: layout.full_size].ljust(layout.full_size, b"\0")
     return Packed(msgid, contents[: layout.base_size], contents.rstrip(b"\0") or b"\0")

@@ -11,7 +11,6 @@ _BOARD = (1, 200)
 
 
 def item(seq: int) -> Message:
-    """A waypoint near the field."""
     place = (45.3838 + seq / 1e4, 8.4733, 20.0 + seq)
     frame, command = m.MAV_FRAME_GLOBAL_RELATIVE_ALT, m.MAV_CMD_NAV_WAYPOINT
     return m.MAVLink_mission_item_message(*_BOARD, seq, frame, command, 0, 1, 0.0, 3.0, 0.0, 0.0, *place)

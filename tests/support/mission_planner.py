@@ -181,7 +181,6 @@ class MissionPlanner:
         self.wait_until(lambda: part in self.said(), f"the text {part!r}")
 
     def wait_for_ack(self, result: MissionResult) -> None:
-        """Wait for a MISSION_ACK with `result`."""
         self.wait_until(lambda: result in self.acks(), result.name)
 
     def wait_for_armed(self, armed: bool) -> None:
@@ -248,7 +247,6 @@ class MissionPlanner:
         return None
 
     def arm(self) -> int | None:
-        """The Arm button."""
         return self.command(messages.MAV_CMD_COMPONENT_ARM_DISARM, 1)
 
     def request_version(self) -> None:
@@ -459,7 +457,6 @@ class MissionPlanner:
         return [message for message in self.heard if message.get_msgbuf()[0] == magic]
 
     def acks(self) -> list[MissionResult]:
-        """The results of all received MISSION_ACKs."""
         return [MissionResult(message.type) for message in self.heard_of("MISSION_ACK")]
 
 

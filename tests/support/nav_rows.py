@@ -130,7 +130,6 @@ ROWS = (
 
 
 def table() -> str:
-    """The table in Markdown."""
     lines = ["| sent | INAV: records | flown | MultiWii: records | flown |", "|---|---|---|---|---|"]
     for row in ROWS:
         cells = [row.name]

@@ -56,7 +56,6 @@ class PlainStation:
         self.send(self._dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
 
     def has_data(self) -> bool:
-        """True if there is unread data."""
         return bool(select.select([self._socket], [], [], 0)[0])
 
     def wait_for(self, *kinds: str) -> Any:
@@ -125,7 +124,6 @@ def udp_station(
     compid: int = COMPID,
     host: str = "127.0.0.1",
 ) -> PlainStation:
-    """A station on a daemon's udpin."""
     connection = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     connection.bind((host, 0))
     connection.connect(address)
@@ -133,5 +131,4 @@ def udp_station(
 
 
 def tcp_station(port: int) -> PlainStation:
-    """A station on a daemon's tcpin."""
     return PlainStation(socket.create_connection(("127.0.0.1", port), TIMEOUT_S))

@@ -38,7 +38,6 @@ class PlanRow:
         return messages.MAVLink_mission_item_int_message(*self._head(sysid, compid, seq), *place, self.alt)
 
     def float_message(self, sysid: int, compid: int, seq: int) -> Message:
-        """MISSION_ITEM."""
         return messages.MAVLink_mission_item_message(*self._head(sysid, compid, seq), self.lat, self.lng, self.alt)
 
     def _head(self, sysid: int, compid: int, seq: int) -> tuple[float, ...]:
@@ -71,7 +70,6 @@ def plan_text(rows: Sequence[PlanRow]) -> str:
 
 
 def plan_file(folder: Path, rows: Sequence[PlanRow]) -> Path:
-    """Write the list to a file."""
     path = folder / "plan.waypoints"
     path.write_text(plan_text(rows))
     return path

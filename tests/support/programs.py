@@ -43,7 +43,6 @@ def comes(condition: Callable[[], T | None], seconds: float = TIMEOUT_S) -> T | 
 
 
 async def until_async(condition: Callable[[], T | None], what: str) -> T:
-    """`until` in a running event loop."""
     deadline = time.monotonic() + TIMEOUT_S
     while not (found := condition()):
         assert time.monotonic() < deadline, f"timed out waiting for {what}"
@@ -52,7 +51,6 @@ async def until_async(condition: Callable[[], T | None], what: str) -> T:
 
 
 def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM, host: str = "127.0.0.1") -> int:
-    """A currently free port of `host`."""
     with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, kind) as probe:
         probe.bind((host, 0))
         port: int = probe.getsockname()[1]

@@ -35,5 +35,4 @@ HOME = item(WAYPOINT, frame=0)
 
 
 def mission(*items: MissionItem) -> list[MissionItem]:
-    """Home, then these items."""
     return [HOME, *items]

@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Missions for the storage tests."""
 
 import random
 import zlib

@@ -49,7 +49,6 @@ def example(folder: Path, of: str, endpoint: str) -> None:
 
 
 def tls_fleet(folder: Path, stack: ExitStack) -> Fleet:
-    """A fleet whose members have certificates."""
     endpoint = f"tls/localhost:{free_port(socket.SOCK_STREAM)}"
     example(folder, "zenoh-tls", endpoint)
     script = [sys.executable, str(folder / "make_certificates.py"), str(folder), "localhost,127.0.0.1"]
@@ -62,7 +61,6 @@ def tls_fleet(folder: Path, stack: ExitStack) -> Fleet:
 
 
 def password_fleet(folder: Path, stack: ExitStack) -> Fleet:
-    """A fleet whose members have user names and passwords."""
     endpoint = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
     example(folder, "zenoh-password", endpoint)
     stack.enter_context(running_router(folder, endpoint, folder / "router.json5"))

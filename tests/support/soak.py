@@ -49,7 +49,6 @@ class Stalls(threading.Thread):
                 self._stalls.append((before, after))
 
     def seconds(self, since: float, until: float) -> float:
-        """The stalled time in that interval."""
         return sum(max(0.0, min(after, until) - max(before, since)) for before, after in self._stalls if after > since)
 
     def end(self) -> None:
@@ -208,13 +207,11 @@ class Crowd:
         self._kinds += [self._flood, self._change_addresses, self._dawdle]
 
     def act(self, board: Board) -> None:
-        """Do one thing."""
         kind = self._chance.choice(self._kinds)
         kind(board)
         self.happened[kind.__name__.strip("_")] += 1
 
     def leave(self) -> None:
-        """Close all connections."""
         for client in (*self._stalled, *self._dawdlers):
             client.close()
         self._stalled.clear()
@@ -381,10 +378,8 @@ class Meter:
         self._folder = Path("/proc") / str(pid)
 
     def memory_kb(self) -> int:
-        """The resident memory."""
         lines = (self._folder / "status").read_text().splitlines()
         return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS:"))
 
     def descriptors(self) -> list[str]:
-        """The number of open descriptors."""
         return sorted(os.readlink(entry) for entry in (self._folder / "fd").iterdir())

@@ -94,7 +94,6 @@ class Rig:
         return self._words(RAM + _LOG, count)
 
     def handler_log(self) -> list[int]:
-        """All values loaded by the handler."""
         (end,) = self._words(RAM + _HANDLER_LOG_END, 1)
         return self._words(RAM + _HANDLER_LOG, (end - RAM - _HANDLER_LOG) // 4)
 

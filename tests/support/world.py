@@ -157,7 +157,6 @@ class World:
     # Actions for tests.
 
     def plug(self) -> None:
-        """Open the port."""
         self._plugged = True
         self.bridge.session.opened(self.now)
         self._flush()
@@ -182,7 +181,6 @@ class World:
         self.at(self.now + seconds, what)
 
     def run(self, seconds: float) -> None:
-        """Let time pass."""
         end = self.now + seconds
         while self.now < end:
             self._step(end)
@@ -371,12 +369,10 @@ class GroundStation:
         world.stations[self.peer] = self
 
     def send(self, message: Message) -> None:
-        """Send a message to the bridge."""
         data = self.pack(message)
         self._through_the_air(lambda: self.world.spoken_by(self, data))
 
     def sign(self, key: bytes, timestamp: int, link_id: int = 0) -> None:
-        """Sign all further messages."""
         signing = self._mavlink.signing
         signing.secret_key, signing.timestamp, signing.link_id, signing.sign_outgoing = key, timestamp, link_id, True
 
@@ -396,7 +392,6 @@ class GroundStation:
         return found
 
     def said(self, *types: str) -> list[Message]:
-        """The received messages of these types."""
         return [message for _, message in self.heard if not types or message.get_type() in types]
 
     def is_meant(self, message: Message) -> bool:

@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A fault in the page's own code."""
 
 import json
 from collections.abc import MutableMapping
