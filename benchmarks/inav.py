@@ -23,6 +23,7 @@ from benchmarks.processes import BenchmarkError, free_udp_port, inav_on_a_socket
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile
 from bridge.missions.list_check import check_list
+from bridge.model.refusal import Refusal
 from protocols.mission_item import Command, Frame, MissionItem
 from protocols.msp.frame import FRAME_OVERHEAD
 from protocols.msp.nav import WP_SIZE, NavRecord, encode_read_wp, encode_set_wp
@@ -123,7 +124,7 @@ async def _push_all(fc: FcAddress, turn: int) -> list[float]:
     daemon = Daemon(Settings(fc, [GcsAddress("udpout", "127.0.0.1", free_udp_port())]))
     running = asyncio.create_task(daemon.run())
     try:
-        while daemon.bridge.missions.fc_store is None or daemon.bridge.runner.is_busy:  # noqa: ASYNC110 - as in push
+        while isinstance(daemon.bridge.missions.fc_store, Refusal) or daemon.bridge.runner.is_busy:  # noqa: ASYNC110 - as in push
             await asyncio.sleep(0.01)
         return [await _push(daemon, _records(turn * _RUNS + run)) for run in range(_RUNS)]
     finally:
@@ -135,7 +136,7 @@ async def _push(daemon: Daemon, records: tuple[NavRecord, ...]) -> float:
     """Push one list; returns the seconds from the first record's frame to the proof of the last."""
     loop = asyncio.get_running_loop()
     fc_store = daemon.bridge.missions.fc_store
-    assert fc_store is not None
+    assert not isinstance(fc_store, Refusal)
     proven_at: list[float] = []
     done: asyncio.Future[object] = loop.create_future()
     push = fc_store.push(records, lambda _number: proven_at.append(loop.time()))

@@ -25,6 +25,7 @@ from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.line.conversation import Conversation, LinkLost, Send
 from bridge.missions.fc_mission_store import PushResult
 from bridge.missions.list_check import check_list
+from bridge.model.refusal import Refusal
 from protocols.msp.mission import RECORD_SIZE, MissionCommand, WpRecord
 from service.daemon.daemon import Daemon
 from service.settings import Settings
@@ -58,7 +59,7 @@ async def _push_all(link: Path) -> list[float]:
     daemon = Daemon(settings)
     running = asyncio.create_task(daemon.run())
     try:
-        while daemon.bridge.missions.fc_store is None:  # noqa: ASYNC110 - only the daemon's log says so
+        while isinstance(daemon.bridge.missions.fc_store, Refusal):  # noqa: ASYNC110 - only the daemon's log says so
             await asyncio.sleep(0.01)
         return [await _push(daemon, _records(seed)) for seed in range(_RUNS)]
     finally:
@@ -76,7 +77,7 @@ async def _push(daemon: Daemon, records: tuple[WpRecord, ...]) -> float:
     """Push one list; returns the seconds from the first CHUNK to the verified checksum."""
     loop = asyncio.get_running_loop()
     fc_store = daemon.bridge.missions.fc_store
-    assert fc_store is not None
+    assert not isinstance(fc_store, Refusal)
     begun_at: list[float] = []
     done: asyncio.Future[tuple[PushResult | LinkLost, float]] = loop.create_future()
     push = _noting_first_chunk(fc_store.push(records, lambda _: None), lambda: begun_at.append(loop.time()))

@@ -11,6 +11,7 @@ An autopilot that speaks MAVLink itself is not represented but passed through, b
     FcSession <-> PassThrough <-> Ground
 """
 
+from itertools import count
 from math import inf
 
 from bridge.config import BridgeConfig
@@ -24,16 +25,15 @@ from bridge.gcs.pass_through import PassThrough
 from bridge.gcs.station import Peer, Severity
 from bridge.line.runner import Runner
 from bridge.missions.mission_service import NO_LINK, EndingListener, MissionService, MissionTransfer
-from bridge.model.events import EventLog, Incidents
-from bridge.model.refusal import Refusal
+from bridge.model.events import EventLog
+from bridge.model.refusal import ARMED, Refusal
 from bridge.model.vehicle import FlightState
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.link_announcer import LinkAnnouncer
 from bridge.vehicle.local_missions import LocalMissions
 from bridge.vehicle.message_router import Incoming, MessageRouter
-from bridge.vehicle.mission_context import MissionContext
 from bridge.vehicle.mission_download import MissionDownloads
-from bridge.vehicle.mission_upload import MissionUploads
+from bridge.vehicle.mission_upload import STOPPED, MissionUploads
 from bridge.vehicle.mission_watch import MissionWatch
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.parameters import Parameters
@@ -53,13 +53,13 @@ class Bridge:
         on_frames: FrameListener | None = None,
         on_ending: EndingListener = lambda _mission, _delivery: None,
     ) -> None:
-        self._config = config
+        self._rule_settings = RuleSettings(config.takeoff_max_m)
         self._log_event = log_event
         self._was_armed = False
         #: True while an autopilot speaks MAVLink itself: the bridge then does not wait for particular bytes.
         self.is_passing_through = False
         self._announcer = LinkAnnouncer()
-        incidents = Incidents()
+        incidents = count(1)
 
         self.guard = Guard(config.links, log_event, passes_everything=config.passes_everything)
         self.ground = Ground(
@@ -82,20 +82,18 @@ class Bridge:
             self._mavlink_received,
             config.autopilot,
         )
-        vehicle = self.session.vehicle
-        self.missions = MissionService(vehicle, on_ending)
-        context = MissionContext(self.missions, self.runner, self.ground, vehicle, log_event, incidents)
-        self.local = LocalMissions(context)
+        self.missions = MissionService(self.session.vehicle, self.runner, on_ending)
+        self.local = LocalMissions(self.missions, self.ground, log_event, incidents)
         self.sharing = MspSharing(self.session, self.runner)
         self._vehicle = OwnVehicle(self.session, self.missions, self.ground, self._announcer, config.unix_time_s, now)
         self.report = VehicleReporter(self.session, self.missions, self.ground, self._vehicle.also_want)
-        self._uploads = MissionUploads(context)
-        self._downloads = MissionDownloads(context)
-        self._watch = MissionWatch(context)
-        parameters = Parameters(context, config.sysid)
+        self._uploads = MissionUploads(self.missions, self.ground, log_event, incidents)
+        self._watch = MissionWatch(self.missions, self.ground, log_event)
+        downloads = MissionDownloads(self.missions, self.ground)
+        parameters = Parameters(self.missions, self.ground, config.sysid)
         actions = FcActions(self.session, self.missions, self.runner)
         commands = CommandService(self.ground, self._vehicle, actions, self.session, config.version)
-        router = MessageRouter(self.ground, self._uploads, self._downloads, parameters, commands, self._vehicle)
+        router = MessageRouter(self.ground, self._uploads, downloads, parameters, commands, self._vehicle)
         self._incoming = Incoming(
             self.guard, self.ground, router, parameters, self.session.send_mavlink, config.sysid, config.compid
         )
@@ -139,7 +137,7 @@ class Bridge:
     def stop_missions(self, now: float) -> None:
         """Accept no more transfers. An upload that still receives items ends; a running push continues."""
         self.missions.close()
-        self._uploads.stop(now)
+        self._uploads.end(STOPPED, now)
 
     # Time.
 
@@ -152,7 +150,8 @@ class Bridge:
         self.session.tick(now)
         self._pass_on_news(now)
         self.runner.tick(now)
-        self._uploads.tick(now)
+        if self._uploads.is_active:
+            self._uploads.tick(now)
         if now >= self._watch.due:
             self._watch.tick(now)
         for peer in self.ground.expire(now):
@@ -166,7 +165,7 @@ class Bridge:
         return min(
             self.session.next_deadline(),
             self.runner.next_deadline(),
-            self._uploads.next_deadline(),
+            self._uploads.next_deadline() if self._uploads.is_active else inf,
             self.ground.stations.next_deadline(),
             self._announcer.due,
             self._watch.due,
@@ -189,24 +188,23 @@ class Bridge:
             self._vehicle.newcomer(peer)
 
     def _controller_changed(self, controller: FlightController | None, now: float) -> None:
-        self._downloads.forget_all()
         vehicle = self.session.vehicle
         self.is_passing_through = controller is not None and controller.profile.is_passed_through
         if controller is None:
             trouble = self.session.state.trouble
             self.missions.use(Refusal(MissionResult.DENIED, trouble) if trouble else NO_LINK)
-            self._uploads.link_lost(now)
+            if self._uploads.is_active:
+                self._uploads.link_lost(now)
             self._announcer.lost(now if vehicle.heard_at is None else vehicle.heard_at)
             return
         missions = controller.profile.missions
-        settings = RuleSettings(self._config.takeoff_max_m)
-        store = missions if isinstance(missions, Refusal) else missions(controller, vehicle, settings)
+        store = missions if isinstance(missions, Refusal) else missions(controller, vehicle, self._rule_settings)
         self.missions.use(store)
         self._incoming.routes = PassThrough(self.ground) if self.is_passing_through else None
         self._say(self._announcer.found(controller, now))
         if not isinstance(store, Refusal):
             # Read its list at once: MISSION_CURRENT reports the count, and the first Read needs no wait.
-            self._watch.look(now)
+            self._watch.due = now
 
     def _mavlink_received(self, frames: list[MavlinkFrame]) -> None:
         if self._incoming.routes is not None:
@@ -216,9 +214,9 @@ class Bridge:
         self.report.now = now
         if self.report.watched:
             self.session.settle_telemetry()
-        news = self.session.vehicle.take_news()
-        if not news:
+        if not self.session.vehicle.news:
             return
+        news = self.session.vehicle.take_news()
         if self.report.watched:
             self.report.heard(news)
         if self._is_represented:
@@ -232,7 +230,7 @@ class Bridge:
             # Unknown is not a change: a Harakiri that arms may fall silent first.
             return
         self._was_armed = armed
-        if armed:
-            self._uploads.armed(now)
+        if armed and self._uploads.is_active:
+            self._uploads.end(ARMED, now)
         self.ground.record_flight(on=armed and self._is_represented)
         self._log_event("info", "vehicle.armed" if armed else "vehicle.disarmed")

@@ -4,7 +4,7 @@
 `TRANSITIONS` is the whole state machine; `bridge.fc.states` has a class for each state.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from bridge.fc.profile import FlightController, Profile, Spoken
 from bridge.fc.states.base import Closed, Event, Found, Identified, Lost, Port, PortClosed, PortOpened, State
@@ -15,7 +15,7 @@ from bridge.fc.states.msp import Identifying, Polling
 from bridge.fc.states.searching import Searching
 from bridge.line.runner import Runner
 from bridge.model.autopilot import Autopilot
-from bridge.model.events import EventLog, Incidents, Level
+from bridge.model.events import EventLog, Level
 from protocols.mavlink.frame import MavlinkFrame
 
 #: State -> event or search result -> next state. Any other event in a state is a bug.
@@ -41,7 +41,7 @@ class FcSession:
     """Runs the state machine of one port.
 
     `on_change` is called with each flight controller that is found, and with None when it is lost or cannot be used.
-    `on_mavlink` gets its MAVLink frames.
+    `on_mavlink` gets its MAVLink frames. `incidents`: numbers for the ids of related log lines.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class FcSession:
         profiles: Sequence[Profile],
         runner: Runner,
         log_event: EventLog,
-        incidents: Incidents,
+        incidents: Iterator[int],
         on_change: Callable[[FlightController | None, float], None],
         on_mavlink: Callable[[list[MavlinkFrame]], None],
         autopilot: Autopilot,
@@ -152,5 +152,5 @@ class FcSession:
         self._log_event(level, event, speed_baud=found.speed, **facts)
 
     def _follow_incident(self) -> str:
-        self._incident = self._incident or self._incidents.begin("link")
+        self._incident = self._incident or f"link-{next(self._incidents)}"
         return self._incident

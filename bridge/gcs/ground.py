@@ -12,9 +12,11 @@ from bridge.gcs.recent_texts import RecentTexts
 from bridge.gcs.station import RECORDER, Peer, Severity, Station
 from bridge.gcs.stations import Stations, displaced
 from bridge.model.events import EventLog
+from bridge.model.refusal import Refusal
 from protocols.mavlink.codec import FrameWriter, Packed, pack
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+from protocols.mission_item import MissionResult
 
 _TEXT_SIZE = 50
 _MAX_TEXT_ID = 0xFFFF
@@ -204,6 +206,15 @@ class Ground:
     def to(self, station: Station, message: Message) -> None:
         """Send a message to one ground station."""
         self._send(station.peer, self._writer(station.peer), message)
+
+    def mission_ack(self, station: Station, result: MissionResult, mission_type: int = 0) -> None:
+        """Send a MISSION_ACK."""
+        self.to(station, messages.MAVLink_mission_ack_message(station.sysid, station.compid, result, mission_type))
+
+    def refuse(self, station: Station, refusal: Refusal) -> None:
+        """Refuse a mission transfer: send the reason as a text, and a MISSION_ACK."""
+        self.say(Severity.ERROR, refusal.text, station)
+        self.mission_ack(station, refusal.ack)
 
     def allows(self, station: Station, cost: Cost) -> bool:
         """Count work that a ground station causes; False if that exceeds its limit."""

@@ -8,9 +8,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from math import inf
-from typing import Any
+from typing import Any, TypeVar
 
-from bridge.line.conversation import Conversation, Pause, conclude, find_pending, recall, save
+from bridge.line.conversation import Conversation, LinkLost, Pause, Stopped, conclude, find_pending, recall, save
+from bridge.line.runner import Runner
 from bridge.missions.fc_mission_store import (
     LIST_IS_GONE,
     AnyFcMissionStore,
@@ -29,6 +30,8 @@ from bridge.model.vehicle import Vehicle
 from bridge.model.verdict import Result, Verdict
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.mission_record import ListIdentity, identify
+
+T = TypeVar("T")
 
 #: The timeout for a running flash write (docs/mission-rules.md).
 _BUSY_TIMEOUT_S = 1.0
@@ -101,12 +104,12 @@ EndingListener = Callable[[ArrivedMission, DeliveryResult], None]
 class MissionService:
     """Holds the transfer lock, the current flight controller's mission store, and its list."""
 
-    def __init__(self, vehicle: Vehicle, on_ending: EndingListener) -> None:
-        self._vehicle = vehicle
+    def __init__(self, vehicle: Vehicle, runner: Runner, on_ending: EndingListener) -> None:
+        self.vehicle = vehicle
+        self.runner = runner
         self._on_ending = on_ending
-        #: The mission store of the current flight controller; None if it has none.
-        self.fc_store: AnyFcMissionStore | None = None
-        self._refusal = NO_LINK
+        #: The mission store of the current flight controller, or the reply to every attempt.
+        self.fc_store: AnyFcMissionStore | Refusal = NO_LINK
         self._owner: object | None = None
         self._closed = False
         #: False until the current flight controller's list was read, and after an interrupted push.
@@ -123,9 +126,21 @@ class MissionService:
         #: Set while records are written and verified.
         self.writing: MissionTransfer | None = None
 
+    def run(
+        self, conversation: Conversation[T | Refusal], on_done: Callable[[T | Refusal, float], None], now: float
+    ) -> None:
+        """Run a conversation; `on_done` gets its result and the time. A lost line is a refusal, too."""
+
+        def done(result: T | Refusal | LinkLost, at: float) -> None:
+            if isinstance(result, LinkLost):
+                result = STOPPING if isinstance(result, Stopped) else NO_LINK
+            on_done(result, at)
+
+        self.runner.start(conversation, done, now)
+
     def use(self, store: AnyFcMissionStore | Refusal) -> None:
-        """Switch to another flight controller; a Refusal becomes the reply to every attempt."""
-        self.fc_store, self._refusal = (None, store) if isinstance(store, Refusal) else (store, NO_LINK)
+        """Switch to another flight controller."""
+        self.fc_store = store
         self.former_home = self.home_item()
         self.held, self._loading = None, Loading.NOT_NEEDED
         self.is_settled = self._told_unloaded = False
@@ -133,7 +148,7 @@ class MissionService:
     @property
     def others(self) -> tuple[HeldMission, ...]:
         """Further missions in the flight controller's store, as last read."""
-        if self.fc_store is None:
+        if isinstance(self.fc_store, Refusal):
             return ()
         return tuple(
             HeldMission(identify(records), records, self.fc_store.items(records, {}))
@@ -147,11 +162,11 @@ class MissionService:
     @property
     def watch_s(self) -> float:
         """How often to ask `is_outdated`, s; infinity without a store."""
-        return inf if self.fc_store is None else self.fc_store.watch_s
+        return inf if isinstance(self.fc_store, Refusal) else self.fc_store.watch_s
 
     def seq_of(self, number: int) -> int:
         """The seq of the item for the flight controller's record `number`; 0: none is known."""
-        if self.fc_store is None or self.held is None:
+        if isinstance(self.fc_store, Refusal) or self.held is None:
             return 0
         return self.fc_store.seq_of(self.held.records, number)
 
@@ -170,7 +185,7 @@ class MissionService:
 
     def armed_refusal(self) -> Refusal | None:
         """The refusal if the craft is known to be armed; saves a request to a busy board."""
-        return ARMED if self.fc_store is not None and self._vehicle.armed else None
+        return ARMED if not isinstance(self.fc_store, Refusal) and self.vehicle.armed else None
 
     def close(self) -> None:
         """Accept no more transfers: the bridge is stopping."""
@@ -186,8 +201,8 @@ class MissionService:
             return armed
         waited_s = 0.0
         while True:
-            if self.fc_store is None:
-                return self._refusal
+            if isinstance(self.fc_store, Refusal):
+                return self.fc_store
             loading = yield from self.fc_store.load()
             report = yield from self.fc_store.report()
             if report is None or loading is Loading.NO_ANSWER:
@@ -203,8 +218,8 @@ class MissionService:
 
     def rules(self) -> Conversation[MissionRules | Refusal]:
         """The rules of the current flight controller, armed or not."""
-        if self.fc_store is None:
-            return self._refusal
+        if isinstance(self.fc_store, Refusal):
+            return self.fc_store
         report = yield from self.fc_store.report()
         return NO_LINK if report is None else report.rules
 
@@ -230,8 +245,8 @@ class MissionService:
             outcome = Outcome.CANCELLED if cancelled else Outcome.REJECTED
             return (yield from self._conclude(number, outcome, verdict.ack, reason))
         fc_store = self.fc_store
-        if fc_store is None:
-            return (yield from self._conclude(number, Outcome.FAILED, self._refusal.ack, self._refusal.text))
+        if isinstance(fc_store, Refusal):
+            return (yield from self._conclude(number, Outcome.FAILED, fc_store.ack, fc_store.text))
         if not (yield from self._copy_erased(fc_store, verdict.records)):
             return (yield from self._conclude(number, Outcome.FAILED, MissionResult.DENIED, _NO_COPY))
         before = None if self.held is None else self.held.identity
@@ -283,8 +298,8 @@ class MissionService:
         After connecting or an interrupted push, the flight controller first loads its saved mission if it holds none.
         """
         fc_store = self.fc_store
-        if fc_store is None:
-            return self._refusal
+        if isinstance(fc_store, Refusal):
+            return fc_store
         if not self.is_settled:
             loading = yield from fc_store.load()
             if loading is Loading.NO_ANSWER:
@@ -316,13 +331,13 @@ class MissionService:
         if not self._has_asked_store:
             self._has_asked_store = True
             self._pending += yield from find_pending()
-        if self.fc_store is None:
+        if isinstance(self.fc_store, Refusal):
             return False
         return not self.is_settled or bool(self._pending) or not (yield from self.fc_store.is_current())
 
     def catch_up(self) -> Conversation[MissionChange | None]:
         """Read the list; returns the text for the pilot if it is another one."""
-        if self.fc_store is None:
+        if isinstance(self.fc_store, Refusal):
             return None
         is_first, before = not self.is_settled, self.held
         held = yield from self.read_back()

@@ -2,6 +2,7 @@
 """Distances between places, and the course over ground for receivers that report a speed but no course."""
 
 import math
+from dataclasses import dataclass
 from typing import Protocol
 
 _METRES_PER_DEGREE = 111_320.0
@@ -21,12 +22,12 @@ class Place(Protocol):
         """Longitude."""
 
 
+@dataclass(slots=True)
 class GroundTrack:
     """Follows successive positions."""
 
-    def __init__(self) -> None:
-        self._leg_began: Place | None = None
-        self._course_deg: float | None = None
+    _leg_began: Place | None = None
+    _course_deg: float | None = None
 
     def course_deg(self, place: Place) -> float | None:
         """Add a position. The course, 0 up to 360, or None before the first metre."""

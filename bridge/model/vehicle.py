@@ -237,7 +237,8 @@ class Vehicle:
         self.heard_at: float | None = None
         self.track = GroundTrack()
         self._readings: dict[type[Reading], Reading] = {}
-        self._news: set[type[Reading]] = set()
+        #: The kinds of readings heard since the last `take_news`.
+        self.news: set[type[Reading]] = set()
         self._cells = 1
         #: False while home is only where the craft stands before its first arming.
         self.is_home_settled = False
@@ -255,7 +256,7 @@ class Vehicle:
             reading = self._estimated(reading)
         before = self._readings.get(kind)
         self._readings[kind] = reading
-        self._news.add(kind)
+        self.news.add(kind)
         if self.heard_at is None or reading.heard_at > self.heard_at:
             self.heard_at = reading.heard_at
         if isinstance(reading, FlightState):
@@ -298,8 +299,8 @@ class Vehicle:
         return reading if reading is not None and now <= reading.heard_at + stale_s else None
 
     def take_news(self) -> Set[type[Reading]]:
-        """The kinds of readings heard since the last call."""
-        news, self._news = self._news, set()
+        """Return and clear `news`."""
+        news, self.news = self.news, set()
         return news
 
     def home_or_position(self) -> Home | None:

@@ -1,18 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Mission operations for the command line, the status page and zenoh. Sans-IO."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
+from bridge.gcs.ground import Ground
 from bridge.gcs.station import Severity
 from bridge.line.conversation import Conversation
 from bridge.missions.fc_mission_store import StoreReport
 from bridge.missions.list_check import check_list
-from bridge.missions.mission_service import DeliveryResult, HeldMission
+from bridge.missions.mission_service import DeliveryResult, HeldMission, MissionService
+from bridge.model.events import EventLog
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.refusal import Refusal
 from bridge.model.verdict import Result, Verdict
-from bridge.vehicle.mission_context import MissionContext
 from protocols.mission_item import MissionItem, MissionResult
 
 _WOULD_ERASE = Refusal(MissionResult.DENIED, "No item can be stored: this would erase the current mission")
@@ -21,9 +22,11 @@ _WOULD_ERASE = Refusal(MissionResult.DENIED, "No item can be stored: this would 
 class LocalMissions:
     """Writes, reads and checks whole lists, by the same rules as uploads from ground stations."""
 
-    def __init__(self, context: MissionContext) -> None:
-        self._context = context
-        self._missions = context.missions
+    def __init__(self, missions: MissionService, ground: Ground, log_event: EventLog, incidents: Iterator[int]) -> None:
+        self._missions = missions
+        self._ground = ground
+        self._log_event = log_event
+        self._incidents = incidents
 
     def push(
         self,
@@ -40,14 +43,14 @@ class LocalMissions:
         `may_erase` False: a list without a storable item is refused.
         """
         owner = object()
-        incident = self._context.incidents.begin("push")
+        incident = f"push-{next(self._incidents)}"
         arrived: list[ArrivedMission] = []
 
         def conversation() -> Conversation[DeliveryResult | Refusal]:
             report: StoreReport | Refusal = yield from self._missions.preflight()
             if isinstance(report, Refusal):
                 return report
-            verdict = check_list(items, report.rules, self._context.vehicle.place())
+            verdict = check_list(items, report.rules, self._missions.vehicle.place())
             arrived.append(ArrivedMission(source, tuple(items), verdict))
             if verdict.result is Result.CLEARED and not may_erase:
                 return _WOULD_ERASE
@@ -57,8 +60,8 @@ class LocalMissions:
             self._missions.release(owner)
             if arrived and isinstance(result, DeliveryResult):
                 severity = Severity.WARNING if result.is_lossy else Severity.NOTICE
-                self._context.ground.say(severity, f"{source}: {result.text}")
-            self._context.log_event(
+                self._ground.say(severity, f"{source}: {result.text}")
+            self._log_event(
                 "info" if result.ack is MissionResult.ACCEPTED else "warning",
                 "mission.push_ended",
                 source=source,
@@ -69,15 +72,15 @@ class LocalMissions:
             )
             on_done(result, arrived[0] if arrived else None)
 
-        self._context.log_event("info", "mission.push_started", source=source, count=len(items), incident=incident)
+        self._log_event("info", "mission.push_started", source=source, count=len(items), incident=incident)
         refusal = self._missions.acquire(owner)
         if refusal is None:
-            self._context.run(conversation(), done, now)
+            self._missions.run(conversation(), done, now)
         else:
             done(refusal, now)
 
     def pull(self, on_done: Callable[[HeldMission | Refusal], None], now: float) -> None:
-        self._context.run(self._missions.read_back(), lambda held, _at: on_done(held), now)
+        self._missions.run(self._missions.read_back(), lambda held, _at: on_done(held), now)
 
     def check(
         self, items: Sequence[MissionItem], on_done: Callable[[Verdict[Any] | Refusal], None], now: float
@@ -86,6 +89,6 @@ class LocalMissions:
 
         def conversation() -> Conversation[Verdict[Any] | Refusal]:
             rules = yield from self._missions.rules()
-            return rules if isinstance(rules, Refusal) else check_list(items, rules, self._context.vehicle.place())
+            return rules if isinstance(rules, Refusal) else check_list(items, rules, self._missions.vehicle.place())
 
-        self._context.run(conversation(), lambda verdict, _at: on_done(verdict), now)
+        self._missions.run(conversation(), lambda verdict, _at: on_done(verdict), now)

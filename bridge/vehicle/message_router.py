@@ -70,7 +70,7 @@ class MessageRouter:
             m.MAVLINK_MSG_ID_MISSION_ITEM_INT: lambda s, msg, now: self._item(s, msg, item_from_int_message(msg), now),
             m.MAVLINK_MSG_ID_MISSION_ACK: lambda s, msg, now: uploads.ack(s, msg.type, now),
             m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL: lambda s, _, now: uploads.clear_all(s, now),
-            m.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST: lambda s, _, now: uploads.partial_list(s, now),
+            m.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST: lambda s, _, now: uploads.answers.partial_list(s, now),
             m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST: lambda s, _, now: downloads.request_list(s, now),
             m.MAVLINK_MSG_ID_MISSION_REQUEST: lambda s, msg, now: downloads.request(s, msg.seq, now, as_int=False),
             m.MAVLINK_MSG_ID_MISSION_REQUEST_INT: lambda s, msg, now: downloads.request(s, msg.seq, now, as_int=True),
@@ -118,15 +118,12 @@ class MessageRouter:
         elif msgid != m.MAVLINK_MSG_ID_MISSION_ACK:
             if msgid == m.MAVLINK_MSG_ID_MISSION_COUNT:
                 self._ground.say(Severity.ERROR, "No fences or rally points: only missions are stored", station)
-            self._ack(station, MissionResult.UNSUPPORTED, mission_type)
-
-    def _ack(self, station: Station, result: MissionResult, mission_type: int) -> None:
-        self._ground.to(station, m.MAVLink_mission_ack_message(station.sysid, station.compid, result, mission_type))
+            self._ground.mission_ack(station, MissionResult.UNSUPPORTED, mission_type)
 
     def _item(self, station: Station, message: Message, item: MissionItem, now: float) -> None:
         if message.current in _GUIDED and not self._uploads.is_writing(station):
             self._commands.refuse(station, m.MAV_CMD_NAV_WAYPOINT)
-            self._ack(station, MissionResult.DENIED, m.MAV_MISSION_TYPE_MISSION)
+            self._ground.mission_ack(station, MissionResult.DENIED)
         else:
             self._uploads.item(station, item, now)
 

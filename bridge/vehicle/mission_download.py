@@ -2,14 +2,13 @@
 """A ground station reads the mission: the vehicle's side of MAVLink's download (docs/mission-rules.md, "Read-back")."""
 
 from dataclasses import dataclass, replace
-from math import inf
 
 from bridge.gcs.cost import Cost
+from bridge.gcs.ground import Ground
 from bridge.gcs.station import Station
-from bridge.missions.mission_service import HeldMission
+from bridge.missions.mission_service import HeldMission, MissionService
 from bridge.model.refusal import Refusal
 from bridge.model.vehicle import Home
-from bridge.vehicle.mission_context import MissionContext
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.mission_messages import item_message
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
@@ -41,25 +40,26 @@ class _Snapshot:
 
     items: tuple[MissionItem, ...]
     until: float
+    fc_store: object
 
 
 class MissionDownloads:
     """Every ground station reads its own snapshot, so an upload in between cannot mix two lists."""
 
-    def __init__(self, context: MissionContext) -> None:
-        self._missions = context.missions
-        self._context = context
-        self._ground = context.ground
-        self._vehicle = context.vehicle
+    def __init__(self, missions: MissionService, ground: Ground) -> None:
+        self._missions = missions
+        self._ground = ground
+        self._vehicle = missions.vehicle
         self._snapshots: dict[Station, _Snapshot] = {}
         self._questions: dict[_Question, None] = {}
         self._is_reading = False
-        self._homeless_since = inf
+        #: While home is unknown: the mission store of the flight controller, and when item 0 was first requested.
+        self._homeless: tuple[object, float] = None, 0.0
 
     def request_list(self, station: Station, now: float) -> None:
         """MISSION_REQUEST_LIST."""
         if self._vehicle.armed:
-            self._context.refuse(station, _ARMED)
+            self._ground.refuse(station, _ARMED)
         else:
             self._ask(_Question(station, None, as_int=True), now)
 
@@ -71,8 +71,8 @@ class MissionDownloads:
             if seq == 0:
                 self._send_home(question, now)
             else:
-                self._context.refuse(station, _ARMED)
-        elif snapshot is not None and now < snapshot.until:
+                self._ground.refuse(station, _ARMED)
+        elif snapshot is not None and now < snapshot.until and snapshot.fc_store is self._missions.fc_store:
             snapshot.until = now + _READING_S
             self._answer(question, snapshot.items)
         else:
@@ -81,11 +81,6 @@ class MissionDownloads:
     def forget(self, station: Station) -> None:
         """The ground station has read the list, or writes a new one."""
         self._snapshots.pop(station, None)
-
-    def forget_all(self) -> None:
-        """The flight controller has changed."""
-        self._snapshots.clear()
-        self._homeless_since = inf
 
     def _ask(self, question: _Question, now: float) -> None:
         """Read the list once for all waiting requests, so that a flood of them cannot fill the queue."""
@@ -99,7 +94,7 @@ class MissionDownloads:
             self._read(held, now)
         else:
             self._is_reading = True
-            self._context.run(self._missions.read_back(), self._read, now)
+            self._missions.run(self._missions.read_back(), self._read, now)
 
     def _read(self, held: HeldMission | Refusal, now: float) -> None:
         self._is_reading = False
@@ -110,11 +105,11 @@ class MissionDownloads:
                 if question.seq == 0 and (self._vehicle.armed or self._vehicle.home_or_position() is not None):
                     self._send_home(question, now)
                 elif question.seq != 0 or self._vehicle.armed is not None:
-                    self._context.refuse(question.station, held)
+                    self._ground.refuse(question.station, held)
                 # Otherwise the craft may be armed: Mission Planner repeats the request until that is known.
                 continue
             self._snapshots.pop(question.station, None)
-            self._snapshots[question.station] = _Snapshot(held.items, now + _READING_S)
+            self._snapshots[question.station] = _Snapshot(held.items, now + _READING_S, self._missions.fc_store)
             if len(self._snapshots) > _MAX_READERS:
                 del self._snapshots[next(iter(self._snapshots))]
             self._answer(question, held.items)
@@ -130,7 +125,7 @@ class MissionDownloads:
         elif question.seq == 0:
             self._send_item(question, self._home_item())
         else:
-            self._context.ack(station, MissionResult.INVALID_SEQUENCE)
+            self._ground.mission_ack(station, MissionResult.INVALID_SEQUENCE)
 
     def _send_item(self, question: _Question, item: MissionItem) -> None:
         station = question.station
@@ -143,8 +138,9 @@ class MissionDownloads:
         """
         known, home = self._missions.home_item(), self._vehicle.home_or_position()
         if known is None and home is None:
-            self._homeless_since = min(self._homeless_since, now)
-            if now < self._homeless_since + _POSITION_WAIT_S:
+            if self._homeless[0] is not self._missions.fc_store:
+                self._homeless = self._missions.fc_store, now
+            if now < self._homeless[1] + _POSITION_WAIT_S:
                 return
         item = known or self._home_item()
         if home is not None and home.altitude_m is not None:

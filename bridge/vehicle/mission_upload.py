@@ -8,26 +8,24 @@ docs/ground-stations.md.
 """
 
 from collections import Counter
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 from functools import partial
 from math import inf
 from typing import Any
 
 from bridge.gcs.cost import Cost
 from bridge.gcs.flash_budget import TOO_MANY_WRITES
+from bridge.gcs.ground import Ground
 from bridge.gcs.station import Peer, Severity, Station
 from bridge.missions.fc_mission_store import StoreReport
 from bridge.missions.list_check import begin_check, check_count
-from bridge.missions.mission_service import OCCUPIED, DeliveryResult, MissionTransfer, TransferStep
-from bridge.missions.mission_texts import finding_lines
-from bridge.model.events import Level
-from bridge.model.finding import Finding, News
+from bridge.missions.mission_service import OCCUPIED, DeliveryResult, MissionService, MissionTransfer, TransferStep
+from bridge.model.events import EventLog, Level
+from bridge.model.finding import Finding
 from bridge.model.mission_log import ArrivedMission
-from bridge.model.refusal import ARMED, Refusal
+from bridge.model.refusal import Refusal
 from bridge.model.verdict import CLEARED_LIST, Result, Verdict
-from bridge.vehicle.mission_context import MissionContext
-from bridge.vehicle.recent_answers import RecentAnswers
+from bridge.vehicle.upload_answers import UploadAnswers
 from bridge.vehicle.upload_states import (
     TRANSITIONS,
     Announced,
@@ -41,6 +39,7 @@ from bridge.vehicle.upload_states import (
     Ready,
     Receiving,
     Turn,
+    Upload,
     UploadState,
     Waiting,
 )
@@ -48,10 +47,6 @@ from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionItem, MissionResult
 
 _TOO_MANY_UPLOADS = Refusal(MissionResult.DENIED, "Too many uploads: wait a few seconds")
-_NOT_WHOLE = Refusal(MissionResult.UNSUPPORTED, "A mission can only be written as a whole")
-_UNKNOWN_UPLOAD = Refusal(MissionResult.OPERATION_CANCELLED, "Unknown upload: write it again")
-#: Mission Planner has reported "Write Fast" as a success to its user, so a failure is shown three times, 2 s apart.
-_REMINDERS_S = (2.0, 4.0)
 #: The maximum number of simultaneous uploads. Beyond it the one with the slowest progress ends.
 _MOST_UPLOADS = 64
 #: After this long with lists arriving, an upload does not wait for its turn: a slow or silent ground station would lock
@@ -64,32 +59,22 @@ _MOST_IN_TURN = 4
 _ASK_INTERVAL_S = 0.2
 
 
-@dataclass(slots=True, eq=False)
-class _Upload:
-    station: Station
-    count: int
-    incident: str
-    state: UploadState
-    #: Its ground station has announced another list while this one was written.
-    is_superseded: bool = False
-    #: Its ground station has sent a MISSION_COUNT of 0.
-    is_cancelled: bool = False
-
-
 class MissionUploads:
     """All ground stations' uploads and clears."""
 
-    def __init__(self, context: MissionContext) -> None:
-        self._context = context
-        self._missions = context.missions
-        self._ground = context.ground
-        self._flash = context.ground.flash
-        self._uploads: list[_Upload] = []  # in the order of their MISSION_COUNT
+    def __init__(self, missions: MissionService, ground: Ground, log_event: EventLog, incidents: Iterator[int]) -> None:
+        self._missions = missions
+        self._ground = ground
+        self._log_event = log_event
+        self._incidents = incidents
+        self._flash = ground.flash
+        self._uploads: list[Upload] = []  # in the order of their MISSION_COUNT
         self._states: Counter[type[UploadState]] = Counter()  # of the uploads
         #: No state ends and no request is repeated before this time.
         self._states_due = inf
-        self._answers = RecentAnswers(context.ground.stations.has_moved)
-        self._reminders: list[tuple[float, Station, str]] = []
+        self.answers = UploadAnswers(ground)
+        #: False while nothing is due: no upload runs, and no reminder waits.
+        self.is_active = False
         self._is_asking = False
         self._may_ask_at = 0.0
         #: Since when lists have been arriving without a pause, and when the last upload ended.
@@ -113,11 +98,9 @@ class MissionUploads:
     def count(self, station: Station, count: int, now: float) -> None:
         """MISSION_COUNT: an upload is announced."""
         present = self._find(station, now)
-        answer = None if present is not None or count else self._answers.to(station, now)
-        if answer is not None and now < answer.cancelled_until:
-            # A repeated Cancel, whose answer was lost: it must not clear the mission on the craft.
-            self._context.ack(station, answer.ack)
-        elif present is None or not self._is_for(present, count, now):
+        if present is None and not count and self.answers.repeat_cancelled(station, now):
+            return
+        if present is None or not self._is_for(present, count, now):
             self._begin(station, count, now)
 
     def clear_all(self, station: Station, now: float) -> None:
@@ -133,7 +116,7 @@ class MissionUploads:
         """MISSION_ITEM or MISSION_ITEM_INT."""
         upload = self._find(station, now)
         if upload is None:
-            self._late_item(station, item.seq, now)
+            self.answers.late_item(station, item.seq, now, is_lost=not self._uploads)
             return
         state = upload.state
         if not isinstance(state, Receiving):
@@ -141,7 +124,7 @@ class MissionUploads:
             return
         if item.seq >= upload.count:
             text = f"WP {item.seq} is beyond the {upload.count} items announced"
-            self._context.refuse(station, Refusal(MissionResult.INVALID_SEQUENCE, text))
+            self._ground.refuse(station, Refusal(MissionResult.INVALID_SEQUENCE, text))
             return
         if state.is_of_another_list(item):
             # Two lists must never be mixed: the previous one is discarded.
@@ -156,14 +139,6 @@ class MissionUploads:
         elif taken:
             self._request(upload, now)
 
-    def partial_list(self, station: Station, now: float) -> None:
-        """MISSION_WRITE_PARTIAL_LIST: Mission Planner's answer to a refusal that it did not understand."""
-        answer = self._answers.to(station, now)
-        if answer is not None and answer.is_refusal:
-            self._context.ack(station, answer.ack)
-        else:
-            self._context.refuse(station, _NOT_WHOLE)
-
     def ack(self, station: Station, result: int, now: float) -> None:
         """MISSION_ACK from a ground station: an error cancels its upload, ACCEPTED ends "Write Fast"."""
         upload = self._find(station, now)
@@ -177,18 +152,14 @@ class MissionUploads:
 
     # From the rest of the bridge.
 
-    def armed(self, now: float) -> None:
-        """The craft was armed: uploads that have not reached the flight controller end."""
-        self._end(self._undelivered(), ARMED, now)
+    def end(self, refusal: Refusal, now: float) -> None:
+        """End the uploads that have not reached the flight controller: the craft was armed, or the bridge stops."""
+        self._end(self._undelivered(), refusal, now)
 
     def peer_gone(self, peer: Peer, now: float) -> None:
         """A ground station's connection is closed: its uploads end without waiting for the timeout."""
         gone = [upload for upload in self._undelivered() if upload.station.peer == peer]
         self._end(gone, _cancelled("ended: disconnected"), now)
-
-    def stop(self, now: float) -> None:
-        """The bridge is stopping: uploads that have not reached the flight controller end."""
-        self._end(self._undelivered(), _cancelled("ended: naze-bridge stops"), now)
 
     def link_lost(self, now: float) -> None:
         """The flight controller is gone: uploads that still receive items end."""
@@ -206,23 +177,20 @@ class MissionUploads:
                     state.request.lost()
                     self._request(upload, now)
             self._states_due = min((upload.state.next_tick() for upload in self._uploads), default=inf)
-        for reminder in [reminder for reminder in self._reminders if now >= reminder[0]]:
-            self._reminders.remove(reminder)
-            _, station, text = reminder
-            self._ground.say(Severity.ERROR, text, station)
+        if now >= self.answers.due:
+            self.answers.tick(now)
         self._begin_next(now)
         self._ask(now)
+        self.is_active = bool(self._uploads) or self.answers.due < inf
 
     def next_deadline(self) -> float:
-        if not (self._uploads or self._reminders):
-            return inf
         # Asked after each datagram of a flood.
         states = self._states
         arriving, waiting = states[Asking] or states[Receiving], states[Waiting]
         is_free = self._missions.occupied() is not OCCUPIED
         if is_free and (states[Complete] or (waiting and not arriving)):
             return 0.0
-        times = [self._states_due, *(due for due, _, _ in self._reminders)]
+        times = [self._states_due, self.answers.due]
         times += [self._may_ask_at] if states[Asking] and not self._is_asking else []
         times += [self._arriving_since + _ALONE_S] if is_free and waiting and arriving else []
         return min(times)
@@ -230,16 +198,16 @@ class MissionUploads:
     # State changes of an upload.
 
     def _begin(self, station: Station, count: int, now: float) -> None:
-        self._answers.forget(station)
-        self._reminders = [reminder for reminder in self._reminders if reminder[1] != station]
+        self.is_active = True
+        self.answers.forget(station)
         for older in self._uploads:
             older.is_superseded |= older.station == station
         if not self._ground.allows(station, Cost.UPLOAD):
             # A flood must cost less than the lists that it announces: no incident, no log entry.
-            self._answers.note(station, _TOO_MANY_UPLOADS.ack, count, now)
-            self._context.refuse(station, _TOO_MANY_UPLOADS)
+            self._ground.say(Severity.ERROR, _TOO_MANY_UPLOADS.text, station)
+            self.answers.end(station, _TOO_MANY_UPLOADS.ack, count, now)
             return
-        upload = _Upload(station, count, self._context.incidents.begin("upload"), Waiting(Announced(), now))
+        upload = Upload(station, count, f"upload-{next(self._incidents)}", Waiting(Announced(), now))
         self._uploads.append(upload)
         self._entered(upload)
         armed = self._missions.armed_refusal()
@@ -249,7 +217,7 @@ class MissionUploads:
             self._end([min(self._undelivered(), key=self._worth)], _cancelled("ended: too many at once"), now)
         self._begin_next(now)
 
-    def _worth(self, upload: _Upload) -> tuple[bool, bool, float]:
+    def _worth(self, upload: Upload) -> tuple[bool, bool, float]:
         """The order in which uploads end if there are too many: strangers' first, then those without any item."""
         state = upload.state
         return self._ground.has_standing(upload.station.peer), bool(state.received), state.since
@@ -261,7 +229,7 @@ class MissionUploads:
             if event is not None:
                 self._handle(upload, event, now)
 
-    def _turn(self, upload: _Upload, now: float) -> Event | None:
+    def _turn(self, upload: Upload, now: float) -> Event | None:
         """The event that continues an upload, None if it must wait for others."""
         state = upload.state
         if isinstance(state, Complete):
@@ -282,7 +250,7 @@ class MissionUploads:
             return False
         return now < self._arriving_since + _ALONE_S and len(self._uploads) <= _MOST_IN_TURN
 
-    def _handle(self, upload: _Upload, event: Event, now: float) -> None:
+    def _handle(self, upload: Upload, event: Event, now: float) -> None:
         before = upload.state
         after = TRANSITIONS[type(before)][type(event)]
         if after is None:
@@ -304,22 +272,22 @@ class MissionUploads:
             case Ended(refusal):
                 self._refuse(upload, before, refusal, now)
 
-    def _end(self, uploads: list[_Upload], refusal: Refusal, now: float) -> None:
+    def _end(self, uploads: list[Upload], refusal: Refusal, now: float) -> None:
         for upload in uploads:
             if upload in self._uploads:
                 self._handle(upload, Ended(refusal), now)
 
-    def _entered(self, upload: _Upload) -> None:
+    def _entered(self, upload: Upload) -> None:
         self._states[type(upload.state)] += 1
         self._states_due = min(self._states_due, upload.state.next_tick())
 
-    def _forget(self, upload: _Upload, now: float) -> None:
+    def _forget(self, upload: Upload, now: float) -> None:
         self._last_end = now
         self._uploads.remove(upload)
         self._states[type(upload.state)] -= 1
         self._missions.release(upload)
 
-    def _is_for(self, upload: _Upload, count: int, now: float) -> bool:
+    def _is_for(self, upload: Upload, count: int, now: float) -> bool:
         """Handle a MISSION_COUNT of a station whose upload runs; False if it announces a new one."""
         state = upload.state
         if count == 0:
@@ -347,23 +315,23 @@ class MissionUploads:
         if self._in(Asking) and not self._is_asking and now >= self._may_ask_at:
             self._is_asking = True
             self._may_ask_at = now + _ASK_INTERVAL_S
-            self._context.run(self._missions.preflight(), self._asked, now)
+            self._missions.run(self._missions.preflight(), self._asked, now)
 
     def _asked(self, answer: StoreReport | Refusal, now: float) -> None:
         self._is_asking = False
         for upload in self._in(Asking):
             self._answered(upload, answer, now)
 
-    def _answered(self, upload: _Upload, answer: StoreReport | Refusal, now: float) -> None:
+    def _answered(self, upload: Upload, answer: StoreReport | Refusal, now: float) -> None:
         if isinstance(answer, StoreReport) and (rejection := check_count(upload.count, answer.rules)):
             answer = Refusal(rejection.ack, rejection.finding.text())
         if isinstance(answer, Refusal):
             self._handle(upload, Ended(answer), now)
         else:
-            check = begin_check(upload.count, answer.rules, self._context.vehicle.place())
+            check = begin_check(upload.count, answer.rules, self._missions.vehicle.place())
             self._handle(upload, Ready(upload.count, check), now)
 
-    def _request(self, upload: _Upload, now: float) -> None:
+    def _request(self, upload: Upload, now: float) -> None:
         """Request the lowest missing item, by id 40: the only one that Mission Planner understands in both modes."""
         state = upload.state
         assert isinstance(state, Receiving)
@@ -378,7 +346,7 @@ class MissionUploads:
 
     def _deliver(
         self,
-        upload: _Upload,
+        upload: Upload,
         items: tuple[MissionItem, ...],
         verdict: Verdict[Any],
         on_done: Callable[[DeliveryResult | Refusal, float], None],
@@ -387,110 +355,82 @@ class MissionUploads:
         """Store the list and write it; a rejected one is only stored, unless its sender sent too many of them."""
         is_kept = verdict.result is not Result.REJECTED or self._ground.allows(upload.station, Cost.STORED)
         arrived = ArrivedMission(str(upload.station), items, verdict)
-        self._context.run(self._missions.deliver(arrived, is_kept=is_kept), on_done, now)
+        self._missions.run(self._missions.deliver(arrived, is_kept=is_kept), on_done, now)
 
-    def _delivered(
-        self, upload: _Upload, verdict: Verdict[Any], delivery: DeliveryResult | Refusal, now: float
-    ) -> None:
+    def _delivered(self, upload: Upload, verdict: Verdict[Any], delivery: DeliveryResult | Refusal, now: float) -> None:
         if isinstance(delivery, Refusal):
             self._end([upload], delivery, now)
             return
         accepted = delivery.ack is MissionResult.ACCEPTED
         if verdict.result is not Result.REJECTED and accepted and not delivery.change:
             self._flash.not_written(upload.station.peer)
-        self._tell(upload.station, verdict, delivery)
+        self.answers.tell(upload.station, verdict, delivery)
         if upload in self._uploads:
             self._answer(upload, delivery.ack, now)
             self._handle(upload, Delivered(), now)
         facts = {"mission": delivery.number, "ack": delivery.ack.name, "detail": delivery.text}
         self._note("mission.upload_ended", upload, "info" if accepted else "warning", **facts)
 
-    def _tell(self, station: Station, verdict: Verdict[Any], delivery: DeliveryResult) -> None:
-        """Report everything to the sender, and the change on the aircraft to other ground stations."""
-        if delivery.ack is not MissionResult.ACCEPTED:
-            self._ground.say(Severity.ERROR, delivery.text, station)
-        else:
-            self._ground.say(Severity.WARNING if delivery.is_lossy else Severity.INFO, delivery.text, station)
-            for news, line in finding_lines(verdict.findings):
-                if line != delivery.text:
-                    self._ground.say(Severity.WARNING if news is News.WARNING else Severity.NOTICE, line, station)
-        if delivery.number is None:
-            self._ground.say(Severity.WARNING, "The mission could not be stored on the Pi", station)
-        if delivery.change:
-            severity = Severity.WARNING if verdict.result is Result.CLEARED else Severity.INFO
-            self._ground.say_to_others(severity, f"{delivery.change}, by {station.peer}", station)
-
-    def _refuse(self, upload: _Upload, state: UploadState, refusal: Refusal, now: float) -> None:
+    def _refuse(self, upload: Upload, state: UploadState, refusal: Refusal, now: float) -> None:
         """Report the reason for the end of an upload; the received items are still stored."""
         if items := state.received:
             finding = Finding(None, "list", len(items), None, refusal.text)
             verdict: Verdict[Any] = Verdict(Result.REJECTED, refusal.ack, findings=(finding,))
             self._deliver(upload, items, verdict, lambda _result, _at: None, now)
             if state.is_closed:
-                self._reminders += [(now + later_s, upload.station, refusal.text) for later_s in _REMINDERS_S]
+                self.answers.remind(upload.station, refusal.text, now)
         self._ground.say(Severity.ERROR, refusal.text, upload.station)
         self._answer(upload, refusal.ack, now)
         self._note("mission.refused", upload, "warning", ack=refusal.ack.name, why=refusal.text)
 
     # Ground stations.
 
-    def _of(self, station: Station) -> _Upload | None:
+    def _of(self, station: Station) -> Upload | None:
         """The newest upload of a ground station: one may wait behind another that is being written."""
         return next((upload for upload in reversed(self._uploads) if upload.station == station), None)
 
-    def _in(self, *states: type[UploadState]) -> list[_Upload]:
+    def _in(self, *states: type[UploadState]) -> list[Upload]:
         if not any(self._states[state] for state in states):
             return []
         return [upload for upload in self._uploads if type(upload.state) in states]
 
-    def _undelivered(self) -> list[_Upload]:
+    def _undelivered(self) -> list[Upload]:
         return [upload for upload in self._uploads if not isinstance(upload.state, Delivering)]
 
-    def _find(self, station: Station, now: float) -> _Upload | None:
+    def _find(self, station: Station, now: float) -> Upload | None:
         """The newest upload of a ground station; it continues if its address has changed (Wi-Fi roaming).
 
         Not if it was answered at this address: then it has announced another list, and lists must never be mixed.
         """
-        if self._of(station) is None and not self._answers.was_said_to(station, now):
+        if self._of(station) is None and not self.answers.was_said_to(station, now):
             for upload in self._uploads:
                 if self._ground.stations.has_moved(upload.station, station, now):
                     self._note("mission.station_moved", upload, before=str(upload.station), after=str(station))
                     upload.station = station
         return self._of(station)
 
-    def _late_item(self, station: Station, seq: int, now: float) -> None:
-        """Answer an item of an upload that has ended, or that was lost when the daemon was killed.
-
-        A ground station whose address has just changed gets no answer.
-        """
-        answer = self._answers.to(station, now)
-        if answer is not None:
-            if answer.is_refusal or seq == answer.count - 1:
-                self._context.ack(station, answer.ack)
-        elif not self._uploads and not self._answers.is_known(station, now):
-            self._answers.note(station, _UNKNOWN_UPLOAD.ack, 0, now)
-            self._context.refuse(station, _UNKNOWN_UPLOAD)
-
-    def _elsewhere(self, upload: _Upload, now: float) -> list[Station]:
+    def _elsewhere(self, upload: Upload, now: float) -> list[Station]:
         """Other addresses of the upload's station, except those that have announced their own list."""
         announced = {other.station for other in self._uploads if other is not upload}
         return [
             where
             for where in self._ground.stations.moved_to(upload.station, now)
-            if where not in announced and not self._answers.was_said_to(where, now)
+            if where not in announced and not self.answers.was_said_to(where, now)
         ]
 
-    def _answer(self, upload: _Upload, ack: MissionResult, now: float) -> None:
+    def _answer(self, upload: Upload, ack: MissionResult, now: float) -> None:
         if upload.is_superseded:
             # The station would attribute this ack to the list that it has announced since.
             return
         for where in (upload.station, *self._elsewhere(upload, now)):
-            self._answers.note(where, ack, upload.count, now, is_cancelled=upload.is_cancelled)
-            self._context.ack(where, ack)
+            self.answers.end(where, ack, upload.count, now, is_cancelled=upload.is_cancelled)
 
-    def _note(self, event: str, upload: _Upload, level: Level = "info", **facts: object) -> None:
-        self._context.log_event(level, event, **{"station": str(upload.station)} | facts, incident=upload.incident)
+    def _note(self, event: str, upload: Upload, level: Level = "info", **facts: object) -> None:
+        self._log_event(level, event, **{"station": str(upload.station)} | facts, incident=upload.incident)
 
 
 def _cancelled(why: str) -> Refusal:
     return Refusal(MissionResult.OPERATION_CANCELLED, f"Upload {why}, old mission kept")
+
+
+STOPPED = _cancelled("ended: naze-bridge stops")

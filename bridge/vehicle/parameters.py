@@ -4,10 +4,12 @@
 import math
 
 from bridge.gcs.flash_budget import TOO_MANY_WRITES
+from bridge.gcs.ground import Ground
 from bridge.gcs.station import Severity, Station
 from bridge.line.conversation import LinkLost
 from bridge.missions.fc_mission_store import AnyFcMissionStore, PushFailure
-from bridge.vehicle.mission_context import MissionContext
+from bridge.missions.mission_service import MissionService
+from bridge.model.refusal import Refusal
 from protocols.mavlink.dialect import messages
 from protocols.msp.mission import MAX_RADIUS_CM
 
@@ -20,10 +22,9 @@ SYSID = "SYSID_THISMAV"
 class Parameters:
     """Answers PARAM_REQUEST_LIST, PARAM_REQUEST_READ and PARAM_SET. Values are REAL32."""
 
-    def __init__(self, context: MissionContext, sysid: int) -> None:
-        self._missions = context.missions
-        self._runner = context.runner
-        self._ground = context.ground
+    def __init__(self, missions: MissionService, ground: Ground, sysid: int) -> None:
+        self._missions = missions
+        self._ground = ground
         self._sysid = sysid
         self._is_setting = False
 
@@ -41,15 +42,14 @@ class Parameters:
 
     def set(self, station: Station, name: str, value: float, now: float) -> None:
         """PARAM_SET: answered with the value then in force, as the protocol requires."""
-        fc_store = self._missions.fc_store
-        radius_cm = None if fc_store is None else fc_store.wp_radius_cm
+        fc_store, radius_cm = self._missions.fc_store, self._values().get(WP_RADIUS)
         # Mission Planner keeps metres as text: 2.10 m comes as 209.99998 cm.
         wanted_cm = round(value) if math.isfinite(value) else -1
         if name != WP_RADIUS or wanted_cm == radius_cm:
             # An equal value is not written: that would erase and rewrite the board's whole configuration.
             self._send(station, name)
             return
-        if fc_store is None or radius_cm is None:
+        if isinstance(fc_store, Refusal) or radius_cm is None:
             refusal = f"{WP_RADIUS} cannot be set on this flight controller now"
         elif not 0 <= wanted_cm <= MAX_RADIUS_CM:
             refusal = f"{WP_RADIUS} must be 0..{MAX_RADIUS_CM} cm"
@@ -57,7 +57,7 @@ class Parameters:
             # A change is pending; a station that requested another value repeats its request.
             return
         elif self._missions.armed_refusal() is not None:
-            refusal = f"{WP_RADIUS} stays {radius_cm}: {PushFailure.ARMED.value}"
+            refusal = f"{WP_RADIUS} stays {radius_cm:.0f}: {PushFailure.ARMED.value}"
         elif not self._ground.flash.allows(station.peer, now):
             refusal = TOO_MANY_WRITES
         else:
@@ -77,12 +77,12 @@ class Parameters:
             self._send(station, WP_RADIUS)
 
         self._is_setting = True
-        self._runner.start(fc_store.set_wp_radius(wanted_cm), done, now)
+        self._missions.runner.start(fc_store.set_wp_radius(wanted_cm), done, now)
 
     def _values(self) -> dict[str, float]:
         values = {SYSID: float(self._sysid)}
         fc_store = self._missions.fc_store
-        if fc_store is not None and fc_store.wp_radius_cm is not None:
+        if not isinstance(fc_store, Refusal) and fc_store.wp_radius_cm is not None:
             values[WP_RADIUS] = float(fc_store.wp_radius_cm)
         return values
 

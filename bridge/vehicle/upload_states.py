@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The states of an upload, from MISSION_COUNT to the final MISSION_ACK, their events and transitions."""
+"""One upload: its states from MISSION_COUNT to the final MISSION_ACK, their events and transitions."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from bridge.gcs.station import Station
 from bridge.missions.list_check import ListCheck
 from bridge.missions.mission_service import OCCUPIED
 from bridge.model.refusal import Refusal
@@ -240,6 +241,20 @@ class Delivering(UploadState):
 
     seconds = 60.0
     timeout = Refusal(MissionResult.DENIED, "Still writing the mission: wait for the result")
+
+
+@dataclass(slots=True, eq=False)
+class Upload:
+    """One ground station's upload of `count` items; a clear has 0."""
+
+    station: Station
+    count: int
+    incident: str
+    state: UploadState
+    #: Its ground station has announced another list while this one was written.
+    is_superseded: bool = False
+    #: Its ground station has sent a MISSION_COUNT of 0.
+    is_cancelled: bool = False
 
 
 #: State -> event -> next state, None at the end; any other event in a state is a bug. A clear asks for nothing first.

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
+from bridge.controllers.harakiri.mission_store import HarakiriMissions
 from bridge.missions.fc_mission_store import PushFailure
 from bridge.vehicle.telemetry_table import TELEMETRY
 from protocols.mavlink.dialect import Message, messages
@@ -395,5 +396,5 @@ def test_a_late_reply_to_the_first_set_does_not_confirm_the_second() -> None:
         told = values(station.said())[-1][1]
         assert told == values(answers((world, station), m.MAVLink_param_request_list_message(1, 1)))[1][1]
         info = world.bridge.missions.fc_store
-        assert info is not None
+        assert isinstance(info, HarakiriMissions)
         assert world.naze._firmware._board.wp_radius_cm == info.wp_radius_cm == told

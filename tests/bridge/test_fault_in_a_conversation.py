@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from bridge.controllers.harakiri.mission_store import HarakiriMissions
 from bridge.model.mission_log import Outcome
 from bridge.model.refusal import Refusal
 from protocols.mavlink.dialect import messages as m
@@ -83,7 +84,7 @@ def test_a_parameter_can_be_set_again(world: World) -> None:
     recover(world)
     station.send(wanted)
     fc_store = world.bridge.missions.fc_store
-    assert fc_store is not None
+    assert isinstance(fc_store, HarakiriMissions)
     world.wait_until(lambda _: fc_store.wp_radius_cm == 300, 10)
 
 

@@ -471,7 +471,7 @@ def test_setup_signing_is_never_forwarded(access: LinkAccess) -> None:
     assert sum(refusals(world).values()) == 2
     assert "Refused: set the key in naze-bridge's settings" in station.texts()
     heard = b"".join(b"".join(each.frames_heard) for each in world.stations.values())
-    for place in (heard, b"".join(logged), repr(world.log_event).encode(), repr(world.bridge._config).encode()):
+    for place in (heard, b"".join(logged), repr(world.log_event).encode(), repr(world.bridge.guard._links).encode()):
         assert KEY not in place
         assert KEY.hex().encode() not in place
         assert repr(KEY).encode() not in place

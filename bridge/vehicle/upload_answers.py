@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The answers that end uploads: sent, reported as texts, and remembered for repeated items. Sans-IO."""
+
+from dataclasses import dataclass
+from math import inf
+from typing import Any
+
+from bridge.gcs.ground import Ground
+from bridge.gcs.station import Severity, Station
+from bridge.missions.mission_service import DeliveryResult
+from bridge.missions.mission_texts import finding_lines
+from bridge.model.finding import News
+from bridge.model.refusal import Refusal
+from bridge.model.verdict import Result, Verdict
+from protocols.mission_item import MissionResult
+
+#: Mission Planner sends its last item for 5 s, its Cancel for 2.8 s.
+_MEMORY_S = 10.0
+_CANCEL_S = 3.0
+#: More than there are ground stations; made-up ids replace the oldest entry.
+_MOST = 64
+#: Mission Planner has reported "Write Fast" as a success to its user, so a failure is shown three times, 2 s apart.
+_REMINDERS_S = (2.0, 4.0)
+_NOT_WHOLE = Refusal(MissionResult.UNSUPPORTED, "A mission can only be written as a whole")
+_UNKNOWN_UPLOAD = Refusal(MissionResult.OPERATION_CANCELLED, "Unknown upload: write it again")
+
+
+@dataclass(frozen=True, slots=True)
+class _Answer:
+    """A MISSION_ACK that ended an upload of `count` items; a repeated cancel is answered until `cancelled_until`."""
+
+    ack: MissionResult
+    count: int
+    until: float
+    cancelled_until: float
+
+    @property
+    def is_refusal(self) -> bool:
+        return self.ack is not MissionResult.ACCEPTED
+
+
+class UploadAnswers:
+    """Answers ground stations, and remembers each one's last answer for 10 s."""
+
+    def __init__(self, ground: Ground) -> None:
+        self._ground = ground
+        self._answers: dict[Station, _Answer] = {}  # oldest first
+        self._reminders: list[tuple[float, Station, str]] = []
+        #: The time of the next `tick`; infinity without reminders.
+        self.due = inf
+
+    # Sent at the end of an upload.
+
+    def end(self, station: Station, ack: MissionResult, count: int, now: float, *, is_cancelled: bool = False) -> None:
+        """Send the final MISSION_ACK; `is_cancelled`: the station had cancelled the upload of `count` items."""
+        self._forget_old(now)
+        self._answers.pop(station, None)
+        if len(self._answers) >= _MOST:
+            del self._answers[next(iter(self._answers))]
+        self._answers[station] = _Answer(ack, count, now + _MEMORY_S, now + _CANCEL_S if is_cancelled else now)
+        self._ground.mission_ack(station, ack)
+
+    def tell(self, station: Station, verdict: Verdict[Any], delivery: DeliveryResult) -> None:
+        """Report everything to the sender, and the change on the aircraft to other ground stations."""
+        if delivery.ack is not MissionResult.ACCEPTED:
+            self._ground.say(Severity.ERROR, delivery.text, station)
+        else:
+            self._ground.say(Severity.WARNING if delivery.is_lossy else Severity.INFO, delivery.text, station)
+            for news, line in finding_lines(verdict.findings):
+                if line != delivery.text:
+                    self._ground.say(Severity.WARNING if news is News.WARNING else Severity.NOTICE, line, station)
+        if delivery.number is None:
+            self._ground.say(Severity.WARNING, "The mission could not be stored on the Pi", station)
+        if delivery.change:
+            severity = Severity.WARNING if verdict.result is Result.CLEARED else Severity.INFO
+            self._ground.say_to_others(severity, f"{delivery.change}, by {station.peer}", station)
+
+    def remind(self, station: Station, text: str, now: float) -> None:
+        """Repeat the reason for a refusal that the station may not have noticed."""
+        self._remind([*self._reminders, *((now + later_s, station, text) for later_s in _REMINDERS_S)])
+
+    def tick(self, now: float) -> None:
+        """Send the reminders that are due."""
+        for due, station, text in self._reminders:
+            if now >= due:
+                self._ground.say(Severity.ERROR, text, station)
+        self._remind([reminder for reminder in self._reminders if now < reminder[0]])
+
+    def _remind(self, reminders: list[tuple[float, Station, str]]) -> None:
+        self._reminders = reminders
+        self.due = min((due for due, _, _ in reminders), default=inf)
+
+    # Repeated, for messages that arrive after the end.
+
+    def repeat_cancelled(self, station: Station, now: float) -> bool:
+        """Answer a repeated Cancel, whose answer was lost: it must not clear the mission on the craft."""
+        answer = self._to(station, now)
+        if answer is None or now >= answer.cancelled_until:
+            return False
+        self._ground.mission_ack(station, answer.ack)
+        return True
+
+    def late_item(self, station: Station, seq: int, now: float, *, is_lost: bool) -> None:
+        """Answer an item of an upload that has ended, or, if `is_lost`, of one before the daemon was killed.
+
+        A ground station whose address has just changed gets no answer.
+        """
+        answer = self._to(station, now)
+        if answer is not None:
+            if answer.is_refusal or seq == answer.count - 1:
+                self._ground.mission_ack(station, answer.ack)
+        elif is_lost and not self._is_known(station, now):
+            self._ground.say(Severity.ERROR, _UNKNOWN_UPLOAD.text, station)
+            self.end(station, _UNKNOWN_UPLOAD.ack, 0, now)
+
+    def partial_list(self, station: Station, now: float) -> None:
+        """MISSION_WRITE_PARTIAL_LIST: Mission Planner's answer to a refusal that it did not understand."""
+        answer = self._to(station, now)
+        if answer is not None and answer.is_refusal:
+            self._ground.mission_ack(station, answer.ack)
+        else:
+            self._ground.refuse(station, _NOT_WHOLE)
+
+    def forget(self, station: Station) -> None:
+        """The ground station has begun a new upload."""
+        self._answers.pop(station, None)
+        self._remind([reminder for reminder in self._reminders if reminder[1] != station])
+
+    def was_said_to(self, station: Station, now: float) -> bool:
+        """True if it was answered at this very address."""
+        self._forget_old(now)
+        return station in self._answers
+
+    def _to(self, station: Station, now: float) -> _Answer | None:
+        """The last answer to a ground station, at its current or previous address."""
+        self._forget_old(now)
+        if station in self._answers:
+            return self._answers[station]
+        has_moved = self._ground.stations.has_moved
+        return next((answer for known, answer in self._answers.items() if has_moved(known, station, now)), None)
+
+    def _is_known(self, station: Station, now: float) -> bool:
+        """True if a station with these ids was answered, here or at an address that it may have left."""
+        self._forget_old(now)
+        return any((known.sysid, known.compid) == (station.sysid, station.compid) for known in self._answers)
+
+    def _forget_old(self, now: float) -> None:
+        while self._answers and now > self._answers[oldest := next(iter(self._answers))].until:
+            del self._answers[oldest]
