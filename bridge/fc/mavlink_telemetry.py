@@ -58,7 +58,8 @@ class MavlinkTelemetry:
     def __init__(self, vehicle: Vehicle, *, is_harakiri: bool) -> None:
         self._vehicle = vehicle
         self._is_harakiri = is_harakiri
-        self._is_level = False
+        #: From a Harakiri's heartbeat; None until one is heard, up to a second after arming.
+        self._is_level: bool | None = None
         self._decoder = MavlinkDecoder()
         self._unread: dict[int, tuple[MavlinkFrame, float]] = {}
         self._readers: Mapping[int, Callable[[Message, float], None]] = {
@@ -215,7 +216,7 @@ class MavlinkTelemetry:
             self._vehicle.hear(Sticks(now, Source.MAVLINK, channels))
         if self._is_harakiri:
             state = self._vehicle.last(FlightState)
-            if state is not None and state.mode != self._harakiri_mode():
+            if state is not None and self._is_level is not None and state.mode != self._harakiri_mode():
                 self._vehicle.hear(replace(state, mode=self._harakiri_mode()))
             if message.rssi or self._vehicle.last(Signal) is not None:
                 self._vehicle.hear(Signal(now, Source.MAVLINK, message.rssi / _HARAKIRI_MAX_RSSI))

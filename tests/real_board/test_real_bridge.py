@@ -1,22 +1,30 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The bridge and the image, in simulated time: an upload interrupted by a reset, and a board in its CLI."""
+"""The bridge and the image, in simulated time: an interrupted upload, a torn MAVLink stream, and a board in its CLI."""
 
 from collections.abc import Callable
 
 import pytest
 
 from bridge.fc.states.cli import Cli
+from bridge.fc.states.mavlink import Mavlink
+from bridge.fc.states.msp import Identifying, Polling
 from protocols.mission_item import MissionItem, MissionResult
 from simulator.emulated_naze.board import EmulatedNaze
 from simulator.emulated_naze.image import Image
 from tests.support.conversations import Upload, records_of, waypoints
-from tests.support.real_bench import Figure
+from tests.support.real_bench import Figure, RealBench
 from tests.support.world import GroundStation, World
 
 _OLD, _NEW = waypoints(20), waypoints(60, seed=1)
 #: Time to read the list, with default telemetry.
 _SETTLED_S = 2.0
 _BOOT_S = 20.0
+_SLOW_BAUD = 2400
+_LONGEST_SEARCH_S = 10.0
+_FOUND_WITHIN_S = 8.0
+_STICKS_S = 5.0
+#: Longer than the bridge's timeout for a torn stream.
+_FLIGHT_S = 8.0
 
 
 @pytest.fixture
@@ -69,6 +77,30 @@ def test_an_upload_interrupted_by_a_reset_is_settled(
     assert world.naze.stored_records == [record.pack() for record in records_of(stored)]
     world.run(_SETTLED_S)
     assert said(station).endswith(last_word)
+
+
+@pytest.mark.parametrize("tele_prot", [2, 3])
+def test_arming_into_mavlink_on_a_slow_line(image: Image, flash: bytes, figure: Figure, tele_prot: int) -> None:
+    """At 2400 baud and `tele_prot` 2 its stream overruns its own send ring, so that most frames are torn."""
+    bench = RealBench(image, flash)
+    bench.configure(tele_prot=tele_prot, serial_baudrate=_SLOW_BAUD)
+    world = World(peer=EmulatedNaze(image, flash=memoryview(bytearray(bench.flash))))
+    world.wait_until(lambda w: isinstance(w.bridge.session.state, Identifying), _FOUND_WITHIN_S + _LONGEST_SEARCH_S)
+    world.naze.faults.armed = True
+    world.wait_until(lambda w: w.naze.armed, _STICKS_S)
+    at_arming = world.now
+    world.wait_until(
+        lambda w: isinstance(w.bridge.session.state, Mavlink) and w.bridge.session.vehicle.armed is True,
+        _FOUND_WITHIN_S,
+    )
+    found_s = world.now - at_arming
+    world.run(_FLIGHT_S)
+    assert isinstance(world.bridge.session.state, Mavlink)
+    world.naze.faults.armed = False
+    world.wait_until(lambda w: not w.naze.armed, _STICKS_S)
+    back_s = world.wait_until(lambda w: isinstance(w.bridge.session.state, Polling), _FOUND_WITHIN_S)
+    assert world.bridge.session.vehicle.armed is False
+    figure(f"armed at {_SLOW_BAUD} baud with tele_prot {tele_prot}", f"found in {found_s:.1f} s, MSP in {back_s:.1f} s")
 
 
 def said(station: GroundStation) -> str:

@@ -16,6 +16,6 @@ def test_an_interrupted_upload_keeps_the_old_list(bench: RealBench, figure: Figu
 
 
 def test_an_upload_while_armed_is_an_error(bench: RealBench, figure: Figure) -> None:
-    bench.set_tele_prot(2)
+    bench.configure(tele_prot=2)
     page.an_upload_while_armed_is_an_error(bench, bench.arm)
     figure("MAVLink upload while armed", "MISSION_ACK 1")

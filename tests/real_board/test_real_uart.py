@@ -45,7 +45,7 @@ def test_arming_by_stick_selects_protocol_and_speed(
     image: Image, flash: bytes, figure: Figure, protocol: TelemetryProtocol
 ) -> None:
     bench = RealBench(image, flash)
-    bench.set_tele_prot(protocol.value)
+    bench.configure(tele_prot=protocol.value)
     bench.arm()
     bench.run(3.0)
     expected = {TelemetryProtocol.FRSKY_9600: 9600, TelemetryProtocol.MAVLINK_57600: 57600}.get(protocol, 115200)

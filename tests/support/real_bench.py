@@ -80,10 +80,11 @@ class RealBench(WireBench):
         self.send(line.encode() + b"\r")
         return self.run(1.0).decode("latin-1")
 
-    def set_tele_prot(self, value: int) -> None:
-        """Set it in the CLI, then save and restart."""
+    def configure(self, **settings: int) -> None:
+        """Set these in the CLI, then save and restart."""
         self.enter_cli()
-        self.type_line(f"set tele_prot={value}")
+        for name, value in settings.items():
+            self.type_line(f"set {name}={value}")
         self.type_line("save")
         self.run(1.5)
         self.wait_for_boot()
