@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The answers that end uploads: sent, reported as texts, and remembered for repeated items. Sans-IO."""
 
+from collections import Counter
 from dataclasses import dataclass
 from math import inf
 from typing import Any
@@ -17,7 +18,7 @@ from protocols.mission_item import MissionResult
 #: Mission Planner sends its last item for 5 s, its Cancel for 2.8 s.
 _MEMORY_S = 10.0
 _CANCEL_S = 3.0
-#: More than there are ground stations; made-up ids replace the oldest entry.
+#: More than there are peers with standing on a link. Twice as many answers are reduced to this number.
 _MOST = 64
 #: Mission Planner has reported "Write Fast" as a success to its user, so a failure is shown three times, 2 s apart.
 _REMINDERS_S = (2.0, 4.0)
@@ -40,7 +41,10 @@ class _Answer:
 
 
 class UploadAnswers:
-    """Answers ground stations, and remembers each one's last answer for 10 s."""
+    """Answers ground stations, and remembers each one's last answer for 10 s.
+
+    In a flood, those to peers with standing (bridge.gcs.budget) are forgotten last.
+    """
 
     def __init__(self, ground: Ground) -> None:
         self._ground = ground
@@ -55,9 +59,9 @@ class UploadAnswers:
         """Send the final MISSION_ACK; `is_cancelled`: the station had cancelled the upload of `count` items."""
         self._forget_old(now)
         self._answers.pop(station, None)
-        if len(self._answers) >= _MOST:
-            del self._answers[next(iter(self._answers))]
         self._answers[station] = _Answer(ack, count, now + _MEMORY_S, now + _CANCEL_S if is_cancelled else now)
+        if len(self._answers) >= 2 * _MOST:
+            self._forget_strangers()
         self._ground.mission_ack(station, ack)
 
     def tell(self, station: Station, verdict: Verdict[Any], delivery: DeliveryResult) -> None:
@@ -143,6 +147,17 @@ class UploadAnswers:
         """True if a station with these ids was answered, here or at an address that it may have left."""
         self._forget_old(now)
         return any((known.sysid, known.compid) == (station.sysid, station.compid) for known in self._answers)
+
+    def _forget_strangers(self) -> None:
+        """Keep those to peers with standing, to hosts with few answers, to accepted lists, and the latest."""
+        hosts = Counter(station.peer.host for station in self._answers)
+
+        def worth(station: Station) -> tuple[bool, int, bool]:
+            peer = station.peer
+            return self._ground.has_standing(peer), -hosts[peer.host], not self._answers[station].is_refusal
+
+        for station in sorted(self._answers, key=worth)[:_MOST]:
+            del self._answers[station]
 
     def _forget_old(self, now: float) -> None:
         while self._answers and now > self._answers[oldest := next(iter(self._answers))].until:

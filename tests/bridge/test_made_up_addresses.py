@@ -9,12 +9,13 @@ from itertools import pairwise
 import pytest
 
 from bridge.gcs.guard import LinkAccess
-from bridge.gcs.station import Peer
+from bridge.gcs.station import Peer, Station
 from bridge.gcs.stations import MAX_PEERS
+from bridge.vehicle.upload_answers import UploadAnswers
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import MissionResult
-from tests.support.conversations import Upload, count_message, records_of, waypoints
+from tests.support.conversations import Upload, count_message, item_message, records_of, waypoints
 from tests.support.world import Air, GroundStation, World, ready_world
 
 HELLO = m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
@@ -112,6 +113,47 @@ def test_a_pilot_who_arrives_later_can_write(addresses: Callable[[random.Random]
     assert Upload(pilot, waypoints(20), repeat_s=0.7, tries=4).run(2) is MissionResult.ACCEPTED
     assert world.stored == records_of(waypoints(20))
     assert longest_gap_s(pilot, came_at) <= 1.1
+
+
+@pytest.mark.parametrize("late", [False, True])
+@pytest.mark.parametrize("addresses", [new_ports, many_hosts])
+def test_a_lost_final_ack_is_repeated_in_a_flood(
+    addresses: Callable[[random.Random], Callable[[], Address]], *, late: bool
+) -> None:
+    world = ready_world()
+    pilot = GroundStation(world, "pilot", air=Air(delay_s=0.01))
+    for beat in range(4):
+        world.after(beat + 0.5 * late, lambda: pilot.send(HELLO))
+    world.run(0.0 if late else 3.5)
+    attack(world, [count_message(9)], addresses(random.Random(7)), 500, 8.0)
+    world.run(3.5)
+    plan = waypoints(20)
+    assert Upload(pilot, plan, repeat_s=0.7).run(3) is MissionResult.ACCEPTED
+    world.run(2)
+    # The ack was lost: Mission Planner repeats its last item.
+    pilot.take()
+    pilot.send(item_message(19, plan[19]))
+    world.run(0.1)
+    assert [ack.type for ack in pilot.said("MISSION_ACK")] == [MissionResult.ACCEPTED]
+
+
+@pytest.mark.parametrize("ids_of_one", [True, False])
+def test_an_answer_to_a_peer_with_standing_is_kept(*, ids_of_one: bool) -> None:
+    """Even a refusal. A peer with standing makes up ids, or other hosts get lists accepted."""
+    ground = ready_world().bridge.ground
+    pilot, rival = (Station(Peer("udp", (f"10.0.0.{number}", 14550)), 255, 190) for number in (1, 2))
+    others = (Peer("udp", (f"10.1.{number // 250}.{number % 250}", 14550)) for number in range(2000))
+    for station in (pilot, rival, *(Station(Peer("udp", (f"10.0.1.{each}", 1)), 9, 9) for each in range(14))):
+        ground.stations.heard(station, 2, 0.0)
+    answers = UploadAnswers(ground)
+    answers.end(pilot, MissionResult.DENIED, 9, 0.0)
+    for number, other in enumerate(others):
+        peer = rival.peer if ids_of_one else other
+        answers.end(Station(peer, number % 250, number // 250), MissionResult.ACCEPTED, 9, 1.0)
+    ground.take_datagrams()
+    answers.late_item(pilot, 0, 2.0, is_lost=False)
+    assert [peer for peer, _ in ground.take_datagrams()] == [pilot.peer]
+    assert len(answers._answers) <= 128
 
 
 def test_a_pilot_on_a_slow_radio_can_write_during_a_flood() -> None:
