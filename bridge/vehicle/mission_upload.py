@@ -47,8 +47,10 @@ from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionItem, MissionResult
 
 _TOO_MANY_UPLOADS = Refusal(MissionResult.DENIED, "Too many uploads: wait a few seconds")
-#: The maximum number of simultaneous uploads. Beyond it the one with the slowest progress ends.
+#: The maximum number of simultaneous uploads.
 _MOST_UPLOADS = 64
+#: A host with more of them than this is the first to lose one.
+_MOST_OF_HOST = 2
 #: After this long with lists arriving, an upload does not wait for its turn: a slow or silent ground station would lock
 #: out the others. A pause ends that.
 _ALONE_S = 4.0
@@ -214,13 +216,19 @@ class MissionUploads:
         if armed is not None:
             self._end([upload], armed, now)
         elif len(self._uploads) > _MOST_UPLOADS:
-            self._end([min(self._undelivered(), key=self._worth)], _cancelled("ended: too many at once"), now)
+            self._end([self._least_worth()], _cancelled("ended: too many at once"), now)
         self._begin_next(now)
 
-    def _worth(self, upload: Upload) -> tuple[bool, bool, float]:
-        """The order in which uploads end if there are too many: strangers' first, then those without any item."""
-        state = upload.state
-        return self._ground.has_standing(upload.station.peer), bool(state.received), state.since
+    def _least_worth(self) -> Upload:
+        """The upload that ends if there are too many: a crowded host's, a stranger's, one without items, the oldest."""
+        hosts = Counter(upload.station.peer.host for upload in self._uploads)
+
+        def worth(upload: Upload) -> tuple[int, bool, bool, float]:
+            peer, state = upload.station.peer, upload.state
+            crowd = max(hosts[peer.host], _MOST_OF_HOST)
+            return -crowd, self._ground.has_standing(peer), bool(state.received), state.since
+
+        return min(self._undelivered(), key=worth)
 
     def _begin_next(self, now: float) -> None:
         """Continue the uploads whose turn has come: first that of the host that has written least."""

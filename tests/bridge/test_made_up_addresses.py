@@ -178,3 +178,24 @@ def test_a_sender_over_its_limit_is_not_read() -> None:
     world.run(1.1)
     read = world.bridge.ground.frames_received["udp", m.MAVLINK_MSG_ID_HEARTBEAT]
     assert 1000 < read < 5000
+
+
+def test_made_up_ids_do_not_cancel_a_pilot_on_a_slow_radio() -> None:
+    """Strangers who came first take all precedence, and announce many lists, each for another station."""
+    world = ready_world()
+    strangers = [GroundStation(world, f"stranger {number}") for number in range(16)]
+    for beat in range(4):
+        for stranger in strangers:
+            world.after(beat, lambda stranger=stranger: stranger.send(HELLO))  # type: ignore[misc]
+    world.run(3.5)
+    pilot = GroundStation(world, "pilot", air=Air(delay_s=0.7))
+    ids = itertools.count()
+
+    def announce() -> None:
+        stranger = GroundStation(world, f"stranger {next(ids) % 16}", sysid=next(ids) % 250, compid=next(ids) % 250)
+        world.spoken_by(stranger, stranger.pack(count_message(9)))
+
+    for number in range(200):
+        world.after(number / 20, announce)
+    assert Upload(pilot, waypoints(3), repeat_s=1.5).run(9) is MissionResult.ACCEPTED
+    assert world.stored == records_of(waypoints(3))
