@@ -17,6 +17,7 @@ from service.daemon.api import DaemonApi
 from service.daemon.client import ControlError
 from service.daemon.daemon import Daemon
 from service.daemon.mission_data import Json, to_json
+from service.machine.os_error import reason
 from storage.store_error import StoreError
 
 #: asyncio buffers twice as much for each client; a list of 146 items has 40 kB.
@@ -58,8 +59,8 @@ class ControlServer:
             )
             self._path.chmod(0o660)
         except OSError as error:
-            reason = error.strerror or str(error)
-            raise ControlError(f"the control socket {self._path} cannot be created: {reason}") from error
+            text = f"the control socket {self._path} cannot be created: {reason(error)}"
+            raise ControlError(f"{text}; name a writable folder with --state-dir") from error
 
     async def close(self) -> None:
         """Stop listening, and tell waiting clients that they get no reply."""

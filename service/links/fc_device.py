@@ -12,6 +12,7 @@ from typing import Protocol
 import serial
 
 from service.links.port_holder import explain_port_error, find_console
+from service.machine.os_error import reason
 from service.settings.addresses import UNKNOWN_HOST_HINT, AutoFc, FcAddress, SerialFc, TcpFc, family_of
 
 #: Errors of an open port: pyserial raises the last two if it is unplugged, or its driver refuses the speed.
@@ -92,8 +93,8 @@ async def _open_tcp(address: TcpFc) -> socket.socket:
             await loop.sock_connect(connection, found[0][4])
     except (OSError, TimeoutError) as error:
         connection.close()
-        reason = error.strerror or str(error) or "no answer"
+        why = reason(error) or "no answer"
         hint = f"; {UNKNOWN_HOST_HINT}" if isinstance(error, socket.gaierror) else ""
-        raise PortError(f"{address} cannot be reached: {reason}{hint}") from error
+        raise PortError(f"{address} cannot be reached: {why}{hint}") from error
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     return connection

@@ -8,6 +8,7 @@ from bridge.gcs.station import Peer
 from service.links.gcs_events import GcsEvents
 from service.links.tcp_link import TcpLink
 from service.links.udp_link import UdpLink
+from service.machine.os_error import reason
 from service.settings.addresses import UNKNOWN_HOST_HINT, GcsAddress
 
 _HINTS = {
@@ -42,5 +43,5 @@ def open_link(address: GcsAddress, events: GcsEvents) -> GcsLink:
     except OSError as error:
         number = error.errno or 0  # below 0 it is one of getaddrinfo's
         hint = UNKNOWN_HOST_HINT if number < 0 else _HINTS.get(number, "")
-        text = f"{address} cannot be opened: {error.strerror or error}"
+        text = f"{address} cannot be opened: {reason(error)}"
         raise LinkError(f"{text}; {hint}" if hint else text) from error

@@ -9,6 +9,7 @@ from bridge.gcs.budget import TokenBucket
 from bridge.gcs.cost import Rate
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from service.links.gcs_links import LinkError
+from service.machine.os_error import reason
 from service.settings.addresses import GcsAddress, family_of
 
 #: A flood would delay telemetry and missions: requests beyond the limit are dropped, the oldest first.
@@ -35,7 +36,7 @@ async def open_share(address: GcsAddress, requested: Requested) -> Callable[[], 
         clients: set[asyncio.Transport] = set()
         server = await loop.create_server(lambda: _TcpClient(requests, clients), *where, family=family)
     except OSError as error:
-        raise LinkError(f"share {address} cannot be opened: {error.strerror or error}") from error
+        raise LinkError(f"share {address} cannot be opened: {reason(error)}") from error
 
     def close() -> None:
         server.close()

@@ -13,6 +13,7 @@ from uvicorn.config import Config
 from uvicorn.server import ServerState
 
 from service.daemon.daemon import Daemon
+from service.machine.os_error import reason
 from service.settings.web import WebSettings
 from service.web.access import SafeHeaders, failed, guarded, refused
 from service.web.api import Api
@@ -72,7 +73,7 @@ class WebServer:
                     backlog=_BACKLOG,
                 )
             except OSError as error:
-                why = error.strerror or str(error)
+                why = reason(error)
                 if why != said:
                     _log.error("web.unavailable", address=str(self._address), why=why, what="it is retried")
                 said = why

@@ -10,6 +10,7 @@ import socket
 import ssl
 from collections.abc import Sequence
 
+from service.machine.os_error import reason
 from service.settings.zenoh_config import TlsFiles
 
 _ENDPOINT = re.compile(r"(?P<protocol>[a-z_]+)/(?P<host>\[[^\]]*\]|[^:/?#]+):(?P<port>\d+)(?:[?#].*)?")
@@ -48,7 +49,7 @@ def _trouble(endpoint: str, files: TlsFiles) -> str:
     except OverflowError:
         return "a port is at most 65535"
     except OSError as error:
-        return (error.strerror or str(error)).lower()
+        return reason(error).lower()
     return "a program listens there but rejected the session: check user and password, and that it is a zenoh router"
 
 

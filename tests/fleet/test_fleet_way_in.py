@@ -64,20 +64,24 @@ def test_another_program_on_the_routers_port_is_reported() -> None:
     ("endpoint", "said"),
     [
         ("tcp/no-such-host.invalid:7447", "the host name 'no-such-host.invalid'"),
-        ("192.168.4.1:7447", "192.168.4.1:7447"),
-        ("tcp/127.0.0.1", "tcp/127.0.0.1"),
         ("smoke/127.0.0.1:7447", "smoke/127.0.0.1:7447"),
         ("tcp/127.0.0.1:99999", "99999"),
-        ("", "--connect"),
     ],
 )
 def test_an_invalid_endpoint_is_one_sentence(endpoint: str, said: str) -> None:
     assert said in sentence_of("list", "--connect", endpoint)
 
 
+@pytest.mark.parametrize("endpoint", ["192.168.4.1:7447", "tcp/127.0.0.1", "router", ""])
+@pytest.mark.parametrize("arguments", [("list", "--connect"), ("enroll", "kite", "--router")])
+def test_an_option_that_is_no_endpoint_is_a_usage_error(arguments: tuple[str, ...], endpoint: str) -> None:
+    said = f"Invalid value for '{arguments[-1]}': {endpoint!r} is not an endpoint: write one like tcp/localhost:7447"
+    assert sentence_of(*arguments, endpoint, code=2) == f"naze-bridge: {said}"
+
+
 @pytest.mark.parametrize("prefix", ["fleet/*", "a/b", "@fleet", "fl eet", "fleet?x"])
 def test_an_invalid_prefix_is_one_sentence(prefix: str) -> None:
-    assert "zenoh.prefix" in sentence_of("list", "--prefix", prefix, code=2)
+    assert f"--prefix is {prefix!r}" in sentence_of("list", "--prefix", prefix, code=2)
 
 
 def test_an_unusable_zenoh_file_is_one_sentence(tmp_path: Path) -> None:
@@ -103,3 +107,14 @@ def test_a_file_that_is_not_a_mission_is_not_sent(tmp_path: Path) -> None:
     ended = run_naze_bridge("fleet", "push", file, "--all")
     assert ended.returncode == 2
     assert re.fullmatch(r"naze-bridge: .*plan.*\n", ended.stderr), ended.stderr
+
+
+def test_an_unusable_name_is_one_sentence() -> None:
+    said = sentence_of("enroll", "my plane", code=2)
+    assert said.startswith("naze-bridge: the name is 'my plane', with ' ' in it: make a name of letters")
+
+
+def test_an_unusable_folder_is_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    said = sentence_of("enroll", "kite", "--folder", tmp_path / "file")
+    assert said.endswith("members.json cannot be read: not a directory")

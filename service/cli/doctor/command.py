@@ -69,7 +69,7 @@ def _examine(
         settings = load_settings(config, fc, (), state_dir)
     except SettingsError as error:
         for wrong in error.problems:
-            yield Checked("configuration", Grade.PROBLEM, str(wrong), "correct that line")
+            yield Checked("configuration", Grade.PROBLEM, str(wrong), "correct this, and run doctor again")
         return
     if config is not None:
         yield Checked("configuration", Grade.OK, f"{config} can be used")

@@ -30,6 +30,7 @@ from service.cli.fleet.watch_screen import print_changes, show_screen
 from service.cli.mission_source import save_mission
 from service.cli.printing import print_json, print_table
 from service.cli.sentences import fail
+from service.machine.os_error import reason
 
 _STANDARD_OUTPUT = Path("-")
 _READ_ONLY = "accepts no MAVLink: zenoh.mavlink_in is off there, the router denies access, or it is not connected"
@@ -172,7 +173,7 @@ def _save(held: Held, path: Path, *, is_file: bool) -> None:
     except MissionFileError as error:
         fail(str(error))
     except OSError as error:
-        fail(f"{click.format_filename(path)} is not a writable folder: {(error.strerror or '').lower()}")
+        fail(f"{click.format_filename(path)} is not a writable folder: {reason(error).lower()}")
 
 
 def _show(held: Held, *, with_items: bool, to_error: bool) -> None:

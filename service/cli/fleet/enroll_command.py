@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from service.cli.fleet.enrolment import EnrolmentError, FleetFolder, Role
-from service.cli.fleet.options import PATH
+from service.cli.fleet.options import PATH, check_endpoint
 from service.cli.sentences import fail
 from service.settings.zenoh import DEFAULT_PREFIX, ZenohSettingsError
 
@@ -24,6 +24,7 @@ from service.settings.zenoh import DEFAULT_PREFIX, ZenohSettingsError
 @click.option("--prefix", default=DEFAULT_PREFIX, show_default=True, help="First part of the vehicles' keys.")
 @click.option(
     "--router",
+    callback=check_endpoint,
     default="tcp/router.local:7447",
     show_default=True,
     metavar="ENDPOINT",
@@ -37,7 +38,9 @@ def enroll(name: str, role: str, folder: Path, prefix: str, router: str) -> None
     fleet = FleetFolder(folder.absolute(), prefix, router)
     try:
         files = fleet.enroll(name, Role(role))
-    except (EnrolmentError, ZenohSettingsError) as error:
+    except ZenohSettingsError as error:
+        raise click.UsageError(str(error)) from error
+    except EnrolmentError as error:
         fail(str(error))
     click.echo(f"Copy to {name}: {', '.join(str(file) for file in files)}")
     if role == Role.VEHICLE.value:

@@ -13,6 +13,7 @@ from enum import Enum
 from pathlib import Path
 
 from service.daemon.mission_data import Json
+from service.machine.os_error import reason
 from service.settings.zenoh import check_name
 
 #: zenoh's own is 1,000. Each session costs the router some 100 kB.
@@ -58,8 +59,10 @@ class FleetFolder:
             return {name: Role(role) for name, role in json.loads(path.read_text()).items()}
         except FileNotFoundError:
             return {}
-        except (OSError, ValueError, AttributeError) as error:
-            raise EnrolmentError(f"{path} cannot be read: {error}") from error
+        except OSError as error:
+            raise EnrolmentError(f"{path} cannot be read: {reason(error).lower()}") from error
+        except (ValueError, AttributeError) as error:
+            raise EnrolmentError(f"{path} is not a list of members: {error}") from error
 
     def enroll(self, name: str, role: Role) -> list[Path]:
         """Add a member and write the router's configuration; returns the member's own files. ZenohSettingsError."""
@@ -75,7 +78,7 @@ class FleetFolder:
             self._write("router.json5", self.router_config(members))
             self._write("members.json", {each: its.value for each, its in members.items()})
         except OSError as error:
-            raise EnrolmentError(f"{self.path} cannot be written: {(error.strerror or str(error)).lower()}") from error
+            raise EnrolmentError(f"{self.path} cannot be written: {reason(error).lower()}") from error
         return [own] if not self.is_tls else [own, *(self.path / f"{name}.{kind}" for kind in ("pem", "key"))]
 
     def router_config(self, members: Mapping[str, Role]) -> Json:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The parts common to all fleet commands: the fleet's address, the choice of vehicles, and the session."""
 
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,6 +22,14 @@ PATH = click.Path(path_type=Path)
 F = TypeVar("F", bound=Callable[..., Any])
 
 
+def check_endpoint(_context: click.Context, option: click.Parameter, value: Any) -> Any:
+    """The endpoints of an option unchanged; BadParameter if one has not zenoh's form."""
+    for endpoint in value if option.multiple else [value]:
+        if re.fullmatch(r"[a-z]+/.+:[0-9]+", endpoint) is None:
+            raise click.BadParameter(f"{endpoint!r} is not an endpoint: write one like {DEFAULT_ENDPOINT}")
+    return value
+
+
 def address_options(command: F) -> F:
     for option in (
         click.option(
@@ -30,6 +39,7 @@ def address_options(command: F) -> F:
         click.option("--zenoh-config", type=PATH, help="zenoh configuration file, for TLS, passwords and the like."),
         click.option(
             "--connect",
+            callback=check_endpoint,
             metavar="ENDPOINT",
             multiple=True,
             show_default=DEFAULT_ENDPOINT,

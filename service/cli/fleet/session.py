@@ -15,6 +15,7 @@ from typing import Any
 
 import zenoh
 
+from service.machine.os_error import reason
 from service.settings.zenoh_config import connect_endpoints, in_short, tls_files
 from service.zenoh_link.endpoint_trouble import endpoint_trouble
 from service.zenoh_link.keys import full
@@ -154,7 +155,7 @@ def _from_file(path: Path) -> zenoh.Config:
         path.open("rb").close()  # zenoh's own message for a missing file is long
         return zenoh.Config.from_file(str(path))
     except OSError as error:
-        raise FleetError(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from error
+        raise FleetError(f"{path} cannot be read: {reason(error).lower()}") from error
     except zenoh.ZError as error:
         raise FleetError(f"{path} is not a zenoh configuration: {in_short(error)}") from error
 

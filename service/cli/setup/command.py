@@ -15,6 +15,7 @@ from service.cli.setup.change import Machine, SetupError, Step, is_root
 from service.cli.setup.steps import GCS_PORT, PAGE_PORT, STATE_FOLDER, SetupChoices, missing_steps
 from service.daemon.client import STATUS, ControlError, ask_daemon
 from service.machine.host import Host
+from service.machine.os_error import reason
 from service.machine.raspberry_pi import pi_model
 from service.settings.addresses import AddressError, parse_fc
 from service.web.token import DEFAULT_NAME
@@ -169,8 +170,10 @@ def _check_wifi(ssid: str | None, password: str | None) -> None:
 def _line_of(path: Path) -> str:
     try:
         lines = path.read_text().splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise click.UsageError(f"{path} cannot be read: {error}") from error
+    except OSError as error:
+        raise click.UsageError(f"{path} cannot be read: {reason(error).lower()}") from error
+    except UnicodeDecodeError:
+        raise click.UsageError(f"{path} is not a text file") from None  # the error would quote the secret
     if len(lines) != 1 or not lines[0].strip():
         raise click.UsageError(f"{path} must hold one line")
     return lines[0].strip()
