@@ -67,7 +67,8 @@ def load_settings(
         text = f"record_uart {record_to} is the flight controller's port: name a file"
         problems.append(Problem(given["record_uart"].where, text))
     used = Given(None, "--gcs") if gcs else given.get("gcs", Given(None, ""))
-    problems += [Problem(used.where, text) for text in port_conflicts(values.get("fc"), addresses, zenoh, web)]
+    conflicts = port_conflicts(values.get("fc"), addresses, values.get("share", ()), zenoh, web)
+    problems += [Problem(used.where, text) for text in conflicts]
     if zenoh is not None:
         problems += _zenoh_problems(zenoh, given)
     if problems:

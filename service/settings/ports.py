@@ -8,10 +8,13 @@ from ipaddress import ip_address
 from itertools import combinations
 
 from service.settings.addresses import FcAddress, GcsAddress, TcpFc
+from service.settings.share import ShareSettings
 from service.settings.web import WebSettings
 from service.settings.zenoh import ZenohSettings
 
-_TCP_LINKS = ("tcp", "tls", "ws")
+#: The transport of each kind of link that listens; the others send.
+_LISTENING = {"udpin": "UDP", "tcpin": "TCP"}
+_ZENOH_OVER_TCP = ("tcp", "tls", "ws")
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,34 +26,42 @@ class _Use:
 
 
 def port_conflicts(
-    fc: FcAddress | None, gcs: Sequence[GcsAddress], zenoh: ZenohSettings | None, web: WebSettings | None
+    fc: FcAddress | None,
+    gcs: Sequence[GcsAddress],
+    share: Sequence[ShareSettings],
+    zenoh: ZenohSettings | None,
+    web: WebSettings | None,
 ) -> Iterator[str]:
     """Yield a sentence for each pair that listens on one port, or that connects the bridge to itself."""
-    uses = [
-        _Use(f"gcs {address}", "TCP" if address.kind == "tcpin" else "UDP", address.host, address.port)
-        for address in gcs
-        if address.kind in ("udpin", "tcpin")
-    ]
+    for address, count in Counter(address for address in gcs if address.kind not in _LISTENING).items():
+        if count > 1:
+            yield f"gcs {address} is listed {count} times: remove the others"
+    uses = list(_uses(gcs, share, zenoh, web))
+    if isinstance(fc, TcpFc):
+        for use in uses:
+            if (use.transport, use.port) == ("TCP", fc.port) and _reaches(fc.host, use.host):
+                yield f"fc {fc} is {use.user}, so the bridge would connect to itself: change one"
+    for first, second in combinations(uses, 2):
+        if (first.transport, first.port) == (second.transport, second.port) and _overlap(first.host, second.host):
+            yield f"{first.user} and {second.user} would both listen on {first.transport} port {first.port}: change one"
+
+
+def _uses(
+    gcs: Sequence[GcsAddress], share: Sequence[ShareSettings], zenoh: ZenohSettings | None, web: WebSettings | None
+) -> Iterator[_Use]:
+    """Everything that listens."""
+    links = [("gcs", address) for address in gcs] + [("share", each.address) for each in share]
+    for setting, address in links:
+        if address.kind in _LISTENING:
+            yield _Use(f"{setting} {address}", _LISTENING[address.kind], address.host, address.port)
     if web is not None:
-        uses.append(_Use(f"web.listen {web.listen}", "TCP", web.listen.host, web.listen.port))
+        yield _Use(f"web.listen {web.listen}", "TCP", web.listen.host, web.listen.port)
     for endpoint in () if zenoh is None else zenoh.listen:
         protocol, _, rest = endpoint.partition("/")
         host, _, port = rest.partition("#")[0].partition("?")[0].rpartition(":")
         if port.isdecimal():
-            transport = "TCP" if protocol in _TCP_LINKS else "UDP"
-            uses.append(_Use(f"zenoh.listen {endpoint}", transport, host.strip("[]"), int(port)))
-    for address, count in Counter(address for address in gcs if address.kind in ("udpout", "udpbcast")).items():
-        if count > 1:
-            yield f"gcs {address} is listed {count} times: remove the others"
-    if isinstance(fc, TcpFc):
-        yield from (
-            f"fc {fc} is {use.user}, so the bridge would connect to itself: change one"
-            for use in uses
-            if (use.transport, use.port) == ("TCP", fc.port) and _reaches(fc.host, use.host)
-        )
-    for first, second in combinations(uses, 2):
-        if (first.transport, first.port) == (second.transport, second.port) and _overlap(first.host, second.host):
-            yield f"{first.user} and {second.user} would both listen on {first.transport} port {first.port}: change one"
+            transport = "TCP" if protocol in _ZENOH_OVER_TCP else "UDP"
+            yield _Use(f"zenoh.listen {endpoint}", transport, host.strip("[]"), int(port))
 
 
 def _reaches(host: str, listening: str) -> bool:

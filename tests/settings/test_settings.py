@@ -115,6 +115,10 @@ def test_a_value_in_place_of_a_table_is_an_error(folder: Path) -> None:
     [
         ('gcs = ["udpin:0.0.0.0:14550", "udpin:127.0.0.1:14550"]', "would both listen on UDP port 14550"),
         ('gcs = ["tcpin:[::]:5760", "tcpin:[::]:5760"]', "would both listen on TCP port 5760"),
+        (
+            'gcs = ["tcpin:0.0.0.0:5760"]\nshare = [{address = "tcpin:127.0.0.1:5760"}]',
+            "gcs tcpin:0.0.0.0:5760 and share tcpin:127.0.0.1:5760 would both listen on TCP port 5760",
+        ),
         ('gcs = ["tcpin:0.0.0.0:7447"]\n[zenoh]\nlisten = ["tcp/0.0.0.0:7447"]', "zenoh.listen tcp/0.0.0.0:7447"),
         ('gcs = ["udpin:0.0.0.0:7447"]\n[zenoh]\nlisten = ["quic/0.0.0.0:7447"]', "UDP port 7447: change one"),
         ('gcs = ["udpout:10.0.0.1:9", "tcpin:[::]:5", "udpout:10.0.0.1:9"]', "is listed 2 times: remove the others"),
