@@ -12,8 +12,11 @@ from contextlib import suppress
 from queue import SimpleQueue
 from typing import TypeVar, TypeVarTuple
 
+import structlog
+
 T = TypeVar("T")
 Arguments = TypeVarTuple("Arguments")
+_log = structlog.get_logger()
 
 
 def post(loop: asyncio.AbstractEventLoop, callback: Callable[[*Arguments], object], *arguments: *Arguments) -> None:
@@ -31,7 +34,7 @@ class DiskThread:
         self._thread.start()
 
     def submit(self, work: Callable[[], object]) -> None:
-        """Queue a job, which must not raise."""
+        """Queue a job. An exception is logged, and the next job runs."""
         self._work.put(work)
 
     async def ask(self, work: Callable[[], T]) -> T:
@@ -56,4 +59,7 @@ class DiskThread:
 
     def _run(self) -> None:
         while (work := self._work.get()) is not None:
-            work()
+            try:
+                work()
+            except Exception:
+                _log.exception("daemon.fault", what=f"a job of the thread {self._thread.name}")

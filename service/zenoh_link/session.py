@@ -92,8 +92,8 @@ class SessionThread:
                 job = self._jobs.popleft()
             try:
                 job()
-            except (zenoh.ZError, TypeError, ValueError) as error:
-                # Encoders may fail as well: one sample must not stop all others.
+            except Exception as error:
+                # Also a bug in an encoder: one sample must not stop all others.
                 self._complain("zenoh.not_sent", error)
 
     def _open(self) -> zenoh.Session | None:

@@ -5,6 +5,7 @@ import asyncio
 import threading
 
 import pytest
+from structlog.testing import capture_logs
 
 from service.machine.threads import DiskThread
 
@@ -43,4 +44,13 @@ async def test_a_cancelled_question_does_not_end_the_thread() -> None:
             await asyncio.wait_for(thread.ask(hangs.wait), 0.01)
     hangs.set()
     assert await thread.ask(lambda: 7) == 7
+    thread.close(timeout_s=10)
+
+
+async def test_a_job_that_raises_does_not_end_the_thread() -> None:
+    thread = DiskThread("test")
+    with capture_logs() as events:
+        thread.submit(lambda: 1 / 0)
+        assert await thread.ask(lambda: 7) == 7
+    assert [(event["event"], event["log_level"]) for event in events] == [("daemon.fault", "error")]
     thread.close(timeout_s=10)
