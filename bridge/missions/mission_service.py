@@ -249,33 +249,29 @@ class MissionService:
             return (yield from self._conclude(number, Outcome.FAILED, fc_store.ack, fc_store.text))
         if not (yield from self._copy_erased(fc_store, verdict.records)):
             return (yield from self._conclude(number, Outcome.FAILED, MissionResult.DENIED, _NO_COPY))
-        before = None if self.held is None else self.held.identity
+        pending = PendingMission(number, identify(verdict.records), None if self.held is None else self.held.identity)
         result = yield from self._push(fc_store, arrived, progress)
-        if result.failure is PushFailure.UNCERTAIN:
-            self._pending.append(PendingMission(number, identify(verdict.records), before))
-            self.is_settled, self.held = False, None
-            return DeliveryResult(MissionResult.DENIED, result.failure.value, number)
         if result.failure is not None:
-            if result.failure in LIST_IS_GONE:
-                self.is_settled, self.held = False, None
-            ack = _ACKS.get(result.failure, MissionResult.DENIED)
-            return (yield from self._conclude(number, Outcome.FAILED, ack, result.failure.value))
+            return (yield from self._not_written(result.failure, pending))
         self.held = HeldMission(identify(verdict.records), verdict.records, verdict.items)
-        is_erased = verdict.result is Result.CLEARED
         lossy = summary(len(arrived.items), verdict)
-        if lossy is not None:
-            text = lossy
-        elif not is_erased:
-            text = f"Mission verified: {len(verdict.records)} records" + (", unchanged" if result.unchanged else "")
-        elif result.unchanged:
-            text = "The flight controller already held no mission"
-        else:
-            text = "Mission on the flight controller cleared"
+        text = lossy or _verified_text(verdict, unchanged=result.unchanged)
         delivery = yield from self._conclude(number, Outcome.VERIFIED, MissionResult.ACCEPTED, text)
         if result.unchanged:
             return replace(delivery, is_lossy=lossy is not None)
+        is_erased = verdict.result is Result.CLEARED
         change = "Mission erased" if is_erased else f"New mission, {len(verdict.items)} items"
         return replace(delivery, is_lossy=lossy is not None or is_erased, change=change)
+
+    def _not_written(self, failure: PushFailure, mission: PendingMission) -> Conversation[DeliveryResult]:
+        """Store the failure, unless only reading the list will show the outcome."""
+        if failure in LIST_IS_GONE:
+            self.is_settled, self.held = False, None
+        if failure is PushFailure.UNCERTAIN:
+            self._pending.append(mission)
+            return DeliveryResult(MissionResult.DENIED, failure.value, mission.number)
+        ack = _ACKS.get(failure, MissionResult.DENIED)
+        return (yield from self._conclude(mission.number, Outcome.FAILED, ack, failure.value))
 
     def _push(
         self, fc_store: AnyFcMissionStore, arrived: ArrivedMission, progress: PushProgress
@@ -407,3 +403,10 @@ _ACKS = {
     PushFailure.NO_SPACE: MissionResult.NO_SPACE,
     PushFailure.REFUSED: MissionResult.INVALID,
 }
+
+
+def _verified_text(verdict: Verdict[Any], *, unchanged: bool) -> str:
+    """The result of a list without losses."""
+    if verdict.result is Result.ACCEPTED:
+        return f"Mission verified: {len(verdict.records)} records{', unchanged' if unchanged else ''}"
+    return "The flight controller already held no mission" if unchanged else "Mission on the flight controller cleared"

@@ -11,6 +11,7 @@ from protocols.mission_item import Command, MissionItem, MissionResult
 DROPPED = "dropped"
 REJECTED = "rejected"
 CLEARED = "cleared"
+_OF_THE_LIST: Mapping[object, str] = {REJECTED: "Mission rejected: ", CLEARED: "Mission erased: "}
 
 _LABELS = {"lat_e7": "Lat", "lon_e7": "Long", "alt_m": "Alt"}
 #: Column heads of Mission Planner's plan screen, param1..4.
@@ -57,30 +58,31 @@ class Finding:
 
     def text(self, count: int = 1) -> str:
         """One line with the reason; `count` items have the same finding."""
+        if self.seq is None:
+            return _OF_THE_LIST.get(self.becomes, "") + self.why
         subject = f"{count} items" if count > 1 else f"WP {self.seq}" if self.seq else "Home"
         if self.becomes == REJECTED:
-            return f"Mission rejected: {self.why}" if self.seq is None else f"Rejected, {subject}: {self.why}"
-        if self.becomes == CLEARED:
-            return f"Mission erased: {self.why}"
+            return f"Rejected, {subject}: {self.why}"
         if self.becomes == DROPPED:
             name = "item" if self.command is None else command_name(self.command)
             return f"{subject}: {name} dropped, {self.why}"
-        if self.seq is None:
-            return self.why
-        if self.field == "frame" or (self.news is News.WARNING and self.field in ("lat_e7", "lon_e7")):
-            return f"{subject}: {self.why}"
-        if self.was == self.becomes:
-            # Nothing is changed: the warning is about the value as sent.
-            return f"{subject}: {self.why}"
+        change = self._change()
+        return f"{subject}: {change} ({self.why})" if change else f"{subject}: {self.why}"
+
+    def _change(self) -> str:
+        """The old and the new value; empty if the reason alone says more."""
+        is_replaced_place = self.field in ("lat_e7", "lon_e7") and self.news is News.WARNING
+        if self.was == self.becomes or self.field == "frame" or is_replaced_place:
+            return ""
         label = value_label(self.command, self.field)
         unit = " m" if self.field in _METRES or label in _METRES else ""
         was, becomes = self._shown(self.was), self._shown(self.becomes)
+        if self.was is None:
+            return f"{label} set to {becomes}{unit}"
         if was == becomes:
             was = f"{self.was:.9g}"  # single precision to the last digit
-        is_raised = self.field == "alt_m" and self.news is News.WARNING
-        verb = "raised" if is_raised else "changed"
-        change = f"set to {becomes}" if self.was is None else f"{verb} from {was} to {becomes}"
-        return f"{subject}: {label} {change}{unit} ({self.why})"
+        verb = "raised" if self.field == "alt_m" and self.news is News.WARNING else "changed"
+        return f"{label} {verb} from {was} to {becomes}{unit}"
 
     def _shown(self, value: str | float | int | None) -> str:
         if value is None or isinstance(value, str):
