@@ -9,10 +9,13 @@ from typing import Any
 import pytest
 
 from bridge.controllers.harakiri.mission_store import HarakiriMissions
+from bridge.controllers.harakiri.profile import PATCHED
+from bridge.fc.profile import FlightController, RuleSettings
 from bridge.line.conversation import Conversation
 from bridge.line.msp_link import MspLink
 from bridge.line.runner import Runner
 from bridge.missions.fc_mission_store import PushResult
+from bridge.model.vehicle import Vehicle
 from protocols.mission_record import pack_records
 from protocols.msp.mission import MissionCommand, WpRecord, decode_info
 from tests.support.c_core import CCore, PowerCut
@@ -69,7 +72,8 @@ class Line:
         self.core.power_cycle()
         info = decode_info(self.core.request(MissionCommand.INFO, b"") or b"")
         assert info is not None
-        self._missions = HarakiriMissions(info, takeoff_max_m=15)
+        board = FlightController(PATCHED, PATCHED.name, info=info)
+        self._missions = HarakiriMissions(board, Vehicle(), RuleSettings(takeoff_max_m=15))
         self.resets = 0
         self.now = 0.0
         self._disturb = disturb

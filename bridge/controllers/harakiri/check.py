@@ -17,6 +17,7 @@ from bridge.controllers.harakiri.rules import (
     items_from_records,
 )
 from bridge.controllers.harakiri.single_precision import readable_e7
+from bridge.fc.profile import RuleSettings
 from bridge.missions.list_check import (
     SEA_LEVEL_FRAMES,
     TERRAIN_FRAMES,
@@ -55,6 +56,12 @@ class HarakiriRules:
 
     def begin(self, count: int, fallback_home: tuple[int, int] | None) -> "HarakiriCheck":
         return HarakiriCheck(self, count, fallback_home)
+
+
+def harakiri_rules(settings: RuleSettings) -> HarakiriRules:
+    """The mission rules; missing settings are those of a board with its defaults."""
+    radius_cm = USUAL_WP_RADIUS_CM if settings.wp_radius_cm is None else settings.wp_radius_cm
+    return HarakiriRules(settings.capacity or USUAL_CAPACITY, radius_cm, settings.takeoff_max_m)
 
 
 class HarakiriCheck(ListCheck):

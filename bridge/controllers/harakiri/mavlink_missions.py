@@ -12,10 +12,11 @@ A written list is read back, item by item. The rules round coordinates so that t
 from collections.abc import Sequence
 from dataclasses import replace
 
-from bridge.controllers.harakiri.check import HarakiriRules
+from bridge.controllers.harakiri.check import harakiri_rules
 from bridge.controllers.harakiri.mission_store import HarakiriStore
 from bridge.controllers.harakiri.rules import MAV_COMMANDS, items_from_records
 from bridge.controllers.harakiri.single_precision import degrees_read_e7, degrees_to_send
+from bridge.fc.profile import FlightController, RuleSettings
 from bridge.line.conversation import Await, Conversation, LinkLost, Pause, Stopped, Transmit
 from bridge.missions.fc_mission_store import PushFailed, PushFailure, PushProgress, PushResult, StoreReport, StoreState
 from bridge.model.vehicle import Vehicle
@@ -49,9 +50,9 @@ _FAILURES = {
 class HarakiriMavlinkMissions(HarakiriStore):
     """The mission store of one Harakiri in MAVLink mode."""
 
-    def __init__(self, vehicle: Vehicle, rules: HarakiriRules) -> None:
+    def __init__(self, _board: FlightController, vehicle: Vehicle, settings: RuleSettings) -> None:
         self._vehicle = vehicle
-        self._rules = replace(rules, is_single_precision=True)
+        self._settings = settings
         self._decoder = MavlinkDecoder()
 
     def report(self) -> Conversation[StoreReport | None]:
@@ -60,7 +61,8 @@ class HarakiriMavlinkMissions(HarakiriStore):
         armed = self._vehicle.armed
         if armed is None:
             return None
-        return StoreReport(StoreState.ARMED if armed else StoreState.READY, self._rules, None)
+        rules = replace(harakiri_rules(self._settings), is_single_precision=True)
+        return StoreReport(StoreState.ARMED if armed else StoreState.READY, rules, None)
 
     def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Conversation[PushResult]:
         if self._vehicle.armed is not False:

@@ -8,6 +8,7 @@ from typing import TypeVar
 
 from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.controllers.harakiri.rules import items_from_records
+from bridge.fc.profile import FlightController, RuleSettings
 from bridge.line.conversation import (
     Conversation,
     LinkLost,
@@ -29,6 +30,7 @@ from bridge.missions.fc_mission_store import (
     StoreReport,
     StoreState,
 )
+from bridge.model.vehicle import Vehicle
 from protocols.mission_item import MissionItem
 from protocols.mission_record import ListIdentity, identify
 from protocols.msp import mission as ext
@@ -87,11 +89,12 @@ class HarakiriStore(FcMissionStore[WpRecord], ABC):
 
 
 class HarakiriMissions(HarakiriStore):
-    """The mission store of one Harakiri. `takeoff_max_m`: the highest take-off that the rules allow."""
+    """The mission store of one Harakiri with the mission extension."""
 
-    def __init__(self, info: Info, takeoff_max_m: int) -> None:
-        self.info = info
-        self._takeoff_max_m = takeoff_max_m
+    def __init__(self, board: FlightController, _vehicle: Vehicle, settings: RuleSettings) -> None:
+        assert board.info is not None
+        self.info = board.info
+        self._settings = settings
         self._may_be_stored = False  # COMMIT was sent, and its result is still unknown
 
     @property
@@ -110,7 +113,7 @@ class HarakiriMissions(HarakiriStore):
             state = StoreState.BUSY
         else:
             state = StoreState.READY
-        rules = HarakiriRules(info.capacity, info.wp_radius_cm, self._takeoff_max_m)
+        rules = HarakiriRules(info.capacity, info.wp_radius_cm, self._settings.takeoff_max_m)
         return StoreReport(state, rules, info.stored)
 
     def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Conversation[PushResult]:

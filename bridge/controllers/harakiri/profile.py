@@ -6,18 +6,15 @@ Disarmed it speaks MSP. Armed, its setting tele_prot decides: MSP (0), FrSky tel
 
 from dataclasses import replace
 
-from bridge.controllers.harakiri.check import HarakiriRules
+from bridge.controllers.harakiri.check import harakiri_rules
 from bridge.controllers.harakiri.mavlink_missions import HarakiriMavlinkMissions
 from bridge.controllers.harakiri.mission_store import HarakiriMissions
-from bridge.controllers.harakiri.rules import USUAL_CAPACITY, USUAL_WP_RADIUS_CM
 from bridge.fc.interview import Interview
-from bridge.fc.profile import FlightController, Profile, RuleSettings, Spoken
+from bridge.fc.profile import FlightController, Profile, Spoken
 from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import BOX_POLL, POLLS
-from bridge.missions.fc_mission_store import AnyFcMissionStore
 from bridge.model.airframe import airframe
 from bridge.model.refusal import ARMED, Refusal
-from bridge.model.vehicle import Vehicle
 from protocols.mission_item import MissionResult
 from protocols.msp.mission import INFO_SIZE, MissionCommand, decode_info
 
@@ -26,12 +23,6 @@ _VERSION = 211
 _CAPABILITY = 0x80000000
 #: A box that only Harakiri has.
 _OWN_BOX = "GTUNE"
-
-
-def rules(settings: RuleSettings) -> HarakiriRules:
-    """The mission rules; missing settings are those of a board with its defaults."""
-    radius_cm = USUAL_WP_RADIUS_CM if settings.wp_radius_cm is None else settings.wp_radius_cm
-    return HarakiriRules(settings.capacity or USUAL_CAPACITY, radius_cm, settings.takeoff_max_m)
 
 
 def _recognise_patched(board: Interview) -> Conversation[FlightController | None]:
@@ -55,19 +46,14 @@ def _recognise_unpatched(board: Interview) -> Conversation[FlightController | No
     return FlightController(UNPATCHED, UNPATCHED.name, airframe(ident.mixer), boxes, version=ident.release)
 
 
-def _msp_store(controller: FlightController, _vehicle: Vehicle, settings: RuleSettings) -> AnyFcMissionStore:
-    assert controller.info is not None
-    return HarakiriMissions(controller.info, settings.takeoff_max_m)
-
-
 PATCHED = Profile(
     "Harakiri with the mission extension",
     _FAMILY,
     recognise=_recognise_patched,
-    missions=_msp_store,
+    missions=HarakiriMissions,
     polls=(*POLLS, BOX_POLL),
     check_kind="harakiri",
-    rules=rules,
+    rules=harakiri_rules,
     restarts_after_calibration=True,
 )
 UNPATCHED = Profile(
@@ -82,7 +68,7 @@ MAVLINK = Profile(
     "Harakiri in MAVLink mode",
     _FAMILY,
     Spoken.MAVLINK,
-    missions=lambda _, vehicle, settings: HarakiriMavlinkMissions(vehicle, rules(settings)),
+    missions=HarakiriMavlinkMissions,
     mavlink_sender=(1, 1, 200),  # baseflight_mavlink.c; other autopilots send as component 1
 )
 FRSKY = Profile(
