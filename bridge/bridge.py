@@ -17,7 +17,7 @@ from math import inf
 from bridge.config import BridgeConfig
 from bridge.fc.actions import FcActions
 from bridge.fc.msp_sharing import MspSharing
-from bridge.fc.profile import FlightController, RuleSettings
+from bridge.fc.profile import FlightController
 from bridge.fc.session import FcSession
 from bridge.gcs.ground import FrameListener, Ground
 from bridge.gcs.guard import Guard
@@ -53,7 +53,7 @@ class Bridge:
         on_frames: FrameListener | None = None,
         on_ending: EndingListener = lambda _mission, _delivery: None,
     ) -> None:
-        self._rule_settings = RuleSettings(config.takeoff_max_m)
+        self._config = config
         self._log_event = log_event
         self._was_armed = False
         #: True while an autopilot speaks MAVLink itself: the bridge then does not wait for particular bytes.
@@ -198,7 +198,7 @@ class Bridge:
             self._announcer.lost(now if vehicle.heard_at is None else vehicle.heard_at)
             return
         missions = controller.profile.missions
-        store = missions if isinstance(missions, Refusal) else missions(controller, vehicle, self._rule_settings)
+        store = missions if isinstance(missions, Refusal) else missions(controller, vehicle, self._config.rules)
         self.missions.use(store)
         self._incoming.routes = PassThrough(self.ground) if self.is_passing_through else None
         self._say(self._announcer.found(controller, now))

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
 from bridge.controllers.table import PROFILES
-from bridge.fc.profile import Profile
+from bridge.fc.profile import Profile, RuleSettings
 from bridge.gcs.guard import LinkAccess
 from bridge.model.autopilot import Autopilot
 
@@ -23,7 +23,7 @@ class BridgeConfig:
     speeds: Sequence[int | None]
     sysid: int = 1
     compid: int = 1
-    takeoff_max_m: int = TAKEOFF_MAX_M
+    rules: RuleSettings = field(default_factory=lambda: RuleSettings(TAKEOFF_MAX_M))
     autopilot: Autopilot = Autopilot.AUTO
     profiles: Sequence[Profile] = PROFILES
     links: Mapping[str, LinkAccess] = field(default_factory=dict)

@@ -15,6 +15,7 @@ import structlog
 from bridge.bridge import Bridge
 from bridge.config import BridgeConfig
 from bridge.fc.msp_sharing import refused
+from bridge.fc.profile import RuleSettings
 from bridge.fc.states.searching import SPEEDS
 from bridge.gcs.guard import LinkAccess
 from bridge.line.conversation import StoreEffect
@@ -85,7 +86,7 @@ class Daemon:
             BridgeConfig(
                 _speeds(settings.fc),
                 sysid=settings.sysid,
-                takeoff_max_m=settings.takeoff_max_m,
+                rules=RuleSettings(settings.takeoff_max_m),
                 autopilot=settings.autopilot,
                 links={**self._signing.links, **_ZENOH},
                 version=version(),
