@@ -32,7 +32,6 @@ class StoreWorker:
     """
 
     def __init__(self, directory: Path | None, on_trouble: Callable[[str], None] = lambda _why: None) -> None:
-        self._directory = directory
         self._on_trouble = on_trouble
         self._thread = DiskThread("store")
         self._loop = asyncio.get_running_loop()

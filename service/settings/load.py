@@ -62,13 +62,10 @@ def load_settings(
     tlog = _tlog_limits(values, given, problems)
     zenoh = ZenohSettings(**_table("zenoh", values)) if "zenoh" in given else None
     web = WebSettings(**_table("web", values)) if "web" in given else None
-    record_to = values.get("record_uart")
-    if isinstance(values.get("fc"), SerialFc) and str(record_to) == values["fc"].path:
-        text = f"record_uart {record_to} is the flight controller's port: name a file"
-        problems.append(Problem(given["record_uart"].where, text))
-    used = Given(None, "--gcs") if gcs else given.get("gcs", Given(None, ""))
+    problems += _recording_problems(values, given)
+    links_are_from = "--gcs" if gcs else given["gcs"].where if "gcs" in given else ""
     conflicts = port_conflicts(values.get("fc"), addresses, values.get("share", ()), zenoh, web)
-    problems += [Problem(used.where, text) for text in conflicts]
+    problems += [Problem(links_are_from, text) for text in conflicts]
     if zenoh is not None:
         problems += _zenoh_problems(zenoh, given)
     if problems:
@@ -155,6 +152,14 @@ def _tlog_limits(values: dict[str, Any], given: Mapping[str, Given], problems: l
 def _table(table: str, values: Mapping[str, Any]) -> dict[str, Any]:
     start = f"{table}."
     return {name.removeprefix(start): value for name, value in values.items() if name.startswith(start)}
+
+
+def _recording_problems(values: Mapping[str, Any], given: Mapping[str, Given]) -> Iterator[Problem]:
+    """Problems of a file for recording."""
+    fc, record_to = values.get("fc"), values.get("record_uart")
+    if isinstance(fc, SerialFc) and str(record_to) == fc.path:
+        text = f"record_uart {record_to} is the flight controller's port: name a file"
+        yield Problem(given["record_uart"].where, text)
 
 
 def _zenoh_problems(zenoh: ZenohSettings, given: Mapping[str, Given]) -> Iterator[Problem]:
