@@ -5,5 +5,5 @@ import os
 
 
 def reason(error: OSError) -> str:
-    """The system's words. asyncio replaces them by longer ones; getaddrinfo has its own, with numbers below 0."""
+    """The system's message. asyncio's errors have a longer one; getaddrinfo's have numbers below 0."""
     return os.strerror(error.errno) if error.errno and error.errno > 0 else error.strerror or str(error)

@@ -181,7 +181,7 @@ def test_a_sender_over_its_limit_is_not_read() -> None:
 
 
 def test_made_up_ids_do_not_cancel_a_pilot_on_a_slow_radio() -> None:
-    """Strangers who came first take all precedence, and announce many lists, each for another station."""
+    """Strangers that arrived first hold all precedence and announce many lists, each for another station."""
     world = ready_world()
     strangers = [GroundStation(world, f"stranger {number}") for number in range(16)]
     for beat in range(4):

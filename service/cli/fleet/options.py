@@ -23,7 +23,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def check_endpoint(_context: click.Context, option: click.Parameter, value: Any) -> Any:
-    """The endpoints of an option unchanged; BadParameter if one has not zenoh's form."""
+    """Return an option's endpoints unchanged; BadParameter if one does not have zenoh's form."""
     for endpoint in value if option.multiple else [value]:
         if re.fullmatch(r"[a-z]+/.+:[0-9]+", endpoint) is None:
             raise click.BadParameter(f"{endpoint!r} is not an endpoint: write one like {DEFAULT_ENDPOINT}")
