@@ -220,7 +220,7 @@ class MissionUploads:
         self._begin_next(now)
 
     def _least_worth(self) -> Upload:
-        """The upload to end if there are too many: first a crowded host's, then a stranger's, one without items, the oldest."""
+        """The upload to end if too many run: a crowded host's, else a stranger's, one without items, the oldest."""
         hosts = Counter(upload.station.peer.host for upload in self._uploads)
 
         def worth(upload: Upload) -> tuple[int, bool, bool, float]:
