@@ -9,7 +9,7 @@ _REPOSITORY = Path(__file__).parents[1]
 _EVENT = re.compile(r"[a-z]+\.[a-z_]+")
 #: Functions called with an event's name as the first or second argument.
 _LEVELS = {"debug", "info", "warning", "error", "exception", "level"}
-_SPEAKERS = _LEVELS | {"log_event", "_log_event", "note", "_note", "_complain"}
+_SPEAKERS = _LEVELS | {"log_event", "_log_event", "note", "_note", "_complain", "warn_once"}
 
 
 def _events_of_the_code() -> set[str]:

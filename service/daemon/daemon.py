@@ -32,6 +32,7 @@ from service.links.msp_share import open_share
 from service.links.signing_state import SigningState
 from service.links.traffic import Traffic
 from service.machine.host import Host
+from service.machine.log_setup import warn_once
 from service.machine.package import version
 from service.recording.tlog_recorder import TLOG_FOLDER, TlogRecorder
 from service.settings import PassThroughRule, Settings
@@ -74,7 +75,7 @@ class Daemon:
     def __init__(self, settings: Settings, host: Host | None = None) -> None:
         self._loop = asyncio.get_running_loop()
         self._loop.set_exception_handler(self._fault)
-        self._complained_of_accept = False
+        self._warned: set[str] = set()
         self.settings = settings
         #: On the loop's clock.
         self.started_at = self._loop.time()
@@ -239,9 +240,7 @@ class Daemon:
         error = context.get("exception")
         if isinstance(error, OSError) and "accept" in context["message"]:
             # No file descriptor is left for a new client; asyncio retries every second.
-            if not self._complained_of_accept:
-                self._complained_of_accept = True
-                _log.warning("daemon.cannot_accept", why=error.strerror)
+            warn_once(self._warned, "daemon.cannot_accept", why=error.strerror)
             return
         _log.error("daemon.fault", what=context["message"], exc_info=error)
         if error is not None and "handle" in context:

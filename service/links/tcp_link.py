@@ -6,11 +6,10 @@ import errno
 import socket
 from collections.abc import Callable
 
-import structlog
-
 from bridge.gcs.station import Peer
 from service.links.gcs_events import GcsEvents
 from service.links.send_queue import SendQueue
+from service.machine.log_setup import warn_once
 from service.settings.addresses import GcsAddress, family_of
 
 #: Small, so that the requests of a client that floods do not delay those of others.
@@ -26,8 +25,6 @@ _MAX_CLIENTS = 32
 _EXHAUSTED = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
 _REST_S = 1.0
 
-_log = structlog.get_logger()
-
 
 class TcpLink:
     """tcpin: ground stations connect."""
@@ -37,7 +34,7 @@ class TcpLink:
         self._events = events
         self._loop = asyncio.get_running_loop()
         self._clients: dict[Peer, _TcpClient] = {}
-        self._complained = False
+        self._warned: set[str] = set()
         self._socket = socket.create_server((address.host, address.port), family=family_of(address.host))
         self._socket.setblocking(False)
         self._resting: asyncio.TimerHandle | None = None
@@ -71,9 +68,9 @@ class TcpLink:
             return
         if len(self._clients) >= _MAX_CLIENTS:
             displaced = self._events.displaced({peer: client.heard_at for peer, client in self._clients.items()})
-            level = _log.debug if self._complained else _log.warning
-            level("gcs.too_many_clients", link=self.name, displaced=str(displaced), limit=_MAX_CLIENTS)
-            self._complained = True
+            warn_once(
+                self._warned, "gcs.too_many_clients", link=self.name, displaced=str(displaced), limit=_MAX_CLIENTS
+            )
             self._clients[displaced].close()
             self._forget(displaced)
         connection.setblocking(False)

@@ -8,6 +8,7 @@ import structlog
 
 from bridge.gcs.station import Peer
 from service.links.gcs_events import GcsEvents
+from service.machine.log_setup import warn_once
 from service.settings.addresses import UNKNOWN_HOST_HINT, GcsAddress, family_of
 
 _DATAGRAM_SIZE = 2048
@@ -30,7 +31,7 @@ class UdpLink:
         self._family = family_of(address.host)
         self._events = events
         self._loop = asyncio.get_running_loop()
-        self._complained = False
+        self._warned: set[str] = set()
         self._lookup: asyncio.Task[None] | None = None
         self._socket = socket.socket(self._family, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
@@ -50,9 +51,7 @@ class UdpLink:
             pass
         except OSError as error:
             # While Wi-Fi is down, every datagram fails.
-            level = _log.debug if self._complained else _log.warning
-            level("gcs.send_failed", peer=str(peer), why=error.strerror or str(error))
-            self._complained = True
+            warn_once(self._warned, "gcs.send_failed", peer=str(peer), why=error.strerror or str(error))
 
     def close(self) -> None:
         if self._lookup is not None:
@@ -80,19 +79,17 @@ class UdpLink:
     async def _follow_name(self, *, until_answered: bool) -> None:
         """Send to the address of a host name: the network may come up later, and a laptop's address may change."""
         known: Peer | None = None
-        complained = False
         while True:
             try:
                 found = await self._loop.getaddrinfo(
                     self._address.host, self._address.port, family=self._family, type=socket.SOCK_DGRAM
                 )
             except OSError as error:
-                level = _log.debug if complained else _log.warning
-                level("gcs.name_unknown", link=self.name, why=f"{error.strerror or error}; {UNKNOWN_HOST_HINT}")
-                complained = True
+                why = f"{error.strerror or error}; {UNKNOWN_HOST_HINT}"
+                warn_once(self._warned, "gcs.name_unknown", link=self.name, why=why)
             else:
                 peers = [Peer(self.name, entry[4]) for entry in found]
-                complained = False
+                self._warned.discard("gcs.name_unknown")
                 if known not in peers:
                     if known is not None:
                         self._events.remove_default_peer(known)

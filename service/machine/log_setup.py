@@ -101,6 +101,13 @@ class _FromLibraries(logging.Handler):
         level("library.log", logger=record.name, what=record.getMessage(), exc_info=record.exc_info)
 
 
+def warn_once(known: set[str], event: str, /, **facts: object) -> None:
+    """Log a problem that lasts: as a warning at first, then at debug level while `known` has the event."""
+    level = _log.debug if event in known else _log.warning
+    known.add(event)
+    level(event, **facts)
+
+
 def set_log_level(level: str) -> None:
     """Show events from this level on: debug, info, warning or error."""
     _least_level.level = level
