@@ -73,7 +73,7 @@ def test_imports_within_a_package_go_one_way(package: str) -> None:
     assert found == []
 
 
-def test_no_cycle_in_the_simulator() -> None:
+def test_the_simulators_imports_have_no_cycle() -> None:
     """Between its modules; the package emulated_naze counts as one. CycleError names the cycle."""
     graph: dict[str, set[str]] = {}
     for file, name in imports(REPOSITORY / "simulator"):
@@ -98,7 +98,7 @@ def test_class_names_are_unique() -> None:
 
 
 @pytest.mark.parametrize("package", ["protocols", "bridge"])
-def test_no_clock_and_no_ports(package: str) -> None:
+def test_only_service_and_simulator_use_clocks_and_ports(package: str) -> None:
     assert [(file, name) for file, name in imports(REPOSITORY / package) if name.split(".")[0] in IMPURE] == []
 
 

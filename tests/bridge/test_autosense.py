@@ -38,7 +38,7 @@ def thinks_armed(world: World) -> bool | None:
 
 @pytest.mark.parametrize("extension", [True, False])
 @pytest.mark.parametrize("baud", ALL_SPEEDS)
-def test_found_within_seconds_at_every_speed(baud: int, extension: bool) -> None:
+def test_a_board_is_found_within_seconds_at_every_speed(baud: int, extension: bool) -> None:
     for seed in range(5):
         world = World(SimOptions(baud=baud), Faults(extension=extension), plugged=False)
         # A random phase of the board's heartbeat.
@@ -57,7 +57,7 @@ def test_found_within_seconds_at_every_speed(baud: int, extension: bool) -> None
 
 
 @pytest.mark.parametrize("baud", [baud for baud in ALL_SPEEDS if baud >= 2400])
-def test_identified_within_8_s(baud: int) -> None:
+def test_a_board_is_identified_within_8_s(baud: int) -> None:
     """Except at 1200 baud, where reading the box names twice takes two seconds."""
     assert World(SimOptions(baud=baud)).wait_ready() <= 8
 
@@ -99,7 +99,7 @@ def test_a_board_that_boots_while_the_port_opens_is_found(boot_ms: float, extens
 
 
 @pytest.mark.parametrize("baud", ALL_SPEEDS)
-def test_found_within_3_s_of_the_ports_return(baud: int) -> None:
+def test_a_board_is_found_within_3_s_of_the_ports_return(baud: int) -> None:
     draw = random.Random(baud)
     for _ in range(8):
         world = World(SimOptions(baud=baud))
@@ -119,7 +119,7 @@ def test_found_within_3_s_of_the_ports_return(baud: int) -> None:
 
 @pytest.mark.parametrize("extension", [True, False])
 @pytest.mark.parametrize("baud", ALL_SPEEDS)
-def test_found_within_3_s_of_booting_after_a_power_cycle_at_any_moment(baud: int, extension: bool) -> None:
+def test_a_board_is_found_within_3_s_of_booting_after_any_power_cycle(baud: int, extension: bool) -> None:
     draw = random.Random(baud)
     for _ in range(8):
         boot_s = draw.choice((0.5, 1.0, 2.0, 3.5))
@@ -181,7 +181,7 @@ def test_the_board_is_found_after_random_power_and_port_losses() -> None:
         (TelemetryProtocol.MAVLINK_57600, 9600),
     ],
 )
-def test_switches_to_mavlink_when_armed_and_back(protocol: TelemetryProtocol, baud: int) -> None:
+def test_the_bridge_follows_to_mavlink_on_arming_and_back(protocol: TelemetryProtocol, baud: int) -> None:
     world = World(SimOptions(baud=baud, tele_prot=protocol))
     world.wait_ready()
     for _ in range(2):

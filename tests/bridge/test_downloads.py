@@ -166,7 +166,7 @@ def test_another_mission_type_is_unsupported(mission_type: int) -> None:
         assert (ack.type, ack.mission_type) == (A.UNSUPPORTED, mission_type)
 
 
-def test_armed_the_list_is_refused_but_item_0_is_served() -> None:
+def test_while_armed_the_list_is_refused_but_item_0_is_served() -> None:
     world, station = holding()
     world.faults.armed = True
     world.run(1)
@@ -285,7 +285,7 @@ def test_without_a_link_and_without_a_store_the_reason_is_reported() -> None:
     assert any("stores no missions" in text for text in station.texts())
 
 
-def test_armed_in_mavlink_mode_only_home_is_served() -> None:
+def test_only_home_is_served_while_armed_in_mavlink_mode() -> None:
     world, station = holding(SimOptions(tele_prot=TelemetryProtocol.MAVLINK))
     world.run(6)
     world.faults.armed = True

@@ -167,7 +167,7 @@ def test_a_repeated_command_is_answered_in_progress() -> None:
     assert done(world) == [250]
 
 
-def test_no_action_during_a_mission_transfer() -> None:
+def test_no_action_runs_during_a_mission_transfer() -> None:
     world, station = a_world()
     outcome = world.push(waypoints(100))
     station.send(long(*SAVE[:2]))

@@ -90,7 +90,7 @@ def test_mission_planner_gets_the_rates_it_requests(world: World) -> None:
     assert of_planner["ATTITUDE"] <= 4.1
 
 
-def test_all_streams_at_once_as_mavproxy_requests(world: World) -> None:
+def test_all_streams_may_be_requested_at_once_as_by_mavproxy(world: World) -> None:
     station = station_of(world, "mavproxy")
     station.send(stream(0, 4))
     world.run(1)

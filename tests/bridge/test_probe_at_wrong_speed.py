@@ -81,7 +81,7 @@ def test_a_minute_of_searching_triggers_no_hazard(read: int) -> None:
 
 
 @pytest.mark.parametrize("read", [9600, 19200, 38400, 57600, 115200, 230400, 250000, 460800, 921600, 1000000])
-def test_no_single_hazard_byte_at_the_speeds_of_other_firmware(read: int) -> None:
+def test_no_hazard_byte_is_read_at_the_speeds_of_other_firmware(read: int) -> None:
     """INAV needs one '#' and silence to enter its command line, and one 'R' to reboot into its bootloader."""
     for sent, clock, probe in itertools.product(SENT, CLOCKS, (PROBE, RESYNC)):
         assert not {0x23, 0x52} & set(heard(probe, sent, read, clock))

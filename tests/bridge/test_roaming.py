@@ -119,7 +119,7 @@ def test_a_silent_station_with_shared_ids_is_kept_for_a_minute() -> None:
     assert station.peer in world.bridge.ground.stations.peers()
 
 
-def test_behind_a_router_a_station_moves_only_with_all_others() -> None:
+def test_a_station_behind_a_router_moves_only_with_all_others() -> None:
     world = ready_world()
     router, away = GroundStation(world, "router"), GroundStation(world, "away")
     behind = GroundStation(world, "router", sysid=250)

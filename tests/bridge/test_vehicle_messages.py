@@ -213,7 +213,7 @@ def test_missing_channels_are_unknown() -> None:
 
 
 @pytest.mark.parametrize(("throttle", "shown"), [(900, 0), (1000, 0), (1450, 45), (2000, 100), (2100, 100)])
-def test_the_throttle_stick_in_percent(throttle: int, shown: int) -> None:
+def test_the_throttle_stick_is_sent_in_percent(throttle: int, shown: int) -> None:
     state = told(Vehicle(), HARAKIRI, ATTITUDE=attitude(), RC=struct.pack("<4H", 1500, 1500, 1500, throttle))
     assert make.vfr_hud(at(state)).throttle == shown
 
@@ -269,7 +269,7 @@ def test_the_active_boxes_determine_the_mode(
         assert state.armed
 
 
-def test_body_rates_from_inavs_gyro() -> None:
+def test_body_rates_come_from_inavs_gyro() -> None:
     """INAV's axes are forward, left and up; MAVLink's are forward, right and down."""
     turning = struct.pack("<9h", 0, 0, 512, 90, 45, -30, 0, 0, 0)
     for who, rates in ((INAV, (90, -45, 30)), (HARAKIRI, (math.nan, math.nan, math.nan))):
@@ -315,7 +315,7 @@ def test_an_inav_without_a_voltage_reports_no_battery() -> None:
     assert at(told(Vehicle(), INAV, INAV_ANALOG=analog)).made((make.battery_status,)) == []
 
 
-def test_distance_home_only_with_a_known_home() -> None:
+def test_the_distance_home_needs_a_known_home() -> None:
     state = told(Vehicle(), HARAKIRI, STATUS=status(flags=1 << 5), RAW_GPS=gps())
     assert at(state).made((make.home_distance, make.home_direction)) == []
     told(state, HARAKIRI, WP=struct.pack("<BiiHB", 0, 453838000 - 3593, 84733000, 0, 0))

@@ -102,7 +102,7 @@ def test_watched_groups_are_polled_and_published_with_each_reply() -> None:
     assert report.take_fresh() == frozenset()
 
 
-def test_groups_from_a_mavlink_autopilot() -> None:
+def test_groups_are_made_from_a_mavlink_autopilot() -> None:
     world, autopilot, _ = passing()
     world.bridge.report.watch(Group)
     autopilot.say(m.MAVLink_heartbeat_message(2, 3, 81 | 128, 4, 4, 3))

@@ -62,7 +62,9 @@ def files(tmp_path: Path) -> dict[str, Path]:
     ],
 )
 @pytest.mark.parametrize("mode", [[], ["--json"]])
-def test_the_exit_code_of_several_files(files: dict[str, Path], names: list[str], code: int, mode: list[str]) -> None:
+def test_the_exit_code_of_several_files_is_the_worst(
+    files: dict[str, Path], names: list[str], code: int, mode: list[str]
+) -> None:
     assert run(*mode, *[files[name] for name in names]).exit_code == code
 
 

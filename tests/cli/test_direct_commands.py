@@ -36,7 +36,7 @@ def assert_one_sentence(ended: subprocess.CompletedProcess[str], code: int, *par
     assert not [part for part in parts if part not in sentence], sentence
 
 
-def test_a_round_trip_of_a_mission(board: Board, tmp_path: Path) -> None:
+def test_a_pushed_mission_is_pulled_unchanged(board: Board, tmp_path: Path) -> None:
     plan = plain_plan(5)
     file = tmp_path / "plan"
     file.write_text(plan_text(plan))

@@ -70,7 +70,7 @@ _READING = (("list",), ("show", "2"), ("diff", "1", "2"))
 # -- output -----------------------------------------------------------------------------------------
 
 
-def test_a_round_trip_of_a_mission(daemon: Daemon, tmp_path: Path) -> None:
+def test_a_pushed_mission_is_pulled_unchanged(daemon: Daemon, tmp_path: Path) -> None:
     plan = plain_plan(7, start=20)
     pushed = ask(daemon, "push", write_plan(tmp_path / "plan", plan))
     assert pushed.returncode == 0

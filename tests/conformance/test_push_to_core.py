@@ -157,7 +157,7 @@ def assert_whole(line: Line) -> None:
     assert line.core.sound
 
 
-def test_146_records_bit_for_bit_and_back() -> None:
+def test_146_records_arrive_bit_for_bit_and_read_back() -> None:
     line = Line()
     assert line.push(NEW) == PushResult(None)
     assert line.core.list == pack_records(NEW)

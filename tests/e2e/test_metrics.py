@@ -33,7 +33,7 @@ def _other_labels(labels: dict[str, str]) -> list[str]:
     return [value for name, value in labels.items() if name != "vehicle"]
 
 
-async def test_the_counters_of_a_daemon(tmp_path: Path) -> None:
+async def test_prometheus_reads_the_counters_of_a_daemon(tmp_path: Path) -> None:
     link = parse_gcs(f"udpin:127.0.0.1:{free_port()}")
     daemon = Daemon(Settings(parse_fc("sim:"), [link], tmp_path))
     metrics = Metrics(daemon)

@@ -137,7 +137,7 @@ def test_no_wildcard_sends_a_command(commanded: tuple[Bench, zenoh.Session]) -> 
     assert len(bench.board.records()) == 9
 
 
-def test_one_transfer_at_a_time(commanded: tuple[Bench, zenoh.Session]) -> None:
+def test_only_one_transfer_runs_at_a_time(commanded: tuple[Bench, zenoh.Session]) -> None:
     """Of simultaneous requests, those not served get the reason."""
     bench, opened = commanded
     answers: list[Any] = []

@@ -54,7 +54,7 @@ def test_mission_planner_writes_and_reads_a_mission(fleet: Fleet, tmp_path: Path
         assert len(planner.read()) == 20
 
 
-async def test_mavsdk_flies_through_the_fleet(fleet: Fleet, tmp_path: Path) -> None:
+async def test_mavsdk_works_through_zenoh(fleet: Fleet, tmp_path: Path) -> None:
     port, board = free_port(), fleet.boards["kite"]
     with relay(tmp_path, fleet, "kite", f"udpout:127.0.0.1:{port}"):
         async with vehicle_at(port, listen=True) as vehicle:

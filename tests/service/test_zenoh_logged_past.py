@@ -42,7 +42,7 @@ def write(folder: Path, begun_s: float, *records: tuple[float, Message], compid:
     return path
 
 
-def test_texts_and_arming_in_order(tmp_path: Path) -> None:
+def test_texts_and_arming_are_in_order(tmp_path: Path) -> None:
     """The log continues in another file during the flight; arming is reported once."""
     write(tmp_path, NOON_S, (NOON_S, heartbeat(armed=True)), (NOON_S + 5, text("Mission: 12 items")), flight=True)
     write(tmp_path, NOON_S + 6, (NOON_S + 6, heartbeat(armed=True)), (NOON_S + 9, heartbeat(armed=False)))

@@ -28,7 +28,7 @@ web = 1
 '''
 
 
-def test_values_of_several_lines_and_tables() -> None:
+def test_values_of_several_lines_and_tables_have_lines() -> None:
     lines = key_lines(TEXT)
     wanted = {("sysid",): 2, ("gcs",): 3, ("note",): 7, ("zenoh",): 10, ("zenoh", "connect"): 12}
     wanted |= {("zenoh", "listen"): 14, ("web",): 15, ("web", "more"): 15}
@@ -71,7 +71,7 @@ def test_every_key_of_a_valid_file_has_a_line_that_names_it(text: str) -> None:
         assert key in text.split("\n")[lines[key,] - 1]
 
 
-def test_each_line_of_the_sample() -> None:
+def test_each_line_of_the_sample_is_found() -> None:
     lines = [line.removeprefix("#") if not line.startswith("# ") else line for line in sample().splitlines()]
     for (*_, key), number in key_lines("\n".join(lines)).items():
         assert key in lines[number - 1]

@@ -39,7 +39,7 @@ def complaint(tmp_path: Path, gcs: str) -> str:
     return text
 
 
-def test_a_string_and_a_table_in_one_list(tmp_path: Path, key_file: Path) -> None:
+def test_one_list_may_have_strings_and_tables(tmp_path: Path, key_file: Path) -> None:
     config = tmp_path / "naze-bridge.toml"
     table = f'{{address = "{LINK}", key_file = "{key_file}", writers = ["192.168.4.0/24", "::1"]}}'
     config.write_text(f'fc = "sim:"\ngcs = ["tcpin:127.0.0.1:5760", {table}]\n')

@@ -89,7 +89,7 @@ def test_without_a_state_directory_there_are_no_logs() -> None:
     assert TelemetryLogs(None).list() == {"logs": []}
 
 
-def test_the_history_of_the_serial_line(lasting_web: WebBench) -> None:
+def test_the_history_of_the_serial_line_is_served(lasting_web: WebBench) -> None:
     history = lasting_web.ask("/api/link").data
     assert history["interval_s"] == 2
     assert set(history["samples"][0]) == {"round_trip_ms", "lost", "damaged"}

@@ -93,7 +93,7 @@ def test_nothing_is_restored_while_armed_in_mavlink_mode(start: Starter) -> None
     assert "rmed" in ended["text"]
 
 
-def test_one_restore_at_a_time(web: WebBench) -> None:
+def test_only_one_restore_runs_at_a_time(web: WebBench) -> None:
     assert web.board is not None
     web.daemon.push(plain_plan(9))
     web.board.set("hang 1")
