@@ -10,14 +10,13 @@ from typing import Any, TypeVar
 
 import click
 
-from service.cli.sentences import complain, fail
+from service.cli.sentences import INTERRUPTED, complain, fail
 from service.daemon.client import ControlError, Interrupted, NoDaemonError, ask_daemon
 from service.daemon.mission_data import Json
 from service.settings import SettingsError, default_state_dir
 from service.settings.addresses import AddressError, parse_fc
 from storage.store_error import StoreError
 
-_INTERRUPTED = 130  # as shells have it: 128 + SIGINT
 _GOES_ON = "the daemon continues with the mission, and the result follows; to exit now, press Ctrl-C again"
 _LEFT = "interrupted; the daemon continues with the mission: see `naze-bridge missions list`"
 _WRITES = ("push", "restore")
@@ -57,7 +56,7 @@ def ask(
     except (KeyboardInterrupt, Interrupted) as error:
         said = _LEFT if fc is None and request["do"] in _WRITES else str(error) or "interrupted"
         complain(said)
-        raise SystemExit(_INTERRUPTED) from None
+        raise SystemExit(INTERRUPTED) from None
     except (AddressError, SettingsError) as error:
         raise click.UsageError(str(error)) from error
     except (ControlError, StoreError) as error:

@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 import click
 
 from service.cli.command_group import LazyCommand, LazyGroup
-from service.cli.sentences import complain
+from service.cli.sentences import INTERRUPTED, complain
 
 _COMMANDS = {
     "setup": LazyCommand("service.cli.setup.command:setup", "Set this Raspberry Pi up: UART, Wi-Fi, page, service."),
@@ -30,7 +30,6 @@ _COMMANDS = {
 #: Libraries and their optional dependencies, 12 MB together, that the daemon does not need: OpenSSL, coloured logs.
 _OPTIONAL = (("hmac", "_hashlib"), ("asyncio", "ssl"), ("structlog", "rich"))
 _UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
-_INTERRUPTED = 130  # as shells have it: 128 + SIGINT
 
 
 class _Main(LazyGroup):
@@ -50,7 +49,7 @@ class _Main(LazyGroup):
             sys.exit(error.exit_code)
         except click.Abort:
             complain("interrupted")
-            sys.exit(_INTERRUPTED)
+            sys.exit(INTERRUPTED)
         except OSError as error:
             if error.errno not in _UNWRITABLE:
                 raise

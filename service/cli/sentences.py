@@ -8,6 +8,9 @@ from typing import NoReturn
 
 import click
 
+#: The exit status after Ctrl-C, as shells have it: 128 + SIGINT.
+INTERRUPTED = 130
+
 
 def say(text: str, *, to_error: bool = False, prefix: str = "", indent: int = 0) -> None:
     """Print `text` after `prefix`, which is `indent` columns wide; further lines are indented as much."""

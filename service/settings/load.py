@@ -3,6 +3,7 @@
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -70,16 +71,17 @@ def load_settings(
         problems += _zenoh_problems(zenoh, given)
     if problems:
         raise SettingsError(problems)
-    return Settings(
-        gcs=addresses,
+    composed = {
+        "gcs": addresses,
         # A link that is also given by a flag keeps the file's access rules.
-        access={str(address): access for address, access in links if not access.is_open},
-        state_dir=values.pop("state_dir", None) or default_state_dir(),
-        tlog=tlog,
-        zenoh=zenoh,
-        web=web,
-        **{name: values[name] for name in _AS_THEY_ARE if name in values},
-    )
+        "access": {str(address): access for address, access in links if not access.is_open},
+        "state_dir": values.get("state_dir") or default_state_dir(),
+        "tlog": tlog,
+        "zenoh": zenoh,
+        "web": web,
+    }
+    plain = {field.name: values[field.name] for field in fields(Settings) if field.name in values}
+    return Settings(**plain | composed)
 
 
 def takeoff_limit_m() -> int:
@@ -92,9 +94,6 @@ def takeoff_limit_m() -> int:
     if problems:
         raise SettingsError(problems)
     return limit
-
-
-_AS_THEY_ARE = ("fc", "sysid", "takeoff_max_m", "autopilot", "pass_through", "record_uart", "log_level", "share")
 
 
 def _read_environment(environment: Mapping[str, str], problems: list[Problem]) -> dict[str, Given]:

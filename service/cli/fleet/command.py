@@ -13,7 +13,6 @@ from service.cli.command_group import CommandGroup
 from service.cli.fleet.conditions import Condition, matching
 from service.cli.fleet.enroll_command import enroll
 from service.cli.fleet.options import (
-    INTERRUPTED,
     PATH,
     address_options,
     fleet_session,
@@ -29,7 +28,7 @@ from service.cli.fleet.watch import watching
 from service.cli.fleet.watch_screen import print_changes, show_screen
 from service.cli.mission_source import save_mission
 from service.cli.printing import print_json, print_table
-from service.cli.sentences import fail
+from service.cli.sentences import INTERRUPTED, fail
 from service.machine.os_error import reason
 
 _STANDARD_OUTPUT = Path("-")

@@ -12,11 +12,9 @@ import zenoh
 
 from service.cli.fleet.conditions import FIELDS, parse_condition
 from service.cli.fleet.session import DEFAULT_ENDPOINT, FleetError, open_session
-from service.cli.sentences import fail
+from service.cli.sentences import INTERRUPTED, fail
 from service.settings.zenoh import ZenohSettings, ZenohSettingsError, check_name
 
-#: The exit status of a shell after Ctrl-C.
-INTERRUPTED = 130
 PATH = click.Path(path_type=Path)
 
 F = TypeVar("F", bound=Callable[..., Any])
