@@ -9,7 +9,6 @@ import click
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
 from service.cli.sentences import complain
-from service.machine.os_error import reason
 from storage.bounded_file import read_bounded
 
 MAX_BYTES = 8 * 2**20  # 65,535 items, the most that MAVLink can count, are about 5 MB of text
@@ -31,7 +30,7 @@ def mission_bytes(path: Path) -> bytes:
         return read_bounded(path, MAX_BYTES)
     except (OSError, ValueError) as error:
         name = click.format_filename(path)
-        raise MissionFileError(name, "", _words(error), "check the path and its permissions") from None
+        raise MissionFileError(name, "", _reason(error), "check the path and its permissions") from None
 
 
 def save_mission(path: Path, text: str) -> None:
@@ -54,8 +53,8 @@ def save_mission(path: Path, text: str) -> None:
                 draft.unlink(missing_ok=True)
                 raise
     except (OSError, ValueError, RuntimeError) as error:  # RuntimeError: a link that leads to itself
-        raise MissionFileError(name, "", _words(error), "check the path and its permissions") from None
+        raise MissionFileError(name, "", _reason(error), "check the path and its permissions") from None
 
 
-def _words(error: Exception) -> str:
-    return (reason(error) if isinstance(error, OSError) else str(error)).lower()
+def _reason(error: Exception) -> str:
+    return (getattr(error, "strerror", None) or str(error)).lower()

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NoReturn
 
 import click
-from rich.table import Table
+from rich.table import Column, Table
 from rich.text import Text
 
 from service.cli.command_group import CommandGroup
@@ -47,12 +47,13 @@ def list_missions(limit: int, state_dir: Path | None, as_json: bool) -> None:
     if not found:
         click.echo("No mission has been received yet.")
         return
-    table = Table("No.", "Received", "Items", "Changes", "Outcome", "From, and details", box=None, pad_edge=False)
+    details = Column("From, and details", overflow="fold")
+    table = Table("No.", "Received", "Items", "Changes", "Outcome", details, box=None, pad_edge=False)
     for mission in found:
         counts = (str(mission["item_count"]), str(mission["finding_count"]))
         when = _local_time(mission["received_at"])
-        details = Text("\n".join(filter(None, (mission["source"], mission["detail"]))))
-        table.add_row(str(mission["number"]), when, *counts, mission["outcome"], details)
+        text = Text("\n".join(filter(None, (mission["source"], mission["detail"]))))
+        table.add_row(str(mission["number"]), when, *counts, mission["outcome"], text)
     print_table(table)
 
 

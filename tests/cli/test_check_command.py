@@ -221,3 +221,15 @@ def test_filled_in_defaults_appear_only_in_the_table(tmp_path: Path) -> None:
     assert output.count("0->2") == 2
     assert "Hit Rad" not in output
     assert "WP 1: Alt changed from 10.5 to 10 m" in output
+
+
+@pytest.mark.parametrize("columns", [10, 40])
+def test_a_narrow_terminal_shortens_no_value(columns: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    def table() -> list[str]:
+        return run(FIELD).stdout.partition("\n\n")[0].splitlines()
+
+    monkeypatch.setenv("COLUMNS", "80")
+    whole = table()
+    assert "18.5->18" in whole[9]
+    monkeypatch.setenv("COLUMNS", str(columns))
+    assert table() == whole
