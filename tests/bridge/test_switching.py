@@ -93,4 +93,5 @@ def test_ground_stations_see_one_vehicle_while_frsky_is_sent(board: type[Simulat
         world.wait_until(lambda w: w.kind is harakiri.PATCHED and w.bridge.session.state.speed == 115200, 5)
         world.run(3)
         assert max(heartbeat_gaps(station)) <= 1.5
+        assert not [text for text in station.texts() if "lost" in text]
     world.assert_line_was_clean()
