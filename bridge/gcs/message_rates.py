@@ -8,9 +8,10 @@ from bridge.gcs.budget import TokenBucket
 from bridge.gcs.cost import Rate
 from bridge.gcs.station import Peer
 
-#: Messages a second to all ground stations together. The defaults are 55 a second. Peers with standing share one half,
-#: at least 75 a second for each of the 16 on a link; all others share the other half.
-_MOST_PER_S = 2400
+#: Messages a second to all peers with standing together: at least 75 for each of the 16 on a link. The defaults are 55.
+_MOST_PER_S = 1200
+#: The same to all other peers: telemetry for a crowd must leave a Pi Zero time for the pilot.
+_MOST_TO_OTHERS_PER_S = 400
 #: A message due within this fraction of its interval is sent now, because the readings arrive at their own rate.
 _EARLY = 0.25
 #: The shortest interval for an unwatched peer, s. The default rates would cost a Pi Zero twice the CPU.
@@ -80,7 +81,8 @@ class MessageRates:
         """Forget all other peers. `with_standing`: those whose share does not depend on the number of the others."""
         self._followers = {peer: self._follower(peer) for peer in peers}
         newcomers = len(self._followers) - len(with_standing)
-        share, self._newcomers_share = _share(len(with_standing)), _share(newcomers)
+        share = _share(_MOST_PER_S, len(with_standing))
+        self._newcomers_share = _share(_MOST_TO_OTHERS_PER_S, newcomers)
         for peer, follower in self._followers.items():
             follower.share.rate = share if peer in with_standing else self._newcomers_share
 
@@ -94,6 +96,7 @@ class MessageRates:
         return peer in self._followers and bool(self._followers[peer].requested)
 
 
-def _share(peers: int) -> Rate:
-    """Each peer's share of half the total rate."""
-    return Rate(_MOST_PER_S / 2 / max(peers, 1), _MOST_PER_S / 2 / max(peers, 1))
+def _share(per_s: float, peers: int) -> Rate:
+    """Each peer's share of a total rate."""
+    each = per_s / max(peers, 1)
+    return Rate(each, max(each, 1.0))

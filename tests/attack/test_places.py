@@ -11,7 +11,7 @@ import pytest
 from bridge.gcs.stations import MAX_PEERS
 from protocols.mavlink.dialect import Message
 from protocols.mission_item import MissionResult
-from tests.support.attack_pilot import HELLO, Attack, Stranger, Watch, assert_uploads, m, sign
+from tests.support.attack_pilot import HELLO, Attack, Stranger, Watch, assert_uploads, has_read_all, m, sign
 from tests.support.benches import Bench, Starter
 from tests.support.plain_station import PlainStation, tcp_station, udp_station
 from tests.support.plan import plain_plan
@@ -48,7 +48,12 @@ def crowd(bench: Bench, stack: ExitStack, *spoken: Message, size: int = CROWD, p
     for stranger in strangers:
         stack.callback(stranger.close)
     turns = itertools.cycle(strangers)
-    return Attack(lambda: next(turns).send(*spoken or (HELLO,)), per_s=per_s)
+
+    def speak() -> None:
+        comes(lambda: has_read_all(bench.daemon.address[1]))
+        next(turns).send(*spoken or (HELLO,))
+
+    return Attack(speak, per_s=per_s)
 
 
 def hears_heartbeats(station: PlainStation, count: int) -> bool:

@@ -5,6 +5,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
@@ -79,6 +80,13 @@ class Attack(threading.Thread):
             self.count += 1
             due = max(due + self._pause_s, time.monotonic() - 0.1)
             self._over.wait(max(0.0, due - time.monotonic()))
+
+
+def has_read_all(port: int) -> bool:
+    """True if a program has read all datagrams that arrived at a UDP port; the kernel's buffer for them is small."""
+    sockets = [line.split() for line in Path("/proc/net/udp").read_text().splitlines()[1:]]
+    unread = [queues.partition(":")[2] for _, at, _, _, queues, *_ in sockets if at.endswith(f":{port:04X}")]
+    return not any(int(size, 16) for size in unread)
 
 
 class Watch:
