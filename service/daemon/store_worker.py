@@ -14,7 +14,7 @@ import structlog
 from bridge.line.conversation import Conclude, FindPending, Recall, Save, StoreEffect
 from bridge.model.mission_log import ArrivedMission, PendingMission
 from protocols.mission_record import ListIdentity, identify, pack_records
-from service.machine.threads import DiskThread, post
+from service.machine.threads import BackgroundThread, post
 from storage.mission_store import MissionStore, ReceivedMission, open_store, store_in_memory
 from storage.store_error import StoreError
 
@@ -33,7 +33,7 @@ class StoreWorker:
 
     def __init__(self, directory: Path | None, on_trouble: Callable[[str], None] = lambda _why: None) -> None:
         self._on_trouble = on_trouble
-        self._thread = DiskThread("store")
+        self._thread = BackgroundThread("store")
         self._loop = asyncio.get_running_loop()
         self._store: MissionStore | None = None
         if directory is not None:

@@ -6,6 +6,7 @@ import os
 import socket
 import termios
 from collections.abc import Awaitable, Callable
+from contextlib import ExitStack
 from functools import partial
 from typing import Protocol
 
@@ -13,6 +14,7 @@ import serial
 
 from service.links.port_holder import explain_port_error, find_console
 from service.machine.os_error import reason
+from service.machine.threads import BackgroundThread
 from service.settings.addresses import UNKNOWN_HOST_HINT, AutoFc, FcAddress, SerialFc, TcpFc, family_of
 
 #: Errors of an open port: pyserial raises the last two if it is unplugged, or its driver refuses the speed.
@@ -45,7 +47,7 @@ def device_opener(address: FcAddress) -> Callable[[], Awaitable[Device]]:
 
         return open_path
     if isinstance(address, TcpFc):
-        return partial(_open_tcp, address)
+        return partial(_open_tcp, address, BackgroundThread("name lookup"))
     # Imported only here: a daemon on a real flight controller does not need a simulator in memory.
     from simulator.naze import SimulatedNaze
     from simulator.pipe_link import SimLink
@@ -82,19 +84,20 @@ def _keep_dtr(descriptor: int) -> None:
     termios.tcsetattr(descriptor, termios.TCSANOW, attributes)
 
 
-async def _open_tcp(address: TcpFc) -> socket.socket:
+async def _open_tcp(address: TcpFc, resolver: BackgroundThread) -> socket.socket:
     family = family_of(address.host)
-    connection = socket.socket(family, socket.SOCK_STREAM)
-    connection.setblocking(False)
-    loop = asyncio.get_running_loop()
-    try:
-        async with asyncio.timeout(_TCP_TIMEOUT_S):
-            found = await loop.getaddrinfo(address.host, address.port, family=family, type=socket.SOCK_STREAM)
-            await loop.sock_connect(connection, found[0][4])
-    except (OSError, TimeoutError) as error:
-        connection.close()
-        why = reason(error) or "no answer"
-        hint = f"; {UNKNOWN_HOST_HINT}" if isinstance(error, socket.gaierror) else ""
-        raise PortError(f"{address} cannot be reached: {why}{hint}") from error
+    with ExitStack() as unless_connected:
+        connection = unless_connected.enter_context(socket.socket(family, socket.SOCK_STREAM))
+        connection.setblocking(False)
+        try:
+            async with asyncio.timeout(_TCP_TIMEOUT_S):
+                look_up = partial(socket.getaddrinfo, address.host, address.port, family, socket.SOCK_STREAM)
+                found = await resolver.ask(look_up)
+                await asyncio.get_running_loop().sock_connect(connection, found[0][4])
+        except (OSError, TimeoutError) as error:
+            why = reason(error) or "no answer"
+            hint = f"; {UNKNOWN_HOST_HINT}" if isinstance(error, socket.gaierror) else ""
+            raise PortError(f"{address} cannot be reached: {why}{hint}") from error
+        unless_connected.pop_all()
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     return connection

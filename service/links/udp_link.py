@@ -3,12 +3,14 @@
 
 import asyncio
 import socket
+from functools import partial
 
 import structlog
 
 from bridge.gcs.station import Peer
 from service.links.gcs_events import GcsEvents
 from service.machine.log_setup import warn_once
+from service.machine.threads import BackgroundThread
 from service.settings.addresses import UNKNOWN_HOST_HINT, GcsAddress, family_of
 
 _DATAGRAM_SIZE = 2048
@@ -72,18 +74,19 @@ class UdpLink:
         try:
             found = socket.getaddrinfo(host, port, self._family, socket.SOCK_DGRAM, flags=socket.AI_NUMERICHOST)
         except socket.gaierror:
-            self._lookup = self._loop.create_task(self._follow_name(until_answered=broadcast))
+            resolver = BackgroundThread("name lookup")
+            self._lookup = self._loop.create_task(self._follow_name(resolver, until_answered=broadcast))
+            self._lookup.add_done_callback(lambda _: resolver.close(0))
         else:
             self._events.add_default_peer(Peer(self.name, found[0][4]), until_answered=broadcast)
 
-    async def _follow_name(self, *, until_answered: bool) -> None:
+    async def _follow_name(self, resolver: BackgroundThread, *, until_answered: bool) -> None:
         """Send to the address of a host name: the network may come up later, and a laptop's address may change."""
+        look_up = partial(socket.getaddrinfo, self._address.host, self._address.port, self._family, socket.SOCK_DGRAM)
         known: Peer | None = None
         while True:
             try:
-                found = await self._loop.getaddrinfo(
-                    self._address.host, self._address.port, family=self._family, type=socket.SOCK_DGRAM
-                )
+                found = await resolver.ask(look_up)
             except OSError as error:
                 why = f"{error.strerror or error}; {UNKNOWN_HOST_HINT}"
                 warn_once(self._warned, "gcs.name_unknown", link=self.name, why=why)

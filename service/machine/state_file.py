@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import structlog
 
-from service.machine.threads import DiskThread
+from service.machine.threads import BackgroundThread
 from storage.atomic_file import replace_file
 from storage.bounded_file import read_bounded
 
@@ -27,7 +27,7 @@ class StateFile:
         self._path = path
         self._without = without
         self._latest = b""
-        self._thread = DiskThread(path.name)
+        self._thread = BackgroundThread(path.name)
 
     def load(self, read: Callable[[Any], T]) -> T | None:
         """The contents, converted by `read`; None if there are none, or they are damaged, which is logged."""

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Threads alongside the event loop: the way back to it, and a thread for work on a disk that may hang.
+"""Threads alongside the event loop: the way back to it, and a thread for disks and name servers, which may hang.
 
-Neither the event loop nor the end of the process waits for the disk.
+Neither the event loop nor the end of the process waits for them. (Both wait for asyncio's own threads.)
 """
 
 import asyncio
@@ -25,7 +25,7 @@ def post(loop: asyncio.AbstractEventLoop, callback: Callable[[*Arguments], objec
         loop.call_soon_threadsafe(callback, *arguments)
 
 
-class DiskThread:
+class BackgroundThread:
     """Runs jobs in order. A daemon thread, so that one that hangs in the kernel ends with the process."""
 
     def __init__(self, name: str) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from service.daemon.api import DaemonApi
 from service.daemon.mission_data import Json
-from service.machine.threads import DiskThread
+from service.machine.threads import BackgroundThread
 from service.zenoh_link.logged_past import LoggedPast, read_logged_past
 from service.zenoh_link.time_range import parse_time_range
 
@@ -26,7 +26,7 @@ class History:
         self._api = api
         self._logs = logs
         self._clock = clock
-        self._disk = DiskThread("history")
+        self._disk = BackgroundThread("history")
         self._events: deque[Json] = deque(maxlen=_MAX_EVENTS)
 
     def add(self, event: Json) -> None:

@@ -3,6 +3,7 @@
 
 import asyncio
 import socket
+import threading
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 
@@ -127,8 +128,10 @@ async def test_a_host_name_is_used_once_it_resolves(links: Links, monkeypatch: p
     asked = 0
     monkeypatch.setattr(udp_link, "_LOOK_UP_S", 0.01)
 
-    async def look_up(host: str, port: int, **_: object) -> list[tuple[object, ...]]:
+    def look_up(host: str, port: int, *_: object, flags: int = 0) -> list[tuple[object, ...]]:
         nonlocal asked
+        if flags & socket.AI_NUMERICHOST:
+            raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
         assert (host, port) == ("laptop.local", 14550)
         found = answers[min(asked, len(answers) - 1)]
         asked += 1
@@ -136,7 +139,7 @@ async def test_a_host_name_is_used_once_it_resolves(links: Links, monkeypatch: p
             raise socket.gaierror(socket.EAI_AGAIN, "Temporary failure in name resolution")
         return [(socket.AF_INET, socket.SOCK_DGRAM, 17, "", address) for address in found]
 
-    monkeypatch.setattr(asyncio.get_running_loop(), "getaddrinfo", look_up)
+    monkeypatch.setattr(socket, "getaddrinfo", look_up)
     link = links.open("udpout:laptop.local:14550")
     seen: list[list[Peer]] = []
     while not seen or asked <= len(answers):
@@ -146,6 +149,36 @@ async def test_a_host_name_is_used_once_it_resolves(links: Links, monkeypatch: p
     assert [[peer.key for peer in peers] for peers in seen] == [[], [first.getsockname()], [second.getsockname()]]
     link.send(seen[-1][0], FRAME)
     assert await received(second) == FRAME
+
+
+@pytest.mark.parametrize("kind", ["gcs", "fc"])
+def test_a_name_server_that_is_silent_does_not_delay_the_end(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the field there is often no network behind the Pi's."""
+    asked, answers = threading.Event(), threading.Event()
+
+    def look_up(*_: object, flags: int = 0) -> list[object]:
+        if not flags & socket.AI_NUMERICHOST:
+            asked.set()
+            answers.wait()
+        raise socket.gaierror(socket.EAI_AGAIN, "Temporary failure in name resolution")
+
+    async def main() -> None:
+        if kind == "gcs":
+            link = open_link(parse_gcs("udpout:laptop.local:14550"), Ears())
+            await until_async(asked.is_set, "the lookup")
+            link.close()
+        else:
+            opening = asyncio.ensure_future(device_opener(TcpFc("naze.local", 5760))())
+            await until_async(asked.is_set, "the lookup")
+            opening.cancel()
+
+    monkeypatch.setattr(socket, "getaddrinfo", look_up)
+    daemon = threading.Thread(target=asyncio.run, args=(main(),), daemon=True)
+    daemon.start()
+    daemon.join(TIMEOUT_S)
+    has_ended = not daemon.is_alive()
+    answers.set()
+    assert has_ended
 
 
 async def test_localhost_is_resolved(links: Links) -> None:

@@ -7,12 +7,12 @@ import threading
 import pytest
 from structlog.testing import capture_logs
 
-from service.machine.threads import DiskThread
+from service.machine.threads import BackgroundThread
 
 
 def test_work_is_done_in_order_before_the_end() -> None:
     done: list[int] = []
-    thread = DiskThread("test")
+    thread = BackgroundThread("test")
     for number in range(100):
         thread.submit(lambda number=number: done.append(number))  # type: ignore[misc]
     assert thread.close(timeout_s=10)
@@ -21,7 +21,7 @@ def test_work_is_done_in_order_before_the_end() -> None:
 
 def test_the_end_does_not_wait_for_a_hung_disk() -> None:
     hangs = threading.Event()
-    thread = DiskThread("test")
+    thread = BackgroundThread("test")
     thread.submit(hangs.wait)
     assert not thread.close(timeout_s=0.05)
     hangs.set()
@@ -29,7 +29,7 @@ def test_the_end_does_not_wait_for_a_hung_disk() -> None:
 
 
 async def test_a_question_gets_its_answer_or_its_error() -> None:
-    thread = DiskThread("test")
+    thread = BackgroundThread("test")
     assert await thread.ask(lambda: 7) == 7
     with pytest.raises(ZeroDivisionError):
         await thread.ask(lambda: 1 / 0)
@@ -38,7 +38,7 @@ async def test_a_question_gets_its_answer_or_its_error() -> None:
 
 async def test_a_cancelled_question_does_not_end_the_thread() -> None:
     hangs = threading.Event()
-    thread = DiskThread("test")
+    thread = BackgroundThread("test")
     for _ in range(2):  # one runs, one waits
         with pytest.raises(TimeoutError):
             await asyncio.wait_for(thread.ask(hangs.wait), 0.01)
@@ -48,7 +48,7 @@ async def test_a_cancelled_question_does_not_end_the_thread() -> None:
 
 
 async def test_a_job_that_raises_does_not_end_the_thread() -> None:
-    thread = DiskThread("test")
+    thread = BackgroundThread("test")
     with capture_logs() as events:
         thread.submit(lambda: 1 / 0)
         assert await thread.ask(lambda: 7) == 7
