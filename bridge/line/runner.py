@@ -55,6 +55,8 @@ class Runner:
     """
 
     def __init__(self) -> None:
+        #: The commands whose replies the running conversation waits for.
+        self.awaited_replies: frozenset[int] = frozenset()
         self._store_effects: list[StoreEffect] = []
         self._link: MspLink | None = None
         self._transmit: Callable[[Packed], bool] | None = None
@@ -113,7 +115,7 @@ class Runner:
 
     def received(self, frame: MspFrame, now: float) -> None:
         """Pass on an MSP reply if the running conversation waits for it."""
-        if isinstance(self._awaited, Receive) and frame.command in self._awaited.commands:
+        if frame.command in self.awaited_replies:
             self._advance(frame, now)
 
     def received_mavlink(self, frame: MavlinkFrame, now: float) -> None:
@@ -174,6 +176,7 @@ class Runner:
 
     def _run(self, answer: object, now: float) -> None:
         assert self._current is not None
+        self.awaited_replies = frozenset()
         task = self._current
         conversation = task.conversation
         self._awaited = None
@@ -194,6 +197,7 @@ class Runner:
                         continue
                     case Receive(commands) if self._link:
                         deadline = self._link.reply_deadline(commands, now)
+                        self.awaited_replies = commands
                     case Await(_, seconds) if self._transmit:
                         deadline = now + seconds
                     case Send() | Transmit() | Receive() | Await():

@@ -86,7 +86,9 @@ class MspLine(State):
         return self.link.unanswered()
 
     def take_frame(self, frame: MspFrame, now: float) -> None:
-        self.port.runner.received(frame, now)
+        # Most replies are telemetry's.
+        if frame.command in self.port.runner.awaited_replies:
+            self.port.runner.received(frame, now)
 
     def _silent_since(self) -> float:
         """The time of the last sign of life, or of the first request after it."""
