@@ -17,6 +17,7 @@ from bridge.gcs.cost import Cost
 from bridge.gcs.flash_budget import TOO_MANY_WRITES
 from bridge.gcs.ground import Ground
 from bridge.gcs.station import Peer, Severity, Station
+from bridge.gcs.stations import MAX_PEERS
 from bridge.missions.fc_mission_store import StoreReport
 from bridge.missions.list_check import begin_check, check_count
 from bridge.missions.mission_service import OCCUPIED, DeliveryResult, MissionService, MissionTransfer, TransferStep
@@ -47,8 +48,8 @@ from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionItem, MissionResult
 
 _TOO_MANY_UPLOADS = Refusal(MissionResult.DENIED, "Too many uploads: wait a few seconds")
-#: The maximum number of simultaneous uploads.
-_MOST_UPLOADS = 64
+#: The maximum number of simultaneous uploads: one for each peer of a link.
+_MOST_UPLOADS = MAX_PEERS
 #: A host with more of them than this is the first to lose one.
 _MOST_OF_HOST = 2
 #: After this long with lists arriving, an upload does not wait for its turn: a slow or silent ground station would lock

@@ -4,6 +4,7 @@
 import itertools
 import random
 from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 
 import pytest
@@ -157,7 +158,7 @@ def test_an_answer_to_a_peer_with_standing_is_kept(*, ids_of_one: bool) -> None:
 
 
 def test_a_pilot_on_a_slow_radio_can_write_during_a_flood() -> None:
-    """Between two of the pilot's items a hundred lists are announced, more than are received at once."""
+    """Between two of the pilot's items a hundred lists are announced."""
     world = ready_world()
     pilot = GroundStation(world, "pilot", air=Air(delay_s=0.7))
     for beat in range(4):
@@ -166,6 +167,20 @@ def test_a_pilot_on_a_slow_radio_can_write_during_a_flood() -> None:
     attack(world, [HELLO, count_message(9)], many_hosts(random.Random(7)), 200, 4.0)
     world.run(1)
     assert Upload(pilot, waypoints(3), repeat_s=1.5).run() is MissionResult.ACCEPTED
+    assert world.stored == records_of(waypoints(3))
+
+
+def test_a_pilot_on_a_slow_radio_who_arrives_later_can_write() -> None:
+    """Before the pilot's first item arrives, two hundred hosts have each announced a list and sent one item."""
+    world = ready_world()
+    for number in range(200):
+        stranger = GroundStation(world, f"10.0.0.{number}", sysid=99)
+        world.after(number / 50, partial(stranger.send, count_message(9)))
+        world.after(number / 50 + 0.5, partial(stranger.send, item_message(0, waypoints(9)[0])))
+    pilot = GroundStation(world, "pilot", air=Air(delay_s=0.8))
+    world.run(0.2)
+    pilot.send(HELLO)
+    assert Upload(pilot, waypoints(3), repeat_s=1.7).run() is MissionResult.ACCEPTED
     assert world.stored == records_of(waypoints(3))
 
 
