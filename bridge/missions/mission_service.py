@@ -22,7 +22,7 @@ from bridge.missions.fc_mission_store import (
     StoreReport,
     StoreState,
 )
-from bridge.missions.list_check import MissionRules
+from bridge.missions.list_check import check_list
 from bridge.missions.mission_texts import summary
 from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission
 from bridge.model.refusal import ARMED, Refusal
@@ -216,12 +216,12 @@ class MissionService:
             yield Pause(_BUSY_INTERVAL_S)
             waited_s += _BUSY_INTERVAL_S
 
-    def rules(self) -> Conversation[MissionRules | Refusal]:
-        """The rules of the current flight controller, armed or not."""
+    def check(self, items: Sequence[MissionItem]) -> Conversation[Verdict[Any] | Refusal]:
+        """Check a list by the rules of the current flight controller, armed or not."""
         if isinstance(self.fc_store, Refusal):
             return self.fc_store
         report = yield from self.fc_store.report()
-        return NO_LINK if report is None else report.rules
+        return NO_LINK if report is None else check_list(items, report.rules, self.vehicle.place())
 
     def deliver(
         self, arrived: ArrivedMission, progress: PushProgress = lambda _records: None, *, is_kept: bool = True

@@ -86,9 +86,4 @@ class LocalMissions:
         self, items: Sequence[MissionItem], on_done: Callable[[Verdict[Any] | Refusal], None], now: float
     ) -> None:
         """Check a list by the rules of the current flight controller, without writing it."""
-
-        def conversation() -> Conversation[Verdict[Any] | Refusal]:
-            rules = yield from self._missions.rules()
-            return rules if isinstance(rules, Refusal) else check_list(items, rules, self._missions.vehicle.place())
-
-        self._missions.run(conversation(), lambda verdict, _at: on_done(verdict), now)
+        self._missions.run(self._missions.check(items), lambda verdict, _at: on_done(verdict), now)

@@ -187,10 +187,10 @@ def test_a_rejected_list_changes_nothing_and_has_a_reason(craft: Craft) -> None:
 def test_item_by_item_and_whole_list_checks_agree(craft: Craft) -> None:
     found: list[Any] = []
     craft.world.bridge.runner.start(
-        craft.world.bridge.missions.rules(), lambda rules, _: found.append(rules), craft.world.now
+        craft.world.bridge.missions.preflight(), lambda report, _: found.append(report), craft.world.now
     )
     craft.world.wait_until(lambda _: bool(found), 10)
-    (rules,) = found
+    rules = found[0].rules
     good = craft.plan(4)
     odd = [replace(good[1], command=command) for command in (*Command, 206)]
     for middle in itertools.chain.from_iterable(([one], [one, other]) for one in odd for other in odd[:3]):
