@@ -10,7 +10,7 @@ from enum import Enum
 from math import inf
 from typing import Any, TypeVar
 
-from bridge.line.conversation import Conversation, LinkLost, Pause, Stopped, conclude, find_pending, recall, save
+from bridge.line.conversation import Conversation, LinkLost, Pause, Stopped, conclude, recall, save
 from bridge.line.runner import Runner
 from bridge.missions.fc_mission_store import (
     LIST_IS_GONE,
@@ -79,15 +79,6 @@ class HeldMission:
     items: tuple[MissionItem, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class MissionChange:
-    """A change of the flight controller's list that no ground station requested, as text for the pilot."""
-
-    text: str
-    is_warning: bool = False
-
-
-_NOT_LOADED = MissionChange("No mission is loaded: disarm to load the saved one", is_warning=True)
 _ERASED_SOURCE = "copy from the flight controller"
 _ERASED = "erased there to make room; `naze-bridge missions restore` writes it again"
 _NO_COPY = "Nothing written: a mission that does not fit next to it could not be copied to the Pi"
@@ -114,12 +105,10 @@ class MissionService:
         self._closed = False
         #: False until the current flight controller's list was read, and after an interrupted push.
         self.is_settled = False
-        #: The saved mission's loading since the last `catch_up`, which reports it.
-        self._loading = Loading.NOT_NEEDED
-        self._told_unloaded = False
+        #: The saved mission's loading since MissionWatch last reported it.
+        self.loading = Loading.NOT_NEEDED
         #: Missions to compare with the list when it is next read.
-        self._pending: list[PendingMission] = []
-        self._has_asked_store = False
+        self.pending: list[PendingMission] = []
         self.held: HeldMission | None = None
         #: Item 0 of the last known list: arming may change the protocol, and the list is unknown then.
         self.former_home: MissionItem | None = None
@@ -142,8 +131,8 @@ class MissionService:
         """Switch to another flight controller."""
         self.fc_store = store
         self.former_home = self.home_item()
-        self.held, self._loading = None, Loading.NOT_NEEDED
-        self.is_settled = self._told_unloaded = False
+        self.held, self.loading = None, Loading.NOT_NEEDED
+        self.is_settled = False
 
     @property
     def others(self) -> tuple[HeldMission, ...]:
@@ -161,7 +150,7 @@ class MissionService:
 
     @property
     def watch_s(self) -> float:
-        """How often to ask `is_outdated`, s; infinity without a store."""
+        """How often MissionWatch asks `is_current`, s; infinity without a store."""
         return inf if isinstance(self.fc_store, Refusal) else self.fc_store.watch_s
 
     def seq_of(self, number: int) -> int:
@@ -268,7 +257,7 @@ class MissionService:
         if failure in LIST_IS_GONE:
             self.is_settled, self.held = False, None
         if failure is PushFailure.UNCERTAIN:
-            self._pending.append(mission)
+            self.pending.append(mission)
             return DeliveryResult(MissionResult.DENIED, failure.value, mission.number)
         ack = _ACKS.get(failure, MissionResult.DENIED)
         return (yield from self._conclude(mission.number, Outcome.FAILED, ack, failure.value))
@@ -300,8 +289,8 @@ class MissionService:
             loading = yield from fc_store.load()
             if loading is Loading.NO_ANSWER:
                 return NO_LINK
-            if self._loading is not Loading.LOADED:
-                self._loading = loading
+            if self.loading is not Loading.LOADED:
+                self.loading = loading
         report = yield from fc_store.report()
         if report is None:
             return NO_LINK
@@ -321,62 +310,6 @@ class MissionService:
             # By the time the store answers, another flight controller may be connected.
             self.held = held
         return held
-
-    def is_outdated(self) -> Conversation[bool]:
-        """True if the list must be read, because it is unknown or was changed on the board."""
-        if not self._has_asked_store:
-            self._has_asked_store = True
-            self._pending += yield from find_pending()
-        if isinstance(self.fc_store, Refusal):
-            return False
-        return not self.is_settled or bool(self._pending) or not (yield from self.fc_store.is_current())
-
-    def catch_up(self) -> Conversation[MissionChange | None]:
-        """Read the list; returns the text for the pilot if it is another one."""
-        if isinstance(self.fc_store, Refusal):
-            return None
-        is_first, before = not self.is_settled, self.held
-        held = yield from self.read_back()
-        if held is NO_LINK:
-            return None
-        loading, self._loading = self._loading, Loading.NOT_NEEDED
-        self.is_settled = loading is not Loading.ARMED
-        if isinstance(held, HeldMission) and (news := (yield from self._settle(held))) is not None:
-            return news
-        if loading is Loading.ARMED:
-            is_news, self._told_unloaded = not self._told_unloaded, True
-            return _NOT_LOADED if is_news else None
-        is_loaded = loading is Loading.LOADED
-        if isinstance(held, Refusal) or (is_first and not (is_loaded and held.records)):
-            return None
-        if is_loaded:
-            is_ours = (yield from recall(held.identity)) is not None
-            again = "loaded again" if is_ours else "loaded, not written by naze-bridge"
-            return MissionChange(f"Saved mission {again}: {held.identity.count} records")
-        if before is not None and before.identity == held.identity:
-            return None
-        text = f"Mission on the flight controller changed: {held.identity.count} records"
-        return MissionChange(text, is_warning=True)
-
-    def _settle(self, held: HeldMission) -> Conversation[MissionChange | None]:
-        """Conclude the pending missions by the list found; returns the text about the newest for the pilot."""
-        news = None
-        pending, self._pending = self._pending, []
-        for mission in pending:
-            has_arrived = mission.identity == held.identity
-            if mission.identity is None:
-                outcome, text = Outcome.CANCELLED, "interrupted, old mission kept"
-            elif has_arrived:
-                outcome, text = Outcome.VERIFIED, f"The mission did arrive: {held.identity.count} records"
-            elif mission.before == held.identity or (mission.before is None and held.records):
-                outcome, text = Outcome.FAILED, "The mission did not arrive: old mission kept, write it again"
-            else:
-                outcome, text = Outcome.FAILED, "The mission arrived incomplete: write it again"
-            if mission.number is not None:
-                yield from conclude(mission.number, outcome, text)
-            if mission.identity is not None:
-                news = MissionChange(text, is_warning=not has_arrived)
-        return news
 
     def _copy_erased(self, fc_store: AnyFcMissionStore, records: Sequence[Any]) -> Conversation[bool]:
         """Store the missions that the new list will erase; False if that fails."""

@@ -1,13 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Watches for mission changes by others than the bridge. Sans-IO."""
+"""Watches for mission changes by others than the bridge, and settles interrupted writes. Sans-IO."""
 
+from dataclasses import dataclass
 from math import inf
 
 from bridge.gcs.ground import Ground
 from bridge.gcs.station import Severity
-from bridge.line.conversation import LinkLost
-from bridge.missions.mission_service import MissionChange, MissionService
+from bridge.line.conversation import Conversation, LinkLost, conclude, find_pending, recall
+from bridge.missions.fc_mission_store import Loading
+from bridge.missions.mission_service import NO_LINK, HeldMission, MissionService
 from bridge.model.events import EventLog
+from bridge.model.mission_log import Outcome
+from bridge.model.refusal import Refusal
+
+
+@dataclass(frozen=True, slots=True)
+class MissionChange:
+    """A change of the flight controller's list that no ground station requested, as text for the pilot."""
+
+    text: str
+    is_warning: bool = False
+
+
+_NOT_LOADED = MissionChange("No mission is loaded: disarm to load the saved one", is_warning=True)
 
 
 class MissionWatch:
@@ -17,6 +32,9 @@ class MissionWatch:
         self._missions = missions
         self._ground = ground
         self._log_event = log_event
+        self._has_asked_store = False
+        #: The mission store whose saved mission was last reported as not loaded.
+        self._unloaded: object = None
         #: When the running check began; None while none runs.
         self._began_at: float | None = None
         #: The time of the next `tick`. A flight controller that was just found is checked at once.
@@ -26,15 +44,72 @@ class MissionWatch:
         self.due = now + self._missions.watch_s
         if self._began_at is None and not self._missions.runner.is_busy and self.due < inf:
             self._began_at, self.due = now, inf
-            self._missions.runner.start(self._missions.is_outdated(), self._looked, now, in_background=True)
+            self._missions.runner.start(self._is_outdated(), self._looked, now, in_background=True)
 
     def _looked(self, is_outdated: bool | LinkLost, now: float) -> None:
         if is_outdated is True:
             # Telemetry makes room while a changed list is read, but not for the first reading: that is not urgent.
             is_first = not self._missions.is_settled
-            self._missions.runner.start(self._missions.catch_up(), self._caught_up, now, in_background=is_first)
+            self._missions.runner.start(self._catch_up(), self._caught_up, now, in_background=is_first)
         else:
             self._caught_up(None, now)
+
+    def _is_outdated(self) -> Conversation[bool]:
+        """True if the list must be read, because it is unknown or was changed on the board."""
+        if not self._has_asked_store:
+            self._has_asked_store = True
+            self._missions.pending += yield from find_pending()
+        if isinstance(self._missions.fc_store, Refusal):
+            return False
+        is_known = self._missions.is_settled and not self._missions.pending
+        return not (is_known and (yield from self._missions.fc_store.is_current()))
+
+    def _catch_up(self) -> Conversation[MissionChange | None]:
+        """Read the list; returns the text for the pilot if it is another one."""
+        if isinstance(self._missions.fc_store, Refusal):
+            return None
+        is_first, before = not self._missions.is_settled, self._missions.held
+        held = yield from self._missions.read_back()
+        if held is NO_LINK:
+            return None
+        loading, self._missions.loading = self._missions.loading, Loading.NOT_NEEDED
+        self._missions.is_settled = loading is not Loading.ARMED
+        if isinstance(held, HeldMission) and (news := (yield from self._settle(held))) is not None:
+            return news
+        if loading is Loading.ARMED:
+            told, self._unloaded = self._unloaded, self._missions.fc_store
+            return None if told is self._unloaded else _NOT_LOADED
+        is_loaded = loading is Loading.LOADED
+        if isinstance(held, Refusal) or (is_first and not (is_loaded and held.records)):
+            return None
+        if is_loaded:
+            is_ours = (yield from recall(held.identity)) is not None
+            again = "loaded again" if is_ours else "loaded, not written by naze-bridge"
+            return MissionChange(f"Saved mission {again}: {held.identity.count} records")
+        if before is not None and before.identity == held.identity:
+            return None
+        text = f"Mission on the flight controller changed: {held.identity.count} records"
+        return MissionChange(text, is_warning=True)
+
+    def _settle(self, held: HeldMission) -> Conversation[MissionChange | None]:
+        """Conclude the pending missions by the list found; returns the text about the newest for the pilot."""
+        news = None
+        pending, self._missions.pending = self._missions.pending, []
+        for mission in pending:
+            has_arrived = mission.identity == held.identity
+            if mission.identity is None:
+                outcome, text = Outcome.CANCELLED, "interrupted, old mission kept"
+            elif has_arrived:
+                outcome, text = Outcome.VERIFIED, f"The mission did arrive: {held.identity.count} records"
+            elif mission.before == held.identity or (mission.before is None and held.records):
+                outcome, text = Outcome.FAILED, "The mission did not arrive: old mission kept, write it again"
+            else:
+                outcome, text = Outcome.FAILED, "The mission arrived incomplete: write it again"
+            if mission.number is not None:
+                yield from conclude(mission.number, outcome, text)
+            if mission.identity is not None:
+                news = MissionChange(text, is_warning=not has_arrived)
+        return news
 
     def _caught_up(self, news: MissionChange | LinkLost | None, now: float) -> None:
         assert self._began_at is not None
