@@ -115,7 +115,7 @@ class MspLine(State):
             return Found(Spoken.MAVLINK, self.speed, "heard where MSP was answered before", heard)
         # Much slower than its telemetry, the port reads only a few wrong bytes of it, or none.
         why = "the incoming data is no longer MSP" if self._is_foreign else f"no answer for {MSP_SILENCE_S} s"
-        # An armed one that sends FrSky telemetry has disarmed, and is back at its former, good speed.
+        # A board that was armed at the speed of FrSky telemetry has disarmed, and is back at its former, good speed.
         has_disarmed = self.speed == FRSKY_SPEED and self.port.vehicle.armed
         return Lost(why, () if has_disarmed else _ARMED_SPEEDS, self.unanswered())
 
