@@ -123,7 +123,7 @@ class Line:
         """The autopilot's next frame."""
         self._seq = (self._seq + 1) & 0xFF
         body = bytes((len(payload), 0, 0, self._seq, _SYSID, _COMPID)) + msgid.to_bytes(3, "little") + payload
-        return b"\xfd" + body + mcrf4xx(body + bytes((CRC_EXTRA[msgid],))).to_bytes(_CRC_SIZE, "little")
+        return b"\xfd" + body + mcrf4xx(body + CRC_EXTRA[msgid]).to_bytes(_CRC_SIZE, "little")
 
     def _send_timed(self, passage: Passage, count: int) -> None:
         self._write(b"".join(self._timed_frame() for _ in range(count)))

@@ -109,5 +109,5 @@ def _checked(raw: bytes) -> MavlinkFrame | None:
 def _without_signature(frame: bytes) -> bytes:
     """Clear the flag, cut the signature, and recompute the CRC, which covers the flags."""
     checked = frame[1:2] + bytes((frame[2] & ~_SIGNED,)) + frame[3 : -_SIGNATURE_SIZE - _CRC_SIZE]
-    crc = mcrf4xx(checked + bytes((CRC_EXTRA[int.from_bytes(frame[_MSGID], "little")],)))
+    crc = mcrf4xx(checked + CRC_EXTRA[int.from_bytes(frame[_MSGID], "little")])
     return frame[:1] + checked + crc.to_bytes(_CRC_SIZE, "little")

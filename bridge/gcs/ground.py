@@ -243,9 +243,10 @@ class Ground:
         frame = None
         is_logged = not self.is_recording
         for peer in peers:
-            if packed.is_v2_only and self._version(peer) == 1:
+            version = self._version(peer)
+            if version == 1 and packed.is_v2_only:
                 continue
-            frame = self._writer(peer).frame(packed, self._version(peer))
+            frame = self._writer(peer).frame(packed, version)
             if peer is RECORDER:
                 is_logged = True
             else:

@@ -132,7 +132,8 @@ class OwnVehicle:
     def heard(self, news: Collection[type[Reading]], now: float) -> None:
         """Send the messages that follow from new readings, where due."""
         self._now = now
-        self._send_due(row for reading in news for row in self._rows.get(reading, ()))
+        for reading in news:
+            self._send_due(self._rows.get(reading, ()))
         if MissionLeg in news:
             self._follow_mission()
         if Readiness in news:

@@ -126,7 +126,10 @@ class Moment:
 
     def need(self, kind: type[ReadingT]) -> ReadingT:
         """The same for a reading without which the message cannot be made."""
-        return known(self.fresh(kind))
+        reading = self.fresh(kind)
+        if reading is None:
+            raise Unknown
+        return reading
 
     def made(self, makers: Iterable["Maker"]) -> list[Message]:
         """The messages of these makers that are not Unknown."""

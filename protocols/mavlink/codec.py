@@ -3,7 +3,7 @@
 
 import struct
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from fastcrc.crc16 import mcrf4xx
 
@@ -14,8 +14,9 @@ from protocols.mavlink.message_table import MESSAGE_FORMATS
 _SIGNED = 0x01
 _CRC_SIZE = 2
 _LAST_V1_ID = 255
-#: Payload size, both kinds of flags, sequence number, sender's ids, and the message id's lower 16 and upper 8 bits.
-_HEADER_V2 = struct.Struct("<BBBBBBHB")
+_HEADER_V1 = struct.Struct("<BBBBBB")
+#: Magic, payload size, both kinds of flags, sequence number, sender's ids, message id's lower 16 and upper 8 bits.
+_HEADER_V2 = struct.Struct("<BBBBBBBHB")
 
 
 class MavlinkDecoder:
@@ -32,8 +33,7 @@ class MavlinkDecoder:
             return None
 
 
-@dataclass(frozen=True, slots=True)
-class Packed:
+class Packed(NamedTuple):
     """A payload, whole and as MAVLink 2 sends it (without trailing zeros); receivers differ only in the header."""
 
     msgid: int
@@ -84,13 +84,12 @@ class FrameWriter:
         seq, self._seq = self._seq, (self._seq + 1) & 0xFF
         msgid = packed.msgid
         if version == 1 and not packed.is_v2_only:
-            magic, payload = MAGIC_V1, packed.payload_v1
-            body = bytes((len(payload), seq, self._sysid, self._compid, msgid)) + payload
+            payload, sign = packed.payload_v1, None
+            header = _HEADER_V1.pack(MAGIC_V1, len(payload), seq, self._sysid, self._compid, msgid)
         else:
-            magic, payload = MAGIC_V2, packed.payload_v2
-            flags = 0 if self._sign is None else _SIGNED
-            body = _HEADER_V2.pack(len(payload), flags, 0, seq, self._sysid, self._compid, msgid & 0xFFFF, msgid >> 16)
-            body += payload
-        crc = mcrf4xx(body + bytes((CRC_EXTRA[msgid],)))
-        frame = bytes((magic,)) + body + crc.to_bytes(_CRC_SIZE, "little")
-        return frame if self._sign is None or magic == MAGIC_V1 else frame + self._sign(frame)
+            payload, sign = packed.payload_v2, self._sign
+            flags, low, high = 0 if sign is None else _SIGNED, msgid & 0xFFFF, msgid >> 16
+            header = _HEADER_V2.pack(MAGIC_V2, len(payload), flags, 0, seq, self._sysid, self._compid, low, high)
+        frame = header + payload
+        frame += mcrf4xx(frame[1:] + CRC_EXTRA[msgid]).to_bytes(_CRC_SIZE, "little")
+        return frame if sign is None else frame + sign(frame)

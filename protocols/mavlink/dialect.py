@@ -16,8 +16,8 @@ from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from protocols.mavlink.message_table import MESSAGE_FORMATS
 
-#: CRC_EXTRA by message id, for all messages that can be forwarded, not only the dialect's.
-CRC_EXTRA: dict[int, int] = {msgid: known.crc_extra for msgid, known in MESSAGE_FORMATS.items()}
+#: CRC_EXTRA, one byte, by message id; for all messages that can be forwarded, not only the dialect's.
+CRC_EXTRA = {msgid: bytes((known.crc_extra,)) for msgid, known in MESSAGE_FORMATS.items()}
 
 #: A decoded or not yet packed message; pymavlink's classes are untyped.
 Message: TypeAlias = Any

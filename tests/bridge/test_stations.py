@@ -325,7 +325,7 @@ def test_any_payload_in_any_message_raises_nothing(seed: int) -> None:
             # Correct target ids, so that it reaches the transfer.
             payload = payload[:2].ljust(2, b"\0") + b"\x01\x01\x00"
         header = bytes((len(payload), 0, 0, number % 256, 255, 190)) + msgid.to_bytes(3, "little")
-        crc = mcrf4xx(header + payload + bytes((CRC_EXTRA[msgid],)))
+        crc = mcrf4xx(header + payload + CRC_EXTRA[msgid])
         world.spoken_by(station, b"\xfd" + header + payload + crc.to_bytes(2, "little"))
         if number % 20 == 0:
             world.run(0.02)

@@ -94,7 +94,7 @@ def test_any_payload_with_a_valid_checksum_decodes_or_is_refused(payload: bytes)
     decoder = MavlinkDecoder()
     for msgid in (0, 20, 23, 39, 44, 45, 47, 73, 76, 110, 253):
         header = bytes((len(payload), 0, 0, 5, 255, 190)) + msgid.to_bytes(3, "little")
-        crc = mcrf4xx(header + payload + bytes((CRC_EXTRA[msgid],)))
+        crc = mcrf4xx(header + payload + CRC_EXTRA[msgid])
         (frame,) = MavlinkSplitter().feed(b"\xfd" + header + payload + crc.to_bytes(2, "little"))
         decoder.decode(frame)
 
