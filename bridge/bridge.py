@@ -147,6 +147,7 @@ class Bridge:
         self.session.restart(why, now)
 
     def tick(self, now: float) -> None:
+        self.ground.now = now
         self.session.tick(now)
         self._pass_on_news(now)
         self.runner.tick(now)
@@ -154,19 +155,20 @@ class Bridge:
             self._uploads.tick(now)
         if now >= self._watch.due:
             self._watch.tick(now)
-        for peer in self.ground.expire(now):
-            self._incoming.forget(peer)
+        if now >= self.ground.stations.due:
+            for peer in self.ground.expire(now):
+                self._incoming.forget(peer)
         if now >= self._announcer.due:
             self._say(self._announcer.tick(now, self.session.state.trouble))
-        if self._is_represented:
+        if now >= self._vehicle.due and self._is_represented:
             self._vehicle.tick(now)
 
     def next_deadline(self) -> float:
         return min(
-            self.session.next_deadline(),
-            self.runner.next_deadline(),
+            self.session.state.deadline(),
+            self.runner.due,
             self._uploads.next_deadline() if self._uploads.is_active else inf,
-            self.ground.stations.next_deadline(),
+            self.ground.stations.due,
             self._announcer.due,
             self._watch.due,
             self._vehicle.due if self._is_represented else inf,

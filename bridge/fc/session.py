@@ -93,9 +93,6 @@ class FcSession:
         if event is not None:
             self._handle(event, now)
 
-    def next_deadline(self) -> float:
-        return self.state.deadline()
-
     def take_output(self) -> list[bytes]:
         """The bytes to be written to the port at the state's `speed`."""
         output, self._port.output = self._port.output, []

@@ -3,7 +3,7 @@
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
-from math import exp, inf
+from math import exp
 
 from bridge.gcs.cost import LIMITS, Cost, Rate
 from bridge.gcs.station import Peer
@@ -23,17 +23,12 @@ class TokenBucket:
         self.rate = rate
         self._tokens = rate.burst
         self._counted_at = 0.0
-        #: When one is available again, after `has` has returned False.
-        self.next_at = -inf
 
     def has(self, now: float) -> bool:
         """True if one more is allowed now."""
         self._tokens = min(self.rate.burst, self._tokens + max(0.0, now - self._counted_at) * self.rate.per_s)
         self._counted_at = now
-        if self._tokens >= 1.0:
-            return True
-        self.next_at = now + (1.0 - self._tokens) / self.rate.per_s
-        return False
+        return self._tokens >= 1.0
 
     def spend(self, amount: float = 1.0) -> None:
         """Count one; a negative amount takes it back."""

@@ -114,7 +114,6 @@ class Ground:
 
     def expire(self, now: float) -> list[Peer]:
         """Forget silent peers, and return them."""
-        self.now = now
         silent = self.stations.expire(now)
         for peer in silent:
             self._forget(peer)

@@ -4,14 +4,14 @@
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from math import inf
 
-from bridge.gcs.budget import TokenBucket
-from bridge.gcs.cost import Rate
 from bridge.gcs.station import Peer
 
 #: Messages a second to all peers with standing together: at least 75 for each of the 16 on a link. The defaults are 55.
 _MOST_PER_S = 1200
 #: The same to all other peers: telemetry for a crowd must leave a Pi Zero time for the pilot.
 _MOST_TO_OTHERS_PER_S = 400
+#: A peer may get its share of this time in one burst.
+_BURST_S = 1.0
 #: A message due within this fraction of its interval is sent now, because the readings arrive at their own rate.
 _EARLY = 0.25
 #: The shortest interval for an unwatched peer, s. The default rates would cost a Pi Zero twice the CPU.
@@ -19,12 +19,16 @@ _UNWATCHED_S = 0.1
 
 
 class _Follower:
-    """A peer's requests and schedule, by message id, and its share of all messages."""
+    """A peer's requests and schedule, by message id.
 
-    def __init__(self, share: Rate) -> None:
+    Each message uses `cost_s` of its time; messages are sent while `used_until` is not more than a burst ahead.
+    """
+
+    def __init__(self, cost_s: float) -> None:
         self.requested: dict[int, float] = {}
         self.due: dict[int, float] = {}
-        self.share = TokenBucket(share)
+        self.cost_s = cost_s
+        self.used_until = -inf
 
 
 class MessageRates:
@@ -33,7 +37,7 @@ class MessageRates:
     def __init__(self, defaults: Mapping[int, float]) -> None:
         self._defaults = defaults
         self._followers: dict[Peer, _Follower] = {}
-        self._newcomers_share = Rate(_MOST_PER_S, _MOST_PER_S)
+        self._newcomers_cost_s = 1 / _MOST_PER_S
         #: Peers at whose end there may be no station. They get no message more than ten times a second.
         self.unwatched: Collection[Peer] = ()
 
@@ -64,14 +68,13 @@ class MessageRates:
         taken = []
         for peer in peers:
             follower = self._followers.get(peer) or self._follower(peer)
-            share = follower.share
-            if now < share.next_at:
+            if follower.used_until > now + _BURST_S:
                 continue
             interval_s = self.interval_s(peer, msgid)
             due = follower.due.get(msgid, -inf)
-            if interval_s == inf or now < due - interval_s * _EARLY or not share.has(now):
+            if interval_s == inf or now < due - interval_s * _EARLY:
                 continue
-            share.spend()
+            follower.used_until = max(follower.used_until, now) + follower.cost_s
             # Counted from the due time to keep the rate, but missed messages are not caught up.
             follower.due[msgid] = (due if now < due + interval_s else now) + interval_s
             taken.append(peer)
@@ -81,22 +84,16 @@ class MessageRates:
         """Forget all other peers. `with_standing`: those whose share does not depend on the number of the others."""
         self._followers = {peer: self._follower(peer) for peer in peers}
         newcomers = len(self._followers) - len(with_standing)
-        share = _share(_MOST_PER_S, len(with_standing))
-        self._newcomers_share = _share(_MOST_TO_OTHERS_PER_S, newcomers)
+        cost_s = len(with_standing) / _MOST_PER_S
+        self._newcomers_cost_s = max(newcomers, 1) / _MOST_TO_OTHERS_PER_S
         for peer, follower in self._followers.items():
-            follower.share.rate = share if peer in with_standing else self._newcomers_share
+            follower.cost_s = cost_s if peer in with_standing else self._newcomers_cost_s
 
     def _follower(self, peer: Peer) -> _Follower:
         follower = self._followers.get(peer)
         if follower is None:
-            follower = self._followers[peer] = _Follower(self._newcomers_share)
+            follower = self._followers[peer] = _Follower(self._newcomers_cost_s)
         return follower
 
     def _has_requests(self, peer: Peer) -> bool:
         return peer in self._followers and bool(self._followers[peer].requested)
-
-
-def _share(per_s: float, peers: int) -> Rate:
-    """Each peer's share of a total rate."""
-    each = per_s / max(peers, 1)
-    return Rate(each, max(each, 1.0))

@@ -147,6 +147,8 @@ class Stations:
         self._turned_away = array("I", [0]) * _REMEMBERED
         self._displaced: list[Peer] = []
         self._expiry_due = inf
+        #: The earliest time that `expire` may have work; may be too early, which saves a search on each frame.
+        self.due = inf
 
     def has_room_for(self, peer: Peer, *, is_listener: bool) -> bool:
         """False if a newcomer's link is full, and it is heard for the first time."""
@@ -179,6 +181,7 @@ class Stations:
         if places.is_full:
             self._displaced.append(places.displaced())
             self.gone(self._displaced[-1])
+            self.due = 0.0
         added = self._known[peer] = _Known(places, version, now, now)
         places.add(peer, added)
         return added
@@ -227,11 +230,8 @@ class Stations:
                 self.gone(peer)
             later = (at for at in due.values() if now < at)
             self._expiry_due = max(min(later, default=inf), now + _EXPIRY_INTERVAL_S)
+        self.due = self._expiry_due
         return silent
-
-    def next_deadline(self) -> float:
-        """The earliest time that a peer may expire; may be too early, which saves a search on each frame."""
-        return 0.0 if self._displaced else self._expiry_due
 
     def peers(self) -> list[Peer]:
         return list(self._known)
@@ -273,6 +273,7 @@ class Stations:
                 return
             # From now on another peer may count as moved.
             self._expiry_due = min(now + MOVED_S, self._expiry_due)
+            self.due = min(self.due, self._expiry_due)
         known.speakers[speaker] = now
 
     def _expiry_times(self) -> dict[Peer, float]:

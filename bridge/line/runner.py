@@ -63,7 +63,8 @@ class Runner:
         self._queue: deque[Task[Any]] = deque()
         self._current: Task[Any] | None = None
         self._awaited: Receive | Await | Pause | StoreEffect | None = None
-        self._deadline = inf
+        #: The time of the next `tick`; infinity while nothing is awaited.
+        self.due = inf
         self._busy = False
 
     @property
@@ -135,25 +136,20 @@ class Runner:
 
     def tick(self, now: float) -> None:
         """End a wait that has timed out."""
+        if now < self.due:
+            return
         task = self._interruptible
         if task is not None and now >= task.ends_at:
             task.ends_at = inf
             self._advance(OutOfTime("the limit has passed"), now)
             return
-        if now < self._deadline:
-            return
-        if isinstance(self._awaited, Receive) and self._link is not None:
+        if task is not None and isinstance(self._awaited, Receive) and self._link is not None:
             # The link may have delayed the request, or received other replies first.
             deadline = self._link.reply_deadline(self._awaited.commands, now)
             if now < deadline:
-                self._deadline = deadline
+                self.due = min(deadline, task.ends_at)
                 return
         self._advance(None, now)
-
-    def next_deadline(self) -> float:
-        """The time of the next `tick`; infinity while nothing is awaited."""
-        task = self._interruptible
-        return self._deadline if task is None else min(self._deadline, task.ends_at)
 
     @property
     def _interruptible(self) -> Task[Any] | None:
@@ -180,7 +176,7 @@ class Runner:
         task = self._current
         conversation = task.conversation
         self._awaited = None
-        self._deadline = inf
+        self.due = inf
         try:
             while True:
                 effect = conversation.throw(answer) if isinstance(answer, LinkLost) else conversation.send(answer)
@@ -208,7 +204,8 @@ class Runner:
                     case Save() | Conclude() | Recall() | FindPending():
                         self._store_effects.append(effect)
                         deadline = now + _STORE_TIMEOUT_S
-                self._awaited, self._deadline = effect, deadline
+                self._awaited = effect
+                self.due = deadline if self._interruptible is None else min(deadline, task.ends_at)
                 return
         except StopIteration as stop:
             self._end(task, stop.value, now)

@@ -87,8 +87,8 @@ class OwnVehicle:
         """Send a new ground station faster heartbeats, so that it connects sooner, and HOME_POSITION soon."""
         self._is_news_wanted = True
         if len(self._newcomers) < PRECEDENCE:  # to a crowd, one a second
-            self._newcomers[peer] = self._now + _NEWCOMER_S
-        self._newcomers_due = min(self._newcomers_due, self._now + _NEWCOMER_INTERVAL_S)
+            self._newcomers[peer] = self._ground.now + _NEWCOMER_S
+        self._newcomers_due = min(self._newcomers_due, self._ground.now + _NEWCOMER_INTERVAL_S)
         self.due = min(self.due, self._newcomers_due)
         self._ground.greet(peer, self._heartbeat())
         self._follow_requests()
@@ -203,7 +203,7 @@ class OwnVehicle:
 
     def _follow_requests(self) -> None:
         """Update the polls now, or shortly after the last update."""
-        if self._now >= self._polls_set_at + _POLLS_INTERVAL_S:
+        if self._ground.now >= self._polls_set_at + _POLLS_INTERVAL_S:
             self._set_polls(self._ground.everyone())
         else:
             self._polls_due = self._polls_set_at + _POLLS_INTERVAL_S
@@ -211,7 +211,7 @@ class OwnVehicle:
 
     def _set_polls(self, everyone: Sequence[Peer]) -> None:
         """Set each poll to the highest rate requested."""
-        self._polls_set_at, self._polls_due = self._now, inf
+        self._polls_set_at, self._polls_due = self._ground.now, inf
         wanted: dict[Msp, float] = {}
         for reading, interval_s in self._also_wanted.items():
             _want(wanted, POLL_FOR.get(reading), interval_s)
