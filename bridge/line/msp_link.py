@@ -208,7 +208,8 @@ class MspLink:
     def receive(self, data: bytes, now: float) -> list[MspFrame]:
         """Take bytes from the port; return the replies, matched with their requests."""
         self._last_byte_at = now
-        return self._take(self.parser.feed(data), now)
+        frames = self.parser.feed(data)
+        return self._take(frames, now) if frames else frames
 
     def tick(self, now: float) -> list[MspFrame]:
         """Time out requests; return replies that were hidden behind a false header."""
@@ -315,10 +316,12 @@ class MspLink:
     def _settle(self, reply: MspFrame, now: float) -> None:
         """Match a reply with its request. Earlier requests will no longer be answered."""
         command = reply.command
-        earlier = next((number for number, sent in enumerate(self._sent) if sent.command == command), None)
-        if earlier is None:
+        for oldest in self._sent:
+            if oldest.command == command:
+                break
+        else:
             return
-        oldest = self._sent[earlier]
+        earlier = self._sent.index(oldest)
         if command == self._risky:
             self._follow_up_at = inf
         if earlier:

@@ -8,7 +8,7 @@ only after its reply has arrived or timed out, so a long round trip slows the fa
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf
 from operator import attrgetter
 
@@ -76,15 +76,12 @@ NAV_POLL = Poll(Msp.NAV_STATUS, request(Msp.NAV_STATUS), 7, 0.5)
 
 @dataclass(slots=True)
 class _Slot:
-    """One poll in the schedule.
-
-    `size`: bytes of its reply, estimated until one was seen. `least_cost`: the bytes that the line could carry while
-    the board serves a request.
-    """
+    """One poll in the schedule. `least_cost`: the bytes that the line could carry while the board serves a request."""
 
     poll: Poll
-    size: int
     least_cost: float
+    request: Send = field(init=False)
+    cost: float = field(init=False)
     wanted_s: float = inf
     interval_s: float = inf
     asked_at: float = -inf
@@ -93,10 +90,13 @@ class _Slot:
     misses: int = 0
     refusals: int = 0
 
-    @property
-    def cost(self) -> float:
-        """The bytes of a request and its reply, or the board's time for them if that is longer."""
-        return max(len(self.poll.frame) + self.size, self.least_cost)
+    def __post_init__(self) -> None:
+        self.expect(frame_size(self.poll.command, self.poll.reply_payload))  # until one was seen
+
+    def expect(self, size: int) -> None:
+        """Set the size of its reply, bytes. Its cost is that of both frames, or the board's time if that is longer."""
+        self.request = Send(self.poll.frame, self.poll.command, size)
+        self.cost = max(len(self.poll.frame) + size, self.least_cost)
 
     def set_interval(self, interval_s: float) -> None:
         self.interval_s = interval_s
@@ -112,7 +112,7 @@ class _Slot:
         """When the link would take it; infinity if the link must change first."""
         if self.is_asked and link.awaits(self.poll.command):
             return inf
-        if self.size <= room:
+        if self.request.reply_size <= room:
             return self.due
         # A late STATUS joins the link's queue, ahead of later mission requests.
         return self.due + self.interval_s if self.poll.command is Msp.STATUS else inf
@@ -146,10 +146,7 @@ class PollSchedule:
         self._budget = bytes_per_s * _LINE_SHARE
         self._quality = 1.0
         self._lost_before = 0
-        self._slots = {
-            poll.command: _Slot(poll, frame_size(poll.command, poll.reply_payload), turn_s * bytes_per_s)
-            for poll in polls
-        }
+        self._slots = {poll.command: _Slot(poll, turn_s * bytes_per_s) for poll in polls}
         self.commands = self._slots.keys()
         self._fit()
 
@@ -186,7 +183,7 @@ class PollSchedule:
                 self._bend()
             slot.asked(now)
             self._free_at = max(self._free_at, now - _BURST_S) + slot.cost / self._budget
-            link.send(Send(slot.poll.frame, slot.poll.command, slot.size), now)
+            link.send(slot.request, now)
             limit = soon
             near = [slot for slot in near if slot.due <= soon]
 
@@ -197,12 +194,13 @@ class PollSchedule:
         is_bent = slot.misses > _TOLERATED_MISSES or self._quality < 1
         slot.misses = 0
         self._quality = min(self._quality + _RECOVERY, 1.0)
-        known = slot.size, slot.refusals
+        size = frame_size(frame.command, len(frame.payload))
         if frame.direction is Direction.ERROR:
             slot.refusals += 1
-        else:
-            slot.size, slot.refusals = frame_size(frame.command, len(frame.payload)), 0
-        if known != (slot.size, slot.refusals):
+            self._fit()
+        elif slot.refusals or size != slot.request.reply_size:
+            slot.refusals = 0
+            slot.expect(size)
             self._fit()
         elif is_bent:
             # The others follow with their own replies.

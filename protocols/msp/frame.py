@@ -35,6 +35,7 @@ class Direction(Enum):
 
 
 _DIRECTIONS = {direction.value: direction for direction in Direction}
+_REQUEST = Direction.REQUEST.value
 _HEADS = tuple(bytes((*_START, version, direction)) for version in (_V1, _V2) for direction in _DIRECTIONS)
 _HEAD_SIZE = 3
 
@@ -127,7 +128,7 @@ def _frame_end(buffer: bytearray, start: int, *, takes_low_v2: bool) -> int | No
         return None if any(head.startswith(cut) for head in _HEADS) else start
     if size < _V1_OVERHEAD - 1:
         return None
-    is_request = buffer[start + 2] == Direction.REQUEST.value
+    is_request = buffer[start + 2] == _REQUEST
     if buffer[start + 1] == _V1:
         if buffer[start + 3] < _JUMBO or is_request:
             return start + _V1_OVERHEAD + buffer[start + 3]
@@ -146,10 +147,11 @@ def _frame_end(buffer: bytearray, start: int, *, takes_low_v2: bool) -> int | No
 
 def _decode(frame: bytearray) -> MspFrame | None:
     """Decode a complete frame; None if its checksum is wrong."""
-    direction, body = _DIRECTIONS[frame[2]], frame[3:-1]
+    direction = _DIRECTIONS[frame[2]]
     if frame[1] == _V1:
-        is_jumbo = frame[3] == _JUMBO and direction is not Direction.REQUEST
-        return None if reduce(xor, frame[3:]) else MspFrame(direction, frame[4], bytes(body[4 if is_jumbo else 2 :]))
+        payload_at = 7 if frame[3] == _JUMBO and direction is not Direction.REQUEST else 5
+        return None if reduce(xor, frame[3:]) else MspFrame(direction, frame[4], bytes(frame[payload_at:-1]))
+    body = frame[3:-1]
     if _crc8(body) != frame[-1]:
         return None
     return MspFrame(direction, int.from_bytes(body[1:3], "little"), bytes(body[_V2_HEADER.size :]), is_v2=True)

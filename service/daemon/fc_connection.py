@@ -49,7 +49,7 @@ class FcConnection:
         if isinstance(self._address, AutoFc):
             self._finder = PortFinder(host, settings.state_dir)
         open_device = device_opener(self._address) if self._finder is None else self._finder.open
-        self._port = FcPort(open_device, self._opened, self._received, self._closed)
+        self._port = FcPort(open_device, self._opened, self._received, self._closed, traffic)
         if self._finder is not None:
             self._finder.move_on = self._port.move_on
         self._speed: int | None = None
@@ -92,8 +92,10 @@ class FcConnection:
 
     def carry_out(self) -> None:
         bridge = self._bridge
-        self._speed = bridge.session.state.speed
-        self._port.set_speed(self._speed)
+        speed = bridge.session.state.speed
+        if speed != self._speed:
+            self._speed = speed
+            self._port.set_speed(speed)
         self._port.may_gather = bridge.is_passing_through
         if output := bridge.take_fc_output():
             data = b"".join(output)
@@ -121,8 +123,6 @@ class FcConnection:
     def _received(self, data: bytes) -> None:
         if self.capture is not None:
             self.capture.note(UartAction.READ, self._speed, data)
-        self._traffic.pieces_received += 1
-        self._traffic.bytes_received += len(data)
         bridge = self._bridge
         if self._finder is not None:
             self._finder.received(data)

@@ -11,6 +11,7 @@ import serial
 import structlog
 
 from service.links.fc_device import DEVICE_ERRORS, Device, PortError
+from service.links.traffic import Traffic
 
 #: The reason given to `on_close` at the end of the daemon.
 STOPPED = "the daemon stops"
@@ -31,7 +32,7 @@ _log = structlog.get_logger()
 class FcPort:
     """Keeps the port open. `open_device` raises PortError if it cannot be opened now.
 
-    `on_open`, `on_data` and `on_close` are called from the event loop.
+    `on_open`, `on_data` and `on_close` are called from the event loop. Reads are counted in `traffic`.
 
     The first failure to open is logged as a warning; a repetition is not logged again.
     """
@@ -42,11 +43,13 @@ class FcPort:
         on_open: Callable[[], None],
         on_data: Callable[[bytes], None],
         on_close: Callable[[str], None],
+        traffic: Traffic,
     ) -> None:
         self._open = open_device
         self._on_open = on_open
         self._on_data = on_data
         self._on_close = on_close
+        self._traffic = traffic
         self._loop = asyncio.get_running_loop()
         self._device: Device | None = None
         self._descriptor = -1
@@ -62,7 +65,8 @@ class FcPort:
         self.may_gather = False
         self._gathering: asyncio.TimerHandle | None = None
         self._window_began = 0.0
-        self._reads = self._bytes = 0
+        self._window_bytes = 0  # received before it
+        self._next_look = _MANY_READS
         self._gather_above = 0.0  # bytes in a window
 
     async def run(self) -> None:
@@ -136,14 +140,12 @@ class FcPort:
         data = self._read()
         if data:
             self._on_data(data)
-        self._reads += 1
-        self._bytes += len(data)
-        if self._reads >= _MANY_READS:
+        if self._traffic.pieces_received >= self._next_look:
             # Time is looked at only now: at each read it would cost too much.
             now = self._loop.time()
             if self.may_gather and self._device is not None and now < self._window_began + _RATE_WINDOW_S:
                 self._loop.remove_reader(self._descriptor)
-                self._gather_above = 0.75 * self._bytes
+                self._gather_above = 0.75 * (self._traffic.bytes_received - self._window_bytes)
                 self._gathering = self._loop.call_later(_GATHER_S, self._gather)
             self._begin_window(now)
 
@@ -153,10 +155,9 @@ class FcPort:
         if self._device is None:
             return
         self._gathering = self._loop.call_later(_GATHER_S, self._gather)
-        self._bytes += len(data)
         now = self._loop.time()
         if now >= self._window_began + _RATE_WINDOW_S:
-            if self._bytes < self._gather_above or not self.may_gather:
+            if self._traffic.bytes_received - self._window_bytes < self._gather_above or not self.may_gather:
                 self._stop_gathering()
                 self._loop.add_reader(self._descriptor, self._readable)
             self._begin_window(now)
@@ -165,7 +166,8 @@ class FcPort:
 
     def _begin_window(self, now: float) -> None:
         self._window_began = now
-        self._reads = self._bytes = 0
+        self._window_bytes = self._traffic.bytes_received
+        self._next_look = self._traffic.pieces_received + _MANY_READS
 
     def _stop_gathering(self) -> None:
         if self._gathering is not None:
@@ -182,7 +184,10 @@ class FcPort:
             return b""
         if not data:
             self._shut("the other end closed the connection")
-        elif self._is_tcp:
+            return data
+        self._traffic.pieces_received += 1
+        self._traffic.bytes_received += len(data)
+        if self._is_tcp:
             self._acknowledge()
         return data
 

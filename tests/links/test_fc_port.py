@@ -18,6 +18,7 @@ from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkSplitter
 from service.links.fc_device import device_opener
 from service.links.fc_port import FcPort
+from service.links.traffic import Traffic
 from service.settings.addresses import SerialFc
 from tests.support.programs import TIMEOUT_S, until_async
 
@@ -45,7 +46,7 @@ class Line:
 
     def start(self) -> FcPort:
         self.port = FcPort(
-            device_opener(SerialFc(str(self.path), None)), self._on_open, self._on_data, self.lost.append
+            device_opener(SerialFc(str(self.path), None)), self._on_open, self._on_data, self.lost.append, Traffic()
         )
         self._task = asyncio.get_running_loop().create_task(self.port.run())
         return self.port
@@ -271,7 +272,7 @@ async def test_after_each_loss_there_is_a_pause(monkeypatch: pytest.MonkeyPatch)
         far.close()
         return near
 
-    port = FcPort(open_device, lambda: None, lambda _data: None, lost.append)
+    port = FcPort(open_device, lambda: None, lambda _data: None, lost.append, Traffic())
     running = asyncio.get_running_loop().create_task(port.run())
     await until_async(lambda: lost, "the loss")
     for _ in range(50):

@@ -9,6 +9,7 @@ import termios
 
 from service.links.fc_device import device_opener
 from service.links.fc_port import FcPort
+from service.links.traffic import Traffic
 from service.settings.addresses import TcpFc
 from tests.support.programs import TIMEOUT_S
 
@@ -29,6 +30,7 @@ async def test_received_bytes_are_acknowledged_at_once() -> None:
             lambda: None,
             lambda data: heard.put_nowait(unacknowledged(board)),
             lambda _: None,
+            Traffic(),
         )
         task = loop.create_task(port.run())
         board, _ = await asyncio.wait_for(loop.sock_accept(listener), TIMEOUT_S)

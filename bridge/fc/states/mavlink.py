@@ -94,9 +94,9 @@ class Mavlink(State):
         if not frames:
             return
         self._heard_at = now
-        was_armed = self.port.vehicle.armed
+        was_armed = self._is_harakiri and self.port.vehicle.armed
         self.telemetry.take(frames, now)
-        if self._is_harakiri and was_armed and not self.port.vehicle.armed:
+        if was_armed and not self.port.vehicle.armed:
             self._probe_due = now
         self.port.on_mavlink(frames)
         if self.port.runner.is_busy:

@@ -108,7 +108,8 @@ class MspLine(State):
 
     def _silence(self, now: float) -> Event | None:
         """Leave MSP when it is no longer answered: for MAVLink if that is heard instead, else to search."""
-        if now < self._silent_since() + self._silence_s:
+        silent_s = now - self._silent_since()
+        if silent_s < _FOREIGN_SILENCE_S or silent_s < self._silence_s:
             return None
         heard = self._foreign.mavlink
         if heard is not None:
@@ -206,13 +207,13 @@ class _ForeignBytes:
 
     def __init__(self, link: MspLink) -> None:
         self.mavlink: MavlinkFrame | None = None
-        self._link = link
+        self._parser = link.parser
         self._skipped_before = link.parser.skipped_bytes
         self._splitter = MavlinkSplitter()
 
     @property
     def size(self) -> int:
-        return self._link.parser.skipped_bytes - self._skipped_before
+        return self._parser.skipped_bytes - self._skipped_before
 
     def note(self, data: bytes) -> None:
         for frame in self._splitter.feed(data) if self.size else ():
