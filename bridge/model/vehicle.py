@@ -43,7 +43,7 @@ class Fix(IntEnum):
     THREE_D = 3
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)  # not frozen, as in protocols.mavlink.frame
 class Reading:
     """Values that arrive together. heard_at: monotonic seconds."""
 
@@ -51,7 +51,7 @@ class Reading:
     source: Source
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Orientation(Reading):
     """Right wing down and nose up are positive; heading 0 up to 360. rates_deg_s: roll, pitch, yaw.
 
@@ -66,7 +66,7 @@ class Orientation(Reading):
     rates_deg_s: tuple[float, float, float] | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class GpsFix(Reading):
     """The GPS receiver's report. The course is the receiver's own, or follows from successive positions."""
 
@@ -77,7 +77,7 @@ class GpsFix(Reading):
     hdop: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class GlobalPosition(Reading):
     """Heard only while there is a fix. Degrees * 1e7, metres above mean sea level, m/s."""
 
@@ -88,7 +88,7 @@ class GlobalPosition(Reading):
     east_m_s: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Height(Reading):
     """Height above the launch point and climb rate, as the flight controller estimates them."""
 
@@ -96,7 +96,7 @@ class Height(Reading):
     climb_m_s: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Power(Reading):
     """The battery. A flight controller without a sensor reports 0 V, which is unknown here.
 
@@ -110,14 +110,14 @@ class Power(Reading):
     remaining_percent: int | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Sticks(Reading):
     """RC pulse widths in MAVLink's order: roll, pitch, throttle, yaw, aux 1.."""
 
     channels_us: tuple[int, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Switches(Reading):
     """The aux channel positions that turn on each box, from MSP_BOX; `boxes`: their names."""
 
@@ -125,14 +125,14 @@ class Switches(Reading):
     activation: tuple[int, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Signal(Reading):
     """The RC receiver's signal strength, 0..1."""
 
     strength: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class FlightState(Reading):
     """armed: None if the flight controller cannot tell. mode: a FlightMode, or another autopilot's mode number.
 
@@ -144,7 +144,7 @@ class FlightState(Reading):
     is_failsafe: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Health(Reading):
     """The flight controller itself. sensors: fitted and answering. i2c_errors: sensor reads that failed since boot.
 
@@ -157,28 +157,28 @@ class Health(Reading):
     cpu_load: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Readiness(Reading):
     """The reasons that prevent arming, as text; () if there are none. Unknown on firmware that does not report them."""
 
     blockers: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Airspeed(Reading):
     """From flight controllers with a pitot tube."""
 
     airspeed_m_s: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Motors(Reading):
     """Motor outputs, microseconds."""
 
     outputs_us: tuple[int, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Pressure(Reading):
     """The barometer."""
 
@@ -186,7 +186,7 @@ class Pressure(Reading):
     temperature_c: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class ImuSample(Reading):
     """Accelerometer, gyro and compass in the firmware's own units: x, y, z each."""
 
@@ -195,14 +195,14 @@ class ImuSample(Reading):
     mag: tuple[int, int, int]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class MissionLeg(Reading):
     """Progress through the mission, from flight controllers that report it."""
 
     status: NavStatus
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class GpsTime(Reading):
     """UTC by the flight controller's GPS, seconds since 1970."""
 

@@ -129,7 +129,7 @@ class FcConnection:
         bridge.fc_received(data, self._loop.time())
         if bridge.is_passing_through:
             self._forward()
-        else:
+        elif not bridge.session.state.is_mid_frame:
             self._flush()
 
     def _closed(self, why: str) -> None:

@@ -118,6 +118,8 @@ class State(ABC):
     controller: FlightController | None = None
     #: While MSP is spoken.
     link: MspLink | None = None
+    #: True if the last bytes ended inside a frame and changed nothing: slow lines deliver a reply in pieces.
+    is_mid_frame: bool = False
 
     def __init__(self, port: Port, event: Event, now: float) -> None:
         self.port = port

@@ -55,6 +55,7 @@ class MspLine(State):
         frames = self.link.receive(data, now)
         for frame in frames:
             self.take_frame(frame, now)
+        self.is_mid_frame = not (frames or self._foreign.size)
         if frames:
             if self._foreign.size:
                 self._foreign = _ForeignBytes(self.link)
