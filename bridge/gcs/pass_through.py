@@ -130,10 +130,12 @@ def in_datagrams(frames: Sequence[bytes]) -> list[bytes]:
     joined = b"".join(frames)
     if len(joined) <= MAX_DATAGRAM_SIZE:
         return [joined]
-    datagrams: list[bytes] = []
+    datagrams: list[list[bytes]] = []
+    size = MAX_DATAGRAM_SIZE
     for frame in frames:
-        if datagrams and len(datagrams[-1]) + len(frame) <= MAX_DATAGRAM_SIZE:
-            datagrams[-1] += frame
-        else:
-            datagrams.append(frame)
-    return datagrams
+        size += len(frame)
+        if size > MAX_DATAGRAM_SIZE:
+            datagrams.append([])
+            size = len(frame)
+        datagrams[-1].append(frame)
+    return [b"".join(datagram) for datagram in datagrams]

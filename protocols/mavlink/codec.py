@@ -62,7 +62,7 @@ def pack(message: Message) -> Packed:
     message._pack = _payload_alone  # noqa: SLF001
     payload: bytes = message.pack(None)
     del message._pack  # noqa: SLF001
-    msgid: int = message.get_msgId()
+    msgid: int = type(message).id
     return Packed(msgid, payload[: MESSAGE_FORMATS[msgid].base_size], payload.rstrip(b"\0") or b"\0")
 
 

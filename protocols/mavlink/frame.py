@@ -159,7 +159,8 @@ class MavlinkSplitter:
                     break
             if crc_extra is not None:
                 if end <= size:
-                    if mcrf4xx(data[start + 1 : crc_at] + crc_extra) == data[crc_at] | data[crc_at + 1] << 8:
+                    # The CRC of bytes that end in their own CRC is 0.
+                    if not mcrf4xx(data[start + 1 : crc_at] + crc_extra + data[crc_at : crc_at + _CRC_SIZE]):
                         frames.append(MavlinkFrame(data[start:end]))
                         start = end
                         if end > crc_at + _CRC_SIZE:

@@ -165,10 +165,10 @@ class Daemon:
     def flush(self) -> None:
         """Carry out the outputs that the bridge has after an input."""
         bridge = self.bridge
+        self._forward()  # first, because a reply is shown at once
         self.fc.carry_out()
         for effect in bridge.runner.take_store_effects():
             self._carry_out(effect)
-        self._forward()
         self._deadline = bridge.next_deadline()
         if self._timer is not None:
             if 0 <= self._deadline - self._timer.when() < _TOO_EARLY_S:
