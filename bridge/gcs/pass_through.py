@@ -40,14 +40,9 @@ class PassThrough:
 
     def from_autopilot(self, frames: Sequence[MavlinkFrame]) -> None:
         """Send the autopilot's frames on; those that arrived together share datagrams unless one has a target."""
-        raws: list[bytes] = []
-        for frame in frames:
-            raw = frame.raw
-            kind = raw[5:10] if raw[0] == MAGIC_V2 else raw[3:6]
-            if kind not in self._for_all and not self._is_for_all(kind, frame):
-                break
-            raws.append(raw)
-        else:
+        raws = [frame.raw for frame in frames]
+        kinds = [raw[5:10] if raw[0] == MAGIC_V2 else raw[3:6] for raw in raws]
+        if self._for_all.issuperset(kinds) or all(map(self._is_for_all, kinds, frames)):
             self._send(raws)
             return
         for frame in frames:
@@ -130,12 +125,11 @@ def in_datagrams(frames: Sequence[bytes]) -> list[bytes]:
     joined = b"".join(frames)
     if len(joined) <= MAX_DATAGRAM_SIZE:
         return [joined]
-    datagrams: list[list[bytes]] = []
-    size = MAX_DATAGRAM_SIZE
+    datagrams: list[bytes] = []
+    start = end = 0
     for frame in frames:
-        size += len(frame)
-        if size > MAX_DATAGRAM_SIZE:
-            datagrams.append([])
-            size = len(frame)
-        datagrams[-1].append(frame)
-    return [b"".join(datagram) for datagram in datagrams]
+        if end + len(frame) > start + MAX_DATAGRAM_SIZE:
+            datagrams.append(joined[start:end])
+            start = end
+        end += len(frame)
+    return [*datagrams, joined[start:]]
