@@ -109,8 +109,8 @@ class MspLine(State):
 
     def _silence(self, now: float) -> Event | None:
         """Leave MSP when it is no longer answered: for MAVLink if that is heard instead, else to search."""
-        silent_s = now - self._silent_since()
-        if silent_s < _FOREIGN_SILENCE_S or silent_s < self._silence_s:
+        since = self._silent_since()
+        if now < since + _FOREIGN_SILENCE_S or now < since + self._silence_s:
             return None
         heard = self._foreign.mavlink
         if heard is not None:
