@@ -51,13 +51,13 @@ class Task(Generic[T]):
 class Runner:
     """Runs conversations in the order they were started. Time is passed in.
 
-    Effects for the store are kept for `take_store_effects`; the reply comes back through `store_answered`.
+    The service takes the `store_effects`, and answers each with `store_answered`.
     """
 
     def __init__(self) -> None:
         #: The commands whose replies the running conversation waits for.
         self.awaited_replies: frozenset[int] = frozenset()
-        self._store_effects: list[StoreEffect] = []
+        self.store_effects: deque[StoreEffect] = deque()
         self._link: MspLink | None = None
         self._transmit: Callable[[Packed], bool] | None = None
         self._queue: deque[Task[Any]] = deque()
@@ -123,11 +123,6 @@ class Runner:
         """Pass on a MAVLink frame if the running conversation waits for it."""
         if isinstance(self._awaited, Await) and frame.msgid in self._awaited.msgids:
             self._advance(frame, now)
-
-    def take_store_effects(self) -> list[StoreEffect]:
-        """The pending store operations; the service answers each with `store_answered`."""
-        effects, self._store_effects = self._store_effects, []
-        return effects
 
     def store_answered(self, effect: StoreEffect, answer: object, now: float) -> None:
         """Pass on the store's reply to an effect; a reply after its timeout is ignored."""
@@ -202,7 +197,7 @@ class Runner:
                     case Pause(seconds):
                         deadline = now + seconds
                     case Save() | Conclude() | Recall() | FindPending():
-                        self._store_effects.append(effect)
+                        self.store_effects.append(effect)
                         deadline = now + _STORE_TIMEOUT_S
                 self._awaited = effect
                 self.due = deadline if self._interruptible is None else min(deadline, task.ends_at)

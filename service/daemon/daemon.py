@@ -167,8 +167,8 @@ class Daemon:
         bridge = self.bridge
         self._forward()  # first, because a reply is shown at once
         self.fc.carry_out()
-        for effect in bridge.runner.take_store_effects():
-            self._carry_out(effect)
+        while bridge.runner.store_effects:
+            self._carry_out(bridge.runner.store_effects.popleft())
         self._deadline = bridge.next_deadline()
         if self._timer is not None:
             if 0 <= self._deadline - self._timer.when() < _TOO_EARLY_S:

@@ -111,7 +111,7 @@ class Line:
         self.now = max(self.now, self._up_at)
 
     def _step(self) -> None:
-        assert not self._runner.take_store_effects()
+        assert not self._runner.store_effects
         due = [self._link.next_deadline(), self._runner.due, *(at for at, *_ in self._wire[:1])]
         self.now = max(self.now, min(due))
         self._tell_the_board_the_time()

@@ -286,8 +286,8 @@ class World:
             station = self.stations.get(peer)
             if station is not None:
                 station.carry(frame)
-        for effect in self.bridge.runner.take_store_effects():
-            self._carry_out(effect)
+        while self.bridge.runner.store_effects:
+            self._carry_out(self.bridge.runner.store_effects.popleft())
 
     def _write(self, data: bytes) -> None:
         assert self._plugged
