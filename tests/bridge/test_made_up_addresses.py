@@ -12,6 +12,7 @@ import pytest
 from bridge.gcs.guard import LinkAccess
 from bridge.gcs.station import Peer, Station
 from bridge.gcs.stations import MAX_PEERS
+from bridge.vehicle import mission_upload
 from bridge.vehicle.upload_answers import UploadAnswers
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
@@ -214,3 +215,21 @@ def test_made_up_ids_do_not_cancel_a_pilot_on_a_slow_radio() -> None:
         world.after(number / 20, announce)
     assert Upload(pilot, waypoints(3), repeat_s=1.5).run(9) is MissionResult.ACCEPTED
     assert world.stored == records_of(waypoints(3))
+
+
+def test_of_too_many_uploads_one_without_items_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    """None of the stations has precedence, and each has announced one list."""
+    monkeypatch.setattr(mission_upload, "_MOST_UPLOADS", 64)
+    world = ready_world()
+    for number in range(16):
+        world.bridge.ground.stations.heard(Station(Peer("udp", f"first {number}"), 255, 190), 2, world.now)
+    stations = [GroundStation(world, f"host {number}", sysid=number + 1) for number in range(80)]
+    for station in stations:
+        station.send(count_message(3))
+        world.run(0.05)
+        if station is stations[8]:
+            for early in stations[:8]:
+                early.send(item_message(0, waypoints(3)[0]))
+    ended = [station for station in stations if station.said("MISSION_ACK")]
+    assert len(ended) == len(stations) - 64
+    assert not set(ended) & set(stations[:8])

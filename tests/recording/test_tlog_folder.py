@@ -26,10 +26,10 @@ def names(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-def fill(folder: TlogFolder, began: datetime, records: int) -> None:
+def fill(folder: TlogFolder, began: datetime, records: int, *, is_flight: bool = False) -> None:
     """Write a file of `records` records."""
     for _ in range(records):
-        folder.write(record(began), 0.0)
+        folder.write(record(began), 0.0, is_flight=is_flight)
     folder.close()
 
 
@@ -67,6 +67,17 @@ def test_the_oldest_files_are_deleted_to_keep_the_total_size(tmp_path: Path) -> 
             assert sum(path.stat().st_size for path in tmp_path.iterdir()) <= limits.total_size
         folder.close()
     assert names(tmp_path) == [f"2026-11-21 {hour}-00-00.tlog" for hour in range(19, 24)]
+
+
+def test_flights_are_deleted_last_unless_they_are_too_old(tmp_path: Path) -> None:
+    folder = TlogFolder(tmp_path, TlogLimits(file_size=1000, total_size=3000, days=30))
+    fill(folder, NOON, 5, is_flight=True)
+    for minute in range(1, 9):
+        fill(folder, NOON + timedelta(minutes=minute), 10)
+    assert names(tmp_path)[0] == "2026-11-21 12-00-00 flight.tlog"
+    assert len(names(tmp_path)) == 3
+    fill(TlogFolder(tmp_path, TlogLimits(days=30)), NOON + timedelta(days=30, minutes=1), 1)
+    assert not any("flight" in name for name in names(tmp_path))
 
 
 def test_files_that_are_too_old_are_deleted(tmp_path: Path) -> None:
