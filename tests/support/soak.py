@@ -11,7 +11,6 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 
 from protocols.mavlink.codec import FrameWriter, pack
@@ -365,7 +364,7 @@ def _near(found: list[str], sent: list[str]) -> bool:
     """True if the records are equal; positions written as single-precision floats may differ by 0.4 m."""
     pairs = list(zip(*(unpack_records(bytes.fromhex("".join(records))) for records in (found, sent)), strict=False))
     return len(found) == len(sent) and all(
-        replace(there, lat_e7=wanted.lat_e7, lon_e7=wanted.lon_e7) == wanted
+        there._replace(lat_e7=wanted.lat_e7, lon_e7=wanted.lon_e7) == wanted
         and max(abs(there.lat_e7 - wanted.lat_e7), abs(there.lon_e7 - wanted.lon_e7)) <= _ROUNDING_E7
         for there, wanted in pairs
     )
