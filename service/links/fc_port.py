@@ -12,6 +12,7 @@ import structlog
 
 from service.links.fc_device import DEVICE_ERRORS, Device, PortError
 from service.links.traffic import Traffic
+from service.machine.os_error import reason
 
 #: The reason given to `on_close` at the end of the daemon.
 STOPPED = "the daemon stops"
@@ -127,7 +128,7 @@ class FcPort:
         except BlockingIOError:
             return 0
         except OSError as error:
-            self._shut(error.strerror or str(error))
+            self._shut(reason(error))
             return len(data)
 
     def _writable(self) -> None:
@@ -180,7 +181,7 @@ class FcPort:
         except BlockingIOError:
             return b""
         except OSError as error:
-            self._shut(error.strerror or str(error))
+            self._shut(reason(error))
             return b""
         if not data:
             self._shut("the other end closed the connection")

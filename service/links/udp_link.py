@@ -10,6 +10,7 @@ import structlog
 from bridge.gcs.station import Peer
 from service.links.gcs_events import GcsEvents
 from service.machine.log_setup import warn_once
+from service.machine.os_error import reason
 from service.machine.threads import BackgroundThread
 from service.settings.addresses import UNKNOWN_HOST_HINT, GcsAddress, family_of
 
@@ -53,7 +54,7 @@ class UdpLink:
             pass
         except OSError as error:
             # While Wi-Fi is down, every datagram fails.
-            warn_once(self._warned, "gcs.send_failed", peer=str(peer), why=error.strerror or str(error))
+            warn_once(self._warned, "gcs.send_failed", peer=str(peer), why=reason(error))
 
     def close(self) -> None:
         if self._lookup is not None:
@@ -88,7 +89,7 @@ class UdpLink:
             try:
                 found = await resolver.ask(look_up)
             except OSError as error:
-                why = f"{error.strerror or error}; {UNKNOWN_HOST_HINT}"
+                why = f"{reason(error)}; {UNKNOWN_HOST_HINT}"
                 warn_once(self._warned, "gcs.name_unknown", link=self.name, why=why)
             else:
                 peers = [Peer(self.name, entry[4]) for entry in found]
