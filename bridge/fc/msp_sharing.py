@@ -55,7 +55,7 @@ class MspSharing:
 
     def request(self, frame: MspFrame, answer: Callable[[MspFrame], None], now: float, *, may_write: bool) -> str:
         """Forward a request; `answer` gets the reply, or is not called if the flight controller does not reply."""
-        why = self._refusal(frame, may_write=may_write)
+        why = self._refusal(frame, may_write=may_write) or self._occupied()
         if why:
             return why
         self._pending += 1
@@ -65,8 +65,18 @@ class MspSharing:
             if isinstance(reply, MspFrame):
                 answer(reply)
 
-        self._runner.start(_carry(frame), done, now)
+        self._runner.start(self._carry(frame, may_write=may_write), done, now)
         return ""
+
+    def _carry(self, frame: MspFrame, *, may_write: bool) -> Conversation[MspFrame | None]:
+        if self._refusal(frame, may_write=may_write):
+            # While it waited for its turn, the craft was armed, or the link lost.
+            return refused(frame)
+        # Low commands as v1, which every flight controller speaks; the client gets its own version back.
+        size = MAX_REPLY if frame.command == _DATAFLASH_READ else _REPLY_PAYLOAD
+        yield from send(request(frame.command, frame.payload), frame.command, size, exclusive=is_change(frame))
+        reply = yield from receive(frame.command)
+        return None if reply is None else replace(reply, is_v2=frame.is_v2)
 
     def _refusal(self, frame: MspFrame, *, may_write: bool) -> str:
         state = self._session.state
@@ -75,17 +85,18 @@ class MspSharing:
             return "no flight controller speaks MSP now"
         if self._session.vehicle.armed is not False:
             return "the craft is armed" if self._session.vehicle.armed else "not yet known to be disarmed"
-        if self._pending >= _MAX_PENDING:
-            return "too many requests at once"
         if frame.command in _NEVER:
             return f"{_NEVER[frame.command]} is never forwarded"
         if not may_write and is_change(frame):
             return "it changes something: set write = true in its [[share]] to allow that"
         if not (link.any_byte or is_clean(request(frame.command, frame.payload))):
             return "its bytes could open this flight controller's command line, or reset it"
-        if self._runner.needs_line and not self._pending:
-            return "a mission transfer is running"
         return ""
+
+    def _occupied(self) -> str:
+        if self._pending >= _MAX_PENDING:
+            return "too many requests at once"
+        return "a mission transfer is running" if self._runner.needs_line and not self._pending else ""
 
 
 def is_change(frame: MspFrame) -> bool:
@@ -93,14 +104,6 @@ def is_change(frame: MspFrame) -> bool:
     if frame.payload:
         return frame.command not in _QUESTIONS_WITH_PAYLOAD
     return frame.command in _ACTIONS
-
-
-def _carry(frame: MspFrame) -> Conversation[MspFrame | None]:
-    # Low commands as v1, which every flight controller speaks; the client gets its own version back.
-    size = MAX_REPLY if frame.command == _DATAFLASH_READ else _REPLY_PAYLOAD
-    yield from send(request(frame.command, frame.payload), frame.command, size, exclusive=is_change(frame))
-    reply = yield from receive(frame.command)
-    return None if reply is None else replace(reply, is_v2=frame.is_v2)
 
 
 def refused(frame: MspFrame) -> MspFrame:

@@ -282,9 +282,9 @@ class MspLink:
         timeout_s = EXCLUSIVE_TIMEOUT_S if message.exclusive else self._timeout_s()
         reply_time = (self.outstanding_bytes + message.reply_size) * self.byte_s + len(self._sent) * self.turn_s
         deadline = self._line_free_at + reply_time + timeout_s
-        self._sent.append(
-            _Request(message.command, message.reply_size, self._line_free_at, deadline, message.exclusive)
-        )
+        # A longer reply, from a board with a larger ring, must not stop the question that shows that it was lost.
+        size = min(message.reply_size, self._ring_size - _QUESTION.reply_size)
+        self._sent.append(_Request(message.command, size, self._line_free_at, deadline, message.exclusive))
 
     def _resync(self, now: float) -> None:
         if any(sent.exclusive and sent.reply is _Reply.AWAITED for sent in self._sent):

@@ -17,6 +17,7 @@ RUN_LENGTH = 3
 
 _DEL = b"\x7f"
 _UNPRINTABLE = bytes(byte for byte in range(256) if not ord(" ") <= byte <= ord("~"))
+_HEADER = b"$M<"
 #: Exactly two requests: noise cannot produce that.
 _EVIDENCE = 10
 _FRAMES_KEPT = 64
@@ -49,5 +50,6 @@ class EchoWatch:
         self._heard = (self._heard + data)[-_EVIDENCE:]
 
     def is_echo(self, size: int = _EVIDENCE) -> bool:
-        """True if the last `size` bytes are our own requests."""
-        return len(self._heard) >= size and self._heard[-size:] in _printable(b"".join(self.sent))
+        """True if the last `size` bytes are our own requests, with a header: a reply may quote a request's text."""
+        tail = self._heard[-size:]
+        return _HEADER in tail and tail in _printable(b"".join(self.sent))

@@ -8,6 +8,7 @@ from tests.support.fake_inav import FakeInav
 from tests.support.world import World
 
 BOXNAMES, DATAFLASH_READ, SERVO_MIXER, SAFEHOME, SET_SAFEHOME = 116, 71, 0x2020, 0x2038, 0x2039
+SETTING_INFO, SET_PID = 0x1007, 202
 
 
 @pytest.mark.parametrize(("command", "size"), [(BOXNAMES, 700), (SERVO_MIXER, 700), (DATAFLASH_READ, MAX_REPLY)])
@@ -32,3 +33,46 @@ def test_a_request_with_a_payload_may_only_read(command: int, is_refused: bool) 
     world.wait_ready(5)
     frame = MspFrame(Direction.REQUEST, command, b"\0")
     assert bool(world.bridge.sharing.request(frame, lambda _: None, world.now, may_write=False)) == is_refused
+
+
+def test_a_lost_reply_does_not_lose_the_link() -> None:
+    board = FakeInav(drop=lambda frame: "reply" if frame.command == BOXNAMES else "")
+    world = World(speeds=(115200,), peer=board)
+    world.wait_ready(5)
+    for _ in range(5):
+        request = MspFrame(Direction.REQUEST, BOXNAMES)
+        assert world.bridge.sharing.request(request, lambda _: None, world.now, may_write=False) == ""
+        world.run(1.0)
+    assert world.events("fc.lost") == []
+
+
+def test_a_reply_with_the_text_of_its_request_is_not_an_echo() -> None:
+    """SETTING_INFO's reply ends in the name that was asked for, and the port may read it in two parts."""
+    board = FakeInav(drop=lambda frame: "request" if frame.command == SETTING_INFO else "")
+    world = World(speeds=(115200,), peer=board)
+    world.wait_ready(5)
+    found: list[MspFrame] = []
+    name = b"nav_wp_multi_mission_index\0"
+    world.bridge.sharing.request(
+        MspFrame(Direction.REQUEST, SETTING_INFO, name, is_v2=True), found.append, world.now, may_write=False
+    )
+    world.hear(b"")  # sends it
+    world.run(0.02)
+    reply = MspFrame(Direction.REPLY, SETTING_INFO, bytes(12) + name).encode()
+    world.hear(reply[:-6])
+    world.hear(reply[-6:])
+    assert [frame.payload for frame in found] == [bytes(12) + name]
+    assert world.is_found
+
+
+def test_a_waiting_request_is_refused_once_the_craft_is_armed() -> None:
+    board = FakeInav(drop=lambda frame: "request" if frame.command == SERVO_MIXER else "")
+    world = World(speeds=(115200,), peer=board)
+    world.wait_ready(5)
+    found: list[MspFrame] = []
+    for frame in (*[MspFrame(Direction.REQUEST, SERVO_MIXER)] * 10, MspFrame(Direction.REQUEST, SET_PID, b"\1")):
+        assert world.bridge.sharing.request(frame, found.append, world.now, may_write=True) == ""
+    board.armed = True
+    world.run(10)
+    assert SET_PID not in board.commands
+    assert found[-1] == MspFrame(Direction.ERROR, SET_PID)
