@@ -2,7 +2,6 @@
 """`naze-bridge fleet` as used by a person and by a script: three daemons behind a router."""
 
 import json
-import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -15,6 +14,7 @@ import zenoh
 from protocols.mission_file import read_mission_file
 from protocols.mission_item import Command
 from service.cli.fleet.session import open_session
+from tests.support.doc_pages import commands
 from tests.support.fleet_bench import Fleet
 from tests.support.plan import HOME, PlanRow, judge, plain_plan, plan_file, records_of, waypoint
 from tests.support.programs import run_naze_bridge, until
@@ -181,10 +181,7 @@ def test_the_example_programs_work(fleet: Fleet, tmp_path: Path) -> None:
 
 
 def test_the_one_liner_in_the_docs_works(fleet: Fleet, tmp_path: Path) -> None:
-    page = (EXAMPLES.parent / "docs" / "fleet.md").read_text()
-    (line,) = [line.strip() for line in page.splitlines() if line.startswith("    python -u -c")]
-    program, flag, option, code = shlex.split(line)
-    assert (program, flag, option) == ("python", "-u", "-c")
+    (code,) = (command.words[3] for command in commands() if command.words[:3] == ("python", "-u", "-c"))
     output = tmp_path / "samples"
     with output.open("w") as log:
         command = [sys.executable, "-u", "-c", code.replace("tcp/localhost:7447", fleet.router.endpoint)]

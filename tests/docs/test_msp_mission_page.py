@@ -9,7 +9,7 @@ from protocols.msp import mission as ext
 from protocols.msp.mission import WpCommand, WpRecord
 from tests.support.naze_bench import Bench
 
-PAGE = Path(__file__).parent.parent / "docs" / "msp-mission.md"
+PAGE = Path(__file__).parents[2] / "docs" / "msp-mission.md"
 HOME = WpRecord(473977420, 85455940, 2, 0, 0, 2, 0, WpCommand.WAYPOINT)
 # A height of 13 m with a brake: bytes 0D 00 00 00 01, a hazard run for Harakiri in plain form.
 WAYPOINT = WpRecord(473980000, 85460000, 13, 0, 1, 2, 0, WpCommand.WAYPOINT)

@@ -10,7 +10,7 @@ import pytest
 from service.zenoh_link.compact import SCHEMAS as FOLDER
 from service.zenoh_link.keys import KEYS, VERSION, ZenohKey
 
-PAGE = (Path(__file__).parents[1] / "docs" / "zenoh.md").read_text()
+PAGE = (Path(__file__).parents[2] / "docs" / "zenoh.md").read_text()
 SECTIONS = dict(re.findall(r"^##+ ([^\n]*)\n(.*?)(?=^##+ |\Z)", PAGE, re.MULTILINE | re.DOTALL))
 SECTION_OF = {"mission_current": "mission/current", "mission_list": "mission/list", "mission_report": "mission/report",
               "command_reply": "Commands"}  # fmt: skip

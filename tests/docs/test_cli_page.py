@@ -7,4 +7,4 @@ from generators.cli_page import page
 
 
 def test_the_page_is_up_to_date() -> None:
-    assert (Path(__file__).parents[1] / "docs" / "cli.md").read_text() == page(), "run make cli-page"
+    assert (Path(__file__).parents[2] / "docs" / "cli.md").read_text() == page(), "run make cli-page"

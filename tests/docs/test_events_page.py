@@ -5,7 +5,7 @@ import ast
 import re
 from pathlib import Path
 
-_REPOSITORY = Path(__file__).parents[1]
+_REPOSITORY = Path(__file__).parents[2]
 _EVENT = re.compile(r"[a-z]+\.[a-z_]+")
 #: Functions called with an event's name as the first or second argument.
 _LEVELS = {"debug", "info", "warning", "error", "exception", "level"}

@@ -11,7 +11,7 @@ from bridge.vehicle.telemetry_table import NO_STREAM, TELEMETRY, Row
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.mode_messages import CURRENT_MODE
 
-PAGE = (Path(__file__).parents[1] / "docs" / "telemetry.md").read_text()
+PAGE = (Path(__file__).parents[2] / "docs" / "telemetry.md").read_text()
 STREAMS = {number: name.removeprefix("MAV_DATA_STREAM_") for name, number in vars(m).items() if "DATA_STREAM_" in name}
 #: Fields that only identify the message, and extensions left at MAVLink's "not given".
 UNTOLD = {"alt_ellipsoid", "h_acc", "v_acc", "vel_acc", "hdg_acc", "yaw", "id", "temperature", "time_remaining",

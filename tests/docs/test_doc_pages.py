@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The documentation's pages: links and their anchors, and the files and names that the text mentions."""
+
+import re
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from tests.support.doc_pages import PAGES, blocks, place_of, prose_of, spans, text_of
+from tests.support.programs import REPOSITORY
+
+LINK = re.compile(r"\]\(([^)\s]+)\)")
+#: What the blocks of each language are tested by.
+LANGUAGES = {
+    "sh": "tests/docs/test_doc_commands.py",
+    "toml": "tests/docs/test_doc_settings.py",
+    "console": "tests/docs/test_doc_texts.py",
+    "msp": "tests/docs/test_msp_mission_page.py",
+    "text": "nothing: a drawing",
+}
+PAGE = pytest.mark.parametrize("page", PAGES, ids=place_of)
+
+
+def anchors(page: Path) -> set[str]:
+    """The anchors of the headings, as GitHub makes them."""
+    headings = re.findall(r"^#+ (.*)$", re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.M | re.S), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading).lower().replace(" ", "-") for heading in headings}
+
+
+@cache
+def files() -> set[str]:
+    """The names of the files in all folders."""
+    folders = [folder for folder in REPOSITORY.glob("[!.]*") if folder.is_dir()]
+    return {path.name for folder in folders for path in folder.rglob("*.*")} | {"CONTRIBUTING.md", "README.md"}
+
+
+@cache
+def names() -> set[str]:
+    """All identifiers in the code."""
+    return {
+        word
+        for package in ("bridge", "protocols", "service", "simulator", "storage")
+        for file in (REPOSITORY / package).rglob("*.py")
+        for word in re.findall(r"[A-Za-z_]\w+", file.read_text())
+    }
+
+
+@PAGE
+def test_links_lead_to_pages_and_headings(page: Path) -> None:
+    broken = []
+    for link in LINK.findall(prose_of(page)):
+        path, _, anchor = link.partition("#")
+        target = page if not path else page.parent / path
+        if "://" not in link and (not target.exists() or (anchor and anchor not in anchors(target))):
+            broken.append(link)
+    assert broken == []
+
+
+def test_every_page_is_linked_from_the_readme_or_from_a_page_that_is() -> None:
+    reached, new = set[Path](), {REPOSITORY / "README.md"}
+    while new:
+        reached |= new
+        links = {
+            (page.parent / link.partition("#")[0]).resolve() for page in new for link in LINK.findall(prose_of(page))
+        }
+        new = {link for link in links if link.suffix == ".md" and link.exists()} - reached
+    assert {*PAGES, REPOSITORY / "docs" / "cli.md"} - reached == set()
+
+
+@PAGE
+def test_files_in_the_text_exist(page: Path) -> None:
+    for span in spans(page):
+        folder = span.partition("/")[0]
+        if folder and "/" in span and " " not in span and (REPOSITORY / folder).is_dir():
+            assert (REPOSITORY / span).exists() or (page.parent / span).exists(), span
+        elif re.fullmatch(r"[\w-]+\.(py|c|h|md)", span):
+            assert span in files(), span
+
+
+def test_names_in_the_tour_exist() -> None:
+    page = REPOSITORY / "docs" / "design.md"
+    for span in spans(page):
+        if re.fullmatch(r"[A-Za-z_]\w+(\.[a-z_]\w+)*", span) and not span.endswith(".py"):
+            assert {*span.split(".")} <= names(), span
+
+
+def test_every_block_has_a_language_with_a_test() -> None:
+    assert {block.place for block in blocks() if block.language not in LANGUAGES} == set()
+    assert [block.place for block in blocks() if block.language == "text" and "──" not in block.text] == []
+    assert {block.place.partition(":")[0] for block in blocks() if block.language == "msp"} == {"docs/msp-mission.md"}
+
+
+@PAGE
+def test_all_blocks_are_fenced(page: Path) -> None:
+    indented = re.findall(r"\n\n(?! *[-*|]| *\d+\.) {4,}\S.*", prose_of(page))
+    assert indented == []
+    assert text_of(page).count("```") == 2 * len(
+        [block for block in blocks() if block.place.startswith(f"{place_of(page)}:")]
+    )

@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Texts that the documentation shows: doctor's report, quoted messages, and JSON."""
+
+import ast
+import json
+import re
+from datetime import UTC, datetime
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from protocols.uart_capture import capture_header, capture_line, read_capture
+from service.cli.doctor.command import _tell as tell
+from service.cli.doctor.machine import check_clock
+from service.cli.doctor.port import check_console, check_port
+from tests.support.doc_pages import PAGES, blocks, place_of, prose_of, spans
+from tests.support.faulty_machine import PORT, FaultyMachine
+from tests.support.programs import REPOSITORY
+
+#: Quoted texts of other programs (Mission Planner, INAV Configurator), of code and of tables.
+NOT_OURS = {
+    "No Heartbeat Packets Received",
+    "Bad GPS Health",
+    "please reduce the number of wp's",
+    "rejected by the Mav, item had a bad option wp# N",
+    "Upload MISSION failed ... DENIED",
+    "Upload MISSION failed ... UNSUPPORTED",
+    "No configuration received within 10 seconds",
+    "begin, send, wait, commit",
+    "Returns whether ...",
+    "only item 1",
+}
+#: Placeholders of the pages for numbers and names.
+_PLACEHOLDER = re.compile(r"\b(?:N|NAME|pid N|\d+|\d+ items|udp [\d.:]+)\b|\.\.\.")
+
+
+def test_the_report_of_doctor(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pi = FaultyMachine(tmp_path / "root")
+    pi.write("/boot/firmware/cmdline.txt", "console=serial0,115200 console=tty1 rootwait\n")
+    pi.path("/run/systemd/timesync/synchronized").unlink()
+    (block,) = [block for block in blocks() if block.language == "console"]
+    time = re.search(r"clock: (\S+ \S+) UTC", block.text)
+    assert time is not None
+    now = datetime.fromisoformat(time[1]).replace(tzinfo=UTC)
+    for checked in (check_port(pi, PORT), check_console(pi, PORT), check_clock(pi, now)):
+        assert checked is not None
+        tell(checked, as_json=False)
+    assert capsys.readouterr().out == block.text
+
+
+@cache
+def texts() -> str:
+    """All texts in the code and the status page, one per line, with \\0 for each inserted value."""
+    found = []
+    for package in ("bridge", "protocols", "service"):
+        for file in (REPOSITORY / package).rglob("*.py"):
+            for node in ast.walk(ast.parse(file.read_text())):
+                if isinstance(node, ast.JoinedStr):
+                    found.append("".join(map(_part, node.values)))
+                elif isinstance(node, ast.Constant):
+                    found.append(_part(node))
+    found += [file.read_text() for file in (REPOSITORY / "service" / "web").rglob("*.js")]
+    return "\n".join(found)
+
+
+@cache
+def templates() -> list[re.Pattern[str]]:
+    """The texts with inserted values, and at least two words of their own."""
+    made = (line for line in texts().splitlines() if "\0" in line and len(re.findall(r"[a-z]{2,}", line)) >= 2)
+    return [re.compile(".+".join(map(re.escape, line.split("\0")))) for line in made]
+
+
+def _part(part: ast.expr) -> str:
+    return part.value if isinstance(part, ast.Constant) and isinstance(part.value, str) else "\0"
+
+
+@cache
+def keys() -> set[str]:
+    """The keys of all objects that the service makes."""
+    trees = (ast.parse(file.read_text()) for file in (REPOSITORY / "service").rglob("*.py"))
+    made = (node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Dict))
+    return {_part(key) for each in made for key in each.keys if key is not None}
+
+
+QUOTED = sorted(
+    {
+        (" ".join(quoted.split()), place_of(page))
+        for page in PAGES
+        for quoted in re.findall(r'"([^"`]+)"', re.sub(r"`[^`]*`", "`", prose_of(page)))
+        if quoted.count(" ") >= 2
+    }
+)
+
+
+@pytest.mark.parametrize(("quoted", "place"), [each for each in QUOTED if each[0] not in NOT_OURS])
+def test_a_quoted_message_is_one_of_ours(quoted: str, place: str) -> None:
+    """Each clause of it: messages are made of several."""
+    for clause in re.split(r"[:;,] | \.\.\. ", quoted):
+        pieces = [re.escape(piece.strip()) for piece in _PLACEHOLDER.split(clause)]
+        is_ours = re.search(r"[^\n]*".join(pieces), texts()) or any(each.search(clause) for each in templates())
+        assert is_ours, f"{place}: {clause}"
+
+
+def test_every_foreign_message_is_quoted() -> None:
+    assert {quoted for quoted, _ in QUOTED} >= NOT_OURS
+
+
+def test_the_lines_of_a_capture() -> None:
+    page = REPOSITORY / "docs" / "recording.md"
+    lines = [span.replace("\N{HORIZONTAL ELLIPSIS}", "") for span in spans(page) if span.startswith("{")]
+    header, *events = map(json.loads, lines)
+    assert header == json.loads(capture_header(header["started"]))
+    written = [json.loads(capture_line(event)) for event in read_capture("\n".join(lines).encode())]
+    start_s = events[0]["t"]  # where reading counts from
+    assert written == [event | {"t": pytest.approx(event["t"] - start_s)} for event in events]
+
+
+@pytest.mark.parametrize("page", ["docs/zenoh.md", "docs/status-page.md"])
+def test_objects_have_keys_of_the_service(page: str) -> None:
+    shown = [json.loads(span.replace("...", "")) for span in spans(REPOSITORY / page) if span.startswith('{"')]
+    assert shown
+    assert [each for each in shown if not each.keys() <= keys()] == []
