@@ -5,6 +5,7 @@ Every peer that reaches a link may read. Everything else may change what the air
 not exist yet: so the lists here name the messages allowed without proof, not those that need it.
 """
 
+import struct
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -81,6 +82,7 @@ _REQUEST_STREAM = int(m.MAVLINK_MSG_ID_REQUEST_DATA_STREAM)
 #: FTP: opcodes that read or end a session (https://mavlink.io/en/services/ftp.html); others write files.
 _FTP_READS = frozenset({0, 1, 2, 3, 4, 5, 14, 15, 128, 129})
 
+_FLOAT = struct.Struct("<f")
 #: Offset of the command number in the payload of both command messages.
 _COMMAND_AT = slice(28, 30)
 #: Offset of the result in a MISSION_ACK.
@@ -90,9 +92,10 @@ _CURRENT_AT = 35
 #: Offset of the opcode in FILE_TRANSFER_PROTOCOL: three bytes of target, then the FTP header.
 _OPCODE_AT = 6
 
-#: Offsets of the sign bit of SET_MESSAGE_INTERVAL's param2, and of REQUEST_DATA_STREAM's rate and start_stop.
-_INTERVAL_SIGN_AT = 7
-_STREAM_RATE_AT, _STREAM_STARTS_AT = slice(0, 2), 5
+#: Offsets of SET_MESSAGE_INTERVAL's param2, and of REQUEST_DATA_STREAM's rate and start_stop.
+_INTERVAL_AT, _STREAM_RATE_AT, _STREAM_STARTS_AT = 4, slice(0, 2), 5
+#: The longest interval that a station may set over an open link, us: like a stream's lowest rate.
+_SLOWEST_US = 1e6
 
 _SETUP = "set the key in naze-bridge's settings"
 _ADDRESS = "this address may only read"
@@ -233,7 +236,7 @@ def may_command(frame: MavlinkFrame) -> bool:
     """True if a frame might arm, disarm, steer or restart an autopilot that obeys it."""
     msgid, payload = frame.msgid, frame.payload
     if _asks_for_rates(frame):
-        # The rates apply to all ground stations: one may ask for more, but not silence the vehicle.
+        # An autopilot's rates apply to all ground stations: one may ask for more, but not silence the vehicle.
         return _silences(frame)
     if msgid in _COMMANDS:
         return _command(frame) not in _QUESTIONS
@@ -251,10 +254,11 @@ def _asks_for_rates(frame: MavlinkFrame) -> bool:
 
 
 def _silences(frame: MavlinkFrame) -> bool:
-    """True if a rate request stops a message: an interval below 0, a rate of 0, or the end of a stream."""
+    """True if a rate request stops a message or nearly so: an interval below 0 or above 1 s, a stream's end."""
     payload = frame.payload.ljust(_CURRENT_AT, b"\0")
     if frame.msgid in _COMMANDS:
-        return bool(payload[_INTERVAL_SIGN_AT] & 0x80)
+        (interval_us,) = _FLOAT.unpack_from(payload, _INTERVAL_AT)
+        return not 0 <= interval_us <= _SLOWEST_US  # NaN, too
     return not (any(payload[_STREAM_RATE_AT]) and payload[_STREAM_STARTS_AT])
 
 

@@ -13,8 +13,10 @@ _REACHED = LEGS | {NavAction.RTH}
 
 
 class Progress(Enum):
-    """The known values of MAVLink's MISSION_STATE."""
+    """MAVLink's MISSION_STATE."""
 
+    UNKNOWN = 0
+    NO_MISSION = 1
     NOT_STARTED = 2
     ACTIVE = 3
     COMPLETE = 5
@@ -22,11 +24,14 @@ class Progress(Enum):
 
 @dataclass(frozen=True, slots=True)
 class FlownMission:
-    """The flight controller's list, home first, and the progress through it: the craft flies to item `seq`."""
+    """The flight controller's list, home first, and the progress through it: the craft flies to item `seq`.
+
+    By default the list is unknown.
+    """
 
     items: tuple[MissionItem, ...] = ()
     seq: int = 0
-    progress: Progress = Progress.NOT_STARTED
+    progress: Progress = Progress.UNKNOWN
 
 
 class MissionProgress:

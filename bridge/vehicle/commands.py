@@ -118,6 +118,8 @@ class CommandService:
 
     def _do(self, station: Station, command: int, params: Sequence[float]) -> CommandResult:
         match command:
+            case messages.MAV_CMD_REQUEST_MESSAGE if params[0] == messages.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
+                return self._tell_interval(station, _msgid(params[1]))
             case messages.MAV_CMD_REQUEST_MESSAGE:
                 return self._send_once(station, _msgid(params[0]), max(_msgid(params[1]), 0))
             case messages.MAV_CMD_SET_MESSAGE_INTERVAL:

@@ -69,7 +69,7 @@ class MessageRouter:
             m.MAVLINK_MSG_ID_MISSION_ITEM: lambda s, msg, now: self._item(s, msg, item_from_float_message(msg), now),
             m.MAVLINK_MSG_ID_MISSION_ITEM_INT: lambda s, msg, now: self._item(s, msg, item_from_int_message(msg), now),
             m.MAVLINK_MSG_ID_MISSION_ACK: lambda s, msg, now: uploads.ack(s, msg.type, now),
-            m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL: lambda s, _, now: uploads.clear_all(s, now),
+            m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL: lambda s, msg, now: uploads.clear_all(s, msg.mission_type, now),
             m.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST: lambda s, _, now: uploads.answers.partial_list(s, now),
             m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST: lambda s, _, now: downloads.request_list(s, now),
             m.MAVLINK_MSG_ID_MISSION_REQUEST: lambda s, msg, now: downloads.request(s, msg.seq, now, as_int=False),

@@ -106,14 +106,14 @@ class MissionUploads:
         if present is None or not self._is_for(present, count, now):
             self._begin(station, count, now)
 
-    def clear_all(self, station: Station, now: float) -> None:
-        """MISSION_CLEAR_ALL."""
+    def clear_all(self, station: Station, mission_type: int, now: float) -> None:
+        """MISSION_CLEAR_ALL. `mission_type`: of the answer, MISSION or ALL."""
         present = self._find(station, now)
         if present is not None and not isinstance(present.state, Delivering):
-            self._forget(present, now)
+            self._supersede(present, now)
         elif present is not None and present.count == 0:
             return
-        self._begin(station, 0, now)
+        self._begin(station, 0, now, mission_type)
 
     def item(self, station: Station, item: MissionItem, now: float) -> None:
         """MISSION_ITEM or MISSION_ITEM_INT."""
@@ -131,7 +131,7 @@ class MissionUploads:
             return
         if state.is_of_another_list(item):
             # Two lists must never be mixed: the previous one is discarded.
-            self._forget(upload, now)
+            self._supersede(upload, now)
             self._begin(station, upload.count, now)
             return
         state.announced_again = False
@@ -200,7 +200,9 @@ class MissionUploads:
 
     # State changes of an upload.
 
-    def _begin(self, station: Station, count: int, now: float) -> None:
+    def _begin(
+        self, station: Station, count: int, now: float, mission_type: int = messages.MAV_MISSION_TYPE_MISSION
+    ) -> None:
         self.is_active = True
         self.answers.forget(station)
         for older in self._uploads:
@@ -208,9 +210,10 @@ class MissionUploads:
         if not self._ground.allows(station, Cost.UPLOAD):
             # A flood must cost less than the lists that it announces: no incident, no log entry.
             self._ground.say(Severity.ERROR, _TOO_MANY_UPLOADS.text, station)
-            self.answers.end(station, _TOO_MANY_UPLOADS.ack, count, now)
+            self.answers.end(station, _TOO_MANY_UPLOADS.ack, count, now, mission_type)
             return
-        upload = Upload(station, count, f"upload-{next(self._incidents)}", Waiting(Announced(), now))
+        incident = f"upload-{next(self._incidents)}"
+        upload = Upload(station, count, incident, Waiting(Announced(), now), mission_type)
         self._uploads.append(upload)
         self._entered(upload)
         armed = self._missions.armed_refusal()
@@ -296,6 +299,12 @@ class MissionUploads:
         self._states[type(upload.state)] -= 1
         self._missions.release(upload)
 
+    def _supersede(self, upload: Upload, now: float) -> None:
+        """Drop an upload without an answer: its station would attribute it to the list that it announces now."""
+        ack = MissionResult.OPERATION_CANCELLED
+        self._note("mission.refused", upload, "warning", ack=ack.name, why="superseded: the station started again")
+        self._forget(upload, now)
+
     def _is_for(self, upload: Upload, count: int, now: float) -> bool:
         """Handle a MISSION_COUNT of a station whose upload runs; False if it announces a new one."""
         state = upload.state
@@ -312,7 +321,7 @@ class MissionUploads:
             upload.count = count
             return True
         if count != upload.count or isinstance(state, Complete):
-            self._forget(upload, now)
+            self._supersede(upload, now)
             return False
         if isinstance(state, Receiving):
             state.announced_again = bool(state.items)
@@ -432,7 +441,7 @@ class MissionUploads:
             # The station would attribute this ack to the list that it has announced since.
             return
         for where in (upload.station, *self._elsewhere(upload, now)):
-            self.answers.end(where, ack, upload.count, now, is_cancelled=upload.is_cancelled)
+            self.answers.end(where, ack, upload.count, now, upload.mission_type, is_cancelled=upload.is_cancelled)
 
     def _note(self, event: str, upload: Upload, level: Level = "info", **facts: object) -> None:
         self._log_event(level, event, **{"station": str(upload.station)} | facts, incident=upload.incident)

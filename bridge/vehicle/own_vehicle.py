@@ -16,7 +16,7 @@ from bridge.gcs.station import Peer, Severity, Station
 from bridge.gcs.stations import PRECEDENCE
 from bridge.missions.mission_service import MissionService
 from bridge.model.flight_mode import FlightMode
-from bridge.model.mission_progress import FlownMission, MissionProgress
+from bridge.model.mission_progress import FlownMission, MissionProgress, Progress
 from bridge.model.vehicle import STALE_S, FlightState, Health, Home, MissionLeg, Readiness, Reading
 from bridge.vehicle import vehicle_messages as make
 from bridge.vehicle.link_announcer import LinkAnnouncer
@@ -232,8 +232,10 @@ class OwnVehicle:
 
     def _flown_mission(self) -> FlownMission:
         held = self._missions.held
+        if held is None:
+            return FlownMission()
         seq = self._missions.seq_of(self._progress.number)
-        return FlownMission(() if held is None else held.items, seq, self._progress.progress)
+        return FlownMission(held.items, seq, self._progress.progress if held.items else Progress.NO_MISSION)
 
     def _follow_state(self) -> None:
         """Send a heartbeat as soon as something in it has changed; report the failsafe."""

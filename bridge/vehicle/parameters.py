@@ -74,7 +74,7 @@ class Parameters:
             elif failure is not None:
                 text = f"{WP_RADIUS} stays {fc_store.wp_radius_cm}: {failure.value}"
                 self._ground.say(Severity.ERROR, text, station)
-            self._send(station, WP_RADIUS)
+            self._send(station if failure else None, WP_RADIUS)
 
         self._is_setting = True
         self._missions.runner.start(fc_store.set_wp_radius(wanted_cm), done, now)
@@ -86,9 +86,13 @@ class Parameters:
             values[WP_RADIUS] = float(fc_store.wp_radius_cm)
         return values
 
-    def _send(self, station: Station, name: str) -> None:
+    def _send(self, station: Station | None, name: str) -> None:
+        """Send PARAM_VALUE, if there is such a parameter; None: to all stations, which keep a copy."""
         values = self._values()
         if name in values:
             index = list(values).index(name)
             message = messages.MAVLink_param_value_message(name.encode(), values[name], _REAL32, len(values), index)
-            self._ground.to(station, message)
+            if station is None:
+                self._ground.broadcast(message)
+            else:
+                self._ground.to(station, message)

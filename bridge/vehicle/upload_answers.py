@@ -55,14 +55,23 @@ class UploadAnswers:
 
     # Sent at the end of an upload.
 
-    def end(self, station: Station, ack: MissionResult, count: int, now: float, *, is_cancelled: bool = False) -> None:
+    def end(
+        self,
+        station: Station,
+        ack: MissionResult,
+        count: int,
+        now: float,
+        mission_type: int = 0,
+        *,
+        is_cancelled: bool = False,
+    ) -> None:
         """Send the final MISSION_ACK; `is_cancelled`: the station had cancelled the upload of `count` items."""
         self._forget_old(now)
         self._answers.pop(station, None)
         self._answers[station] = _Answer(ack, count, now + _MEMORY_S, now + _CANCEL_S if is_cancelled else now)
         if len(self._answers) >= 2 * _MOST:
             self._forget_strangers()
-        self._ground.mission_ack(station, ack)
+        self._ground.mission_ack(station, ack, mission_type)
 
     def tell(self, station: Station, verdict: Verdict[Any], delivery: DeliveryResult) -> None:
         """Report everything to the sender, and the change on the aircraft to other ground stations."""

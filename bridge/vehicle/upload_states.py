@@ -251,6 +251,8 @@ class Upload:
     count: int
     incident: str
     state: UploadState
+    #: MAV_MISSION_TYPE of the final MISSION_ACK.
+    mission_type: int
     #: Its ground station has announced another list while this one was written.
     is_superseded: bool = False
     #: Its ground station has sent a MISSION_COUNT of 0.

@@ -12,7 +12,7 @@ from typing import NamedTuple, TypeVar
 from bridge.model.airframe import Airframe
 from bridge.model.flight_mode import FlightMode
 from bridge.model.ground_track import bearing_deg, distance_m, north_east_m
-from bridge.model.mission_progress import FlownMission
+from bridge.model.mission_progress import FlownMission, Progress
 from bridge.model.vehicle import (
     STALE_S,
     Airspeed,
@@ -77,8 +77,7 @@ _CAPABILITIES = (
     | messages.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
     | messages.MAV_PROTOCOL_CAPABILITY_MAVLINK2
 )
-_NO_MISSION = 1
-_NO_TOTAL = 0xFFFF
+_NO_MISSION = 0xFFFF
 #: For firmware that reports no version: below 1.0 Mission Planner hides the choice of altitude frames.
 _UNKNOWN_VERSION = (1, 0, 0)
 _OFFICIAL = 255
@@ -219,10 +218,10 @@ def autopilot_version(vehicle: Vehicle) -> Message:
 
 
 def mission_current(at: Moment) -> Message:
+    """MISSION_CURRENT: `total` is 0 while the list is unknown."""
     mission = at.mission()
-    if not mission.items:
-        return messages.MAVLink_mission_current_message(0, _NO_TOTAL, _NO_MISSION, 0)
-    return messages.MAVLink_mission_current_message(mission.seq, len(mission.items) - 1, mission.progress.value, 0)
+    total = _NO_MISSION if mission.progress is Progress.NO_MISSION else max(len(mission.items) - 1, 0)
+    return messages.MAVLink_mission_current_message(mission.seq, total, mission.progress.value, 0)
 
 
 def mission_item_reached(seq: int) -> Message:

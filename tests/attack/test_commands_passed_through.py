@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A stranger on an open link tries to command an autopilot that speaks MAVLink itself."""
 
+import math
 import socket
 import threading
 from contextlib import ExitStack
@@ -29,7 +30,11 @@ COMMANDS = {
     "a script by FTP": m.MAVLink_file_transfer_protocol_message(0, 1, 1, [0, 0, 0, 6, *[1] * 247]),
     "a shell": m.MAVLink_serial_control_message(10, 0, 0, 0, 1, [13] * 70),
     "no telemetry": m.MAVLink_request_data_stream_message(1, 1, 0, 4, 0),
+    "hardly any telemetry": m.MAVLink_command_long_message(1, 1, 511, 0, 30, 1e9, 0, 0, 0, 0, 0),
+    "an odd interval": m.MAVLink_command_long_message(1, 1, 511, 0, 30, math.nan, 0, 0, 0, 0, 0),
 }
+#: Rate requests are refused without a text: clients repeat them.
+RATES = {"no telemetry", "hardly any telemetry", "an odd interval"}
 
 
 class Autopilot(threading.Thread):
@@ -99,9 +104,12 @@ def test_no_command_passes_an_open_link(start: Starter, autopilot: Autopilot) ->
             question = f"LAST{number}"
             stranger.send(m.MAVLink_param_request_read_message(1, 1, question.encode(), -1))
             until(partial(autopilot.was_asked_for, question), "the question behind it")
-            if name != "no telemetry":
+            is_command = "COMMAND" in command.get_type()
+            if name not in RATES:
                 assert "pass_through" in stranger.wait_for("STATUSTEXT").text
-            if "COMMAND" in command.get_type():
+            elif is_command:
+                stranger.wait_for("COMMAND_ACK")
+            if is_command:
                 answers = [heard for heard in stranger.heard if heard.get_type() == "COMMAND_ACK"]
                 assert [answer.result for answer in answers] == [m.MAV_RESULT_DENIED]
     assert set(autopilot.kinds()) == {"HEARTBEAT", "PARAM_REQUEST_READ"}
@@ -114,6 +122,7 @@ def test_missions_and_parameters_pass_an_open_link(start: Starter, autopilot: Au
         m.MAVLink_mission_item_int_message(1, 1, 1, 3, 16, 0, 1, 0, 0, 0, 0, 1, 1, 9.0),
         m.MAVLink_param_set_message(1, 1, b"WPNAV_SPEED", 300, 9),
         m.MAVLink_request_data_stream_message(1, 1, 0, 4, 1),
+        m.MAVLink_command_int_message(1, 1, 0, 511, 0, 0, 30, 1e6, 0, 0, 0, 0, 0),
         m.MAVLink_command_long_message(1, 1, 512, 0, 148, 0, 0, 0, 0, 0, 0),
         m.MAVLink_file_transfer_protocol_message(0, 1, 1, [0, 0, 0, 4, *[1] * 247]),
     )

@@ -284,9 +284,11 @@ def test_a_parameter_is_read_by_index_or_by_name(
 def test_the_radius_is_set_on_the_flight_controller() -> None:
     world, station = radius_world()
     operations = world.naze.flash_operations
+    other = GroundStation(world, "other", sysid=254)
+    other.send(m.MAVLink_ping_message(0, 0, 0, 0))
     station.send(param_set(b"WPNAV_RADIUS", 350.0))
     world.wait_until(lambda _: bool(station.said("PARAM_VALUE")), 1)
-    assert values(station.said()) == [("WPNAV_RADIUS", 350.0, 1, 2)]
+    assert values(station.said()) == values(other.said()) == [("WPNAV_RADIUS", 350.0, 1, 2)]
     assert station.texts() == []
     world.run(2)
     # The firmware applies it in its next loop.

@@ -363,3 +363,8 @@ def test_mission_current_has_the_number_of_items_held() -> None:
     Upload(station, waypoints(5)).run()
     world.run(1.5)
     assert station.said("MISSION_CURRENT")[-1].total == 4
+    # While the list is unknown, so is its length: that is not the same as no mission.
+    world.power_off()
+    world.run(5)
+    current = station.said("MISSION_CURRENT")[-1]
+    assert (current.seq, current.total, current.mission_state) == (0, 0, 0)

@@ -140,6 +140,9 @@ def interval_us(station: GroundStation, msgid: int) -> int:
     result = ask(station, 510, msgid)
     (told,) = station.said("MESSAGE_INTERVAL")
     assert told.message_id == msgid
+    assert ask(station, 512, m.MAVLINK_MSG_ID_MESSAGE_INTERVAL, msgid) == result
+    (again,) = station.said("MESSAGE_INTERVAL")
+    assert (again.message_id, again.interval_us) == (msgid, told.interval_us)
     assert (result == UNSUPPORTED) == (told.interval_us == 0)
     found: int = told.interval_us
     return found

@@ -13,6 +13,7 @@ from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
 from simulator.options import Faults, SimOptions, TelemetryProtocol
 from tests.support.conversations import (
+    MISSION,
     Upload,
     ack_message,
     clear_message,
@@ -187,6 +188,7 @@ def test_clear_all_clears_the_list_and_verifies_it(message: Message) -> None:
     station.send(message)
     world.run(1)
     assert acks(station) == [A.ACCEPTED, A.ACCEPTED]
+    assert {ack.mission_type for ack in station.said("MISSION_ACK")} == {getattr(message, "mission_type", MISSION)}
     assert world.naze.counters.flash_writes == 2
 
 
@@ -396,6 +398,9 @@ def test_the_same_station_restarts_while_items_arrive(sent: int, count: int) -> 
     again = waypoints(count, 2)
     assert Upload(station, again).run() is A.ACCEPTED
     assert world.stored == records_of(again)
+    begun = [event.facts["incident"] for event in world.events("mission.upload_started")]
+    ends = world.events("mission.refused") + world.events("mission.upload_ended")
+    assert [event.facts["incident"] for event in ends] == begun
 
 
 def test_two_lists_are_never_mixed_if_a_burst_loses_its_first_item() -> None:
