@@ -34,6 +34,8 @@ from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame
 from protocols.msp.telemetry import Sensor
 
 _HEARTBEAT = m.MAVLINK_MSG_ID_HEARTBEAT
+#: Five lost heartbeats. Only then is another autopilot followed: it may be the same one with a new system id.
+_GONE_S = 5.0
 #: The autopilot field of a heartbeat's payload, and its value from cameras and gimbals. MAVLink 2 may omit it.
 _AUTOPILOT_AT, _NO_AUTOPILOT = 5, bytes((m.MAV_AUTOPILOT_INVALID,))
 _UNKNOWN_U16, _UNKNOWN_U8 = 0xFFFF, 0xFF
@@ -49,7 +51,7 @@ _SENSORS = {
 
 
 class MavlinkTelemetry:
-    """Fills a vehicle from the frames of the first autopilot that is heard; from a Harakiri's at once.
+    """Fills a vehicle from the frames of one autopilot: the first that is heard, until it falls silent.
 
     Harakiri (baseflight_mavlink.c) sends no GLOBAL_POSITION_INT: its position is in GPS_RAW_INT, and its height above
     the launch point in VFR_HUD.alt, where MAVLink has the one above mean sea level. Its rssi is 0..255.
@@ -78,11 +80,13 @@ class MavlinkTelemetry:
         }
         #: Message id by the bytes of a frame's header that hold sender and message id.
         self._known: dict[bytes, int] = {}
+        #: When the autopilot counts as gone if no heartbeat of it is heard; a Harakiri never does.
+        self._gone_at = -math.inf
 
     def take(self, frames: Sequence[MavlinkFrame], now: float) -> None:
         """Keep the newest frames. Heartbeats are read at once: arming must be noticed."""
-        if not self._known:
-            self._recognise(frames)
+        if now >= self._gone_at:
+            self._recognise(frames, now)
         known, unread = self._known, self._unread
         for frame in frames:
             raw = frame.raw
@@ -90,6 +94,7 @@ class MavlinkTelemetry:
             if msgid is not None:
                 unread[msgid] = frame, now
                 if msgid == _HEARTBEAT:
+                    self._gone_at = max(self._gone_at, now + _GONE_S)
                     self._read(_HEARTBEAT)
         if self._is_harakiri:
             self.settle()
@@ -99,14 +104,18 @@ class MavlinkTelemetry:
         for msgid in [*self._unread]:
             self._read(msgid)
 
-    def _recognise(self, frames: Sequence[MavlinkFrame]) -> None:
+    def _recognise(self, frames: Sequence[MavlinkFrame], now: float) -> None:
         for frame in frames:
             is_heartbeat = frame.msgid == _HEARTBEAT
             if self._is_harakiri or (is_heartbeat and frame.payload[_AUTOPILOT_AT:][:1] != _NO_AUTOPILOT):
-                sender = bytes((frame.sysid, frame.compid))
-                for msgid in self._readers:
-                    self._known[sender + msgid.to_bytes(3, "little")] = msgid
-                    self._known[sender + bytes((msgid & 0xFF,))] = msgid
+                sender = bytes(frame.sender)
+                keys = {sender + msgid.to_bytes(size, "little"): msgid for msgid in self._readers for size in (1, 3)}
+                if self._known and keys != self._known:
+                    # The values of two autopilots must not mix.
+                    self._unread.clear()
+                    self._vehicle.forget()
+                self._known = keys
+                self._gone_at = math.inf if self._is_harakiri else now + _GONE_S
                 return
 
     def _read(self, msgid: int) -> None:
@@ -201,19 +210,22 @@ class MavlinkTelemetry:
         drawn = None if before is None or before.source is not Source.MAVLINK else before.drawn_mah
         self._vehicle.hear(Power(now, Source.MAVLINK, _scaled(message.voltage_battery, 1000) or None, current, drawn))
 
-    def _battery_status(self, message: Message, now: float) -> None:
+    def _battery_status(self, message: Message, _now: float) -> None:
         power = self._vehicle.last(Power)
-        if power is not None and message.current_consumed >= 0:
-            self._vehicle.hear(Power(now, Source.MAVLINK, power.voltage_v, power.current_a, message.current_consumed))
+        # SYS_STATUS has the voltage of the first battery.
+        if power is not None and message.id == 0 and message.current_consumed >= 0:
+            self._vehicle.hear(replace(power, drawn_mah=message.current_consumed))
 
     def _scaled_pressure(self, message: Message, now: float) -> None:
         self._vehicle.hear(Pressure(now, Source.MAVLINK, message.press_abs, message.temperature / 100))
 
     def _rc_channels(self, message: Message, now: float) -> None:
         values = [getattr(message, f"chan{number}_raw", _UNKNOWN_U16) for number in range(1, _CHANNELS + 1)]
-        channels = tuple(value for value in values if value not in (0, _UNKNOWN_U16))
+        channels = [0 if value == _UNKNOWN_U16 else value for value in values]
+        while channels and not channels[-1]:
+            channels.pop()
         if channels:
-            self._vehicle.hear(Sticks(now, Source.MAVLINK, channels))
+            self._vehicle.hear(Sticks(now, Source.MAVLINK, tuple(channels)))
         if self._is_harakiri:
             state = self._vehicle.last(FlightState)
             if state is not None and self._is_level is not None and state.mode != self._harakiri_mode():

@@ -68,6 +68,8 @@ class FcSession:
         self.state: State = Closed(self._port, PortClosed(None), 0.0)
 
     def opened(self, now: float) -> None:
+        # Another board may have been connected.
+        self._port.met_family = None
         self._handle(PortOpened(), now)
 
     def closed(self, now: float, why: str | None) -> None:

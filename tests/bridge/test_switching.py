@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import pytest
 
+from bridge.controllers import other
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.fc.profile import Profile
 from protocols.mavlink.dialect import messages
@@ -12,8 +13,8 @@ from protocols.mission_item import MissionResult
 from simulator.naze import SimulatedNaze
 from simulator.options import Faults, SimOptions, TelemetryProtocol
 from tests.support.conversations import Upload, records_of, waypoints
-from tests.support.fake_controllers import DeafWhileArmed
-from tests.support.world import GroundStation, World
+from tests.support.fake_controllers import DeafWhileArmed, MavlinkOnly
+from tests.support.world import GroundStation, World, ready_world
 
 COPTER_STABILIZE = 0
 READABLE = [TelemetryProtocol.MSP, TelemetryProtocol.MAVLINK, TelemetryProtocol.MAVLINK_57600]
@@ -95,3 +96,15 @@ def test_ground_stations_see_one_vehicle_while_frsky_is_sent(board: type[Simulat
         assert max(heartbeat_gaps(station)) <= 1.5
         assert not [text for text in station.texts() if "lost" in text]
     world.assert_line_was_clean()
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_another_autopilot_in_place_of_a_harakiri_is_not_taken_for_it(version: int) -> None:
+    """It can be told apart without a new connection only if it sends MAVLink 2."""
+    world = ready_world()
+    if version == 1:
+        world.unplug()
+    world.naze = MavlinkOnly(version)
+    if version == 1:
+        world.plug()
+    world.wait_until(lambda w: w.kind is other.OTHER_MAVLINK, 8)

@@ -129,6 +129,60 @@ def test_groups_are_made_from_a_mavlink_autopilot() -> None:
     assert report.group(Group.LINK).state == "MAVLink"
 
 
+def test_an_autopilot_with_a_new_system_id_is_followed() -> None:
+    world, autopilot, _ = passing()
+    autopilot.heartbeat = m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3)
+    world.run(2)
+    autopilot.say(m.MAVLink_home_position_message(453838000, 84733000, 0, 0, 0, 0, [1, 0, 0, 0], 0, 0, 0))
+    world.bridge.report.watch(Group)
+    autopilot.mavlink.srcSystem = 7
+    autopilot.heartbeat = m.MAVLink_heartbeat_message(2, 3, 81 | 128, 4, 4, 3)
+    world.wait_until(lambda w: bool(w.bridge.session.vehicle.armed), 8)
+    autopilot.say(m.MAVLink_attitude_message(1, 0.5, 0, 0, 0, 0, 0))
+    world.run(0.05)
+    assert world.bridge.report.group(Group.ATTITUDE).roll_deg == 28.65
+    assert world.bridge.session.vehicle.home is None
+    assert world.events("vehicle.armed") != []
+
+
+def test_two_autopilots_on_one_line_are_not_mixed() -> None:
+    world, autopilot, _ = passing()
+    autopilot.heartbeat = m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3)
+    world.bridge.report.watch(Group)
+    other = m.MAVLink(None, srcSystem=7, srcComponent=1)
+    for _ in range(40):
+        autopilot.outgoing += m.MAVLink_heartbeat_message(2, 3, 81 | 128, 4, 4, 3).pack(other)
+        autopilot.outgoing += m.MAVLink_attitude_message(1, 0.5, 0, 0, 0, 0, 0).pack(other)
+        world.run(0.5)
+        assert world.bridge.session.vehicle.armed is False
+        assert world.bridge.report.group(Group.ATTITUDE).roll_deg is None
+
+
+def test_an_unused_channel_does_not_move_the_others() -> None:
+    world, autopilot, _ = passing()
+    world.bridge.report.watch(Group)
+    autopilot.say(m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3))
+    autopilot.say(m.MAVLink_rc_channels_message(1, 5, 1500, 1501, 65535, 1502, 1800, *[65535] * 13, 127))
+    world.run(0.05)
+    assert world.bridge.report.group(Group.RC).channels_us == (1500, 1501, 0, 1502, 1800)
+
+
+def test_a_voltage_is_not_renewed_by_the_consumption() -> None:
+    world, autopilot, _ = passing()
+    world.bridge.report.watch(Group)
+    autopilot.say(m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3))
+    autopilot.say(m.MAVLink_sys_status_message(7, 7, 6, 0, 12600, 100, -1, 0, 0, 0, 0, 0, 0))
+    for battery in (0, 1):
+        world.run(5)
+        consumed = 500 + battery
+        autopilot.say(m.MAVLink_battery_status_message(battery, 0, 0, 0, [65535] * 10, 100, consumed, -1, 50))
+    world.run(0.05)
+    power = world.bridge.report.group(Group.BATTERY)
+    assert power.age_s is not None
+    assert power.age_s > 9
+    assert power.drawn_mah == 500
+
+
 def test_groups_continue_when_an_armed_harakiri_switches_to_mavlink() -> None:
     world = World(SimOptions(tele_prot=TelemetryProtocol.MAVLINK))
     world.wait_ready()

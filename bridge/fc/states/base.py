@@ -85,7 +85,7 @@ class Port:
     #: The speeds of the last two finds of the board, the older first: a Harakiri that arms may change its speed,
     #: and disarmed it comes back.
     good_speeds: deque[int | None] = field(default_factory=lambda: deque(maxlen=2))
-    #: The family of the board that was last identified over MSP on this port.
+    #: The family of the board that was last identified over MSP since the port was opened.
     met_family: str | None = None
     #: The family of the board that `vehicle` describes, which outlives a lost link and a change of protocol.
     family: str | None = None

@@ -118,7 +118,7 @@ class Mavlink(State):
         return _HARAKIRI_ARMED_SILENCE_S + _BYTES_BEFORE_LOSS * byte_time_s(self.speed)
 
     def _profile(self, heard: MavlinkFrame) -> Profile:
-        """A board met over MSP on this port stays in its family; otherwise the sender decides."""
+        """A board met over MSP stays in its family unless it sends MAVLink 2; otherwise the sender decides."""
         profiles = [profile for profile in self.port.profiles if profile.spoken is Spoken.MAVLINK]
         ours = [profile for profile in profiles if not profile.is_passed_through]
         (other,) = (profile for profile in profiles if profile.is_passed_through)
@@ -127,7 +127,8 @@ class Mavlink(State):
         if self.port.autopilot is Autopilot.HARAKIRI:
             return ours[0]
         sender = (heard.version, heard.sysid, heard.compid)
-        known = (p for p in ours if p.family == self.port.met_family or p.mavlink_sender == sender)
+        family = self.port.met_family if heard.version == 1 else None
+        known = (p for p in ours if p.family == family or p.mavlink_sender == sender)
         return next(known, other)
 
 
