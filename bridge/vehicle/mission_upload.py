@@ -358,7 +358,9 @@ class MissionUploads:
         station = upload.station
         request = messages.MAVLink_mission_request_message(station.sysid, station.compid, state.wanted)
         self._ground.to(station, request)
-        if state.request.is_repeated:
+        # Without items, a station at another address may have started again: it would take this request for its own
+        # list's, whose MISSION_COUNT it repeats until it has one.
+        if state.request.is_repeated and state.items:
             for elsewhere in self._elsewhere(upload, now):
                 self._ground.to(elsewhere, request)
 

@@ -18,6 +18,8 @@ _LAST_ITEMS_S = 0.3
 #: Of an item request.
 _FIRST_TIMEOUT_S = 0.25
 _MAX_TIMEOUT_S = 1.5
+#: Of one item's timeouts, this many are equal; then each is twice the previous one.
+_EQUAL_TIMEOUTS = 3
 #: A message repeated within this time was duplicated by the network. Answering each copy would double every message
 #: that follows, and MAVSDK gives up after five repeats; a ground station that missed our request repeats it later.
 _REPEAT_AFTER_S = 0.1
@@ -118,37 +120,46 @@ class ItemRequest:
     #: The item was requested more than once: its answer gives no round trip time.
     is_repeated: bool = False
     _seq: int | None = None
+    _first_at: float = 0.0
     _asked_at: float = 0.0
+    _repeats: int = 0
     _timeout_s: float = _FIRST_TIMEOUT_S
     _round_trip_s: float | None = None
 
     def asked(self, seq: int, now: float) -> None:
         self.is_repeated = seq == self._seq
-        self._seq = seq
+        if not self.is_repeated:
+            self._seq, self._first_at, self._repeats = seq, now, 0
         self._asked_at = now
         self.due = now + self._timeout_s
 
     def lost(self) -> None:
-        self._timeout_s = min(self._timeout_s * 2, _MAX_TIMEOUT_S)
+        """No answer before `due`. The timeout grows while the round trip time is unknown or several copies are lost.
+
+        MAVSDK gives up 2.5 s after its last new request, and on a lossy link a longer timeout leaves too few repeats.
+        """
+        self._repeats += 1
+        if self._round_trip_s is None or self._repeats >= _EQUAL_TIMEOUTS:
+            self._timeout_s = min(self._timeout_s * 2, _MAX_TIMEOUT_S)
 
     def is_copy(self, now: float) -> bool:
         """True if a repeated message was duplicated on its way, and needs no separate answer."""
         return now < self._asked_at + _REPEAT_AFTER_S
 
     def answered(self, now: float) -> None:
-        """Update the timeout when the requested item arrives.
-
-        The answer to a repeated request gives no round trip time. But if it took a usual round trip after the repeat,
-        a frame was lost, and the timeout shrinks again: MAVSDK gives up if we wait longer after each loss.
-        """
-        elapsed_s = now - self._asked_at
-        known_s = self._round_trip_s
+        """Update the timeout when the requested item arrives."""
+        elapsed_s, known_s = now - self._asked_at, self._round_trip_s
         if not self.is_repeated:
-            old = elapsed_s if known_s is None else known_s
-            self._round_trip_s = old * 7 / 8 + elapsed_s / 8
-            self._timeout_s = min(max(2 * self._round_trip_s, _FIRST_TIMEOUT_S), _MAX_TIMEOUT_S)
-        elif known_s is not None and elapsed_s >= known_s / 2:
-            self._timeout_s = max(self._timeout_s / 2, 2 * known_s, _FIRST_TIMEOUT_S)
+            round_trip_s = elapsed_s if known_s is None else known_s * 7 / 8 + elapsed_s / 8
+        elif known_s is None:
+            return
+        elif elapsed_s < known_s / 2:
+            # Too early for an answer to the last copy: the round trip has become longer than the timeout.
+            round_trip_s = min(now - self._first_at, _MAX_TIMEOUT_S)
+        else:
+            round_trip_s = known_s
+        self._round_trip_s = round_trip_s
+        self._timeout_s = min(max(1.5 * round_trip_s, _FIRST_TIMEOUT_S), _MAX_TIMEOUT_S)
 
 
 class Receiving(UploadState):

@@ -174,6 +174,20 @@ def test_an_upload_restarted_from_a_new_address_replaces_the_old_one() -> None:
         assert world.stored == records_of(plan)
 
 
+def test_a_restarted_station_is_not_asked_for_items_of_its_former_list() -> None:
+    """Its item 0 would complete the former list of one item, and its own list would get that list's refusal."""
+    world = ready_world()
+    roamer = Roamer(world)
+    former = Upload(roamer.station, PLAN[:1])
+    former.stop()
+    world.run(1.5)
+    roamer.move()
+    world.run(3)
+    assert roamer.station.said("MISSION_REQUEST") == []
+    assert Upload(roamer.station, PLAN).run() is MissionResult.ACCEPTED
+    assert world.stored == records_of(PLAN)
+
+
 def test_the_result_of_an_upload_goes_to_the_new_address() -> None:
     world = ready_world()
     roamer = Roamer(world)

@@ -745,6 +745,26 @@ def test_the_timeout_adapts_to_the_round_trip(round_trip_s: float, copies: int) 
     assert max(requested(station).count(seq) for seq in range(30)) == copies
 
 
+def test_four_copies_of_a_lost_request_arrive_before_mavsdk_gives_up() -> None:
+    """It waits 2.5 s for the next request."""
+    world, station = holding()
+    station.air = Air(delay_s=0.2)
+    items = waypoints(8)
+    asked: dict[int, list[float]] = {seq: [] for seq in range(8)}
+
+    def answer(message: Message) -> None:
+        if message.get_type() == "MISSION_REQUEST":
+            asked[message.seq].append(world.now)
+            if len(asked[message.seq]) == (4 if message.seq == 4 else 1):
+                station.send(item_message(message.seq, items[message.seq]))
+
+    station.on_message.append(answer)
+    station.send(count_message(8))
+    world.wait_until(lambda _: bool(acks(station)), 60)
+    assert acks(station) == [A.ACCEPTED]
+    assert asked[4][3] - asked[4][0] < 2.5
+
+
 @pytest.mark.parametrize("round_trip_s", [0.3, 0.6, 1.0])
 def test_needless_repeats_lengthen_the_timeout(round_trip_s: float) -> None:
     """A ground station that answers each request once: only the first request is repeated."""
