@@ -72,17 +72,17 @@ def main(counts: tuple[int, ...]) -> None:
             vehicles = stack.enter_context(running(command, log))
             wait_for(partial(_is_up, log), "the vehicles are up", _OPENING_S * count + 30)
             opened_s = time.monotonic() - began_at
-            heard = [0]
+            received = [0]
 
-            def take(_sample: object, heard: list[int] = heard) -> None:
-                heard[0] += 1
+            def take(_sample: object, received: list[int] = received) -> None:
+                received[0] += 1
 
             with client(endpoint) as session, session.declare_subscriber("fleet/**", take):
                 time.sleep(2.0)
-                heard[0], before_s = 0, cpu_s(router)
+                received[0], before_s = 0, cpu_s(router)
                 time.sleep(_WATCHED_S)
                 cpu_percent = 100 * (cpu_s(router) - before_s) / _WATCHED_S
-                rate_hz = heard[0] / _WATCHED_S
+                rate_hz = received[0] / _WATCHED_S
             router_mb = _resident_mb(router)
             list_s = _listed_s(endpoint, count)
             print(

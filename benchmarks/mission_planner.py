@@ -46,7 +46,7 @@ def measure() -> list[Figure]:
                     connects_s.append(time.perf_counter() - began_at)
                     writes_s.append(_write(planner, run))
                 with MissionPlanner(("127.0.0.1", ideal_port)) as planner:
-                    planner.meet()
+                    planner.wait_for_vehicle()
                     floors_s.append(_write(planner, run))
     floor = Floor(statistics.median(floors_s) + _LINE_S, "ideal vehicle and bytes at line rate")
     name = f"Mission Planner's Write of {COUNT} items, median of {_RUNS}"

@@ -64,14 +64,14 @@ def _latency_and_memory(folder: Path, endpoint: str) -> list[Figure]:
         process.wait_for_event("fc.found")
         request_rates(ground)
 
-        def heard(sample: zenoh.Sample) -> None:
+        def received(sample: zenoh.Sample) -> None:
             came_at = time.perf_counter()
             samples.append(came_at)
             if str(sample.key_expr).endswith("/attitude"):
                 number = round(json.loads(sample.payload.to_bytes())["roll_deg"] * 10) % ATTITUDES
                 milliseconds.append((came_at - controller.attitudes_at[number]) * 1000)
 
-        with session.declare_subscriber(full(DEFAULT_PREFIX, _VEHICLE, ALL_TELEMETRY), heard):
+        with session.declare_subscriber(full(DEFAULT_PREFIX, _VEHICLE, ALL_TELEMETRY), received):
             time.sleep(_SETTLING_S)
             drain(ground)
             samples.clear()
@@ -114,14 +114,14 @@ def _bare_latencies_ms(folder: Path, endpoint: str) -> list[float]:
     """The times of bare puts; on Linux perf_counter() is one clock for all processes."""
     found: list[float] = []
 
-    def heard(sample: zenoh.Sample) -> None:
+    def received(sample: zenoh.Sample) -> None:
         came_at = time.perf_counter()
         (put_at,) = struct.unpack_from("<d", sample.payload.to_bytes())
         found.append((came_at - put_at) * 1000)
 
     with (
         client(endpoint) as session,
-        session.declare_subscriber("floor", heard),
+        session.declare_subscriber("floor", received),
         running([sys.executable, "-c", _PUTTER, endpoint], folder / "putter.log"),
     ):
         wait_for(lambda: bool(found), "a bare put arrives")

@@ -14,7 +14,7 @@ import pytest
 from tests.support.attack_pilot import HELLO, m, sign
 from tests.support.benches import Starter
 from tests.support.plain_station import udp_station
-from tests.support.programs import TIMEOUT_S, Daemon, comes, free_port, until
+from tests.support.programs import TIMEOUT_S, Daemon, free_port, happens, until
 
 COMMANDS = {
     "forced disarm": m.MAVLink_command_long_message(1, 1, 400, 0, 0, 21196, 0, 0, 0, 0, 0),
@@ -110,7 +110,7 @@ def test_no_command_passes_an_open_link(start: Starter, autopilot: Autopilot) ->
             elif is_command:
                 stranger.wait_for("COMMAND_ACK")
             if is_command:
-                answers = [heard for heard in stranger.heard if heard.get_type() == "COMMAND_ACK"]
+                answers = [message for message in stranger.received if message.get_type() == "COMMAND_ACK"]
                 assert [answer.result for answer in answers] == [m.MAV_RESULT_DENIED]
     assert set(autopilot.kinds()) == {"HEARTBEAT", "PARAM_REQUEST_READ"}
 
@@ -142,7 +142,7 @@ def test_commands_pass_with_a_list_of_writers(start: Starter, autopilot: Autopil
         for message in COMMANDS.values():
             station.send(message)
         kinds = {message.get_type() for message in COMMANDS.values()}
-        assert comes(lambda: kinds <= set(autopilot.kinds())), autopilot.kinds()
+        assert happens(lambda: kinds <= set(autopilot.kinds())), autopilot.kinds()
 
 
 def test_signed_commands_pass(start: Starter, autopilot: Autopilot, tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from tests.support.attack_pilot import HELLO, Attack, Stranger, Watch, assert_up
 from tests.support.benches import Starter
 from tests.support.plain_station import udp_station
 from tests.support.plan import plain_plan
-from tests.support.programs import REPOSITORY, Daemon, comes, free_port, until
+from tests.support.programs import REPOSITORY, Daemon, free_port, happens, until
 from tests.support.web_bench import WebBench
 
 
@@ -39,7 +39,7 @@ def test_the_log_of_a_flight_survives_a_flood(start: Starter, stack: ExitStack) 
     stack.callback(stranger.close)
     text = m.MAVLink_statustext_message(6, b"x" * 50)
     with Watch(bench.daemon), Attack(lambda: stranger.send(*[text] * 50), per_s=40) as attack:
-        assert comes(lambda: attack.count > 300)
+        assert happens(lambda: attack.count > 300)
     assert flight in logs(state)
     # The 1.2 MB of the flood are not recorded.
     assert sum(path.stat().st_size for path in logs(state)) < 600_000
@@ -154,8 +154,8 @@ def test_connections_and_unread_replies_are_limited(start: Starter) -> None:
                 with suppress(OSError):  # the daemon has disconnected, or its backlog is full
                     client.connect(address)
                     client.sendall(request)
-            heard = len(witness.gaps_s)
-            until(lambda heard=heard: len(witness.gaps_s) > heard, "a heartbeat")  # type: ignore[misc]
+            received = len(witness.gaps_s)
+            until(lambda received=received: len(witness.gaps_s) > received, "a heartbeat")  # type: ignore[misc]
             assert _open_files(process) < MOST_OPEN_FILES
         assert _memory_kb(process) - memory < 15_000
         with udp_station(daemon.address) as pilot:
@@ -163,7 +163,7 @@ def test_connections_and_unread_replies_are_limited(start: Starter) -> None:
     # One more than before: the telemetry log.
     until(lambda: _open_files(process) <= before + 1, "the end of the connections")
     assert "Traceback" not in daemon.printed
-    assert comes(lambda: daemon.status() is not None)
+    assert happens(lambda: daemon.status() is not None)
 
 
 def test_a_long_source_is_truncated(start: Starter) -> None:
@@ -189,7 +189,7 @@ def test_requests_of_a_megabyte_do_not_fill_the_memory(start: Starter) -> None:
                 client.sendall(request)
         until(lambda: len(witness.gaps_s) >= 2, "heartbeats")
     assert _memory_kb(bench.daemon.process.pid, "VmHWM") - before < 15_000
-    assert comes(lambda: bench.daemon.status() is not None)
+    assert happens(lambda: bench.daemon.status() is not None)
 
 
 def _open_files(pid: int) -> int:

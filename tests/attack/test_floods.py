@@ -10,7 +10,7 @@ from tests.support.attack_pilot import HELLO, Attack, Stranger, Watch, assert_up
 from tests.support.benches import Bench, Starter
 from tests.support.plain_station import udp_station
 from tests.support.plan import plain_plan
-from tests.support.programs import comes
+from tests.support.programs import happens
 
 
 @pytest.fixture
@@ -31,6 +31,6 @@ def test_the_text_of_a_refusal_goes_only_to_the_refused_station(bench: Bench, st
         pilot.send(HELLO)
         pilot.wait_for("HEARTBEAT")
         with Watch(bench.daemon) as witness, Attack(lambda: stranger.send(*loud), per_s=125) as attack:
-            assert comes(lambda: attack.count > 600)
+            assert happens(lambda: attack.count > 600)
             assert_uploads(pilot, bench.board, plain_plan(20))
         assert witness.frames[m.MAVLINK_MSG_ID_STATUSTEXT] <= 4

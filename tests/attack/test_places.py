@@ -15,7 +15,7 @@ from tests.support.attack_pilot import HELLO, Attack, Stranger, Watch, assert_up
 from tests.support.benches import Bench, Starter
 from tests.support.plain_station import PlainStation, tcp_station, udp_station
 from tests.support.plan import plain_plan
-from tests.support.programs import comes, free_port, until
+from tests.support.programs import free_port, happens, until
 
 PASSPHRASE = "loop the loop"  # noqa: S105 - it is only ours
 #: More than the places for listeners, or for TCP clients.
@@ -39,7 +39,7 @@ def guarded(start: Starter, key_file: Path) -> Bench:
     return bench
 
 
-def crowd(bench: Bench, stack: ExitStack, *spoken: Message, size: int = CROWD, per_s: float = 30) -> Attack:
+def crowd(bench: Bench, stack: ExitStack, *messages: Message, size: int = CROWD, per_s: float = 30) -> Attack:
     """Strangers, each with its own address and ids, that send heartbeats and other messages from time to time."""
     strangers = [
         Stranger(bench.daemon.address, f"127.0.{1 + row}.{1 + number}", sysid=1 + number, compid=190 + row)
@@ -49,18 +49,18 @@ def crowd(bench: Bench, stack: ExitStack, *spoken: Message, size: int = CROWD, p
         stack.callback(stranger.close)
     turns = itertools.cycle(strangers)
 
-    def speak() -> None:
-        comes(lambda: has_read_all(bench.daemon.address[1]))
-        next(turns).send(*spoken or (HELLO,))
+    def send() -> None:
+        happens(lambda: has_read_all(bench.daemon.address[1]))
+        next(turns).send(*messages or (HELLO,))
 
-    return Attack(speak, per_s=per_s)
+    return Attack(send, per_s=per_s)
 
 
-def hears_heartbeats(station: PlainStation, count: int) -> bool:
+def receives_heartbeats(station: PlainStation, count: int) -> bool:
     """Send a heartbeat every second until `count` heartbeats have been received."""
     for _ in range(60):
         station.send(HELLO)
-        count -= len([heard for heard in station._messages(1.0) if heard.get_type() == "HEARTBEAT"])
+        count -= len([message for message in station._messages(1.0) if message.get_type() == "HEARTBEAT"])
         if count <= 0:
             return True
     return False
@@ -79,12 +79,12 @@ def test_a_crowd_neither_displaces_a_pilot_nor_locks_one_out(start: Starter, sta
         udp_station(bench.daemon.address, sysid=254, host="127.0.0.2") as late,
     ):
         for _ in range(3):
-            assert hears_heartbeats(first, 1)
+            assert receives_heartbeats(first, 1)
         count = m.MAVLink_mission_count_message(1, 1, 9)
         with Watch(bench.daemon), crowd(bench, stack, HELLO, count, size=MAX_PEERS + 40, per_s=100):
             until(lambda: len(places()) == MAX_PEERS, "the crowd")
             for _ in range(3):
-                assert hears_heartbeats(late, 1)
+                assert receives_heartbeats(late, 1)
             assert_uploads(late, bench.board, plain_plan(30))
             assert any(str(first.own_address[1]) in place for place in places())
             assert_uploads(first, bench.board, plain_plan(20))
@@ -93,14 +93,14 @@ def test_a_crowd_neither_displaces_a_pilot_nor_locks_one_out(start: Starter, sta
 def test_strangers_on_a_keyed_link_do_not_displace_the_pilot(start: Starter, stack: ExitStack, key_file: Path) -> None:
     bench = guarded(start, key_file)
     with crowd(bench, stack) as attack:
-        assert comes(lambda: attack.count > 2 * CROWD)
+        assert happens(lambda: attack.count > 2 * CROWD)
         with udp_station(bench.daemon.address) as pilot:
             # Like Mission Planner, sign once a signed heartbeat was received.
-            assert hears_heartbeats(pilot, 2)
+            assert receives_heartbeats(pilot, 2)
             sign(pilot._codec, PASSPHRASE)
             assert_uploads(pilot, bench.board, plain_plan(30))
             listener = stack.enter_context(udp_station(bench.daemon.address))
-            assert hears_heartbeats(listener, 2)
+            assert receives_heartbeats(listener, 2)
             assert listener.upload(plain_plan(3)) is MissionResult.DENIED
             listener.send(m.MAVLink_command_long_message(1, 1, 511, 0, 30, 10000, 0, 0, 0, 0, 0))
             assert listener.wait_for("COMMAND_ACK").result == m.MAV_RESULT_DENIED
@@ -108,11 +108,11 @@ def test_strangers_on_a_keyed_link_do_not_displace_the_pilot(start: Starter, sta
             assert len(bench.daemon.ask({"do": "status"})["ground_stations"]) < CROWD
     # Texts to the pilot do not go to strangers, even if there is room.
     with udp_station(bench.daemon.address) as pilot, udp_station(bench.daemon.address) as listener:
-        assert hears_heartbeats(listener, 2)
+        assert receives_heartbeats(listener, 2)
         sign(pilot._codec, PASSPHRASE)
         assert_uploads(pilot, bench.board, plain_plan(10))
-        assert hears_heartbeats(listener, 2)
-        assert "STATUSTEXT" not in {message.get_type() for message in listener.heard}
+        assert receives_heartbeats(listener, 2)
+        assert "STATUSTEXT" not in {message.get_type() for message in listener.received}
 
 
 def test_an_unsigned_frame_does_not_change_the_pilots_rates(start: Starter, stack: ExitStack, key_file: Path) -> None:
@@ -130,10 +130,10 @@ def test_an_unsigned_frame_does_not_change_the_pilots_rates(start: Starter, stac
         ):
             pilot._socket.send(bytes(message.pack(forger)))
         until(lambda: "3 x not signed" in str(bench.daemon.ask({"do": "status"})["refused"]), "the refusals")
-        pilot.heard.clear()
+        pilot.received.clear()
         for _ in range(20):
             pilot.wait_for("ATTITUDE")
-        assert "PARAM_VALUE" not in {message.get_type() for message in pilot.heard}
+        assert "PARAM_VALUE" not in {message.get_type() for message in pilot.received}
 
 
 def test_idle_connections_do_not_lock_a_pilot_out(start: Starter, stack: ExitStack) -> None:
@@ -167,7 +167,7 @@ def test_slow_uploads_and_forged_addresses_do_not_delay_the_pilot(start: Starter
         for stranger in slow:
             stranger.send(m.MAVLink_mission_count_message(1, 1, 100))
         with Watch(bench.daemon) as witness, Attack(lambda: next(turns).send(HELLO), per_s=100) as attack:
-            assert comes(lambda: attack.count > 100)
+            assert happens(lambda: attack.count > 100)
             for stranger in slow:
                 stranger.send(m.MAVLink_mission_item_int_message(1, 1, 0, 3, 16, 0, 1, 0, 0, 0, 0, 1, 1, 9.0))
             assert_uploads(pilot, bench.board, plain_plan(30))

@@ -34,15 +34,15 @@ def test_other_members_cannot_publish_for_a_vehicle(start: Starter, fleet: Fleet
         # The guest only subscribes.
         assert Reader(guest, key("telemetry/*")).wait("telemetry/attitude")
         truth = ask_surely(pilot, "state")
-        heard = Reader(pilot)
+        received = Reader(pilot)
         tokens: list[str] = []
         pilot.liveliness().declare_subscriber("fleet/**", lambda sample: tokens.append(str(sample.key_expr)))
         for liar in (guest, other):
-            _lie(liar)
+            _send_forgeries(liar)
         time.sleep(2.0)  # time for forged samples to arrive
-        heard.wait("telemetry/attitude")
-        assert [sample for sample in heard.samples if sample.payload.to_bytes() == b"forged"] == []
-        assert zenoh.SampleKind.DELETE not in [sample.kind for sample in heard.samples]
+        received.wait("telemetry/attitude")
+        assert [sample for sample in received.samples if sample.payload.to_bytes() == b"forged"] == []
+        assert zenoh.SampleKind.DELETE not in [sample.kind for sample in received.samples]
         replies = [reply.ok.payload.to_bytes() for reply in pilot.get(key("state"), timeout=3.0) if reply.ok]
         assert b"forged" not in replies
         assert ask_surely(pilot, "state").keys() == truth.keys()
@@ -57,7 +57,7 @@ def test_other_members_cannot_publish_for_a_vehicle(start: Starter, fleet: Fleet
     bench.board.assert_was_treated_well()
 
 
-def _lie(session: zenoh.Session) -> None:
+def _send_forgeries(session: zenoh.Session) -> None:
     session.put(key("telemetry/position"), b"forged")
     session.delete(key("telemetry/position"))
     session.declare_queryable(key("state"), lambda query: query.reply(query.key_expr, b"forged"), complete=True)

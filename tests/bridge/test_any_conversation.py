@@ -164,7 +164,7 @@ class Conversation(RuleBasedStateMachine):
             station.send(list_message())
         world.run(1)
         for station in self.stations:
-            assert station.said("MISSION_COUNT")[-1].count == len(items)
+            assert station.messages("MISSION_COUNT")[-1].count == len(items)
 
 
 TestConversation = Conversation.TestCase

@@ -196,8 +196,8 @@ def test_the_bridge_follows_to_mavlink_on_arming_and_back(protocol: TelemetryPro
         world.run(0.5)
         assert thinks_armed(world) is False
         world.run(3)
-    told = [event.name for event in world.log_event if event.name.startswith("vehicle.")]
-    assert told == ["vehicle.armed", "vehicle.disarmed"] * 2
+    names = [event.name for event in world.log_event if event.name.startswith("vehicle.")]
+    assert names == ["vehicle.armed", "vehicle.disarmed"] * 2
     world.assert_line_was_clean()
 
 
@@ -312,7 +312,7 @@ def test_an_empty_heartbeat_is_ignored() -> None:
     for fields in ((0, 0, 0, 0, 0, 0), (2, 3, 0x80, 0, 3, 0), (2, 3, 0x80 | 81, 0, 4, 3)):
         for version in (1, 2):
             message = messages.MAVLink_heartbeat_message(*fields)
-            world.hear(bytes(message.pack(mavlink, force_mavlink1=version == 1)))
+            world.receive_from_fc(bytes(message.pack(mavlink, force_mavlink1=version == 1)))
     assert thinks_armed(world) is True
 
 

@@ -76,7 +76,7 @@ def test_a_flood_of_counts_is_not_logged() -> None:
     world.run(5)
     limit = LIMITS[Cost.UPLOAD].each
     assert limit.burst / 2 < len(world.events("mission.refused")) <= limit.burst + limit.per_s * 5
-    assert {ack.type for ack in station.said("MISSION_ACK")} == {m.MAV_MISSION_DENIED}
+    assert {ack.type for ack in station.messages("MISSION_ACK")} == {m.MAV_MISSION_DENIED}
 
 
 def test_requests_from_strangers_are_not_passed_to_an_armed_board() -> None:

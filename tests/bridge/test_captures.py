@@ -46,7 +46,7 @@ def test_every_capture_is_played_to_its_end(name: str) -> None:
     station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
     world.run(world.naze.duration_s)
     assert world.events("fc.found")
-    heartbeats = [at for at, message in station.heard if message.get_type() == "HEARTBEAT"]
+    heartbeats = [at for at, message in station.received if message.get_type() == "HEARTBEAT"]
     assert max(later - earlier for earlier, later in pairwise(heartbeats)) <= 1.5
 
 

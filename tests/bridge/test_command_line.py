@@ -41,18 +41,18 @@ def open_command_line(world: World) -> None:
 def type_exit(world: World) -> bytes:
     """Type `exit` and return the echo."""
     world.run(0.1)
-    heard: list[bytes] = []
+    received: list[bytes] = []
     receive = world.bridge.fc_received
 
     def listen(data: bytes, now: float) -> None:
-        heard.append(data)
+        received.append(data)
         receive(data, now)
 
     world.bridge.fc_received = listen  # type: ignore[method-assign]
     world.naze.receive(b"exit\r", world.now)
     world.run(0.5)
     world.bridge.fc_received = receive  # type: ignore[method-assign]
-    return b"".join(heard)
+    return b"".join(received)
 
 
 def left_in_cli(board: Any) -> World:

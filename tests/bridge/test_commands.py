@@ -50,13 +50,13 @@ def answers(flying: tuple[World, GroundStation], *sent: Message) -> list[Message
     for message in sent:
         station.send(message)
     world.run(0.05)
-    return [heard for heard in station.said() if heard.get_type() not in TELEMETRY_TYPES]
+    return [message for message in station.messages() if message.get_type() not in TELEMETRY_TYPES]
 
 
-def acks(heard: list[Message]) -> list[tuple[int, int, int, int]]:
+def acks(received: list[Message]) -> list[tuple[int, int, int, int]]:
     return [
         (ack.command, ack.result, ack.target_system, ack.target_component)
-        for ack in heard
+        for ack in received
         if ack.get_type() == "COMMAND_ACK"
     ]
 
@@ -90,20 +90,20 @@ def test_every_command_is_acknowledged_once(
     result: int,
     also: str | None,
 ) -> None:
-    heard = answers(flying, make(command, param1))
-    assert acks(heard) == [(command, result, 255, 190)]
-    others = [message.get_type() for message in heard if message.get_type() != "COMMAND_ACK"]
+    received = answers(flying, make(command, param1))
+    assert acks(received) == [(command, result, 255, 190)]
+    others = [message.get_type() for message in received if message.get_type() != "COMMAND_ACK"]
     assert others == ([also] if also else [])
 
 
 def test_all_command_numbers_are_acknowledged(flying: tuple[World, GroundStation]) -> None:
     numbers = [*range(700), *range(3000, 3010), *range(42400, 42440)]
     world, _ = flying
-    heard = []
+    received = []
     for first in range(0, len(numbers), 100):
         world.run(4.0)  # faster would exceed the rate limit
-        heard += answers(flying, *(long(number) for number in numbers[first : first + 100]))
-    assert [ack[0] for ack in acks(heard)] == numbers
+        received += answers(flying, *(long(number) for number in numbers[first : first + 100]))
+    assert [ack[0] for ack in acks(received)] == numbers
 
 
 @pytest.mark.parametrize(
@@ -125,9 +125,9 @@ def test_commands_that_act_on_the_aircraft_are_denied_with_a_reason(
     world, _ = flying
     world.run(_SILENCE_S)
     before = len(world.written)
-    heard = answers(flying, long(command, 1.0))
-    assert acks(heard) == [(command, DENIED, 255, 190)]
-    texts = [message for message in heard if message.get_type() == "STATUSTEXT"]
+    received = answers(flying, long(command, 1.0))
+    assert acks(received) == [(command, DENIED, 255, 190)]
+    texts = [message for message in received if message.get_type() == "STATUSTEXT"]
     assert len(texts) == 1
     assert words in texts[0].text
     assert texts[0].severity == 3
@@ -138,9 +138,9 @@ def test_commands_that_act_on_the_aircraft_are_denied_with_a_reason(
 
 def test_a_mode_change_is_refused_with_a_text(flying: tuple[World, GroundStation]) -> None:
     flying[0].run(_SILENCE_S)
-    heard = answers(flying, m.MAVLink_set_mode_message(1, 1, 4))
-    assert [message.get_type() for message in heard] == ["STATUSTEXT"]
-    assert "transmitter switches" in heard[0].text
+    received = answers(flying, m.MAVLink_set_mode_message(1, 1, 4))
+    assert [message.get_type() for message in received] == ["STATUSTEXT"]
+    assert "transmitter switches" in received[0].text
 
 
 @pytest.mark.parametrize(
@@ -171,8 +171,8 @@ def test_only_the_sender_gets_the_refusal(refused: Message) -> None:
 
 def test_the_current_waypoint_cannot_be_set(flying: tuple[World, GroundStation]) -> None:
     flying[0].run(_SILENCE_S)
-    heard = answers(flying, m.MAVLink_mission_set_current_message(1, 1, 3))
-    assert ["cannot be set" in message.text for message in heard] == [True]
+    received = answers(flying, m.MAVLink_mission_set_current_message(1, 1, 3))
+    assert ["cannot be set" in message.text for message in received] == [True]
 
 
 def test_a_command_for_another_system_is_not_answered(flying: tuple[World, GroundStation]) -> None:
@@ -196,13 +196,13 @@ def test_autopilot_version_has_no_ftp_capability(flying: tuple[World, GroundStat
 def test_requesting_an_unknown_home_is_temporarily_rejected() -> None:
     world = World(powered=False)
     world.run(0.5)
-    heard = answers((world, GroundStation(world)), long(410), long(512, 242))
-    assert [(ack[0], ack[1]) for ack in acks(heard)] == [(410, TEMPORARILY_REJECTED), (512, TEMPORARILY_REJECTED)]
+    received = answers((world, GroundStation(world)), long(410), long(512, 242))
+    assert [(ack[0], ack[1]) for ack in acks(received)] == [(410, TEMPORARILY_REJECTED), (512, TEMPORARILY_REJECTED)]
 
 
 def test_the_banner_names_the_flight_controller(flying: tuple[World, GroundStation]) -> None:
-    heard = answers(flying, long(42428))
-    text = "".join(message.text for message in heard if message.get_type() == "STATUSTEXT")
+    received = answers(flying, long(42428))
+    text = "".join(message.text for message in received if message.get_type() == "STATUSTEXT")
     assert "Harakiri with the mission extension" in text
 
 
@@ -238,10 +238,10 @@ def param_set(name: bytes, value: float) -> Message:
     return m.MAVLink_param_set_message(1, 1, name, value, 9)
 
 
-def values(heard: list[Message]) -> list[tuple[str, float, int, int]]:
+def values(received: list[Message]) -> list[tuple[str, float, int, int]]:
     return [
         (message.param_id, message.param_value, message.param_index, message.param_count)
-        for message in heard
+        for message in received
         if message.get_type() == "PARAM_VALUE"
     ]
 
@@ -252,9 +252,9 @@ def radius_world() -> tuple[World, GroundStation]:
 
 
 def test_the_parameter_list_is_short_and_complete(flying: tuple[World, GroundStation]) -> None:
-    heard = answers(flying, m.MAVLink_param_request_list_message(1, 1))
-    assert values(heard) == [("SYSID_THISMAV", 1.0, 0, 2), ("WPNAV_RADIUS", 200.0, 1, 2)]
-    assert {message.param_type for message in heard} == {9}
+    received = answers(flying, m.MAVLink_param_request_list_message(1, 1))
+    assert values(received) == [("SYSID_THISMAV", 1.0, 0, 2), ("WPNAV_RADIUS", 200.0, 1, 2)]
+    assert {message.param_type for message in received} == {9}
 
 
 @pytest.mark.parametrize(
@@ -277,8 +277,8 @@ def test_the_parameter_list_is_short_and_complete(flying: tuple[World, GroundSta
 def test_a_parameter_is_read_by_index_or_by_name(
     flying: tuple[World, GroundStation], name: bytes, index: int, expected: str | None
 ) -> None:
-    heard = answers(flying, m.MAVLink_param_request_read_message(1, 1, name, index))
-    assert [value[0] for value in values(heard)] == ([expected] if expected else [])
+    received = answers(flying, m.MAVLink_param_request_read_message(1, 1, name, index))
+    assert [value[0] for value in values(received)] == ([expected] if expected else [])
 
 
 def test_the_radius_is_set_on_the_flight_controller() -> None:
@@ -287,8 +287,8 @@ def test_the_radius_is_set_on_the_flight_controller() -> None:
     other = GroundStation(world, "other", sysid=254)
     other.send(m.MAVLink_ping_message(0, 0, 0, 0))
     station.send(param_set(b"WPNAV_RADIUS", 350.0))
-    world.wait_until(lambda _: bool(station.said("PARAM_VALUE")), 1)
-    assert values(station.said()) == values(other.said()) == [("WPNAV_RADIUS", 350.0, 1, 2)]
+    world.wait_until(lambda _: bool(station.messages("PARAM_VALUE")), 1)
+    assert values(station.messages()) == values(other.messages()) == [("WPNAV_RADIUS", 350.0, 1, 2)]
     assert station.texts() == []
     world.run(2)
     # The firmware applies it in its next loop.
@@ -303,8 +303,8 @@ def test_the_radius_is_set_on_the_flight_controller() -> None:
 def test_an_unchanged_value_is_not_written(value: float) -> None:
     world, station = radius_world()
     before, operations = len(world.written), world.naze.flash_operations
-    heard = answers((world, station), param_set(b"WPNAV_RADIUS", value))
-    assert values(heard) == [("WPNAV_RADIUS", 200.0, 1, 2)]
+    received = answers((world, station), param_set(b"WPNAV_RADIUS", value))
+    assert values(received) == [("WPNAV_RADIUS", 200.0, 1, 2)]
     assert all(data[4] < 190 for _, _, data in world.written[before:])
     world.run(2)
     assert world.naze.flash_operations == operations
@@ -313,8 +313,8 @@ def test_an_unchanged_value_is_not_written(value: float) -> None:
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, -1.0, 2001.0, 1e30])
 def test_a_value_out_of_range_is_refused_with_a_text(value: float) -> None:
     world, station = radius_world()
-    heard = answers((world, station), param_set(b"WPNAV_RADIUS", value))
-    assert values(heard) == [("WPNAV_RADIUS", 200.0, 1, 2)]
+    received = answers((world, station), param_set(b"WPNAV_RADIUS", value))
+    assert values(received) == [("WPNAV_RADIUS", 200.0, 1, 2)]
     assert station.texts() == ["WPNAV_RADIUS must be 0..2000 cm"]
 
 
@@ -322,8 +322,8 @@ def test_a_value_out_of_range_is_refused_with_a_text(value: float) -> None:
 def test_every_radius_in_range_is_set(value: float) -> None:
     world, station = radius_world()
     station.send(param_set(b"WPNAV_RADIUS", value))
-    world.wait_until(lambda _: bool(station.said("PARAM_VALUE")), 1)
-    assert values(station.said())[0][1] == round(value)
+    world.wait_until(lambda _: bool(station.messages("PARAM_VALUE")), 1)
+    assert values(station.messages())[0][1] == round(value)
     world.assert_line_was_clean()
 
 
@@ -337,8 +337,8 @@ def test_setting_the_radius_while_armed_is_refused_with_a_text() -> None:
     world, station = radius_world()
     world.faults.armed = True
     world.run(1)
-    heard = answers((world, station), param_set(b"WPNAV_RADIUS", 400.0))
-    assert values(heard) == [("WPNAV_RADIUS", 200.0, 1, 2)]
+    received = answers((world, station), param_set(b"WPNAV_RADIUS", 400.0))
+    assert values(received) == [("WPNAV_RADIUS", 200.0, 1, 2)]
     assert any("disarm" in text for text in station.texts())
 
 
@@ -351,8 +351,8 @@ def test_a_radius_refused_for_flash_wear_is_reported() -> None:
         world.wait_until(lambda _, ended=ended: bool(ended), 5)  # type: ignore[misc]
         assert ended == [None]
     station.send(param_set(b"WPNAV_RADIUS", 400.0))
-    world.wait_until(lambda _: bool(station.said("PARAM_VALUE")), 5)
-    assert values(station.said()) == [("WPNAV_RADIUS", 550.0, 1, 2)]
+    world.wait_until(lambda _: bool(station.messages("PARAM_VALUE")), 5)
+    assert values(station.messages()) == [("WPNAV_RADIUS", 550.0, 1, 2)]
     assert " ".join(station.texts()) == f"WPNAV_RADIUS stays 550: {PushFailure.WRITES_SPENT.value}"
 
 
@@ -368,8 +368,8 @@ def test_without_the_extension_there_is_no_radius() -> None:
     world = World(faults=Faults(extension=False))
     world.wait_ready()
     station = GroundStation(world)
-    heard = answers((world, station), m.MAVLink_param_request_list_message(1, 1), param_set(b"WPNAV_RADIUS", 300.0))
-    assert values(heard) == [("SYSID_THISMAV", 1.0, 0, 1)]
+    received = answers((world, station), m.MAVLink_param_request_list_message(1, 1), param_set(b"WPNAV_RADIUS", 300.0))
+    assert values(received) == [("SYSID_THISMAV", 1.0, 0, 1)]
 
 
 def test_repeated_sets_are_done_one_at_a_time() -> None:
@@ -379,8 +379,8 @@ def test_repeated_sets_are_done_one_at_a_time() -> None:
         if number % 9 == 0:
             world.run(0.0001)
     world.run(4)
-    heard = answers((world, station), m.MAVLink_param_request_list_message(1, 1))
-    assert 300 <= values(heard)[1][1] <= 304
+    received = answers((world, station), m.MAVLink_param_request_list_message(1, 1))
+    assert 300 <= values(received)[1][1] <= 304
     world.assert_line_was_clean()
 
 
@@ -395,8 +395,8 @@ def test_a_late_reply_to_the_first_set_does_not_confirm_the_second() -> None:
         world.run(hang_s - 0.01)
         station.send(param_set(b"WPNAV_RADIUS", 500.0))
         world.run(3)
-        told = values(station.said())[-1][1]
-        assert told == values(answers((world, station), m.MAVLink_param_request_list_message(1, 1)))[1][1]
+        radius_cm = values(station.messages())[-1][1]
+        assert radius_cm == values(answers((world, station), m.MAVLink_param_request_list_message(1, 1)))[1][1]
         info = world.bridge.missions.fc_store
         assert isinstance(info, HarakiriMissions)
-        assert world.naze._firmware._board.wp_radius_cm == info.wp_radius_cm == told
+        assert world.naze._firmware._board.wp_radius_cm == info.wp_radius_cm == radius_cm

@@ -45,7 +45,7 @@ def ask(station: GroundStation, message: Message, seconds: float = 0.2) -> list[
     station.take()
     station.send(message)
     station.world.run(seconds)
-    return [heard for heard in station.said() if station.is_meant(heard)]
+    return [message for message in station.messages() if station.is_target_of(message)]
 
 
 def reads(world: World) -> int:
@@ -66,10 +66,10 @@ def test_the_list_reads_back_as_it_is_stored(as_int: bool) -> None:
     assert [(item.p1, item.p2, item.p3, item.p4, item.alt_m) for item in items] == [
         (item.p1, item.p2, item.p3, item.p4, item.alt_m) for item in OLD
     ]
-    assert {(m.autocontinue, m.current) for m in station.said("MISSION_ITEM", "MISSION_ITEM_INT")} == {(1, 0)}
+    assert {(m.autocontinue, m.current) for m in station.messages("MISSION_ITEM", "MISSION_ITEM_INT")} == {(1, 0)}
     expected = "MISSION_ITEM_INT" if as_int else "MISSION_ITEM"
-    assert len(station.said(expected)) == 20
-    assert len(station.said("MISSION_ITEM", "MISSION_ITEM_INT")) == 20
+    assert len(station.messages(expected)) == 20
+    assert len(station.messages("MISSION_ITEM", "MISSION_ITEM_INT")) == 20
 
 
 def test_a_list_changed_on_the_board_is_read_again() -> None:
@@ -133,7 +133,7 @@ def test_an_empty_list_is_count_0_until_home_is_known() -> None:
     assert (home.seq, home.command, home.frame) == (0, 16, 0)
     assert (home.lat_e7, home.lon_e7) == world.bridge.session.vehicle.place()
     world.run(1.1)
-    assert station.said("MISSION_CURRENT")[-1].mission_state == 1
+    assert station.messages("MISSION_CURRENT")[-1].mission_state == 1
 
 
 @pytest.mark.parametrize("as_int", [True, False])
@@ -325,7 +325,7 @@ def test_a_craft_that_is_armed_from_the_start_has_an_item_0(board: str | Telemet
     world.run(2.3)
     (home_item,) = ask(station, request_message(0))
     assert home_item.z == pytest.approx(131, abs=1.5)  # the launch altitude; the craft is higher by now
-    for home in station.said("HOME_POSITION")[-1:]:
+    for home in station.messages("HOME_POSITION")[-1:]:
         assert (home_item.x, home_item.y, home_item.z) == (home.latitude, home.longitude, home.altitude / 1000)
     assert not any("disarm to change" in text for text in station.texts())
 
@@ -358,13 +358,13 @@ def test_mission_current_has_the_number_of_items_held() -> None:
     world, station = holding()
     station.send(count_message(1))
     world.run(1.5)
-    current = station.said("MISSION_CURRENT")[-1]
+    current = station.messages("MISSION_CURRENT")[-1]
     assert (current.seq, current.total, current.mission_state) == (0, 19, 2)
     Upload(station, waypoints(5)).run()
     world.run(1.5)
-    assert station.said("MISSION_CURRENT")[-1].total == 4
+    assert station.messages("MISSION_CURRENT")[-1].total == 4
     # While the list is unknown, so is its length: that is not the same as no mission.
     world.power_off()
     world.run(5)
-    current = station.said("MISSION_CURRENT")[-1]
+    current = station.messages("MISSION_CURRENT")[-1]
     assert (current.seq, current.total, current.mission_state) == (0, 0, 0)

@@ -26,21 +26,21 @@ class DroneKit:
         self._station.on_message.append(self._take)
         self.parameters: dict[str, float] = {}
         self._parameter_names: list[str | None] = []
-        self.heard: set[str] = set()
+        self.received: set[str] = set()
         self.home: tuple[float, float, float] | None = None
         self.commands: list[Message] = []
         self.expected = 0
         self._is_loaded = True
         self._uploaded: list[bool] | None = None
-        self._beat()
+        self._send_heartbeat()
 
     def connect(self) -> None:
         """`connect(wait_ready=True)`: parameters, gps_0, armed, mode, attitude."""
-        self._wait(lambda: "HEARTBEAT" in self.heard)
+        self._wait(lambda: "HEARTBEAT" in self.received)
         self._station.send(m.MAVLink_request_data_stream_message(0, 0, m.MAV_DATA_STREAM_ALL, 4, 1))
         self._station.send(m.MAVLink_param_request_list_message(0, 0))
         self._request_gaps()
-        self._wait(lambda: self._has_parameters and self.heard >= {"GPS_RAW_INT", "ATTITUDE"})
+        self._wait(lambda: self._has_parameters and self.received >= {"GPS_RAW_INT", "ATTITUDE"})
 
     def download(self) -> None:
         """`commands.download()` and `commands.wait_ready()`."""
@@ -59,9 +59,9 @@ class DroneKit:
         self._wait(lambda: all(self._uploaded or ()))
         self._uploaded = None
 
-    def _beat(self) -> None:
+    def _send_heartbeat(self) -> None:
         self._station.send(m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3))
-        self.world.after(1.0, self._beat)
+        self.world.after(1.0, self._send_heartbeat)
 
     @property
     def _has_parameters(self) -> bool:
@@ -78,7 +78,7 @@ class DroneKit:
         self.world.wait_until(lambda _: done(), _TIMEOUT_S)
 
     def _take(self, message: Message) -> None:
-        self.heard.add(message.get_type())
+        self.received.add(message.get_type())
         match message.get_type():
             case "PARAM_VALUE":
                 self._parameter_names = self._parameter_names or [None] * message.param_count

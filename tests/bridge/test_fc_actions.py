@@ -46,7 +46,7 @@ def integer(command: int, params: tuple[float, ...]) -> Message:
 
 
 def results(station: GroundStation) -> list[int]:
-    return [ack.result for ack in station.said("COMMAND_ACK") if station.is_meant(ack)]
+    return [ack.result for ack in station.messages("COMMAND_ACK") if station.is_target_of(ack)]
 
 
 def done(world: World) -> list[int]:
@@ -186,11 +186,11 @@ def test_a_mission_transfer_waits_for_the_action_to_end() -> None:
     station.send(m.MAVLink_mission_count_message(1, 1, 5, 0))
     world.run(0.02)
     assert results(station) == []
-    assert station.said("MISSION_REQUEST") == []
+    assert station.messages("MISSION_REQUEST") == []
     world.run(1)
     assert results(station) == [ACCEPTED]
-    assert station.said("MISSION_REQUEST")[0].seq == 0
-    assert station.said("MISSION_ACK") == []
+    assert station.messages("MISSION_REQUEST")[0].seq == 0
+    assert station.messages("MISSION_ACK") == []
 
 
 def test_calibrating_a_missing_sensor_is_denied(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -273,7 +273,7 @@ def test_seven_downloads_while_armed_are_refused_with_one_text() -> None:
     for _ in range(7):
         station.send(m.MAVLink_mission_request_list_message(1, 1, 0))
         world.run(0.7)
-    assert len(station.said("MISSION_ACK")) == 7
+    assert len(station.messages("MISSION_ACK")) == 7
     assert len(station.texts()) == 1
 
 
@@ -283,13 +283,13 @@ def test_a_guided_item_is_refused_at_once(current: int) -> None:
     here = (45.3838, 8.4733, 20.0)
     station.send(m.MAVLink_mission_item_message(1, 1, 0, 3, 16, current, 0, 0, 0, 0, 0, *here))
     world.run(0.1)
-    (ack,) = station.said("MISSION_ACK")
-    assert station.is_meant(ack)
+    (ack,) = station.messages("MISSION_ACK")
+    assert station.is_target_of(ack)
     assert ack.type == m.MAV_MISSION_DENIED
     assert "transmitter" in station.texts()[0]
     station.take()
     e7 = (453838000, 84733000, 20.0)
     station.send(m.MAVLink_mission_item_int_message(1, 1, 0, 3, 16, current, 0, 0, 0, 0, 0, *e7))
     world.run(0.1)
-    assert [ack.type for ack in station.said("MISSION_ACK")] == [m.MAV_MISSION_DENIED]
+    assert [ack.type for ack in station.messages("MISSION_ACK")] == [m.MAV_MISSION_DENIED]
     assert station.texts() == []

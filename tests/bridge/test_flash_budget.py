@@ -26,7 +26,7 @@ def host(number: int) -> Peer:
     return Peer("udp", (f"10.1.{number // 256}.{number % 256}", 14550))
 
 
-class Field:
+class Link:
     """A link with its stations; counts the writes granted to each."""
 
     def __init__(self) -> None:
@@ -35,7 +35,7 @@ class Field:
         self.budget = FlashBudget(lambda _peer: Standing.OPEN, self.stations)
         self.writes = 0
 
-    def comes(self, *peers: Peer) -> None:
+    def connect(self, *peers: Peer) -> None:
         for beat in range(3):
             for peer in peers:
                 self.stations.heard(Station(peer, 255, 190), 2, self.now + beat)
@@ -47,31 +47,31 @@ class Field:
         return allowed
 
 
-def steady(field: Field, hosts: int) -> Iterator[Callable[[], None]]:
+def steady(link: Link, hosts: int) -> Iterator[Callable[[], None]]:
     """An attack by the same hosts all day."""
     strangers = [host(number) for number in range(hosts)]
-    field.comes(*strangers)
+    link.connect(*strangers)
 
     def attack() -> None:
         for stranger in strangers:
-            field.writes_now(stranger)
+            link.writes_now(stranger)
 
     while True:
         yield attack
 
 
-def rotating(field: Field, hosts: int) -> Iterator[Callable[[], None]]:
+def rotating(link: Link, hosts: int) -> Iterator[Callable[[], None]]:
     """An attack by as many hosts at a time, each replaced by a new one after its first write."""
     names = itertools.count()
     present: list[Peer] = []
 
     def attack() -> None:
         for stranger in present[:]:
-            if field.writes_now(stranger):
-                field.stations.gone(stranger)
+            if link.writes_now(stranger):
+                link.stations.gone(stranger)
                 present.remove(stranger)
         new = [host(next(names)) for _ in range(hosts - len(present))]
-        field.comes(*new)
+        link.connect(*new)
         present.extend(new)
 
     while True:
@@ -81,42 +81,42 @@ def rotating(field: Field, hosts: int) -> Iterator[Callable[[], None]]:
 @pytest.mark.parametrize("attack", [steady, rotating])
 @pytest.mark.parametrize("hosts", [1, 15, 240])
 def test_the_pilot_can_write_throughout_a_day_of_attacks(
-    attack: Callable[[Field, int], Iterator[Callable[[], None]]], hosts: int
+    attack: Callable[[Link, int], Iterator[Callable[[], None]]], hosts: int
 ) -> None:
-    field = Field()
-    field.comes(PILOT)
-    for strike in itertools.islice(attack(field, hosts), 24 * 6):
+    link = Link()
+    link.connect(PILOT)
+    for strike in itertools.islice(attack(link, hosts), 24 * 6):
         strike()
-        field.now += 600
-    assert field.writes <= MOST_IN_A_DAY
+        link.now += 600
+    assert link.writes <= MOST_IN_A_DAY
     # The pilot, connected earlier, writes at once and then every two hours.
-    assert field.writes_now(PILOT)
+    assert link.writes_now(PILOT)
     for _ in range(2):
         for _ in range(24):
             strike()
-            field.now += 300
-        assert field.writes_now(PILOT)
+            link.now += 300
+        assert link.writes_now(PILOT)
 
 
 def test_a_pilot_who_arrives_after_a_day_of_attacks_writes_at_once() -> None:
     """All 16 places with precedence are occupied."""
-    field = Field()
-    strikes = steady(field, 16)
+    link = Link()
+    strikes = steady(link, 16)
     for strike in itertools.islice(strikes, 24 * 6):
         strike()
-        field.now += 600
-    field.comes(PILOT)
-    assert not field.stations.has_standing(PILOT)
-    assert field.writes_now(PILOT)
+        link.now += 600
+    link.connect(PILOT)
+    assert not link.stations.has_standing(PILOT)
+    assert link.writes_now(PILOT)
 
 
 def test_a_single_pilot_leaves_a_reserve_to_newcomers() -> None:
-    field = Field()
-    field.comes(PILOT)
-    assert [field.writes_now(PILOT) for _ in range(258)] == [True] * 257 + [False]
+    link = Link()
+    link.connect(PILOT)
+    assert [link.writes_now(PILOT) for _ in range(258)] == [True] * 257 + [False]
     for _ in range(60):
-        field.now += 660
-        assert field.writes_now(PILOT)
+        link.now += 660
+        assert link.writes_now(PILOT)
 
 
 def test_an_unchanged_list_is_not_counted() -> None:

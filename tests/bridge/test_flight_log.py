@@ -63,5 +63,5 @@ def test_low_requested_rates_do_not_slow_the_log() -> None:
     log.take()
     station.take()
     world.run(10)
-    assert len(station.said("ATTITUDE")) == pytest.approx(10, abs=2)
+    assert len(station.messages("ATTITUDE")) == pytest.approx(10, abs=2)
     assert log.take()["ATTITUDE"] == pytest.approx(250, rel=0.1)

@@ -14,7 +14,7 @@ from tests.support.world import World
 HERE = 453838000, 84733000
 
 
-def hear(*reports: FrskyReport) -> Vehicle:
+def vehicle_after(*reports: FrskyReport) -> Vehicle:
     """Receive one report a second."""
     vehicle = Vehicle()
     telemetry = FrskyTelemetry(vehicle)
@@ -28,8 +28,8 @@ def at(north_e7: int, height_m: float | None = None) -> FrskyReport:
 
 
 def test_velocity_and_climb_are_computed_from_two_reports() -> None:
-    assert hear(at(0, 3.0)).last(GlobalPosition) is None
-    vehicle = hear(at(0, 3.0), at(500, 4.5))
+    assert vehicle_after(at(0, 3.0)).last(GlobalPosition) is None
+    vehicle = vehicle_after(at(0, 3.0), at(500, 4.5))
     position, height = vehicle.last(GlobalPosition), vehicle.last(Height)
     assert position is not None
     assert height is not None
@@ -39,14 +39,14 @@ def test_velocity_and_climb_are_computed_from_two_reports() -> None:
 
 
 def test_a_position_that_stops_changing_is_treated_as_a_lost_fix() -> None:
-    position = hear(at(0), at(500), at(500), at(500)).last(GlobalPosition)
+    position = vehicle_after(at(0), at(500), at(500), at(500)).last(GlobalPosition)
     assert position is not None
     assert position.heard_at == 1
 
 
 @pytest.mark.parametrize("damaged", [at(10_000_000, 8000.0), at(-600_000_000, 60.0)])
 def test_a_jump_is_dropped(damaged: FrskyReport) -> None:
-    vehicle = hear(at(0, 2.0), at(300, 3.0), damaged, at(900, 5.0))
+    vehicle = vehicle_after(at(0, 2.0), at(300, 3.0), damaged, at(900, 5.0))
     position, height = vehicle.last(GlobalPosition), vehicle.last(Height)
     assert position is not None
     assert height is not None

@@ -62,7 +62,7 @@ def test_no_input_from_ground_stations_raises(seed: int) -> None:
     stations = [GroundStation(world, str(number), sysid=250 + number) for number in range(4)]
     for number in range(AT_ONCE):
         station = inputs.random.choice(stations)
-        world.spoken_by(station, inputs.from_a_ground_station(), datagram=inputs.random.random() < 0.5)
+        world.receive_from(station, inputs.from_a_ground_station(), datagram=inputs.random.random() < 0.5)
         if number % TOGETHER == 0:
             world.run(0.01)
     world.run(1)
@@ -75,7 +75,7 @@ def test_no_input_from_the_uart_raises(seed: int) -> None:
     if inputs.random.random() < 0.7:
         world.wait_ready()
     for number in range(AT_ONCE):
-        world.hear(inputs.from_the_uart())
+        world.receive_from_fc(inputs.from_the_uart())
         if number % TOGETHER == 0:
             world.run(0.01)
     world.run(1)

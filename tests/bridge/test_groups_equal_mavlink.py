@@ -49,7 +49,7 @@ def number(low: float, high: float) -> st.SearchStrategy[float]:
     return st.floats(low, high)
 
 
-def heard(kind: type[Reading], **values: st.SearchStrategy[Any]) -> st.SearchStrategy[Reading | None]:
+def readings(kind: type[Reading], **values: st.SearchStrategy[Any]) -> st.SearchStrategy[Reading | None]:
     ages = st.sampled_from([0.0, 0.3, STALE_S - 0.01, STALE_S + 0.2, 90.0])
     return st.none() | st.builds(kind, heard_at=ages.map(lambda age: NOW - age), source=st.just(Source.MSP), **values)
 
@@ -68,7 +68,7 @@ POSITIONS = st.builds(
     VELOCITY,
 )
 READINGS = st.tuples(
-    heard(
+    readings(
         Orientation,
         roll_deg=number(-180, 180),
         pitch_deg=number(-90, 90),
@@ -76,7 +76,7 @@ READINGS = st.tuples(
         is_north_known=st.booleans(),
         rates_deg_s=st.none() | st.tuples(*[number(-2000, 2000)] * 3),
     ),
-    heard(
+    readings(
         GpsFix,
         fix=st.sampled_from(Fix),
         satellites=st.none() | st.integers(0, 40),
@@ -85,17 +85,17 @@ READINGS = st.tuples(
         hdop=st.none() | number(0, 99),
     ),
     POSITIONS,
-    heard(Height, height_m=number(-500, 5000), climb_m_s=number(-100, 100)),
-    heard(
+    readings(Height, height_m=number(-500, 5000), climb_m_s=number(-100, 100)),
+    readings(
         Power,
         voltage_v=st.none() | number(0.1, 60),
         current_a=st.none() | number(0, 300),
         drawn_mah=st.none() | st.integers(0, 30000),
     ),
-    heard(Sticks, channels_us=st.lists(st.integers(800, 2200), min_size=4, max_size=18).map(tuple)),
-    heard(Signal, strength=number(0, 1)),
-    heard(FlightState, armed=st.none() | st.booleans(), mode=st.sampled_from(FlightMode)),
-    heard(
+    readings(Sticks, channels_us=st.lists(st.integers(800, 2200), min_size=4, max_size=18).map(tuple)),
+    readings(Signal, strength=number(0, 1)),
+    readings(FlightState, armed=st.none() | st.booleans(), mode=st.sampled_from(FlightMode)),
+    readings(
         Health,
         sensors=st.integers(0, 31).map(Sensor),
         cycle_time_us=st.none() | st.integers(0, 65535),
@@ -150,19 +150,19 @@ def test_groups_have_the_values_of_mavlink_messages(
     if home is not None:
         vehicle.hear_home(*home)
     bridge.report.now = NOW
-    told = Receivers(vehicle, bridge.report, encoding)
-    attitude_is_true(told)
-    position_is_true(told)
-    home_is_true(told)
-    gps_is_true(told)
-    battery_is_true(told)
-    rc_is_true(told)
-    status_is_true(told)
+    receivers = Receivers(vehicle, bridge.report, encoding)
+    attitude_is_true(receivers)
+    position_is_true(receivers)
+    home_is_true(receivers)
+    gps_is_true(receivers)
+    battery_is_true(receivers)
+    rc_is_true(receivers)
+    status_is_true(receivers)
 
 
-def attitude_is_true(told: Receivers) -> None:
-    group, sent = told.group(Group.ATTITUDE), told.message(make.attitude)
-    assert (sent is not None) == told.is_fresh(group)
+def attitude_is_true(receivers: Receivers) -> None:
+    group, sent = receivers.group(Group.ATTITUDE), receivers.message(make.attitude)
+    assert (sent is not None) == receivers.is_fresh(group)
     if sent is None:
         return
     assert near(group["roll_deg"], math.degrees(sent.roll), ROUNDED)
@@ -170,15 +170,15 @@ def attitude_is_true(told: Receivers) -> None:
     if group["heading_deg"] is not None:
         assert 0 <= group["heading_deg"] < 360
         assert near_on_circle(group["heading_deg"], math.degrees(sent.yaw), ROUNDED)
-    where = told.message(make.global_position_int)
+    where = receivers.message(make.global_position_int)
     if where is not None:
         assert (where.hdg == U16) == (group["heading_deg"] is None)
         assert where.hdg == U16 or near_on_circle(group["heading_deg"], where.hdg / 100, 0.011)
 
 
-def position_is_true(told: Receivers) -> None:
-    group, sent = told.group(Group.POSITION), told.message(make.global_position_int)
-    raw = told.message(make.gps_raw_int)
+def position_is_true(receivers: Receivers) -> None:
+    group, sent = receivers.group(Group.POSITION), receivers.message(make.global_position_int)
+    raw = receivers.message(make.gps_raw_int)
     if raw is not None and raw.lat:
         assert group["altitude_m"] is not None
         assert near(group["altitude_m"], raw.alt / 1000, 0.001)
@@ -189,27 +189,27 @@ def position_is_true(told: Receivers) -> None:
     assert near(group["climb_m_s"], -sent.vz / 100, 0.011)
     assert near(group["north_m_s"], sent.vx / 100, 0.011)
     assert near(group["east_m_s"], sent.vy / 100, 0.011)
-    assert told.is_fresh(group)
+    assert receivers.is_fresh(group)
 
 
-def home_is_true(told: Receivers) -> None:
-    group = told.group(Group.POSITION)
-    sent = told.message(make.home_position)
+def home_is_true(receivers: Receivers) -> None:
+    group = receivers.group(Group.POSITION)
+    sent = receivers.message(make.home_position)
     if sent is not None:
         assert (group["home_lat_deg"], group["home_lon_deg"]) == (sent.latitude / 1e7, sent.longitude / 1e7)
-    distance, direction = told.message(make.home_distance), told.message(make.home_direction)
+    distance, direction = receivers.message(make.home_distance), receivers.message(make.home_direction)
     assert (distance is None) == (direction is None)
     if distance is not None and direction is not None:
         assert near(group["home_distance_m"], distance.value, 0.051 + 1e-6 * distance.value)
         assert 0 <= group["home_direction_deg"] < 360
         assert near_on_circle(group["home_direction_deg"], direction.value, ROUNDED)
     elif group["home_distance_m"] is not None:
-        assert not told.is_fresh(group)
+        assert not receivers.is_fresh(group)
 
 
-def gps_is_true(told: Receivers) -> None:
-    group, sent = told.group(Group.GPS), told.message(make.gps_raw_int)
-    assert (sent is not None) == told.is_fresh(group)
+def gps_is_true(receivers: Receivers) -> None:
+    group, sent = receivers.group(Group.GPS), receivers.message(make.gps_raw_int)
+    assert (sent is not None) == receivers.is_fresh(group)
     if sent is None:
         return
     assert group["fix"] == {1: "none", 2: "2D", 3: "3D"}[sent.fix_type]
@@ -223,9 +223,9 @@ def gps_is_true(told: Receivers) -> None:
         assert near_on_circle(group["course_deg"], sent.cog / 100, 0.011)
 
 
-def battery_is_true(told: Receivers) -> None:
-    group, sent = told.group(Group.BATTERY), told.message(make.battery_status)
-    assert (sent is not None) == (told.is_fresh(group) and group["voltage_v"] is not None)
+def battery_is_true(receivers: Receivers) -> None:
+    group, sent = receivers.group(Group.BATTERY), receivers.message(make.battery_status)
+    assert (sent is not None) == (receivers.is_fresh(group) and group["voltage_v"] is not None)
     if sent is None:
         return
     assert near(group["voltage_v"], sent.voltages[0] / 1000, 0.0005)
@@ -235,9 +235,9 @@ def battery_is_true(told: Receivers) -> None:
     assert group["remaining_percent"] == (None if sent.battery_remaining == -1 else sent.battery_remaining)
 
 
-def rc_is_true(told: Receivers) -> None:
-    group, sent = told.group(Group.RC), told.message(make.rc_channels)
-    assert (sent is not None) == told.is_fresh(group)
+def rc_is_true(receivers: Receivers) -> None:
+    group, sent = receivers.group(Group.RC), receivers.message(make.rc_channels)
+    assert (sent is not None) == receivers.is_fresh(group)
     if sent is None:
         return
     assert group["channels_us"] == [getattr(sent, f"chan{channel + 1}_raw") for channel in range(sent.chancount)]
@@ -245,13 +245,13 @@ def rc_is_true(told: Receivers) -> None:
         assert near(group["rssi_percent"], sent.rssi / 254 * 100, 0.5)
 
 
-def status_is_true(told: Receivers) -> None:
-    group, sent = told.group(Group.STATUS), told.message(lambda at: make.heartbeat(at.vehicle, is_lost=False))
+def status_is_true(receivers: Receivers) -> None:
+    group, sent = receivers.group(Group.STATUS), receivers.message(lambda at: make.heartbeat(at.vehicle, is_lost=False))
     assert bool(group["armed"]) == bool(sent.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED)
     if group["mode"] is not None:
         mode = {"STABILIZE": 0, "ACRO": 1, "ALT_HOLD": 2, "AUTO": 3, "LOITER": 5, "RTL": 6}[group["mode"]]
         assert sent.custom_mode == mode
-    health = told.message(make.sys_status)
+    health = receivers.message(make.sys_status)
     assert (health is None) == (group["sensors"] is None)
     if health is not None:
         bits = {"accelerometer": 2, "barometer": 8, "compass": 4, "gps": 32, "sonar": 256}
@@ -259,5 +259,5 @@ def status_is_true(told: Receivers) -> None:
         assert set(group["sensors"]) == shown
         assert (group["i2c_errors"] or 0) == health.errors_comm
     for name, maker in (("cycle_time_us", make.cycle_time), ("i2c_errors", make.i2c_errors)):
-        named = told.message(maker)
+        named = receivers.message(maker)
         assert named is None or group[name] == named.value

@@ -123,17 +123,17 @@ def test_messages_that_change_something_must_be_signed(message: Message, answer:
     station.send(message)
     world.run(0.01)
     assert refusals(world) == {"not signed": 1}
-    said = [heard.get_type() for heard in station.said() if heard.get_type() in ANSWERS]
-    assert said == ([] if answer is None else [answer])
+    types = [message.get_type() for message in station.messages() if message.get_type() in ANSWERS]
+    assert types == ([] if answer is None else [answer])
     if answer == "MISSION_ACK":
-        (ack,) = station.said("MISSION_ACK")
+        (ack,) = station.messages("MISSION_ACK")
         assert (ack.type, ack.mission_type) == (MissionResult.DENIED, getattr(message, "mission_type", 0))
-        assert station.is_meant(ack)
+        assert station.is_target_of(ack)
     if answer == "COMMAND_ACK":
-        (ack,) = station.said("COMMAND_ACK")
+        (ack,) = station.messages("COMMAND_ACK")
         assert (ack.result, ack.command) == (mavlink.MAV_RESULT_DENIED, message.command)
     if answer == "PARAM_VALUE":
-        (value,) = station.said("PARAM_VALUE")
+        (value,) = station.messages("PARAM_VALUE")
         assert (value.param_id, value.param_value) == ("WPNAV_RADIUS", 200.0)
     assert station.texts() == ["Refused: not signed"]
 
@@ -156,7 +156,7 @@ def test_every_message_not_known_to_be_harmless_must_be_signed() -> None:
         mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_PARTIAL_LIST,
     }
     for msgid in CRC_EXTRA:
-        world.spoken_by(station, FrameWriter(255, 190).frame(Packed(msgid, b"", b"\0"), 2))
+        world.receive_from(station, FrameWriter(255, 190).frame(Packed(msgid, b"", b"\0"), 2))
     assert len(CRC_EXTRA) > 250
     assert free < CRC_EXTRA.keys()
     assert sum(refusals(world).values()) == len(CRC_EXTRA) - len(free)
@@ -174,8 +174,8 @@ def test_a_signed_upload_is_accepted_and_every_reply_is_signed() -> None:
     receiver = every_message.MAVLink(None)
     receiver.robust_parsing = False
     receiver.signing.secret_key, receiver.signing.timestamp = KEY, ticks(NOON)
-    assert len(station.frames_heard) > 50
-    for frame in station.frames_heard:
+    assert len(station.frames) > 50
+    for frame in station.frames:
         (message,) = receiver.parse_buffer(frame)
         assert message.get_signed()
         assert message.get_link_id() == LINK_ID
@@ -189,8 +189,8 @@ def test_mavlink_1_and_unheard_peers_get_only_signed_frames() -> None:
     old.send(READS[0])
     world.run(3)
     for station in (unheard, old):
-        assert station.said("HEARTBEAT")
-        assert all(frame[0] == 0xFD and frame[2] & 1 for frame in station.frames_heard)
+        assert station.messages("HEARTBEAT")
+        assert all(frame[0] == 0xFD and frame[2] & 1 for frame in station.frames)
 
 
 def test_without_the_key_an_upload_is_refused() -> None:
@@ -215,7 +215,7 @@ def test_a_refusal_is_logged_once_for_each_peer_and_counted_each_time() -> None:
     ] * 2
     assert refusals(world) == {"not signed": 10}
     for station in stations:
-        assert len(station.said("COMMAND_ACK")) == 5
+        assert len(station.messages("COMMAND_ACK")) == 5
         assert station.texts() == ["Refused: not signed"]
 
 
@@ -267,7 +267,7 @@ def test_an_address_must_show_the_key_again_after_its_station_has_left() -> None
     for times in (1, 2):
         another.send(clear_message())
         world.run(0.1)
-        assert [ack.type for ack in another.said("MISSION_ACK")] == [MissionResult.DENIED] * times
+        assert [ack.type for ack in another.messages("MISSION_ACK")] == [MissionResult.DENIED] * times
         assert another.texts() == ["Refused: not signed"] * times
         station.send(READS[0])
         world.run(0.1)
@@ -278,18 +278,18 @@ def test_a_replayed_frame_is_refused() -> None:
     world = keyed()
     station = signing_station(world)
     frame = station.pack(clear_message())
-    world.spoken_by(station, frame)
+    world.receive_from(station, frame)
     world.run(2)
-    (ack,) = station.said("MISSION_ACK")
+    (ack,) = station.messages("MISSION_ACK")
     assert ack.type == MissionResult.ACCEPTED
     thief = GroundStation(world, "thief")
     for speaker in (thief, station):
-        world.spoken_by(speaker, frame)
+        world.receive_from(speaker, frame)
     world.run(2)
     assert refusals(world) == {Check.REPLAYED.value: 2}
     # The copy is refused silently, because the network may have duplicated the frame.
-    assert [ack.type for ack in thief.said("MISSION_ACK")] == [MissionResult.DENIED]
-    assert len(station.said("MISSION_ACK")) == 1
+    assert [ack.type for ack in thief.messages("MISSION_ACK")] == [MissionResult.DENIED]
+    assert len(station.messages("MISSION_ACK")) == 1
 
 
 def test_after_a_signed_read_older_recordings_are_refused() -> None:
@@ -298,7 +298,7 @@ def test_after_a_signed_read_older_recordings_are_refused() -> None:
     lost = station.pack(clear_message())
     station.send(READS[0])
     world.run(0.1)
-    world.spoken_by(GroundStation(world, "thief"), lost)
+    world.receive_from(GroundStation(world, "thief"), lost)
     assert refusals(world) == {Check.REPLAYED.value: 1}
 
 
@@ -322,7 +322,7 @@ def test_an_unsigned_frame_cannot_end_the_pilots_upload() -> None:
     def forge(message: Message) -> None:
         if message.get_type() == "MISSION_REQUEST":
             for frame in frames:
-                world.after(0.0, partial(world.spoken_by, station, frame))
+                world.after(0.0, partial(world.receive_from, station, frame))
 
     station.on_message.append(forge)
     assert Upload(station, waypoints(20)).run() is MissionResult.ACCEPTED
@@ -340,7 +340,7 @@ def test_a_signed_upload_over_a_network_that_loses_and_duplicates(seed: int) -> 
     assert Upload(station, waypoints(30)).run() is MissionResult.ACCEPTED
     assert len(world.stored) == 30
     assert set(refusals(world)) == {Check.REPLAYED.value}
-    assert MissionResult.DENIED not in [ack.type for ack in station.said("MISSION_ACK")]
+    assert MissionResult.DENIED not in [ack.type for ack in station.messages("MISSION_ACK")]
 
 
 def test_setting_the_clock_back_repeats_no_timestamp() -> None:
@@ -352,7 +352,7 @@ def test_setting_the_clock_back_repeats_no_timestamp() -> None:
     clock.unix_s -= 86400
     assert Upload(station, waypoints(4)).run() is MissionResult.ACCEPTED
     world.run(2)
-    stamps = [int.from_bytes(frame[-12:-6], "little") for frame in station.frames_heard]
+    stamps = [int.from_bytes(frame[-12:-6], "little") for frame in station.frames]
     assert stamps == sorted(set(stamps))
     assert refusals(world) == {}
 
@@ -362,18 +362,18 @@ def test_a_pi_without_a_clock_continues_after_a_reboot() -> None:
     world = keyed(before)
     station = signing_station(world)
     frame = station.pack(clear_message())
-    world.spoken_by(station, frame)
+    world.receive_from(station, frame)
     world.run(2)
     stored = ticks(NOON) + TOLERANCE
     # The clock starts in 1970; the stored state, streams included, was loaded.
     after = signing(Clock(0.0), at_least=stored)
     after.streams.update(before.streams)
     rebooted = keyed(after)
-    rebooted.spoken_by(GroundStation(rebooted, "thief"), frame)
+    rebooted.receive_from(GroundStation(rebooted, "thief"), frame)
     assert refusals(rebooted) == {Check.REPLAYED.value: 1}
     station = signing_station(rebooted, at=ticks(NOON) + 30 * TICKS_PER_S)
     assert Upload(station, waypoints(4)).run() is MissionResult.ACCEPTED
-    first = min(int.from_bytes(frame[-12:-6], "little") for frame in station.frames_heard)
+    first = min(int.from_bytes(frame[-12:-6], "little") for frame in station.frames)
     assert first > stored
 
 
@@ -389,7 +389,7 @@ def test_an_unlisted_address_may_only_read() -> None:
     assert len(world.stored) == 6
     assert len(Download(guest).run()) == 6
     assert guest.texts()[0] == "Refused: this address may only read"
-    assert all(frame[0] == 0xFE or not frame[2] & 1 for frame in guest.frames_heard)
+    assert all(frame[0] == 0xFE or not frame[2] & 1 for frame in guest.frames)
 
 
 def test_with_a_key_and_a_list_both_are_required() -> None:
@@ -422,9 +422,9 @@ def test_unsigned_frames_are_not_passed_to_a_mavlink_autopilot(message: Message,
     world.run(0.01)
     assert bytes(autopilot.received) == b""
     assert refusals(world) == {"not signed": 1}
-    assert [said.get_type() for said in other.said() if said.get_type() != "HEARTBEAT"] == []
+    assert [message.get_type() for message in other.messages() if message.get_type() != "HEARTBEAT"] == []
     if answer in ("MISSION_ACK", "COMMAND_ACK"):
-        assert len(station.said(answer)) == 1
+        assert len(station.messages(answer)) == 1
 
 
 def test_a_refusal_has_the_autopilots_ids() -> None:
@@ -433,7 +433,7 @@ def test_a_refusal_has_the_autopilots_ids() -> None:
     station.send(mavlink.MAVLink_command_long_message(42, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0))
     station.send(mavlink.MAVLink_command_long_message(77, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0))
     world.run(0.01)
-    (ack,) = station.said("COMMAND_ACK")
+    (ack,) = station.messages("COMMAND_ACK")
     assert (ack.get_srcSystem(), ack.get_srcComponent(), ack.result) == (42, 1, mavlink.MAV_RESULT_DENIED)
     assert refusals(world) == {"this address may only read": 2}
 
@@ -443,9 +443,9 @@ def test_signed_frames_reach_the_autopilot_unchanged() -> None:
     station = signing_station(world)
     frames = [station.pack(message) for message, _ in WRITES]
     for frame in frames:
-        world.spoken_by(station, frame)
+        world.receive_from(station, frame)
     for frame in frames:
-        world.spoken_by(station, frame)
+        world.receive_from(station, frame)
     assert bytes(autopilot.received) == b"".join(frames)
     assert refusals(world) == {Check.REPLAYED.value: len(frames)}
 
@@ -470,8 +470,8 @@ def test_setup_signing_is_never_forwarded(access: LinkAccess) -> None:
     assert bytes(autopilot.received) == b""
     assert sum(refusals(world).values()) == 2
     assert "Refused: set the key in naze-bridge's settings" in station.texts()
-    heard = b"".join(b"".join(each.frames_heard) for each in world.stations.values())
-    for place in (heard, b"".join(logged), repr(world.log_event).encode(), repr(world.bridge.guard._links).encode()):
+    received = b"".join(b"".join(each.frames) for each in world.stations.values())
+    for place in (received, b"".join(logged), repr(world.log_event).encode(), repr(world.bridge.guard._links).encode()):
         assert KEY not in place
         assert KEY.hex().encode() not in place
         assert repr(KEY).encode() not in place

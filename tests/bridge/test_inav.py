@@ -190,12 +190,12 @@ def test_a_multiwiis_own_limits_are_warned_of_and_read_for_each_list() -> None:
     assert not [text for text in station.texts() if "WP" in text]
     multiwii.answers = {**multiwii.answers, 122: nav_config(60, 100, 25, wp_radius=900)}
     assert Upload(station, sent).run() is ACCEPTED
-    told = " ".join(station.texts())
-    assert "WP 9: flown at 25 m" in told
-    assert "WP 4: flown" not in told
-    assert "WP 5: 100 m or more from the waypoint before: the mission stops there" in told
-    assert "WP 4: 100 m" not in told
-    assert "WP 7: passes the ROI at less than 14 m: the board may end this leg there" in told
+    texts = " ".join(station.texts())
+    assert "WP 9: flown at 25 m" in texts
+    assert "WP 4: flown" not in texts
+    assert "WP 5: 100 m or more from the waypoint before: the mission stops there" in texts
+    assert "WP 4: 100 m" not in texts
+    assert "WP 7: passes the ROI at less than 14 m: the board may end this leg there" in texts
 
 
 def test_a_multiwii_that_arms_during_a_read_gets_no_write() -> None:
@@ -283,12 +283,12 @@ def test_the_current_item_and_reached_items_are_reported() -> None:
     ]:
         inav.nav = nav
         world.run(3)
-    heard = [message for _, message in station.heard]
-    assert [m.seq for m in heard if m.get_type() == "MISSION_ITEM_REACHED"] == [1, 3, 4, 5]
-    current = [(m.seq, m.mission_state) for m in heard if m.get_type() == "MISSION_CURRENT"]
+    received = [message for _, message in station.received]
+    assert [m.seq for m in received if m.get_type() == "MISSION_ITEM_REACHED"] == [1, 3, 4, 5]
+    current = [(m.seq, m.mission_state) for m in received if m.get_type() == "MISSION_CURRENT"]
     wanted = [(1, 3), (3, 3), (4, 3), (5, 3), (5, 5)]
     assert [now for n, now in enumerate(current) if now in wanted and (n == 0 or now != current[n - 1])] == wanted
-    assert all(m.total == 5 for m in heard if m.get_type() == "MISSION_CURRENT" and m.seq)
+    assert all(m.total == 5 for m in received if m.get_type() == "MISSION_CURRENT" and m.seq)
 
 
 def test_a_frame_that_may_have_lost_its_header_is_followed_by_a_harmless_one() -> None:
@@ -321,7 +321,7 @@ def test_a_reply_for_home_is_not_taken_for_a_written_record() -> None:
     home = MspFrame(Direction.REPLY, Nav.WP, b"\0" + inav.read(0)).encode()
     while not upload.is_over:
         world.run(0.005)
-        world.hear(home)
+        world.receive_from_fc(home)
     assert upload.result is ACCEPTED
     assert inav.writes == 39
 
@@ -351,7 +351,7 @@ def test_the_arm_box_of_a_betaflight_whose_box_names_exceed_a_frame() -> None:
     world, station = found(board)
     station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
     world.run(3)
-    beat = station.said("HEARTBEAT")[-1]
+    beat = station.messages("HEARTBEAT")[-1]
     assert beat.base_mode & messages.MAV_MODE_FLAG_SAFETY_ARMED
     assert beat.custom_mode == 6
 

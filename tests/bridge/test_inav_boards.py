@@ -180,7 +180,7 @@ def test_polls_to_a_slow_board_are_not_lost() -> None:
         station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
         world.run(1)
     assert world.bridge.session.state.link.requests_lost == lost
-    assert len(station.said("ATTITUDE")) > 5 * 18
+    assert len(station.messages("ATTITUDE")) > 5 * 18
 
 
 def test_mission_progress_is_reported_item_by_item() -> None:
@@ -193,9 +193,9 @@ def test_mission_progress_is_reported_item_by_item() -> None:
     board.faults.armed = True
     world.run(2)
     board.faults.boxes = 1 << BOXES["9.1.0"].index(NAV_WP_ID)
-    world.run_until(lambda _: any(m.mission_state == 5 for m in station.said("MISSION_CURRENT")[-1:]), 300)
-    assert [m.seq for m in station.said("MISSION_ITEM_REACHED")] == [1, 3, 4]
-    current = [m.seq for m in station.said("MISSION_CURRENT")]
+    world.run_until(lambda _: any(m.mission_state == 5 for m in station.messages("MISSION_CURRENT")[-1:]), 300)
+    assert [m.seq for m in station.messages("MISSION_ITEM_REACHED")] == [1, 3, 4]
+    current = [m.seq for m in station.messages("MISSION_CURRENT")]
     assert [seq for n, seq in enumerate(current) if n == 0 or seq != current[n - 1]] == [0, 1, 3, 4]
 
 

@@ -70,7 +70,7 @@ class Bench:
         self.world.run(3)
         return [] if held is None else [record.pack() for record in held.records]
 
-    def told(self) -> str:
+    def text(self) -> str:
         """All texts so far; long ones arrive in pieces."""
         self.world.run(0.1)
         return " ".join(self.station.texts())
@@ -117,7 +117,7 @@ def test_missions_that_no_longer_fit_are_reported_and_copied_to_the_pi() -> None
     assert bench.stored() == [packed(plan(81, 7)), sets(4, 30)[1]]
     copies = [mission for mission, _ in bench.world.store.missions if mission.source.startswith("copy")]
     assert [[record.pack() for record in copy.verdict.records] for copy in copies] == [sets(4, 30, 60)[2]]
-    assert "Mission of 60 records does not fit" in bench.told()
+    assert "Mission of 60 records does not fit" in bench.text()
 
 
 def test_record_fields_without_an_item_field_survive_a_read_and_a_write() -> None:
@@ -185,19 +185,19 @@ def test_after_a_restart_the_saved_mission_is_loaded_and_reported() -> None:
     assert Upload(bench.station, plan(13)).run() is ACCEPTED
     restart(bench)
     assert without_home(Download(bench.station).run()) == without_home(plan(13))
-    assert "Saved mission loaded again: 12 records" in bench.told()
+    assert "Saved mission loaded again: 12 records" in bench.text()
     assert bench.flown() == packed(plan(13))
 
 
 def test_a_saved_mission_from_another_planner_is_reported_as_such() -> None:
     bench = Bench(4)
-    assert "not written by naze-bridge" in bench.told()
+    assert "not written by naze-bridge" in bench.text()
     assert bench.flown() == sets(4)[0]
 
 
 def test_while_armed_the_missing_mission_is_reported_but_not_loaded() -> None:
     bench = Bench(4, faults=Faults(boxes=0, armed=True))
-    assert bench.told().count("No mission is loaded: disarm to load the saved one") == 1
+    assert bench.text().count("No mission is loaded: disarm to load the saved one") == 1
     assert Download(bench.station).run() in ([], None)
     bench.faults.armed = False
     bench.world.run(3)
@@ -236,7 +236,7 @@ def test_a_list_that_is_not_loaded_yet_is_not_read_as_empty(command: int, lost: 
         held = pulled(bench)
     assert [record.pack() for record in held.records] == sets(4)[0]
     bench.world.run(2)
-    assert "Saved mission loaded, not written by naze-bridge: 4 records" in bench.told()
+    assert "Saved mission loaded, not written by naze-bridge: 4 records" in bench.text()
 
 
 @pytest.mark.parametrize("armed", [False, True])
@@ -249,7 +249,7 @@ def test_a_mission_selected_by_sticks_is_noticed_within_two_seconds(armed: bool)
     held = bench.world.bridge.missions.held
     assert held is not None
     assert [record.pack() for record in held.records] == sets(4, 6)[1]
-    assert "changed: 6 records" in bench.told()
+    assert "changed: 6 records" in bench.text()
 
 
 def test_another_clients_list_is_noticed_and_its_progress_is_correct() -> None:
@@ -260,13 +260,13 @@ def test_another_clients_list_is_noticed_and_its_progress_is_correct() -> None:
     )
     bench.faults.stick_loads += 1
     bench.world.run(2.0)
-    assert "changed: 4 records" in bench.told()
+    assert "changed: 4 records" in bench.text()
     held = bench.world.bridge.missions.held
     assert held is not None
     assert [record.pack() for record in held.records] == sets(4)[0]
     bench.faults.armed, bench.faults.boxes = True, NAV_WP
     bench.world.run(5)
-    assert {message.total for message in bench.station.said("MISSION_CURRENT")[-3:]} == {4}
+    assert {message.total for message in bench.station.messages("MISSION_CURRENT")[-3:]} == {4}
 
 
 @pytest.mark.parametrize(("size", "turn_ms"), [(3, 10.0), (30, 10.0)])
@@ -367,15 +367,15 @@ def test_a_list_that_another_client_is_writing_is_reported_once_it_is_complete()
         mission.write(number, waypoint(number, flag=FLAG_LAST if number == 30 else 0))
         bench.world.run(0.1)
     bench.world.run(2)
-    told = " ".join(bench.station.texts()[before:])
-    assert told == "Mission on the flight controller changed: 30 records"
+    text = " ".join(bench.station.texts()[before:])
+    assert text == "Mission on the flight controller changed: 30 records"
 
 
 def test_a_list_that_another_client_left_unfinished_is_reported() -> None:
     bench = Bench(9)
     bench.board._firmware._mission.write(1, waypoint(1))  # type: ignore[union-attr]
     bench.world.run(2)
-    assert "Mission on the flight controller changed: 0 records" in bench.told()
+    assert "Mission on the flight controller changed: 0 records" in bench.text()
 
 
 def test_a_multiwii_is_not_read_in_flight() -> None:
@@ -431,5 +431,5 @@ def test_after_a_push_that_fails_for_good_the_saved_mission_is_loaded() -> None:
     bench.faults.armed = False
     bench.world.run(4)
     assert without_home(Download(bench.station).run()) == without_home(plan(13))
-    assert "Saved mission loaded again" in bench.told()
+    assert "Saved mission loaded again" in bench.text()
     assert bench.world.store.outcomes().count(Outcome.VERIFIED) == 1

@@ -52,7 +52,7 @@ def test_the_version_is_reported(version: str) -> None:
 )
 def test_the_platform_determines_the_vehicle_type(platform: int, kind: int, by_hand: int) -> None:
     _, _, station = introduced(platform=platform, faults=Faults(boxes=0))
-    last = station.said("HEARTBEAT")[-1]
+    last = station.messages("HEARTBEAT")[-1]
     assert (last.type, last.custom_mode) == (kind, by_hand)
 
 
@@ -61,7 +61,7 @@ def test_airspeed_is_measured_or_unknown(platform: int, pitot: bool) -> None:
     """Ground speed stands in for airspeed on a copter, as in ArduCopter, but not on a plane."""
     _, world, station = introduced(platform=platform, pitot=pitot, faults=Faults(boxes=0))
     world.run(2)
-    hud = station.said("VFR_HUD")[-1]
+    hud = station.messages("VFR_HUD")[-1]
     if pitot:
         assert hud.airspeed == pytest.approx(hud.groundspeed + 2.5)
     elif platform == 1:
@@ -72,17 +72,17 @@ def test_airspeed_is_measured_or_unknown(platform: int, pitot: bool) -> None:
 
 def test_a_failsafe_is_critical_at_once_and_only_in_flight() -> None:
     board, world, station = introduced(faults=Faults(boxes=FAILSAFE))
-    assert station.said("HEARTBEAT")[-1].system_status == messages.MAV_STATE_STANDBY
+    assert station.messages("HEARTBEAT")[-1].system_status == messages.MAV_STATE_STANDBY
     board.faults.armed, board.faults.boxes = True, 0
     world.run(2)
-    assert station.said("HEARTBEAT")[-1].system_status == messages.MAV_STATE_ACTIVE
+    assert station.messages("HEARTBEAT")[-1].system_status == messages.MAV_STATE_ACTIVE
     board.faults.boxes = FAILSAFE
     world.run(0.5)
-    assert station.said("HEARTBEAT")[-1].system_status == messages.MAV_STATE_CRITICAL
+    assert station.messages("HEARTBEAT")[-1].system_status == messages.MAV_STATE_CRITICAL
     board.faults.boxes = 0
     world.run(0.5)
-    assert station.said("HEARTBEAT")[-1].system_status == messages.MAV_STATE_ACTIVE
-    texts = [(text.severity, text.text) for text in station.said("STATUSTEXT") if "ailsafe" in text.text]
+    assert station.messages("HEARTBEAT")[-1].system_status == messages.MAV_STATE_ACTIVE
+    texts = [(text.severity, text.text) for text in station.messages("STATUSTEXT") if "ailsafe" in text.text]
     assert texts == [
         (messages.MAV_SEVERITY_CRITICAL, "Failsafe: the flight controller has taken over"),
         (messages.MAV_SEVERITY_NOTICE, "Failsafe ended: the pilot has control"),
@@ -96,7 +96,7 @@ def test_load_battery_percentage_and_cells_come_from_the_board() -> None:
     assert health is not None
     assert (power.cells, power.remaining_percent, power.drawn_mah) == (3, 88, 120)
     assert health.cpu_load == pytest.approx(0.07)
-    status = station.said("SYS_STATUS")[-1]
+    status = station.messages("SYS_STATUS")[-1]
     assert (status.load, status.battery_remaining) == (70, 88)
     assert 12_000 < status.voltage_battery < 12_700
 
@@ -104,19 +104,19 @@ def test_load_battery_percentage_and_cells_come_from_the_board() -> None:
 @pytest.mark.parametrize("unix_s", [0.0, 1_777_636_800.0])
 def test_the_boards_time_is_known_once_its_gps_has_it(unix_s: float) -> None:
     _, world, _ = introduced(unix_s=unix_s)
-    heard = world.bridge.session.vehicle.last(GpsTime)
-    assert (heard is not None) == bool(unix_s)
-    if heard is not None:
-        assert heard.unix_s - unix_s == pytest.approx(heard.heard_at, abs=0.1)
+    time = world.bridge.session.vehicle.last(GpsTime)
+    assert (time is not None) == bool(unix_s)
+    if time is not None:
+        assert time.unix_s - unix_s == pytest.approx(time.heard_at, abs=0.1)
 
 
 def test_arming_blockers_are_reported_when_they_change() -> None:
     board, world, station = introduced(faults=Faults(boxes=0, arming_blockers=RC_LINK | NOT_LEVEL))
-    assert station.said("SYS_STATUS")[-1].onboard_control_sensors_health & PREARM == 0
+    assert station.messages("SYS_STATUS")[-1].onboard_control_sensors_health & PREARM == 0
     assert [text for text in station.texts() if "arm" in text] == ["Not ready to arm: not level, no RC link"]
     board.faults.arming_blockers = 0
     world.run(3)
-    assert station.said("SYS_STATUS")[-1].onboard_control_sensors_health & PREARM
+    assert station.messages("SYS_STATUS")[-1].onboard_control_sensors_health & PREARM
     assert len([text for text in station.texts() if "arm" in text]) == 1
 
 
@@ -143,11 +143,11 @@ def test_the_current_item_is_reported_together_with_nav_status() -> None:
     assert Upload(station, [plan(1)[0], *legs]).run() is MissionResult.ACCEPTED
     board.faults.armed, board.faults.boxes = True, 1 << BOXES["9.1.0"].index(NAV_WP)
     seen: set[int] = set()
-    while not seen or station.said("MISSION_CURRENT")[-1].mission_state != messages.MISSION_STATE_COMPLETE:
+    while not seen or station.messages("MISSION_CURRENT")[-1].mission_state != messages.MISSION_STATE_COMPLETE:
         assert world.now < 100
         world.run(0.1)
         leg = world.bridge.session.vehicle.last(MissionLeg)
         if leg is not None and leg.status.mode == NavMode.MISSION:
             seen.add(leg.status.number)
-            assert station.said("MISSION_CURRENT")[-1].seq == leg.status.number
+            assert station.messages("MISSION_CURRENT")[-1].seq == leg.status.number
     assert seen == {1, 2, 3}

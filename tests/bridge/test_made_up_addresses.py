@@ -51,16 +51,16 @@ def attack(world: World, spoken: list[Message], address: Callable[[], Address], 
     stranger = GroundStation(world, "stranger", sysid=99)
     frames = itertools.cycle([stranger.pack(message) for message in spoken])
 
-    def speak() -> None:
+    def send() -> None:
         world.bridge.gcs_received(Peer("udp", address()), next(frames), world.now, datagram=True)
 
     for number in range(int(seconds * per_s)):
-        world.after(number / per_s, speak)
+        world.after(number / per_s, send)
 
 
 def longest_gap_s(pilot: GroundStation, since: float) -> float:
-    beats = [at for at, message in pilot.heard if message.get_type() == "HEARTBEAT"]
-    return max(after - before for before, after in pairwise([since, *beats, pilot.world.now]))
+    heartbeats = [at for at, message in pilot.received if message.get_type() == "HEARTBEAT"]
+    return max(after - before for before, after in pairwise([since, *heartbeats, pilot.world.now]))
 
 
 def test_a_flood_does_not_affect_a_pilot_who_connected_before_it() -> None:
@@ -136,7 +136,7 @@ def test_a_lost_final_ack_is_repeated_in_a_flood(
     pilot.take()
     pilot.send(item_message(19, plan[19]))
     world.run(0.1)
-    assert [ack.type for ack in pilot.said("MISSION_ACK")] == [MissionResult.ACCEPTED]
+    assert [ack.type for ack in pilot.messages("MISSION_ACK")] == [MissionResult.ACCEPTED]
 
 
 @pytest.mark.parametrize("ids_of_one", [True, False])
@@ -190,7 +190,7 @@ def test_a_sender_over_its_limit_is_not_read() -> None:
     stranger = GroundStation(world)
     data = stranger.pack(HELLO)
     for number in range(10_000):
-        world.after(number / 10_000, lambda: world.spoken_by(stranger, data))
+        world.after(number / 10_000, lambda: world.receive_from(stranger, data))
     world.run(1.1)
     read = world.bridge.ground.frames_received["udp", m.MAVLINK_MSG_ID_HEARTBEAT]
     assert 1000 < read < 5000
@@ -207,12 +207,12 @@ def test_made_up_ids_do_not_cancel_a_pilot_on_a_slow_radio() -> None:
     pilot = GroundStation(world, "pilot", air=Air(delay_s=0.7))
     ids = itertools.count()
 
-    def announce() -> None:
+    def send_count() -> None:
         stranger = GroundStation(world, f"stranger {next(ids) % 16}", sysid=next(ids) % 250, compid=next(ids) % 250)
-        world.spoken_by(stranger, stranger.pack(count_message(9)))
+        world.receive_from(stranger, stranger.pack(count_message(9)))
 
     for number in range(200):
-        world.after(number / 20, announce)
+        world.after(number / 20, send_count)
     assert Upload(pilot, waypoints(3), repeat_s=1.5).run(9) is MissionResult.ACCEPTED
     assert world.stored == records_of(waypoints(3))
 
@@ -230,6 +230,6 @@ def test_of_too_many_uploads_one_without_items_ends(monkeypatch: pytest.MonkeyPa
         if station is stations[8]:
             for early in stations[:8]:
                 early.send(item_message(0, waypoints(3)[0]))
-    ended = [station for station in stations if station.said("MISSION_ACK")]
+    ended = [station for station in stations if station.messages("MISSION_ACK")]
     assert len(ended) == len(stations) - 64
     assert not set(ended) & set(stations[:8])

@@ -28,12 +28,12 @@ def world() -> World:
 def station_of(world: World, name: str) -> GroundStation:
     # Different ids: with the same ids it would be one station that has moved.
     station = GroundStation(world, name, sysid=255 - len(world.stations))
-    beat(station)
+    send_heartbeat(station)
     world.run(1.1)
     return station
 
 
-def beat(station: GroundStation) -> None:
+def send_heartbeat(station: GroundStation) -> None:
     station.send(m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3))
 
 
@@ -42,7 +42,7 @@ def ask(station: GroundStation, command: int, *params: float) -> int:
     station.take()
     station.send(m.MAVLink_command_long_message(1, 1, command, 0, *params, *[0.0] * (7 - len(params))))
     station.world.run(0.05)
-    (ack,) = station.said("COMMAND_ACK")
+    (ack,) = station.messages("COMMAND_ACK")
     assert ack.command == command
     result: int = ack.result
     return result
@@ -56,7 +56,7 @@ def rates_hz(station: GroundStation, seconds: float = 20) -> dict[str, float]:
     """The rate of each message, measured over `seconds`."""
     station.take()
     station.world.run(seconds)
-    names = [message.get_type() for message in station.said()]
+    names = [message.get_type() for message in station.messages()]
     return {name: names.count(name) / seconds for name in names}
 
 
@@ -75,7 +75,7 @@ def test_mission_planner_gets_the_rates_it_requests(world: World) -> None:
     world.run(1)
     planner.take()
     of_other = rates_hz(other)
-    names = [message.get_type() for message in planner.said()]
+    names = [message.get_type() for message in planner.messages()]
     of_planner = {name: names.count(name) / 20 for name in names}
     expected = {
         "ATTITUDE": 4, "VFR_HUD": 4, "GPS_RAW_INT": 2, "GLOBAL_POSITION_INT": 2, "SYS_STATUS": 2, "RC_CHANNELS": 2,
@@ -122,7 +122,7 @@ def test_a_stations_requests_set_the_poll_rates_until_it_leaves(world: World) ->
 def test_a_message_is_sent_at_the_requested_interval(world: World) -> None:
     station = station_of(world, "gcs")
     for interval_us, expected_hz in ((100_000, 10), (-1, 0), (0, 25), (20_000, 50)):
-        beat(station)
+        send_heartbeat(station)
         assert ask(station, 511, ATTITUDE, interval_us) == ACCEPTED
         assert rates_hz(station).get("ATTITUDE", 0) == pytest.approx(expected_hz, rel=0.05)
 
@@ -138,13 +138,13 @@ def test_unknown_messages_cannot_be_requested(world: World) -> None:
 
 def interval_us(station: GroundStation, msgid: int) -> int:
     result = ask(station, 510, msgid)
-    (told,) = station.said("MESSAGE_INTERVAL")
-    assert told.message_id == msgid
+    (interval,) = station.messages("MESSAGE_INTERVAL")
+    assert interval.message_id == msgid
     assert ask(station, 512, m.MAVLINK_MSG_ID_MESSAGE_INTERVAL, msgid) == result
-    (again,) = station.said("MESSAGE_INTERVAL")
-    assert (again.message_id, again.interval_us) == (msgid, told.interval_us)
-    assert (result == UNSUPPORTED) == (told.interval_us == 0)
-    found: int = told.interval_us
+    (again,) = station.messages("MESSAGE_INTERVAL")
+    assert (again.message_id, again.interval_us) == (msgid, interval.interval_us)
+    assert (result == UNSUPPORTED) == (interval.interval_us == 0)
+    found: int = interval.interval_us
     return found
 
 
@@ -190,7 +190,7 @@ def test_each_message_can_be_requested_once(world: World, row: Row) -> None:
     name = m.mavlink_map[msgid].msgname
     ask(station, 511, msgid, -1)
     assert ask(station, 512, msgid) == ACCEPTED
-    assert name in {message.get_type() for message in station.said()}
+    assert name in {message.get_type() for message in station.messages()}
 
 
 def test_without_a_flight_controller_messages_are_temporarily_rejected() -> None:
@@ -214,15 +214,15 @@ def test_rates_requested_before_the_flight_controller_is_found_are_kept() -> Non
 
 def test_the_modes_are_listed_and_the_current_one_is_reported(world: World) -> None:
     station, old = station_of(world, "gcs"), GroundStation(world, "old", version=1)
-    beat(old)
+    send_heartbeat(old)
     world.run(1)
     assert ask(station, 512, AVAILABLE_MODES) == ACCEPTED
-    listed = station.said("AVAILABLE_MODES")
+    listed = station.messages("AVAILABLE_MODES")
     assert [(mode.mode_index, mode.number_modes) for mode in listed] == [(number, 6) for number in range(1, 7)]
     names = {mode.custom_mode: mode.mode_name for mode in listed}
     assert names == {0: "STABILIZE", 1: "ACRO", 2: "ALT_HOLD", 3: "AUTO", 5: "LOITER", 6: "RTL"}
     assert ask(station, 512, AVAILABLE_MODES, 3) == ACCEPTED
-    assert [mode.mode_index for mode in station.said("AVAILABLE_MODES")] == [3]
+    assert [mode.mode_index for mode in station.messages("AVAILABLE_MODES")] == [3]
     assert ask(station, 512, AVAILABLE_MODES, 7) == UNSUPPORTED
     world.faults.boxes = 1 << 0 | 1 << 2
     world.run(3)
@@ -230,5 +230,5 @@ def test_the_modes_are_listed_and_the_current_one_is_reported(world: World) -> N
     assert 2 <= len(present) <= 4
     assert (present[-1].custom_mode, present[-1].standard_mode) == (2, m.MAV_STANDARD_MODE_ALTITUDE_HOLD)
     # Its id does not fit MAVLink 1.
-    assert "HEARTBEAT" in {message.get_type() for message in old.said()}
-    assert not old.said("CURRENT_MODE")
+    assert "HEARTBEAT" in {message.get_type() for message in old.messages()}
+    assert not old.messages("CURRENT_MODE")

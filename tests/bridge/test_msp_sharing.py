@@ -21,7 +21,7 @@ def test_a_long_reply_is_forwarded_and_the_link_continues(command: int, size: in
     for _ in range(3):
         frame = MspFrame(Direction.REQUEST, command, is_v2=True)
         assert world.bridge.sharing.request(frame, found.append, world.now, may_write=False) == ""
-        world.hear(b"")  # sends it
+        world.receive_from_fc(b"")  # sends it
         world.run(1.0)
     assert [frame.payload for frame in found] == [bytes(size)] * 3
     assert world.events("fc.lost") == []
@@ -56,11 +56,11 @@ def test_a_reply_with_the_text_of_its_request_is_not_an_echo() -> None:
     world.bridge.sharing.request(
         MspFrame(Direction.REQUEST, SETTING_INFO, name, is_v2=True), found.append, world.now, may_write=False
     )
-    world.hear(b"")  # sends it
+    world.receive_from_fc(b"")  # sends it
     world.run(0.02)
     reply = MspFrame(Direction.REPLY, SETTING_INFO, bytes(12) + name).encode()
-    world.hear(reply[:-6])
-    world.hear(reply[-6:])
+    world.receive_from_fc(reply[:-6])
+    world.receive_from_fc(reply[-6:])
     assert [frame.payload for frame in found] == [bytes(12) + name]
     assert world.is_found
 

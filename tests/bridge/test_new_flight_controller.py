@@ -34,6 +34,6 @@ def test_a_new_flight_controller_needs_only_a_profile() -> None:
     world.wait_until(lambda w: w.kind is TOY, 5)
     world.run(2)
     assert "Found Toy 1.0" in station.texts()
-    assert station.said("HEARTBEAT")[-1].base_mode & 128, "its ARM box is the second one"
+    assert station.messages("HEARTBEAT")[-1].base_mode & 128, "its ARM box is the second one"
     assert Upload(station, waypoints(3)).run() is MissionResult.UNSUPPORTED
     assert "Toys do not navigate" in station.texts()

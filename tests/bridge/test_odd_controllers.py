@@ -155,4 +155,4 @@ def test_any_telemetry_is_shown_or_dropped(payloads: list[bytes]) -> None:
     world, station = found(board)
     station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
     world.run(3)
-    assert len(station.said("HEARTBEAT")) >= 2
+    assert len(station.messages("HEARTBEAT")) >= 2

@@ -34,7 +34,7 @@ class Autopilot(QuietLine):
         self.mavlink.seq = (self.mavlink.seq + 1) % 256
         return frame
 
-    def say(self, message: mavlink.MAVLink_message) -> bytes:
+    def send(self, message: mavlink.MAVLink_message) -> bytes:
         frame = self.pack(message)
         self.sent.append(frame)
         self.outgoing += frame
@@ -46,7 +46,7 @@ class Autopilot(QuietLine):
     def advance(self, now: float) -> bytes:
         while self._due <= now:
             self._due += 1.0
-            self.say(self.heartbeat)
+            self.send(self.heartbeat)
         return super().advance(now)
 
     def next_wakeup(self, now: float) -> float:
@@ -60,16 +60,16 @@ def passing(
     autopilot = autopilot or Autopilot()
     world = World(peer=autopilot, passes_everything=everything)
     world.wait_until(lambda w: w.kind is other.OTHER_MAVLINK, 3)
-    heard = [GroundStation(world, f"gcs{number}", sysid=255 - number) for number in range(stations)]
-    for station in heard:
+    gcs = [GroundStation(world, f"gcs{number}", sysid=255 - number) for number in range(stations)]
+    for station in gcs:
         station.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
     world.run(0.01)
-    for station in heard:
+    for station in gcs:
         station.take()
-        station.frames_heard.clear()
+        station.frames.clear()
     autopilot.received.clear()
     autopilot.sent.clear()
-    return world, autopilot, heard
+    return world, autopilot, gcs
 
 
 def telemetry(seed: int, count: int) -> Iterable[mavlink.MAVLink_message]:
@@ -88,11 +88,11 @@ def test_every_station_gets_every_frame_unchanged(version: int, signed: bool) ->
         autopilot.mavlink.signing.sign_outgoing = True
     world, autopilot, stations = passing(autopilot)
     for message in telemetry(1, 200):
-        autopilot.say(message)
+        autopilot.send(message)
         world.run(0.004)
     world.run(2)
     for station in stations:
-        assert station.frames_heard == autopilot.sent
+        assert station.frames == autopilot.sent
 
 
 def test_a_heartbeat_whose_last_fields_are_0_is_passed_on() -> None:
@@ -101,13 +101,13 @@ def test_a_heartbeat_whose_last_fields_are_0_is_passed_on() -> None:
     autopilot.heartbeat = mavlink.MAVLink_heartbeat_message(2, 0, 0, 0, 0, 0)
     world, autopilot, (station, _) = passing(autopilot)
     world.run(5)
-    assert station.frames_heard == autopilot.sent != []
+    assert station.frames == autopilot.sent != []
 
 
 def test_the_bridge_sends_no_messages_of_its_own() -> None:
     world, autopilot, (station, _) = passing()
     world.run(20)
-    assert station.frames_heard == autopilot.sent
+    assert station.frames == autopilot.sent
     assert bytes(autopilot.received) == b""
 
 
@@ -123,57 +123,57 @@ def test_frames_from_ground_stations_arrive_unchanged() -> None:
         mavlink.MAVLink_command_long_message(77, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0),
     ):
         frame = one.pack(message)
-        world.spoken_by(one, frame)
+        world.receive_from(one, frame)
         sent += frame
     world.run(0.1)
     assert bytes(autopilot.received) == sent
     # The others get broadcasts; no sender gets its own frame.
-    assert [message.get_type() for message in other.said()] == ["PARAM_REQUEST_LIST", "HEARTBEAT"]
-    assert one.said() == []
+    assert [message.get_type() for message in other.messages()] == ["PARAM_REQUEST_LIST", "HEARTBEAT"]
+    assert one.messages() == []
 
 
 def test_an_addressed_frame_goes_only_to_its_target() -> None:
     world, autopilot, (one, other) = passing()
-    autopilot.say(mavlink.MAVLink_mission_ack_message(255, 190, 0, 0))
-    autopilot.say(mavlink.MAVLink_mission_ack_message(254, 0, 0, 0))
-    autopilot.say(mavlink.MAVLink_mission_ack_message(254, 1, 0, 0))
-    autopilot.say(mavlink.MAVLink_mission_ack_message(9, 0, 0, 0))
+    autopilot.send(mavlink.MAVLink_mission_ack_message(255, 190, 0, 0))
+    autopilot.send(mavlink.MAVLink_mission_ack_message(254, 0, 0, 0))
+    autopilot.send(mavlink.MAVLink_mission_ack_message(254, 1, 0, 0))
+    autopilot.send(mavlink.MAVLink_mission_ack_message(9, 0, 0, 0))
     world.run(0.1)
-    assert [message.target_component for message in one.said("MISSION_ACK")] == [190]
-    assert [message.target_component for message in other.said("MISSION_ACK")] == [0]
+    assert [message.target_component for message in one.messages("MISSION_ACK")] == [190]
+    assert [message.target_component for message in other.messages("MISSION_ACK")] == [0]
 
 
 def test_ground_stations_reach_each_other() -> None:
     world, autopilot, (one, other) = passing()
     one.send(mavlink.MAVLink_command_long_message(254, 190, 400, 0, 1, 0, 0, 0, 0, 0, 0))
     world.run(0.1)
-    assert [message.get_type() for message in other.said("COMMAND_LONG")] == ["COMMAND_LONG"]
+    assert [message.get_type() for message in other.messages("COMMAND_LONG")] == ["COMMAND_LONG"]
     assert bytes(autopilot.received) == b""
 
 
 def test_a_silent_station_gets_no_more_frames() -> None:
     world, _autopilot, (one, other) = passing()
 
-    def speak() -> None:
+    def send() -> None:
         one.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
-        world.after(1.0, speak)
+        world.after(1.0, send)
 
-    speak()
+    send()
     world.run(70)
-    other.frames_heard.clear()
+    other.frames.clear()
     world.run(5)
-    assert other.frames_heard == []
-    assert one.frames_heard
+    assert other.frames == []
+    assert one.frames
 
 
 def test_signing_keys_are_never_forwarded() -> None:
     world, autopilot, (one, other) = passing()
     one.send(mavlink.MAVLink_setup_signing_message(1, 1, list(KEY), 5))
     one.send(mavlink.MAVLink_setup_signing_message(0, 0, list(KEY), 5))
-    autopilot.say(mavlink.MAVLink_setup_signing_message(0, 0, list(KEY), 5))
+    autopilot.send(mavlink.MAVLink_setup_signing_message(0, 0, list(KEY), 5))
     world.run(0.1)
     assert bytes(autopilot.received) == b""
-    assert one.said("SETUP_SIGNING") == other.said("SETUP_SIGNING") == []
+    assert one.messages("SETUP_SIGNING") == other.messages("SETUP_SIGNING") == []
 
 
 def test_damaged_frames_are_dropped_and_intact_ones_kept() -> None:
@@ -199,7 +199,7 @@ def test_damaged_frames_are_dropped_and_intact_ones_kept() -> None:
             intact.append(frame)
         world.run(0.01)
     world.run(0.3)
-    passed = [frame for frame in station.frames_heard if frame[7:10] != b"\0\0\0"]
+    passed = [frame for frame in station.frames if frame[7:10] != b"\0\0\0"]
     assert set(passed) <= set(intact)
     assert len(intact) - len(passed) <= 2
 
@@ -215,11 +215,11 @@ def test_the_bridge_sends_no_heartbeats_for_a_lost_autopilot() -> None:
     assert not is_passing
     station.take()
     world.run(10)
-    assert station.said() == []
+    assert station.messages() == []
     world.plug()
     world.wait_until(lambda w: w.kind is other.OTHER_MAVLINK, 3)
     world.run(3)
-    assert station.said("HEARTBEAT")
+    assert station.messages("HEARTBEAT")
 
 
 def test_frames_are_split_as_in_pymavlink() -> None:
@@ -235,7 +235,7 @@ def test_a_false_header_in_a_slow_stream_delays_no_frame() -> None:
     autopilot.outgoing += b"\xfd\xff\x00\x00\x00\x01\x01\x1e\x00\x00"
     world.run(6)
     assert world.events("fc.lost") == []
-    assert station.frames_heard == autopilot.sent
+    assert station.frames == autopilot.sent
     assert len(autopilot.sent) >= 5
 
 
@@ -245,10 +245,10 @@ def test_a_companion_with_the_autopilots_system_id_is_heard_but_echoes_are_not()
     companion.send(mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3))
     world.run(0.1)
     assert bytes(autopilot.received)
-    assert one.said("HEARTBEAT")[-1].get_srcComponent() == 191
+    assert one.messages("HEARTBEAT")[-1].get_srcComponent() == 191
     autopilot.received.clear()
     world.run(2)
-    world.spoken_by(one, autopilot.sent[-1])
+    world.receive_from(one, autopilot.sent[-1])
     world.run(0.1)
     assert bytes(autopilot.received) == b""
 
@@ -285,11 +285,11 @@ def test_a_sender_with_all_ids_does_not_displace_others() -> None:
         for compid in (1, 2, 3):
             frame = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
             liar._mavlink.srcSystem, liar._mavlink.srcComponent = sysid, compid
-            world.spoken_by(liar, liar.pack(frame))
-    liar.frames_heard.clear()
+            world.receive_from(liar, liar.pack(frame))
+    liar.frames.clear()
     for sysid in range(2, 200):
-        autopilot.say(mavlink.MAVLink_mission_ack_message(sysid, 0, 0, 0))
-    autopilot.say(mavlink.MAVLink_mission_ack_message(255, 190, 0, 0))
+        autopilot.send(mavlink.MAVLink_mission_ack_message(sysid, 0, 0, 0))
+    autopilot.send(mavlink.MAVLink_mission_ack_message(255, 190, 0, 0))
     world.run(0.5)
-    assert 0 < len(liar.said("MISSION_ACK")) <= 64
-    assert len(one.said("MISSION_ACK")) == 1
+    assert 0 < len(liar.messages("MISSION_ACK")) <= 64
+    assert len(one.messages("MISSION_ACK")) == 1

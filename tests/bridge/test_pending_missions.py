@@ -42,8 +42,8 @@ def test_a_board_that_resets_during_commit_is_asked_later(boot_ms: int, cut_afte
         # Stored, but the reply is lost.
         world.unplug()
     world.power_off()
-    world.wait_until(lambda _: bool(station.said("MISSION_ACK")), 20)
-    assert [message.type for message in station.said("MISSION_ACK")] == [MissionResult.DENIED]
+    world.wait_until(lambda _: bool(station.messages("MISSION_ACK")), 20)
+    assert [message.type for message in station.messages("MISSION_ACK")] == [MissionResult.DENIED]
     assert PushFailure.UNCERTAIN.value in station.texts()
     assert world.store.outcomes() == [None]
     station.take()

@@ -25,7 +25,7 @@ READ = (1200, 2400, 4800, 7200, 9600, 14400, 19200, 28800, 38400, 57600, 76800, 
 CLOCKS = (970, 985, 1000, 1015, 1030)
 
 
-def heard(data: bytes, sent: int, read: int, clock: int = 1000) -> bytes:
+def as_read(data: bytes, sent: int, read: int, clock: int = 1000) -> bytes:
     return garble(data, sent * 1000, read * clock)
 
 
@@ -41,18 +41,18 @@ def test_probes_are_clean_at_their_own_speed() -> None:
 @pytest.mark.parametrize("read", READ)
 def test_no_run_within_a_probe(read: int) -> None:
     for sent, clock in itertools.product(SENT, CLOCKS):
-        assert runs(heard(PROBE, sent, read, clock)) == 0
-        assert runs(heard(RESYNC, sent, read, clock)) == 0
-        assert runs(heard(RUB_OUT_LINE + typed_and_rubbed_out(PROBE) * 2, sent, read, clock)) == 0
+        assert runs(as_read(PROBE, sent, read, clock)) == 0
+        assert runs(as_read(RESYNC, sent, read, clock)) == 0
+        assert runs(as_read(RUB_OUT_LINE + typed_and_rubbed_out(PROBE) * 2, sent, read, clock)) == 0
         # Frames without a pause, repeated, so that the sampling points vary.
-        assert runs(heard(RESYNC * 4, sent, read, clock)) == 0
+        assert runs(as_read(RESYNC * 4, sent, read, clock)) == 0
 
 
 @pytest.mark.parametrize("read", READ)
 def test_no_run_across_probes(read: int) -> None:
     """A run across probes needs one that ends with a hazard byte and one that begins with it. There are none."""
     for clock in CLOCKS:
-        words = {heard(frame, sent, read, clock) for sent in SENT for frame in (PROBE, RESYNC)} - {b""}
+        words = {as_read(frame, sent, read, clock) for sent in SENT for frame in (PROBE, RESYNC)} - {b""}
         for hazard in HAZARDS:
             most_at_end = max(len(word) - len(word.rstrip(bytes((hazard,)))) for word in words)
             most_at_start = max(len(word) - len(word.lstrip(bytes((hazard,)))) for word in words)
@@ -66,7 +66,7 @@ def test_no_run_for_a_receiver_that_starts_within_a_probe(sent: int) -> None:
     for read in (sent // 12, sent // 6, sent // 4, sent // 3, sent // 2, 2 * sent):
         for clock in CLOCKS:
             for cut in range(1, len(RESYNC)):
-                assert runs(heard(RESYNC[cut:], sent, read, clock)) == 0
+                assert runs(as_read(RESYNC[cut:], sent, read, clock)) == 0
 
 
 @pytest.mark.parametrize("read", [300, 14400, 31250, 250000])
@@ -84,4 +84,4 @@ def test_a_minute_of_searching_triggers_no_hazard(read: int) -> None:
 def test_no_hazard_byte_is_read_at_the_speeds_of_other_firmware(read: int) -> None:
     """INAV needs one '#' and silence to enter its command line, and one 'R' to reboot into its bootloader."""
     for sent, clock, probe in itertools.product(SENT, CLOCKS, (PROBE, RESYNC)):
-        assert not {0x23, 0x52} & set(heard(probe, sent, read, clock))
+        assert not {0x23, 0x52} & set(as_read(probe, sent, read, clock))

@@ -17,7 +17,7 @@ PLAN = waypoints(40)
 WIFI = Air(delay_s=0.02)
 
 
-def beat(station: GroundStation, is_there: list[GroundStation]) -> None:
+def send_heartbeats(station: GroundStation, is_there: list[GroundStation]) -> None:
     """Send a heartbeat a second while the station is in `is_there`."""
 
     def send() -> None:
@@ -57,7 +57,7 @@ class Roamer:
             upload.station = station
             station.on_message.append(upload._react)
         if speaks:
-            beat(station, self.present)
+            send_heartbeats(station, self.present)
         self.world.run(0.03)
         return station
 
@@ -69,11 +69,11 @@ def test_the_new_address_is_served_at_once_and_the_old_one_dropped() -> None:
     world.run(3)
     new = roamer.move()
     world.run(1.5)
-    assert new.said("HEARTBEAT", "ATTITUDE")
+    assert new.messages("HEARTBEAT", "ATTITUDE")
     world.run(MOVED_S)
     old.take()
     world.run(3)
-    assert old.heard == []
+    assert old.received == []
     assert world.bridge.ground.stations.peers() == [new.peer]
 
 
@@ -86,13 +86,13 @@ def test_a_station_may_move_away_and_back() -> None:
         away = roamer.move()
         world.run(2)
         roamer.present[:] = [home]
-        beat(home, roamer.present)
+        send_heartbeats(home, roamer.present)
     world.run(MOVED_S + 2)
     away.take()
     home.take()
     world.run(3)
-    assert away.heard == []
-    assert home.said("HEARTBEAT")
+    assert away.received == []
+    assert home.messages("HEARTBEAT")
 
 
 def test_two_stations_with_the_same_ids_stay_separate() -> None:
@@ -100,13 +100,13 @@ def test_two_stations_with_the_same_ids_stay_separate() -> None:
     world = ready_world()
     both = [GroundStation(world, name) for name in ("one", "other")]
     for station in both:
-        beat(station, both)
+        send_heartbeats(station, both)
         world.run(0.4)
     world.run(EXPIRY_S + 10)
     for station in both:
         station.take()
     world.run(3)
-    assert all(station.said("HEARTBEAT") for station in both)
+    assert all(station.messages("HEARTBEAT") for station in both)
     assert world.events("gcs.silent") == []
 
 
@@ -114,7 +114,7 @@ def test_a_silent_station_with_shared_ids_is_kept_for_a_minute() -> None:
     world = ready_world()
     station, other = GroundStation(world), GroundStation(world, "other", sysid=250)
     station.send(heartbeat())
-    beat(other, [other])
+    send_heartbeats(other, [other])
     world.run(EXPIRY_S - 2)
     assert station.peer in world.bridge.ground.stations.peers()
 
@@ -126,11 +126,11 @@ def test_a_station_behind_a_router_moves_only_with_all_others() -> None:
     for station in (router, behind):
         station.send(heartbeat())
     world.run(1)
-    beat(away, [away])
+    send_heartbeats(away, [away])
     world.run(MOVED_S + 3)
     assert router.peer in world.bridge.ground.stations.peers()
     also_away = GroundStation(world, "away", sysid=250)
-    beat(also_away, [also_away])
+    send_heartbeats(also_away, [also_away])
     world.run(MOVED_S + 3)
     assert world.bridge.ground.stations.peers() == [away.peer]
 
@@ -183,7 +183,7 @@ def test_a_restarted_station_is_not_asked_for_items_of_its_former_list() -> None
     world.run(1.5)
     roamer.move()
     world.run(3)
-    assert roamer.station.said("MISSION_REQUEST") == []
+    assert roamer.station.messages("MISSION_REQUEST") == []
     assert Upload(roamer.station, PLAN).run() is MissionResult.ACCEPTED
     assert world.stored == records_of(PLAN)
 
@@ -196,7 +196,7 @@ def test_the_result_of_an_upload_goes_to_the_new_address() -> None:
     upload.stop()
     new = roamer.move()
     world.run(8)
-    assert [message.type for message in new.said("MISSION_ACK")] == [MissionResult.OPERATION_CANCELLED]
+    assert [message.type for message in new.messages("MISSION_ACK")] == [MissionResult.OPERATION_CANCELLED]
     assert Upload(new, PLAN).run() is MissionResult.ACCEPTED
 
 
@@ -215,7 +215,7 @@ def test_a_second_station_with_the_same_ids_cannot_join_an_upload() -> None:
         for seq, item in enumerate(other):
             intruder.send(item_message(seq, item))
         world.run(0.05)
-        assert intruder.said("MISSION_ACK", "MISSION_REQUEST") == []
+        assert intruder.messages("MISSION_ACK", "MISSION_REQUEST") == []
     assert upload.run() is MissionResult.ACCEPTED
     assert world.stored == records_of(PLAN)
 
@@ -236,7 +236,7 @@ def test_a_refused_station_is_not_mistaken_for_one_that_moved() -> None:
         for seq, item in enumerate(other):
             newcomer.send(item_message(seq, item))
     world.run(10)
-    assert MissionResult.ACCEPTED not in [message.type for message in newcomer.said("MISSION_ACK")]
+    assert MissionResult.ACCEPTED not in [message.type for message in newcomer.messages("MISSION_ACK")]
     assert world.stored == ()
 
 

@@ -162,12 +162,12 @@ class Screen:
 
     @property
     def heartbeat(self) -> Message:
-        return self.station.said("HEARTBEAT")[-1]
+        return self.station.messages("HEARTBEAT")[-1]
 
 
-def beat(station: GroundStation) -> None:
+def send_heartbeats(station: GroundStation) -> None:
     station.send(m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3))
-    station.world.after(1.0, lambda: beat(station))
+    station.world.after(1.0, lambda: send_heartbeats(station))
 
 
 def on_the_ground(board: str | TelemetryProtocol) -> Screen:
@@ -181,7 +181,7 @@ def on_the_ground(board: str | TelemetryProtocol) -> Screen:
         world = World(peer=make_board(board, faults=(faults := Faults(boxes=0))), faults=faults)
     world.wait_ready(30)
     station = GroundStation(world)
-    beat(station)
+    send_heartbeats(station)
     world.run(6)  # long enough for the switches' ranges to be read
     if board in BOXES:
         assert Upload(station, MISSION).run() is MissionResult.ACCEPTED
@@ -229,7 +229,7 @@ def test_every_shown_value_is_true_for_two_minutes_of_flight(board: str | Teleme
         screen.fly(40)
         assert screen.heartbeat.custom_mode == mode
         assert screen.heartbeat.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED
-        home = screen.station.said("HOME_POSITION")[-1]
+        home = screen.station.messages("HOME_POSITION")[-1]
         assert (home.latitude, home.longitude) == FIELD
         place = screen.world.bridge.report.whole().position
         assert (place.home_lat_deg, place.home_lon_deg) == (home.latitude / 1e7, home.longitude / 1e7)
@@ -252,7 +252,7 @@ def test_values_from_before_a_lost_link_are_not_shown_as_current(board: str | Te
     assert screen.heartbeat.system_status == m.MAV_STATE_CRITICAL
     assert screen.heartbeat.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED
     assert screen.heartbeat.custom_mode == mode
-    status = screen.station.said("SYS_STATUS")[-1]
+    status = screen.station.messages("SYS_STATUS")[-1]
     assert status.onboard_control_sensors_present & m.MAV_SYS_STATUS_SENSOR_GPS
     assert not status.onboard_control_sensors_health & m.MAV_SYS_STATUS_SENSOR_GPS
     assert status.voltage_battery == 65535
@@ -266,5 +266,5 @@ def test_values_from_before_a_lost_link_are_not_shown_as_current(board: str | Te
     screen.shown.clear()
     screen.fly(5)
     assert set(screen.shown) == shown_by(board)
-    home = screen.station.said("HOME_POSITION")[-1]
+    home = screen.station.messages("HOME_POSITION")[-1]
     assert (home.latitude, home.longitude) == FIELD

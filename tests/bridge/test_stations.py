@@ -27,7 +27,7 @@ def gcs_heartbeat() -> Message:
 def versions(station: GroundStation, *, heartbeats: bool = True) -> set[int]:
     """The MAVLink versions of the received frames, by their first byte."""
     heartbeat_ids = {(0xFE, 0), (0xFD, 0)}
-    frames = station.frames_heard
+    frames = station.frames
     ids = [(frame[0], frame[5] if frame[0] == 0xFE else int.from_bytes(frame[7:10], "little")) for frame in frames]
     return {1 if magic == 0xFE else 2 for magic, msgid in ids if heartbeats or (magic, msgid) not in heartbeat_ids}
 
@@ -40,7 +40,7 @@ def test_each_station_is_answered_in_its_own_version(version: int) -> None:
     for one in (station, other):
         one.send(gcs_heartbeat())
     world.run(0.01)
-    station.frames_heard.clear()
+    station.frames.clear()
     assert Upload(station, waypoints(5)).run() is MissionResult.ACCEPTED
     world.run(2.5)
     assert versions(station, heartbeats=False) == {version}
@@ -57,7 +57,7 @@ def test_a_station_that_switches_to_mavlink_2_is_answered_in_it() -> None:
     station.version = 2
     station.send(gcs_heartbeat())
     world.run(0.01)
-    station.frames_heard.clear()
+    station.frames.clear()
     # It may still send an occasional MAVLink 1 frame.
     station.version = 1
     station.send(gcs_heartbeat())
@@ -77,7 +77,7 @@ def test_a_new_station_gets_faster_heartbeats_for_three_seconds() -> None:
     assert 14 <= len(new.take("HEARTBEAT")) <= 19
     assert len(old.take("HEARTBEAT")) <= 4
     world.run(10)
-    assert len(new.said("HEARTBEAT")) == 10
+    assert len(new.messages("HEARTBEAT")) == 10
 
 
 def test_a_heartbeat_is_sent_once_a_second() -> None:
@@ -87,10 +87,10 @@ def test_a_heartbeat_is_sent_once_a_second() -> None:
     world.run(4)
     station.take()
     world.run(10)
-    beats = [at for at, message in station.heard if message.get_type() == "HEARTBEAT"]
-    assert len(beats) == 10
-    assert 9 <= len(station.said("MISSION_CURRENT")) <= 11
-    beat = station.said("HEARTBEAT")[-1]
+    heartbeats = [at for at, message in station.received if message.get_type() == "HEARTBEAT"]
+    assert len(heartbeats) == 10
+    assert 9 <= len(station.messages("MISSION_CURRENT")) <= 11
+    beat = station.messages("HEARTBEAT")[-1]
     assert (beat.get_srcSystem(), beat.get_srcComponent(), beat.autopilot, beat.type) == (1, 1, 3, 2)
 
 
@@ -99,14 +99,14 @@ def test_the_heartbeat_reflects_the_flight_controller_and_arming() -> None:
     station = GroundStation(world)
     station.send(gcs_heartbeat())
     world.run(2)
-    assert station.said("HEARTBEAT")[-1].system_status == m.MAV_STATE_UNINIT
-    assert station.said("ATTITUDE", "GPS_RAW_INT") == []
+    assert station.messages("HEARTBEAT")[-1].system_status == m.MAV_STATE_UNINIT
+    assert station.messages("ATTITUDE", "GPS_RAW_INT") == []
     world.power_on()
     world.run(world.naze.options.boot_ms / 1000 + 3)
-    assert station.said("HEARTBEAT")[-1].system_status == m.MAV_STATE_STANDBY
+    assert station.messages("HEARTBEAT")[-1].system_status == m.MAV_STATE_STANDBY
     world.faults.armed = True
     world.run(2)
-    beat = station.said("HEARTBEAT")[-1]
+    beat = station.messages("HEARTBEAT")[-1]
     assert beat.system_status == m.MAV_STATE_ACTIVE
     assert beat.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED
     assert station.texts() == ["Found Harakiri with the mission extension"]
@@ -121,11 +121,11 @@ def test_a_station_silent_for_a_minute_gets_no_more_messages() -> None:
     world.run(3)
     station.take()
     world.run(5)
-    assert station.heard == []
+    assert station.received == []
     assert world.bridge.ground.stations.peers() == []
     station.send(gcs_heartbeat())
     world.run(2)
-    assert station.said("HEARTBEAT")
+    assert station.messages("HEARTBEAT")
 
 
 def test_an_active_station_is_kept() -> None:
@@ -144,16 +144,16 @@ def test_a_default_peer_always_gets_messages_in_both_versions() -> None:
     world.bridge.ground.add_default_peer(station.peer, until_answered=False)
     world.run(5)
     assert versions(station) == {1, 2}
-    assert len(station.said("ATTITUDE")) >= 4
+    assert len(station.messages("ATTITUDE")) >= 4
     station.send(gcs_heartbeat())
     world.run(EXPIRY_S + 5)
     station.take()
     world.run(5)
-    assert len(station.said("ATTITUDE")) >= 4
+    assert len(station.messages("ATTITUDE")) >= 4
     world.bridge.ground.remove_default_peer(station.peer)
     station.take()
     world.run(3)
-    assert station.heard == []
+    assert station.received == []
 
 
 def test_a_broadcast_address_is_used_until_a_station_answers() -> None:
@@ -161,16 +161,16 @@ def test_a_broadcast_address_is_used_until_a_station_answers() -> None:
     everyone = GroundStation(world, "broadcast")
     world.bridge.ground.add_default_peer(everyone.peer, until_answered=True)
     world.run(3)
-    assert everyone.said("HEARTBEAT")
+    assert everyone.messages("HEARTBEAT")
     station = GroundStation(world, "answers")
     station.send(gcs_heartbeat())
     world.run(0.01)
     everyone.take()
     world.run(5)
-    assert everyone.heard == []
-    assert station.said("HEARTBEAT")
+    assert everyone.received == []
+    assert station.messages("HEARTBEAT")
     world.run(EXPIRY_S)
-    assert everyone.said("HEARTBEAT")
+    assert everyone.messages("HEARTBEAT")
 
 
 def test_hundreds_of_strangers_leave_room_for_a_new_station() -> None:
@@ -187,7 +187,7 @@ def test_hundreds_of_strangers_leave_room_for_a_new_station() -> None:
     # Once they are silent, there is room for a new one.
     station.send(gcs_heartbeat())
     world.run(1.5)
-    assert station.said("HEARTBEAT")
+    assert station.messages("HEARTBEAT")
 
 
 def test_thirty_stations_that_request_everything_share_1600_messages_a_second() -> None:
@@ -199,9 +199,9 @@ def test_thirty_stations_that_request_everything_share_1600_messages_a_second() 
             station.send(m.MAVLink_command_long_message(1, 1, 511, 0, msgid, 10_000, 0, 0, 0, 0, 0))
     world.run(3)
     for station in stations:
-        station.frames_heard.clear()
+        station.frames.clear()
     world.run(2)
-    assert 1000 < sum(len(station.frames_heard) for station in stations) < 2 * 1800
+    assert 1000 < sum(len(station.frames) for station in stations) < 2 * 1800
 
 
 def test_a_thousand_peers_all_get_telemetry() -> None:
@@ -223,15 +223,15 @@ def test_a_stream_may_be_split_over_reads_and_is_forgotten_at_its_end() -> None:
         m.MAVLink_command_long_message(1, 1, 511, 0, 0, 0, 0, 0, 0, 0, 0)
     )
     for byte in data:
-        world.spoken_by(station, bytes((byte,)), datagram=False)
+        world.receive_from(station, bytes((byte,)), datagram=False)
     world.run(0.01)
-    assert len(station.said("COMMAND_ACK")) == 1
-    world.spoken_by(station, data[:9], datagram=False)
+    assert len(station.messages("COMMAND_ACK")) == 1
+    world.receive_from(station, data[:9], datagram=False)
     world.bridge.gcs_gone(station.peer, world.now)
     # A new connection from the same address starts from scratch.
-    world.spoken_by(station, data, datagram=False)
+    world.receive_from(station, data, datagram=False)
     world.run(0.01)
-    assert len(station.said("COMMAND_ACK")) == 2
+    assert len(station.messages("COMMAND_ACK")) == 2
     world.bridge.gcs_gone(station.peer, world.now)
     assert world.bridge.ground.stations.peers() == []
     assert world.bridge.ground._splitters == {}
@@ -243,9 +243,9 @@ def test_a_truncated_datagram_does_not_affect_the_next() -> None:
     station = GroundStation(world)
     command = station.pack(m.MAVLink_command_long_message(1, 1, 511, 0, 0, 0, 0, 0, 0, 0, 0))
     for datagram in (command[:10], b"\xfd\xff" + command, command + command, b"\xfe\x09" + command[:5]):
-        world.spoken_by(station, datagram)
+        world.receive_from(station, datagram)
     world.run(0.01)
-    assert len(station.said("COMMAND_ACK")) == 3
+    assert len(station.messages("COMMAND_ACK")) == 3
 
 
 def test_our_own_frames_are_not_taken_for_a_station() -> None:
@@ -253,7 +253,7 @@ def test_our_own_frames_are_not_taken_for_a_station() -> None:
     station = GroundStation(world)
     station.send(gcs_heartbeat())
     world.run(2)
-    echo = list(station.frames_heard)
+    echo = list(station.frames)
     before = len(world.bridge.ground.stations.peers())
     for frame in echo:
         world.bridge.gcs_received(Peer("udp", "echo"), frame, world.now, datagram=True)
@@ -298,12 +298,12 @@ def test_the_pieces_of_a_long_text_can_be_joined_or_read_alone() -> None:
     for text in (long, "short", long):
         world.bridge.ground.say(Severity.WARNING, text)
     world.run(0.1)
-    chunks = [(text.id, text.chunk_seq) for text in stations[0].said("STATUSTEXT")]
+    chunks = [(text.id, text.chunk_seq) for text in stations[0].messages("STATUSTEXT")]
     (first, _), (second, _) = chunks[0], chunks[3]
     assert chunks == [(first, 0), (first, 1), (0, 0), (second, 0), (second, 1)]
     assert 0 < first != second > 0
     for station in stations:
-        pieces = [text.text for text in station.said("STATUSTEXT")]
+        pieces = [text.text for text in station.messages("STATUSTEXT")]
         assert " ".join("".join(pieces[:2]).split()) == long
         assert pieces[0].rstrip() == "Mission rejected: the first half of a sentence of"
 
@@ -326,7 +326,7 @@ def test_any_payload_in_any_message_raises_nothing(seed: int) -> None:
             payload = payload[:2].ljust(2, b"\0") + b"\x01\x01\x00"
         header = bytes((len(payload), 0, 0, number % 256, 255, 190)) + msgid.to_bytes(3, "little")
         crc = mcrf4xx(header + payload + CRC_EXTRA[msgid])
-        world.spoken_by(station, b"\xfd" + header + payload + crc.to_bytes(2, "little"))
+        world.receive_from(station, b"\xfd" + header + payload + crc.to_bytes(2, "little"))
         if number % 20 == 0:
             world.run(0.02)
     world.run(12)

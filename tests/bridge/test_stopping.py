@@ -102,7 +102,7 @@ def test_an_unfinished_upload_is_cancelled_and_stored(world: World) -> None:
     world.run(0.1)
     assert world.store.outcomes() == [Outcome.CANCELLED]
     # An item already on its way gets the same answer.
-    assert {ack.type for ack in station.said("MISSION_ACK")} == {MissionResult.OPERATION_CANCELLED}
+    assert {ack.type for ack in station.messages("MISSION_ACK")} == {MissionResult.OPERATION_CANCELLED}
     assert "Upload ended: naze-bridge stops, old mission kept" in station.texts()
     assert world.stored == records_of(OLD)
 
@@ -113,6 +113,6 @@ def test_no_transfer_is_started_while_stopping(world: World) -> None:
     station.send(count_message(5))
     outcome = world.push(NEW)
     world.run(0.1)
-    assert [ack.type for ack in station.said("MISSION_ACK")] == [MissionResult.DENIED]
+    assert [ack.type for ack in station.messages("MISSION_ACK")] == [MissionResult.DENIED]
     assert outcome[0][0].text == "naze-bridge is stopping: try again later"
     assert at_rest(world)

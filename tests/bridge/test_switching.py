@@ -21,7 +21,7 @@ READABLE = [TelemetryProtocol.MSP, TelemetryProtocol.MAVLINK, TelemetryProtocol.
 
 
 def heartbeat_gaps(station: GroundStation) -> list[float]:
-    times = [at for at, message in station.heard if message.get_type() == "HEARTBEAT"]
+    times = [at for at, message in station.received if message.get_type() == "HEARTBEAT"]
     return [later - sooner for sooner, later in pairwise(times)]
 
 
@@ -29,12 +29,12 @@ def wait_for_telemetry(world: World, station: GroundStation, *, armed: bool) -> 
     """Wait for a heartbeat with this armed state and an attitude; return the longest gap in ATTITUDE, s."""
     began = world.now
     longest, last = 0.0, began
-    station.heard.clear()
+    station.received.clear()
     while world.now < began + 8:
         world.run(0.1)
-        times = [at for at, message in station.heard if message.get_type() == "ATTITUDE"]
+        times = [at for at, message in station.received if message.get_type() == "ATTITUDE"]
         longest = max([longest, *(later - sooner for sooner, later in pairwise([last, *times]))])
-        beats = [message for message in station.said("HEARTBEAT") if bool(message.base_mode & 128) is armed]
+        beats = [message for message in station.messages("HEARTBEAT") if bool(message.base_mode & 128) is armed]
         if beats and times:
             break
     else:
@@ -51,7 +51,9 @@ def test_ground_stations_see_one_vehicle(protocol: TelemetryProtocol, baud: int)
     world.wait_ready()
     assert Upload(station, waypoints(12)).run() is MissionResult.ACCEPTED
     modes: set[int] = set()
-    station.on_message.append(lambda heard: modes.add(heard.custom_mode) if heard.get_type() == "HEARTBEAT" else None)
+    station.on_message.append(
+        lambda message: modes.add(message.custom_mode) if message.get_type() == "HEARTBEAT" else None
+    )
     for _ in range(3):
         for armed in (True, False):
             world.faults.armed = armed
@@ -62,7 +64,7 @@ def test_ground_stations_see_one_vehicle(protocol: TelemetryProtocol, baud: int)
     assert world.stored == records_of(waypoints(12))
     assert max(heartbeat_gaps(station)) <= 1.5
     assert modes == {COPTER_STABILIZE}
-    senders = {(message.get_srcSystem(), message.get_srcComponent()) for message in station.said()}
+    senders = {(message.get_srcSystem(), message.get_srcComponent()) for message in station.messages()}
     assert senders == {(1, 1)}
     assert not [text for text in station.texts() if "lost" in text or "Found" in text]
     world.assert_line_was_clean()
@@ -76,19 +78,19 @@ def test_ground_stations_see_one_vehicle_while_frsky_is_sent(board: type[Simulat
     world.bridge.ground.add_default_peer(station.peer, until_answered=False)
     world.wait_ready()
     for _ in range(2):
-        station.heard.clear()
+        station.received.clear()
         faults.armed = True
         world.wait_until(lambda w: w.bridge.session.state.speed == 9600 and w.kind is wanted, 5)
         world.run(60)
         assert world.kind is wanted
-        assert station.said("HEARTBEAT")[-1].base_mode & 128
+        assert station.messages("HEARTBEAT")[-1].base_mode & 128
         warnings = [text for text in station.texts() if "FrSky" in text]
         assert len(warnings) == (board is DeafWhileArmed)
         # Values no longer received are not shown as current.
-        status = station.said("SYS_STATUS")[-1]
+        status = station.messages("SYS_STATUS")[-1]
         gps_health = status.onboard_control_sensors_health & messages.MAV_SYS_STATUS_SENSOR_GPS
         assert (gps_health == 0) == (board is DeafWhileArmed)
-        assert world.now - next(at for at, message in reversed(station.heard) if message is status) <= 1.1
+        assert world.now - next(at for at, message in reversed(station.received) if message is status) <= 1.1
         assert Upload(station, waypoints(13)).run() is MissionResult.DENIED
         faults.armed = False
         world.wait_until(lambda w: w.kind is harakiri.PATCHED and w.bridge.session.state.speed == 115200, 5)

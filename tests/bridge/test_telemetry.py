@@ -37,12 +37,12 @@ def flown(seconds: float, *, baud: int = 115200, faults: Faults | None = None) -
 
 def listening(world: World, name: str = "gcs") -> GroundStation:
     station = GroundStation(world, name)
-    beat(station)
+    send_heartbeat(station)
     world.run(0.01)
     return station
 
 
-def beat(station: GroundStation) -> None:
+def send_heartbeat(station: GroundStation) -> None:
     station.send(m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3))
 
 
@@ -52,7 +52,7 @@ def polls(world: World) -> Counter[int]:
 
 
 def rate_hz(station: GroundStation, name: str, seconds: float) -> float:
-    return len(station.said(name)) / seconds
+    return len(station.messages(name)) / seconds
 
 
 # The messages match the craft.
@@ -121,7 +121,7 @@ def angle_between(degrees: float, others: float) -> float:
 
 def test_the_sticks_are_in_arducopters_order() -> None:
     _, station = flown(5)
-    (channels,) = station.said("RC_CHANNELS")[-1:]
+    (channels,) = station.messages("RC_CHANNELS")[-1:]
     assert channels.chancount == 8
     assert [getattr(channels, f"chan{number}_raw") for number in range(1, 9)] == [
         1500,
@@ -135,13 +135,13 @@ def test_the_sticks_are_in_arducopters_order() -> None:
     ]
     assert {getattr(channels, f"chan{number}_raw") for number in range(9, 19)} == {65535}
     assert channels.rssi == 920 * 254 // 1020
-    (raw,) = station.said("RC_CHANNELS_RAW")[-1:]
+    (raw,) = station.messages("RC_CHANNELS_RAW")[-1:]
     assert (raw.port, raw.chan3_raw, raw.chan4_raw, raw.rssi) == (0, 1450, 1500, channels.rssi)
 
 
 def test_values_without_a_mavlink_field_are_sent_as_named_values() -> None:
     _, station = flown(20)
-    named = {message.name: message.value for message in station.said("NAMED_VALUE_INT", "NAMED_VALUE_FLOAT")}
+    named = {message.name: message.value for message in station.messages("NAMED_VALUE_INT", "NAMED_VALUE_FLOAT")}
     assert (named["cycle_us"], named["i2c_err"]) == (3000, 0)
     assert named["home_m"] == pytest.approx(41, abs=3)  # after 20 s on the circle
     assert 180 <= named["home_deg"] <= 270
@@ -150,7 +150,7 @@ def test_values_without_a_mavlink_field_are_sent_as_named_values() -> None:
 def test_no_ground_station_shows_a_false_alarm() -> None:
     """MAVProxy shows "fence breach" without the fence bit, Mission Planner "SAFE" without the motor bit."""
     _, station = flown(3)
-    status = station.said("SYS_STATUS")[-1]
+    status = station.messages("SYS_STATUS")[-1]
     present, health = status.onboard_control_sensors_present, status.onboard_control_sensors_health
     assert present == status.onboard_control_sensors_enabled
     assert health & present == present
@@ -177,10 +177,10 @@ def test_no_ground_station_shows_a_false_alarm() -> None:
 )
 def test_the_switches_determine_the_mode(boxes: int, custom_mode: int, stabilized: bool) -> None:
     _, station = flown(1.5, faults=Faults(boxes=boxes))
-    beat = station.said("HEARTBEAT")[-1]
-    assert beat.custom_mode == custom_mode
-    assert bool(beat.base_mode & m.MAV_MODE_FLAG_STABILIZE_ENABLED) is stabilized
-    assert beat.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED
+    send_heartbeat = station.messages("HEARTBEAT")[-1]
+    assert send_heartbeat.custom_mode == custom_mode
+    assert bool(send_heartbeat.base_mode & m.MAV_MODE_FLAG_STABILIZE_ENABLED) is stabilized
+    assert send_heartbeat.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED
 
 
 @pytest.mark.parametrize(("switch", "position"), [("armed", False), ("boxes", 5)])
@@ -189,9 +189,9 @@ def test_arming_and_modes_are_reported_at_once(switch: str, position: int) -> No
     station.take()
     setattr(world.faults, switch, position)
     world.run(0.3)
-    told = station.said("HEARTBEAT")[-1]
-    assert told.custom_mode == (2 if switch == "boxes" else 0)
-    assert bool(told.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED) is (switch == "boxes")
+    heartbeat = station.messages("HEARTBEAT")[-1]
+    assert heartbeat.custom_mode == (2 if switch == "boxes" else 0)
+    assert bool(heartbeat.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED) is (switch == "boxes")
 
 
 def test_a_disarmed_craft_is_on_the_ground() -> None:
@@ -199,12 +199,12 @@ def test_a_disarmed_craft_is_on_the_ground() -> None:
     assert station.take("EXTENDED_SYS_STATE")[-1].landed_state == m.MAV_LANDED_STATE_IN_AIR
     world.faults.armed = False
     world.run(3)
-    assert station.said("EXTENDED_SYS_STATE")[-1].landed_state == m.MAV_LANDED_STATE_ON_GROUND
+    assert station.messages("EXTENDED_SYS_STATE")[-1].landed_state == m.MAV_LANDED_STATE_ON_GROUND
 
 
 def test_home_is_the_place_and_altitude_of_arming() -> None:
     _, station = flown(30)
-    home = station.said("HOME_POSITION")[-1]
+    home = station.messages("HOME_POSITION")[-1]
     assert (home.latitude, home.longitude) == (453838000, 84733000)
     assert home.altitude == pytest.approx(131_000, abs=1000)
 
@@ -216,7 +216,7 @@ def test_home_before_arming_is_the_position(tree: Tree) -> None:
     world.wait_ready()
     station = listening(world)
     world.run(3)
-    home = station.said("HOME_POSITION")[-1]
+    home = station.messages("HOME_POSITION")[-1]
     assert (home.latitude, home.longitude) == (453838000, 84733000)
 
 
@@ -275,7 +275,7 @@ def test_an_unanswered_address_gets_ten_a_second_until_the_craft_arms() -> None:
     station.take()
     world.run(10)
     assert rate_hz(station, "ATTITUDE", 10) == pytest.approx(10, abs=1)
-    beat(station)
+    send_heartbeat(station)
     world.run(2)
     station.take()
     world.run(10)
@@ -288,7 +288,7 @@ def test_a_bad_line_slows_the_polls_until_it_recovers() -> None:
     for loss in (0.0, 0.01, 0.0):
         world.faults.lost_byte_rate = loss
         world.run(15)
-        beat(station)
+        send_heartbeat(station)
         world.written.clear()
         world.run(10)
         rates.append(polls(world)[Msp.ATTITUDE] / 10)
@@ -339,10 +339,10 @@ def test_noise_gives_neither_telemetry_nor_a_flight_controller() -> None:
     station.take()
     found = len(world.events("fc.found"))
     for _ in range(300):
-        world.hear(noise.randbytes(1000))
+        world.receive_from_fc(noise.randbytes(1000))
         world.run(0.087)
     assert len(world.events("fc.found")) == found
-    assert {message.get_type() for message in station.said()} <= {
+    assert {message.get_type() for message in station.messages()} <= {
         "HEARTBEAT",
         "MISSION_CURRENT",
         "STATUSTEXT",
@@ -356,16 +356,16 @@ def test_noise_gives_neither_telemetry_nor_a_flight_controller() -> None:
 @pytest.mark.parametrize("baud", [1200, 2400, 4800])
 def test_on_a_slow_line_combined_messages_keep_the_rate_of_their_polls(baud: int) -> None:
     world, station = flown(10, baud=baud)
-    station.heard.clear()
+    station.received.clear()
     world.run(40)
-    fixes = len(station.said("GPS_RAW_INT"))
+    fixes = len(station.messages("GPS_RAW_INT"))
     assert fixes >= 40 / 5 - 2
     for name in ("GLOBAL_POSITION_INT", "VFR_HUD"):
-        assert fixes - 2 <= len(station.said(name)) <= fixes + 2, name
+        assert fixes - 2 <= len(station.messages(name)) <= fixes + 2, name
     # Missing values become unknown as soon as the loss is noticed.
     world.faults.hang = True
-    beat(station)
+    send_heartbeat(station)
     world.run(12)
-    station.heard.clear()
+    station.received.clear()
     world.run(5)
-    assert {status.voltage_battery for status in station.said("SYS_STATUS")} == {65535}
+    assert {status.voltage_battery for status in station.messages("SYS_STATUS")} == {65535}

@@ -57,12 +57,12 @@ def receiving(world: World, station: GroundStation, items: list[MissionItem], se
 
 
 def acks(station: GroundStation) -> list[MissionResult]:
-    return [MissionResult(message.type) for message in station.said("MISSION_ACK")]
+    return [MissionResult(message.type) for message in station.messages("MISSION_ACK")]
 
 
 def requested(station: GroundStation) -> list[int]:
-    assert station.said("MISSION_REQUEST_INT") == []
-    return [message.seq for message in station.said("MISSION_REQUEST")]
+    assert station.messages("MISSION_REQUEST_INT") == []
+    return [message.seq for message in station.messages("MISSION_REQUEST")]
 
 
 def partial_list_message(mission_type: int = 0) -> Message:
@@ -112,13 +112,17 @@ def test_another_mission_type_is_unsupported(mission_type: int) -> None:
         station.take()
         station.send(message)
         world.run(0.3)
-        assert [(ack.type, ack.mission_type) for ack in station.said("MISSION_ACK")] == [(A.UNSUPPORTED, mission_type)]
+        assert [(ack.type, ack.mission_type) for ack in station.messages("MISSION_ACK")] == [
+            (A.UNSUPPORTED, mission_type)
+        ]
         assert requested(station) == []
     if mission_type != 255:
         station.take()
         station.send(clear_message(mission_type))
         world.run(0.3)
-        assert [(ack.type, ack.mission_type) for ack in station.said("MISSION_ACK")] == [(A.UNSUPPORTED, mission_type)]
+        assert [(ack.type, ack.mission_type) for ack in station.messages("MISSION_ACK")] == [
+            (A.UNSUPPORTED, mission_type)
+        ]
     assert world.stored == OLD_RECORDS
 
 
@@ -177,7 +181,7 @@ def test_clear_all_clears_the_list_and_verifies_it(message: Message) -> None:
     world, station = holding()
     stored_at_ack = []
     station.on_message.append(
-        lambda heard: stored_at_ack.append(world.stored) if heard.get_type() == "MISSION_ACK" else None
+        lambda message: stored_at_ack.append(world.stored) if message.get_type() == "MISSION_ACK" else None
     )
     station.send(message)
     world.wait_until(lambda _: bool(acks(station)), 2)
@@ -188,7 +192,7 @@ def test_clear_all_clears_the_list_and_verifies_it(message: Message) -> None:
     station.send(message)
     world.run(1)
     assert acks(station) == [A.ACCEPTED, A.ACCEPTED]
-    assert {ack.mission_type for ack in station.said("MISSION_ACK")} == {getattr(message, "mission_type", MISSION)}
+    assert {ack.mission_type for ack in station.messages("MISSION_ACK")} == {getattr(message, "mission_type", MISSION)}
     assert world.naze.counters.flash_writes == 2
 
 
@@ -319,7 +323,7 @@ def test_an_upload_whose_turn_does_not_come_is_denied() -> None:
     for message in (count_message(5), count_message(5), item_message(0, OLD[1]), ack_message(A.ACCEPTED)):
         second.send(message)
     world.run(2.4)
-    assert second.said("MISSION_ACK", "MISSION_REQUEST", "STATUSTEXT") == []
+    assert second.messages("MISSION_ACK", "MISSION_REQUEST", "STATUSTEXT") == []
     world.run(0.2)
     assert acks(second) == [A.DENIED]
     assert second.texts() == ["Another mission transfer is running"]
@@ -333,7 +337,7 @@ def test_an_upload_during_a_push_from_the_command_line_is_denied() -> None:
     for message in (count_message(5), count_message(5), item_message(0, OLD[1]), ack_message(A.ACCEPTED)):
         station.send(message)
     world.run(2.4)
-    assert station.said("MISSION_ACK", "MISSION_REQUEST", "STATUSTEXT") == []
+    assert station.messages("MISSION_ACK", "MISSION_REQUEST", "STATUSTEXT") == []
     world.run(0.2)
     assert acks(station) == [A.DENIED]
     assert station.texts() == ["Another mission transfer is running"]
@@ -564,7 +568,7 @@ def test_a_write_fast_with_lost_items_is_reported_repeatedly() -> None:
     assert world.stored == OLD_RECORDS
     world.run(10)
     assert station.texts() == [text] * 3
-    assert {message.severity for message in station.said("STATUSTEXT")} == {3}
+    assert {message.severity for message in station.messages("STATUSTEXT")} == {3}
     assert other.texts() == []
 
 
@@ -611,12 +615,12 @@ def test_each_item_is_requested_once_with_mission_request(as_int: bool) -> None:
     upload = Upload(station, items, as_int=as_int)
     stored_at_ack = []
     station.on_message.append(
-        lambda heard: stored_at_ack.append(world.stored) if heard.get_type() == "MISSION_ACK" else None
+        lambda message: stored_at_ack.append(world.stored) if message.get_type() == "MISSION_ACK" else None
     )
     assert upload.run() is A.ACCEPTED
     assert requested(station) == list(range(146))
     assert stored_at_ack == [records_of(items if as_int else rounded(items))]
-    assert {(m.target_system, m.target_component) for m in station.said("MISSION_REQUEST")} == {(255, 190)}
+    assert {(m.target_system, m.target_component) for m in station.messages("MISSION_REQUEST")} == {(255, 190)}
     world.assert_line_was_clean()
 
 
@@ -719,7 +723,7 @@ def test_an_unanswered_request_is_repeated_for_five_seconds(sent: int) -> None:
     assert world.now - began == pytest.approx(5.0, abs=0.05)
     assert acks(station) == [A.OPERATION_CANCELLED]
     assert any("silent for 5 s" in text for text in station.texts())
-    times = [at - began for at, message in station.heard if message.get_type() == "MISSION_REQUEST"]
+    times = [at - began for at, message in station.received if message.get_type() == "MISSION_REQUEST"]
     assert set(requested(station)) == {sent}
     assert times[0] == pytest.approx(0.25, abs=0.05)
     assert 4 <= len(times) <= 8
@@ -894,7 +898,7 @@ def test_a_lost_final_ack_is_sent_again() -> None:
     items = waypoints(20)
     receiving(world, station, items, 19)
     station.air.loss = 1.0
-    world.spoken_by(station, station.pack(item_message(19, items[19])))
+    world.receive_from(station, station.pack(item_message(19, items[19])))
     world.run(1)
     station.air.loss = 0.0
     assert acks(station) == []
@@ -946,13 +950,13 @@ def test_the_summary_comes_first_and_goes_only_to_the_writer() -> None:
     items[30] = replace(items[30], frame=Frame.GLOBAL)
     assert Upload(station, items).run() is A.ACCEPTED
     world.run(0.1)
-    texts = [(text.severity, text.text) for text in station.said("STATUSTEXT") if "naze" not in text.text]
+    texts = [(text.severity, text.text) for text in station.messages("STATUSTEXT") if "naze" not in text.text]
     assert texts == [
         (4, "20 of 40 stored: 20 dropped, 1 Alt now relative"),
         (4, "20 items: DO_CHANGE_SPEED dropped, not supported"),
         (4, "WP 30: Alt flown above home, not above sea level"),
     ]
-    assert [text.text for text in other.said("STATUSTEXT")] == ["New mission, 20 items, by udp gcs"]
+    assert [text.text for text in other.messages("STATUSTEXT")] == ["New mission, 20 items, by udp gcs"]
 
 
 def test_a_reason_is_sent_once_per_attempt() -> None:
@@ -974,10 +978,10 @@ def test_other_stations_are_told_of_a_clear() -> None:
     other.send(ack_message(A.ACCEPTED))
     station.send(clear_message())
     world.run(1)
-    assert [(text.severity, text.text) for text in station.said("STATUSTEXT")] == [
+    assert [(text.severity, text.text) for text in station.messages("STATUSTEXT")] == [
         (4, "Mission on the flight controller cleared")
     ]
-    assert [(text.severity, text.text) for text in other.said("STATUSTEXT")] == [(4, "Mission erased, by udp gcs")]
+    assert [(text.severity, text.text) for text in other.messages("STATUSTEXT")] == [(4, "Mission erased, by udp gcs")]
 
 
 @pytest.mark.parametrize("lose", [World.unplug, World.power_off])

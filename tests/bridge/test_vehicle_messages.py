@@ -37,7 +37,7 @@ def at(vehicle: Vehicle, boot_ms: int = 0) -> make.Moment:
     return make.Moment(vehicle, 0.0, boot_ms)
 
 
-def told(state: Vehicle, who: FlightController, **replies: bytes) -> Vehicle:
+def with_replies(state: Vehicle, who: FlightController, **replies: bytes) -> Vehicle:
     """Pass replies (payloads by command name) to a vehicle; return it."""
     for name, payload in replies.items():
         hear_msp(state, MspFrame(Direction.REPLY, Msp[name], payload), who, 0.0)
@@ -78,7 +78,7 @@ def test_errors_and_short_replies_change_nothing() -> None:
 @pytest.mark.parametrize("profile", [each for each in PROFILES if each.spoken is Spoken.MSP], ids=lambda it: it.name)
 def test_every_message_can_be_packed_whatever_a_board_replies(profile: Profile, fill: int) -> None:
     who = FlightController(profile, profile.name, None, HARAKIRI_BOXES)
-    state = told(Vehicle(), who, **{poll.name: bytes((fill,)) * 68 for poll in Msp if poll is not Msp.BOX})
+    state = with_replies(Vehicle(), who, **{poll.name: bytes((fill,)) * 68 for poll in Msp if poll is not Msp.BOX})
     for row in TELEMETRY:
         for message in at(state, boot_ms=0xFFFFFFFF).made(row.makers):
             assert pack(message).payload_v2
@@ -87,16 +87,16 @@ def test_every_message_can_be_packed_whatever_a_board_replies(profile: Profile, 
 def test_a_current_sensor_below_zero_is_no_huge_consumption() -> None:
     """INAV's current and consumption are signed: a wrong offset makes both negative."""
     analog = struct.pack("<BHhiiiIBH", 3 << 4, 1200, -40, -480, -7, -80, 0, 90, 800)
-    (message,) = at(told(Vehicle(), INAV, INAV_ANALOG=analog)).made((make.battery_status,))
+    (message,) = at(with_replies(Vehicle(), INAV, INAV_ANALOG=analog)).made((make.battery_status,))
     assert (message.current_battery, message.current_consumed) == (-40, -7)
 
 
 def test_without_a_fix_there_is_no_position() -> None:
-    state = told(Vehicle(), HARAKIRI, STATUS=status(), RAW_GPS=gps(fix=0), ALTITUDE=bytes(6))
+    state = with_replies(Vehicle(), HARAKIRI, STATUS=status(), RAW_GPS=gps(fix=0), ALTITUDE=bytes(6))
     assert make.gps_raw_int(at(state)).fix_type == m.GPS_FIX_TYPE_NO_FIX
     assert at(state).made((make.global_position_int,)) == []
     assert at(state).made((make.home_position,)) == []
-    told(state, HARAKIRI, ATTITUDE=attitude(), RC=struct.pack("<8H", *[1500] * 8))
+    with_replies(state, HARAKIRI, ATTITUDE=attitude(), RC=struct.pack("<8H", *[1500] * 8))
     hud = fields(make.vfr_hud(at(state)))
     assert math.isnan(hud["groundspeed"])
     assert math.isnan(hud["airspeed"])
@@ -104,28 +104,28 @@ def test_without_a_fix_there_is_no_position() -> None:
 
 
 def test_harakiri_sends_no_course_and_no_dilution() -> None:
-    raw = fields(make.gps_raw_int(at(told(Vehicle(), HARAKIRI, RAW_GPS=gps()), 5)))
+    raw = fields(make.gps_raw_int(at(with_replies(Vehicle(), HARAKIRI, RAW_GPS=gps()), 5)))
     assert (raw["cog"], raw["eph"], raw["epv"], raw["time_usec"]) == (U16, U16, U16, 5000)
 
 
 def test_a_first_fix_in_motion_has_no_direction_yet() -> None:
-    state = told(Vehicle(), HARAKIRI, STATUS=status(), ALTITUDE=struct.pack("<ih", 150, 20), RAW_GPS=gps())
+    state = with_replies(Vehicle(), HARAKIRI, STATUS=status(), ALTITUDE=struct.pack("<ih", 150, 20), RAW_GPS=gps())
     assert at(state).made((make.global_position_int,)) == []
-    told(state, HARAKIRI, RAW_GPS=gps(lat=453838000 + 90))  # a metre to the north
+    with_replies(state, HARAKIRI, RAW_GPS=gps(lat=453838000 + 90))  # a metre to the north
     position = fields(make.global_position_int(at(state)))
     assert (position["vx"], position["vy"], position["vz"], position["relative_alt"]) == (250, 0, -20, 1500)
     assert position["hdg"] == U16
 
 
 def test_a_craft_that_never_moved_has_zero_velocity() -> None:
-    state = told(Vehicle(), HARAKIRI, STATUS=status(), ALTITUDE=bytes(6), RAW_GPS=gps(speed=0))
+    state = with_replies(Vehicle(), HARAKIRI, STATUS=status(), ALTITUDE=bytes(6), RAW_GPS=gps(speed=0))
     position = fields(make.global_position_int(at(state)))
     assert (position["vx"], position["vy"], position["relative_alt"]) == (0, 0, 0)
 
 
 def test_a_reported_course_is_used() -> None:
-    state = told(Vehicle(), INAV, STATUS=status(), ALTITUDE=bytes(10))
-    told(state, INAV, RAW_GPS=gps(fix=2, more=struct.pack("<HH", 900, 140)))
+    state = with_replies(Vehicle(), INAV, STATUS=status(), ALTITUDE=bytes(10))
+    with_replies(state, INAV, RAW_GPS=gps(fix=2, more=struct.pack("<HH", 900, 140)))
     position, raw = fields(make.global_position_int(at(state))), fields(make.gps_raw_int(at(state)))
     assert (position["vx"], position["vy"]) == (0, 250)
     assert (raw["cog"], raw["eph"], raw["fix_type"]) == (9000, 140, m.GPS_FIX_TYPE_3D_FIX)
@@ -135,30 +135,30 @@ def test_a_reported_course_is_used() -> None:
     ("who", "fix", "fix_type"), [(INAV, 0, 1), (INAV, 1, 2), (INAV, 2, 3), (HARAKIRI, 1, 3), (BETAFLIGHT, 1, 3)]
 )
 def test_only_inav_reports_the_kind_of_fix(who: FlightController, fix: int, fix_type: int) -> None:
-    assert make.gps_raw_int(at(told(Vehicle(), who, RAW_GPS=gps(fix=fix)), 0)).fix_type == fix_type
+    assert make.gps_raw_int(at(with_replies(Vehicle(), who, RAW_GPS=gps(fix=fix)), 0)).fix_type == fix_type
 
 
 def test_without_a_barometer_there_is_no_height() -> None:
-    state = told(Vehicle(), HARAKIRI, STATUS=status(sensors=0b1101), ALTITUDE=bytes(6), RAW_GPS=gps(speed=0))
+    state = with_replies(Vehicle(), HARAKIRI, STATUS=status(sensors=0b1101), ALTITUDE=bytes(6), RAW_GPS=gps(speed=0))
     assert at(state).made((make.global_position_int,)) == []
-    told(state, HARAKIRI, ATTITUDE=attitude(), RC=struct.pack("<8H", *[1500] * 8))
+    with_replies(state, HARAKIRI, ATTITUDE=attitude(), RC=struct.pack("<8H", *[1500] * 8))
     assert math.isnan(make.vfr_hud(at(state)).climb)
     # A board that derives height from GPS reports one.
-    told(state, BETAFLIGHT, ALTITUDE=struct.pack("<ih", 20, 0))
+    with_replies(state, BETAFLIGHT, ALTITUDE=struct.pack("<ih", 20, 0))
     assert make.global_position_int(at(state)).relative_alt == 200
 
 
 def test_without_a_compass_the_heading_is_unknown() -> None:
-    state = told(Vehicle(), HARAKIRI, STATUS=status(sensors=0b1011), ALTITUDE=bytes(6), RAW_GPS=gps(speed=0))
-    told(state, HARAKIRI, ATTITUDE=attitude(heading=0))
+    state = with_replies(Vehicle(), HARAKIRI, STATUS=status(sensors=0b1011), ALTITUDE=bytes(6), RAW_GPS=gps(speed=0))
+    with_replies(state, HARAKIRI, ATTITUDE=attitude(heading=0))
     assert make.global_position_int(at(state)).hdg == U16
 
 
 @pytest.mark.parametrize(("heading", "shown"), [(-170, 190), (170, 170), (190, 190), (359, 359), (0, 0), (-1, 359)])
 @pytest.mark.parametrize("who", [HARAKIRI, INAV, BETAFLIGHT])
 def test_signs_are_the_same_on_all_firmware(who: FlightController, heading: int, shown: int) -> None:
-    state = told(Vehicle(), who, STATUS=status(), ALTITUDE=bytes(6), RAW_GPS=gps(fix=2, speed=0))
-    told(state, who, ATTITUDE=attitude(roll=105, pitch=32, heading=heading), RC=bytes(16))
+    state = with_replies(Vehicle(), who, STATUS=status(), ALTITUDE=bytes(6), RAW_GPS=gps(fix=2, speed=0))
+    with_replies(state, who, ATTITUDE=attitude(roll=105, pitch=32, heading=heading), RC=bytes(16))
     shown_attitude = fields(make.attitude(at(state, 7)))
     assert math.degrees(shown_attitude["roll"]) == pytest.approx(10.5)
     assert math.degrees(shown_attitude["pitch"]) == pytest.approx(-3.2)
@@ -170,17 +170,17 @@ def test_signs_are_the_same_on_all_firmware(who: FlightController, heading: int,
 
 
 def test_an_unmeasured_battery_is_unknown() -> None:
-    state = told(Vehicle(), HARAKIRI, STATUS=status())
+    state = with_replies(Vehicle(), HARAKIRI, STATUS=status())
     for reply in (None, struct.pack("<BHH", 0, 0, 0)):
         if reply:
-            told(state, HARAKIRI, ANALOG=reply)
+            with_replies(state, HARAKIRI, ANALOG=reply)
         power = fields(make.sys_status(at(state)))
         assert (power["voltage_battery"], power["current_battery"], power["battery_remaining"]) == (U16, -1, -1)
         assert at(state).made((make.battery_status,)) == []
 
 
 def test_a_current_of_0_without_consumption_is_unknown() -> None:
-    state = told(Vehicle(), BETAFLIGHT, STATUS=status(), ANALOG=struct.pack("<BHHh", 124, 350, 0, 1234))
+    state = with_replies(Vehicle(), BETAFLIGHT, STATUS=status(), ANALOG=struct.pack("<BHHh", 124, 350, 0, 1234))
     battery = fields(make.battery_status(at(state)))
     assert (battery["voltages"], battery["current_battery"], battery["current_consumed"]) == (
         [12400, *[U16] * 9],
@@ -189,22 +189,22 @@ def test_a_current_of_0_without_consumption_is_unknown() -> None:
     )
     assert (battery["temperature"], battery["battery_remaining"], battery["energy_consumed"]) == (32767, 93, -1)
     assert make.sys_status(at(state)).current_battery == 1234
-    told(state, BETAFLIGHT, ANALOG=struct.pack("<BHHh", 124, 0, 0, 0))
+    with_replies(state, BETAFLIGHT, ANALOG=struct.pack("<BHHh", 124, 0, 0, 0))
     assert make.battery_status(at(state)).current_battery == make.battery_status(at(state)).current_consumed == -1
 
 
 def test_signal_strength_is_unknown_until_it_was_above_0() -> None:
-    state = told(Vehicle(), HARAKIRI, RC=struct.pack("<4H", 1500, 1500, 1500, 1000))
+    state = with_replies(Vehicle(), HARAKIRI, RC=struct.pack("<4H", 1500, 1500, 1500, 1000))
     assert make.rc_channels(at(state)).rssi == U8
-    told(state, HARAKIRI, ANALOG=struct.pack("<BHH", 120, 0, 0))
+    with_replies(state, HARAKIRI, ANALOG=struct.pack("<BHH", 120, 0, 0))
     assert make.rc_channels(at(state)).rssi == U8
     for sent, shown in ((1020, 254), (1023, 254), (510, 127), (0, 0)):
-        told(state, HARAKIRI, ANALOG=struct.pack("<BHH", 120, 0, sent))
+        with_replies(state, HARAKIRI, ANALOG=struct.pack("<BHH", 120, 0, sent))
         assert make.rc_channels(at(state)).rssi == make.rc_channels_raw(at(state)).rssi == shown
 
 
 def test_missing_channels_are_unknown() -> None:
-    state = told(Vehicle(), HARAKIRI, RC=struct.pack("<6H", 1501, 1502, 1503, 1004, 1005, 1006))
+    state = with_replies(Vehicle(), HARAKIRI, RC=struct.pack("<6H", 1501, 1502, 1503, 1004, 1005, 1006))
     all_channels, raw = make.rc_channels(at(state)), make.rc_channels_raw(at(state))
     assert all_channels.chancount == 6
     sent = [1501, 1502, 1004, 1503, 1005, 1006]  # throttle before yaw
@@ -214,7 +214,7 @@ def test_missing_channels_are_unknown() -> None:
 
 @pytest.mark.parametrize(("throttle", "shown"), [(900, 0), (1000, 0), (1450, 45), (2000, 100), (2100, 100)])
 def test_the_throttle_stick_is_sent_in_percent(throttle: int, shown: int) -> None:
-    state = told(Vehicle(), HARAKIRI, ATTITUDE=attitude(), RC=struct.pack("<4H", 1500, 1500, 1500, throttle))
+    state = with_replies(Vehicle(), HARAKIRI, ATTITUDE=attitude(), RC=struct.pack("<4H", 1500, 1500, 1500, throttle))
     assert make.vfr_hud(at(state)).throttle == shown
 
 
@@ -262,7 +262,7 @@ def test_the_active_boxes_determine_the_mode(
     flags = sum(1 << who.boxes.index(name) for name in ("ARM", *active))
     copter, plane, rover, boat = Airframe.QUADROTOR, Airframe.FIXED_WING, Airframe.ROVER, Airframe.BOAT
     for kind, mode in ((copter, copter_mode), (plane, plane_mode), (rover, rover_mode), (boat, rover_mode)):
-        state = told(Vehicle(), who, STATUS=status(flags=flags))
+        state = with_replies(Vehicle(), who, STATUS=status(flags=flags))
         state.airframe = kind
         beat = make.heartbeat(state, is_lost=False)
         assert (beat.custom_mode, beat.system_status) == (mode, m.MAV_STATE_ACTIVE)
@@ -273,20 +273,20 @@ def test_body_rates_come_from_inavs_gyro() -> None:
     """INAV's axes are forward, left and up; MAVLink's are forward, right and down."""
     turning = struct.pack("<9h", 0, 0, 512, 90, 45, -30, 0, 0, 0)
     for who, rates in ((INAV, (90, -45, 30)), (HARAKIRI, (math.nan, math.nan, math.nan))):
-        state = told(Vehicle(), who, RAW_IMU=turning, ATTITUDE=attitude())
+        state = with_replies(Vehicle(), who, RAW_IMU=turning, ATTITUDE=attitude())
         for message in (make.attitude(at(state)), make.attitude_quaternion(at(state))):
             told_rates = tuple(math.degrees(getattr(message, f"{axis}speed")) for axis in ("roll", "pitch", "yaw"))
             assert told_rates == pytest.approx(rates, nan_ok=True)
 
 
 def test_rates_are_unknown_once_the_gyro_is_silent() -> None:
-    state = told(Vehicle(), INAV, RAW_IMU=struct.pack("<9h", 0, 0, 512, 90, 45, -30, 0, 0, 0))
+    state = with_replies(Vehicle(), INAV, RAW_IMU=struct.pack("<9h", 0, 0, 512, 90, 45, -30, 0, 0, 0))
     hear_msp(state, MspFrame(Direction.REPLY, Msp.ATTITUDE, attitude()), INAV, 1.0)
     assert math.isnan(make.attitude(make.Moment(state, 1.0, 0)).rollspeed)
 
 
 def test_home_in_flight_is_lower_than_the_craft() -> None:
-    state = told(
+    state = with_replies(
         Vehicle(),
         HARAKIRI,
         STATUS=status(flags=1 << 5),
@@ -294,7 +294,7 @@ def test_home_in_flight_is_lower_than_the_craft() -> None:
         WP=struct.pack("<BiiHB", 0, 453830000, 84730000, 0, 0),
     )
     assert at(state).made((make.home_position,)) == []  # the craft's height is unknown
-    told(state, HARAKIRI, ALTITUDE=struct.pack("<ih", 2150, 0))
+    with_replies(state, HARAKIRI, ALTITUDE=struct.pack("<ih", 2150, 0))
     home = make.home_position(at(state))
     assert (home.latitude, home.longitude, home.altitude) == (453830000, 84730000, 109_500)
     assert all(math.isnan(value) for value in (*home.q, home.approach_x))
@@ -304,27 +304,27 @@ def test_inavs_home_has_its_altitude_in_centimetres() -> None:
     home = struct.pack("<BBiiihhhB", 0, 4, 453830000, 84730000, 13147, 0, 0, 0, 0xA5)
     mission_record = struct.pack("<BBiiihhhB", 1, 1, 453838000, 84733000, 2000, 0, 0, 0, 0xA5)
     height = struct.pack("<ihi", 1012, 0, 0)
-    state = told(Vehicle(), INAV, STATUS=status(flags=1), RAW_GPS=gps(speed=0), ALTITUDE=height, WP=home)
-    told(state, INAV, WP=mission_record)
+    state = with_replies(Vehicle(), INAV, STATUS=status(flags=1), RAW_GPS=gps(speed=0), ALTITUDE=height, WP=home)
+    with_replies(state, INAV, WP=mission_record)
     assert make.home_position(at(state)).altitude == 131_470
     assert make.global_position_int(at(state)).alt == 141_590
 
 
 def test_an_inav_without_a_voltage_reports_no_battery() -> None:
     analog = struct.pack("<BHHIIIIBH", 3 << 4, 0, 0, 0, 0, 0, 0, 0, 0)
-    assert at(told(Vehicle(), INAV, INAV_ANALOG=analog)).made((make.battery_status,)) == []
+    assert at(with_replies(Vehicle(), INAV, INAV_ANALOG=analog)).made((make.battery_status,)) == []
 
 
 def test_the_distance_home_needs_a_known_home() -> None:
-    state = told(Vehicle(), HARAKIRI, STATUS=status(flags=1 << 5), RAW_GPS=gps())
+    state = with_replies(Vehicle(), HARAKIRI, STATUS=status(flags=1 << 5), RAW_GPS=gps())
     assert at(state).made((make.home_distance, make.home_direction)) == []
-    told(state, HARAKIRI, WP=struct.pack("<BiiHB", 0, 453838000 - 3593, 84733000, 0, 0))
+    with_replies(state, HARAKIRI, WP=struct.pack("<BiiHB", 0, 453838000 - 3593, 84733000, 0, 0))
     assert make.home_distance(at(state)).value == pytest.approx(40, abs=0.1)
     assert make.home_direction(at(state)).value == pytest.approx(180)
 
 
 def test_sensors_and_i2c_errors_are_reported() -> None:
-    present = make.sys_status(at(told(Vehicle(), HARAKIRI, STATUS=status(sensors=0b0001, i2c_errors=9)), 0))
+    present = make.sys_status(at(with_replies(Vehicle(), HARAKIRI, STATUS=status(sensors=0b0001, i2c_errors=9)), 0))
     assert present.errors_comm == 9
     assert not present.onboard_control_sensors_present & m.MAV_SYS_STATUS_SENSOR_GPS
     assert not present.onboard_control_sensors_health & m.MAV_SYS_STATUS_SENSOR_GPS
@@ -335,21 +335,21 @@ def test_sensors_and_i2c_errors_are_reported() -> None:
 )
 def test_remaining_charge_is_estimated(volts: tuple[float, ...], percent: int) -> None:
     """From the number of cells, determined while the battery is full; it does not change as the battery drains."""
-    state = told(Vehicle(), HARAKIRI, STATUS=status())
+    state = with_replies(Vehicle(), HARAKIRI, STATUS=status())
     for voltage in volts:
-        told(state, HARAKIRI, ANALOG=struct.pack("<BHH", round(voltage * 10), 0, 0))
+        with_replies(state, HARAKIRI, ANALOG=struct.pack("<BHH", round(voltage * 10), 0, 0))
     assert make.sys_status(at(state)).battery_remaining == percent
     assert make.battery_status(at(state)).battery_remaining == percent
 
 
 def test_a_receiver_is_healthy_while_it_has_a_signal() -> None:
-    state = told(Vehicle(), HARAKIRI, STATUS=status())
+    state = with_replies(Vehicle(), HARAKIRI, STATUS=status())
     bit = m.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
     assert not make.sys_status(at(state)).onboard_control_sensors_present & bit
-    told(state, HARAKIRI, RC=struct.pack("<8H", *[1500] * 8))
+    with_replies(state, HARAKIRI, RC=struct.pack("<8H", *[1500] * 8))
     assert make.sys_status(at(state)).onboard_control_sensors_health & bit
-    told(state, HARAKIRI, ANALOG=struct.pack("<BHH", 120, 0, 500))
-    told(state, HARAKIRI, ANALOG=struct.pack("<BHH", 120, 0, 0))
+    with_replies(state, HARAKIRI, ANALOG=struct.pack("<BHH", 120, 0, 500))
+    with_replies(state, HARAKIRI, ANALOG=struct.pack("<BHH", 120, 0, 0))
     power = make.sys_status(at(state))
     assert power.onboard_control_sensors_present & bit
     assert not power.onboard_control_sensors_health & bit
@@ -368,19 +368,19 @@ def test_a_receiver_is_healthy_while_it_has_a_signal() -> None:
 def test_height_and_speed_determine_the_landed_state(
     flags: int, height_cm: int, climb_cms: int, speed: int, landed: int
 ) -> None:
-    state = told(Vehicle(), HARAKIRI, STATUS=status(flags=flags), RAW_GPS=gps(speed=speed))
-    told(state, HARAKIRI, ALTITUDE=struct.pack("<ih", height_cm, climb_cms))
+    state = with_replies(Vehicle(), HARAKIRI, STATUS=status(flags=flags), RAW_GPS=gps(speed=speed))
+    with_replies(state, HARAKIRI, ALTITUDE=struct.pack("<ih", height_cm, climb_cms))
     assert make.extended_sys_state(at(state)).landed_state == landed
 
 
 def test_motors_and_local_position_are_reported() -> None:
-    state = told(
+    state = with_replies(
         Vehicle(), HARAKIRI, STATUS=status(), RAW_GPS=gps(speed=0), MOTOR=struct.pack("<8H", *range(1000, 1008))
     )
     motors = make.servo_output_raw(at(state))
     assert [getattr(motors, f"servo{n}_raw") for n in range(1, 9)] == [*range(1000, 1008)]
-    told(state, HARAKIRI, STATUS=status(flags=1 << 5), ALTITUDE=struct.pack("<ih", 1500, 20))
-    told(state, HARAKIRI, RAW_GPS=gps(lat=453838000 + 1797, more=struct.pack("<H", 0)))
+    with_replies(state, HARAKIRI, STATUS=status(flags=1 << 5), ALTITUDE=struct.pack("<ih", 1500, 20))
+    with_replies(state, HARAKIRI, RAW_GPS=gps(lat=453838000 + 1797, more=struct.pack("<H", 0)))
     local = make.local_position_ned(at(state))
     assert (local.x, local.y, local.z) == (pytest.approx(20, abs=0.1), pytest.approx(0, abs=0.1), -15)
     assert (local.vx, local.vy, local.vz) == (pytest.approx(2.5), pytest.approx(0), pytest.approx(-0.2))
@@ -388,7 +388,7 @@ def test_motors_and_local_position_are_reported() -> None:
 
 @pytest.mark.parametrize(("roll", "pitch", "yaw"), [(0, 0, 0), (30, 0, 0), (0, -20, 0), (10, 20, 170), (-5, 3, -90)])
 def test_the_quaternion_is_the_same_attitude(roll: int, pitch: int, yaw: int) -> None:
-    state = told(Vehicle(), HARAKIRI, STATUS=status(), ATTITUDE=attitude(roll * 10, -pitch * 10, yaw))
+    state = with_replies(Vehicle(), HARAKIRI, STATUS=status(), ATTITUDE=attitude(roll * 10, -pitch * 10, yaw))
     sent = make.attitude_quaternion(at(state))
     w, x, y, z = sent.q1, sent.q2, sent.q3, sent.q4
     assert math.degrees(math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))) == pytest.approx(roll)

@@ -31,8 +31,8 @@ def without_age(group: Any) -> Any:
     return replace(group, age_s=None)
 
 
-def heard(station: GroundStation, kind: str) -> Any:
-    return station.said(kind)[-1]
+def last(station: GroundStation, kind: str) -> Any:
+    return station.messages(kind)[-1]
 
 
 def test_groups_have_the_values_sent_to_ground_stations() -> None:
@@ -42,7 +42,7 @@ def test_groups_have_the_values_sent_to_ground_stations() -> None:
     world.wait_ready()
     world.run(5.0)
     report = world.bridge.report.whole()
-    attitude, position = heard(station, "ATTITUDE"), heard(station, "GLOBAL_POSITION_INT")
+    attitude, position = last(station, "ATTITUDE"), last(station, "GLOBAL_POSITION_INT")
     assert report.attitude.pitch_deg == pytest.approx(math.degrees(attitude.pitch), abs=1e-4)
     assert report.attitude.roll_deg == pytest.approx(math.degrees(attitude.roll), abs=1e-4)
     assert report.attitude.heading_deg == pytest.approx(math.degrees(attitude.yaw) % 360, abs=1e-4)
@@ -50,7 +50,7 @@ def test_groups_have_the_values_sent_to_ground_stations() -> None:
     assert report.position.lon_deg == position.lon / 1e7
     assert report.position.altitude_m == position.alt / 1000
     assert report.position.height_m == pytest.approx(position.relative_alt / 1000)
-    gps, battery, rc = heard(station, "GPS_RAW_INT"), heard(station, "SYS_STATUS"), heard(station, "RC_CHANNELS")
+    gps, battery, rc = last(station, "GPS_RAW_INT"), last(station, "SYS_STATUS"), last(station, "RC_CHANNELS")
     assert (report.gps.fix, report.gps.satellites, report.gps.hdop) == ("3D", gps.satellites_visible, None)
     assert report.battery.voltage_v == battery.voltage_battery / 1000
     assert report.battery.current_a is None
@@ -105,12 +105,12 @@ def test_watched_groups_are_polled_and_published_with_each_reply() -> None:
 def test_groups_are_made_from_a_mavlink_autopilot() -> None:
     world, autopilot, _ = passing()
     world.bridge.report.watch(Group)
-    autopilot.say(m.MAVLink_heartbeat_message(2, 3, 81 | 128, 4, 4, 3))
-    autopilot.say(m.MAVLink_attitude_message(1, 0.1, -0.2, -0.3, 0, 0, 0))
-    autopilot.say(m.MAVLink_global_position_int_message(1, 453838000, 84733000, 131000, 20000, 100, -200, -50, 9000))
-    autopilot.say(m.MAVLink_gps_raw_int_message(1, 2, 0, 0, 0, 120, 65535, 65535, 65535, 255))
-    autopilot.say(m.MAVLink_sys_status_message(7, 7, 6, 0, 12600, -1, -1, 0, 0, 0, 0, 0, 0))
-    autopilot.say(m.MAVLink_rc_channels_raw_message(1, 0, 1500, 1501, 1000, 1502, *[65535] * 4, 127))
+    autopilot.send(m.MAVLink_heartbeat_message(2, 3, 81 | 128, 4, 4, 3))
+    autopilot.send(m.MAVLink_attitude_message(1, 0.1, -0.2, -0.3, 0, 0, 0))
+    autopilot.send(m.MAVLink_global_position_int_message(1, 453838000, 84733000, 131000, 20000, 100, -200, -50, 9000))
+    autopilot.send(m.MAVLink_gps_raw_int_message(1, 2, 0, 0, 0, 120, 65535, 65535, 65535, 255))
+    autopilot.send(m.MAVLink_sys_status_message(7, 7, 6, 0, 12600, -1, -1, 0, 0, 0, 0, 0, 0))
+    autopilot.send(m.MAVLink_rc_channels_raw_message(1, 0, 1500, 1501, 1000, 1502, *[65535] * 4, 127))
     # A gimbal on board is not the autopilot.
     gimbal = m.MAVLink(None, srcSystem=1, srcComponent=154)
     autopilot.outgoing += m.MAVLink_heartbeat_message(26, 8, 0, 0, 4, 3).pack(gimbal)
@@ -133,12 +133,12 @@ def test_an_autopilot_with_a_new_system_id_is_followed() -> None:
     world, autopilot, _ = passing()
     autopilot.heartbeat = m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3)
     world.run(2)
-    autopilot.say(m.MAVLink_home_position_message(453838000, 84733000, 0, 0, 0, 0, [1, 0, 0, 0], 0, 0, 0))
+    autopilot.send(m.MAVLink_home_position_message(453838000, 84733000, 0, 0, 0, 0, [1, 0, 0, 0], 0, 0, 0))
     world.bridge.report.watch(Group)
     autopilot.mavlink.srcSystem = 7
     autopilot.heartbeat = m.MAVLink_heartbeat_message(2, 3, 81 | 128, 4, 4, 3)
     world.wait_until(lambda w: bool(w.bridge.session.vehicle.armed), 8)
-    autopilot.say(m.MAVLink_attitude_message(1, 0.5, 0, 0, 0, 0, 0))
+    autopilot.send(m.MAVLink_attitude_message(1, 0.5, 0, 0, 0, 0, 0))
     world.run(0.05)
     assert world.bridge.report.group(Group.ATTITUDE).roll_deg == 28.65
     assert world.bridge.session.vehicle.home is None
@@ -161,8 +161,8 @@ def test_two_autopilots_on_one_line_are_not_mixed() -> None:
 def test_an_unused_channel_does_not_move_the_others() -> None:
     world, autopilot, _ = passing()
     world.bridge.report.watch(Group)
-    autopilot.say(m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3))
-    autopilot.say(m.MAVLink_rc_channels_message(1, 5, 1500, 1501, 65535, 1502, 1800, *[65535] * 13, 127))
+    autopilot.send(m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3))
+    autopilot.send(m.MAVLink_rc_channels_message(1, 5, 1500, 1501, 65535, 1502, 1800, *[65535] * 13, 127))
     world.run(0.05)
     assert world.bridge.report.group(Group.RC).channels_us == (1500, 1501, 0, 1502, 1800)
 
@@ -170,12 +170,12 @@ def test_an_unused_channel_does_not_move_the_others() -> None:
 def test_a_voltage_is_not_renewed_by_the_consumption() -> None:
     world, autopilot, _ = passing()
     world.bridge.report.watch(Group)
-    autopilot.say(m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3))
-    autopilot.say(m.MAVLink_sys_status_message(7, 7, 6, 0, 12600, 100, -1, 0, 0, 0, 0, 0, 0))
+    autopilot.send(m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3))
+    autopilot.send(m.MAVLink_sys_status_message(7, 7, 6, 0, 12600, 100, -1, 0, 0, 0, 0, 0, 0))
     for battery in (0, 1):
         world.run(5)
         consumed = 500 + battery
-        autopilot.say(m.MAVLink_battery_status_message(battery, 0, 0, 0, [65535] * 10, 100, consumed, -1, 50))
+        autopilot.send(m.MAVLink_battery_status_message(battery, 0, 0, 0, [65535] * 10, 100, consumed, -1, 50))
     world.run(0.05)
     power = world.bridge.report.group(Group.BATTERY)
     assert power.age_s is not None
@@ -204,7 +204,7 @@ def test_groups_continue_when_an_armed_harakiri_switches_to_mavlink() -> None:
 def test_arbitrary_contents_of_an_intact_frame_raise_nothing(data: st.DataObject) -> None:
     """As from a faulty autopilot."""
     world, autopilot, _ = passing()
-    autopilot.say(m.MAVLink_heartbeat_message(2, 3, 81, 0, 3, 3))
+    autopilot.send(m.MAVLink_heartbeat_message(2, 3, 81, 0, 3, 3))
     for msgid in (0, 1, 24, 30, 33, 35, 65, 74, 147, 242):
         known = m.mavlink_map[msgid]
         size = known.unpacker.size
@@ -221,7 +221,7 @@ def test_arbitrary_contents_of_an_intact_frame_raise_nothing(data: st.DataObject
 
 def test_autopilots_on_mavlink_1_and_2_are_reported_separately() -> None:
     world, autopilot, _ = passing(Autopilot(version=1))
-    autopilot.say(m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3))
-    autopilot.say(m.MAVLink_attitude_message(1, 0.5, 0, 0, 0, 0, 0))
+    autopilot.send(m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3))
+    autopilot.send(m.MAVLink_attitude_message(1, 0.5, 0, 0, 0, 0, 0))
     world.run(0.05)
     assert world.bridge.report.group(Group.ATTITUDE).roll_deg == 28.65

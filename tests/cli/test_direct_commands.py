@@ -127,10 +127,10 @@ def test_a_closed_pipe_is_not_reported() -> None:
 def test_a_user_without_a_home_is_told_of_the_state_dir_option(
     monkeypatch: pytest.MonkeyPatch, command: list[str]
 ) -> None:
-    def nobody(uid: int) -> None:
+    def unknown_user(uid: int) -> None:
         raise KeyError(uid)
 
-    monkeypatch.setattr(pwd, "getpwuid", nobody)
+    monkeypatch.setattr(pwd, "getpwuid", unknown_user)
     for name in ("HOME", "XDG_STATE_HOME", "STATE_DIRECTORY"):
         monkeypatch.delenv(name, raising=False)
     ended = CliRunner().invoke(main, command)

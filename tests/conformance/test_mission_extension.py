@@ -526,7 +526,7 @@ class SameAnswers(RuleBasedStateMachine):
     def same_state(self) -> None:
         self.send(ext.INFO_REQUEST)
         assert len({device.list for device in self.devices}) == 1
-        assert self.core.sound
+        assert self.core.is_intact
 
 
 TestSameAnswers = SameAnswers.TestCase

@@ -154,7 +154,7 @@ class Line:
 
 def assert_whole(line: Line) -> None:
     assert line.core.list in (pack_records(OLD), pack_records(NEW))
-    assert line.core.sound
+    assert line.core.is_intact
 
 
 def test_146_records_arrive_bit_for_bit_and_read_back() -> None:

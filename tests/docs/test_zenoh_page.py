@@ -19,10 +19,10 @@ ENVELOPE = {"v", "seq", "time_s"}
 
 def test_the_table_has_every_key_and_its_version() -> None:
     rows = re.findall(r"^\| `([^`]*)` \| .* \| ([^|]*) \|$", SECTIONS[f"Keys, version {VERSION}"], re.MULTILINE)
-    told = {suffix: delivery for suffix, delivery in rows if not suffix.startswith("alive")}
-    assert told.keys() == {key.suffix for key in KEYS}
+    documented = {suffix: delivery for suffix, delivery in rows if not suffix.startswith("alive")}
+    assert documented.keys() == {key.suffix for key in KEYS}
     for key in KEYS:
-        assert key.delivery.value.startswith(told[key.suffix]), key
+        assert key.delivery.value.startswith(documented[key.suffix]), key
 
 
 @pytest.mark.parametrize("key", [key for key in KEYS if key.schema], ids=lambda key: key.suffix)
@@ -40,5 +40,5 @@ def test_each_field_is_on_the_page(key: ZenohKey) -> None:
 def test_the_groups_tables_list_existing_fields() -> None:
     for path in FOLDER.glob("*.json"):
         schema = json.loads(path.read_text())
-        told = set(re.findall(r"^\| `([a-z0-9_]+)` \| ", SECTIONS.get(path.stem, ""), re.MULTILINE))
-        assert not told or told | ENVELOPE == schema["properties"].keys(), path.stem
+        documented = set(re.findall(r"^\| `([a-z0-9_]+)` \| ", SECTIONS.get(path.stem, ""), re.MULTILINE))
+        assert not documented or documented | ENVELOPE == schema["properties"].keys(), path.stem

@@ -18,7 +18,7 @@ from tests.support.benches import Bench, Starter
 from tests.support.mission_planner import MissionPlanner
 from tests.support.plain_station import PlainStation, udp_station
 from tests.support.plan import judge, plain_plan, records_of
-from tests.support.programs import comes, free_port, until
+from tests.support.programs import free_port, happens, until
 
 MEGABYTE = 1 << 20
 #: The only bytes that may be sent to an unknown device are complete read requests.
@@ -96,24 +96,24 @@ class NoisyWire:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.heard = bytearray()
+        self.received = bytearray()
         self._near, self._far = os.openpty()
         tty.setraw(self._far)
         os.set_blocking(self._near, False)
         path.symlink_to(os.ttyname(self._far))
 
-    def say(self, data: bytes) -> None:
+    def send(self, data: bytes) -> None:
         while data:
             readable, writable, _ = select.select([self._near], [self._near], [])
             if readable:
-                self.heard += os.read(self._near, 4096)
+                self.received += os.read(self._near, 4096)
             if writable:
                 data = data[os.write(self._near, data[:1024]) :]
 
     def listen(self) -> bytearray:
         while select.select([self._near], [], [], 0)[0]:
-            self.heard += os.read(self._near, 4096)
-        return self.heard
+            self.received += os.read(self._near, 4096)
+        return self.received
 
     def unplug(self) -> None:
         self.path.unlink()
@@ -128,9 +128,9 @@ def test_a_megabyte_of_noise_on_the_uart_does_no_harm(start: Starter) -> None:
     chance = random.Random(4)
     with MissionPlanner(daemon.address) as planner:
         for _ in range(MEGABYTE // 4096):
-            wire.say(chance.randbytes(4096))
-        planner.meet()
-        heartbeats = planner.heard_of("HEARTBEAT")
+            wire.send(chance.randbytes(4096))
+        planner.wait_for_vehicle()
+        heartbeats = planner.messages("HEARTBEAT")
     assert {heartbeat.system_status for heartbeat in heartbeats} == {messages.MAV_STATE_UNINIT}
     status = daemon.status()
     assert status is not None
@@ -138,8 +138,8 @@ def test_a_megabyte_of_noise_on_the_uart_does_no_harm(start: Starter) -> None:
     assert daemon.has_logged("fc.found") is None
     # It sent only complete, harmless probes, whatever it received.
     until(lambda: len(wire.listen()) > 100, "probes")
-    assert is_clean(bytes(wire.heard))
-    assert re.fullmatch(PROBES, wire.heard)
+    assert is_clean(bytes(wire.received))
+    assert re.fullmatch(PROBES, wire.received)
     # The same daemon then finds a real board.
     wire.unplug()
     board = start.board()
@@ -153,7 +153,7 @@ def test_a_megabyte_of_noise_on_the_uart_does_no_harm(start: Starter) -> None:
 def test_messages_for_others_change_nothing(shared: Bench, kept: list[str]) -> None:
     m = messages
     with udp_station(shared.daemon.address) as station:
-        station.say_hello()
+        station.send_heartbeat()
         for system, component in ((2, 1), (1, 100), (255, 190)):
             station.send(m.MAVLink_mission_count_message(system, component, 0, 0))
             station.send(m.MAVLink_mission_count_message(system, component, 12, 0))
@@ -166,22 +166,22 @@ def test_messages_for_others_change_nothing(shared: Bench, kept: list[str]) -> N
         station.send(m.MAVLink_param_request_read_message(1, 1, b"WPNAV_RADIUS", -1))
         assert station.wait_for("PARAM_VALUE").param_value == 200
         addressed = {"MISSION_ACK", "MISSION_REQUEST", "MISSION_COUNT", "COMMAND_ACK", "STATUSTEXT"}
-        assert not addressed & {message.get_type() for message in station.heard}
+        assert not addressed & {message.get_type() for message in station.received}
     assert shared.board.records() == kept
 
 
 def test_messages_with_our_own_ids_are_ignored(shared: Bench, kept: list[str]) -> None:
     """They may be an echo of our own messages."""
     with udp_station(shared.daemon.address, sysid=1, compid=1) as echo, udp_station(shared.daemon.address) as station:
-        echo.say_hello()
+        echo.send_heartbeat()
         echo.send(messages.MAVLink_mission_clear_all_message(1, 1, 0))
-        echo.announce(12)
-        station.say_hello()
+        echo.send_count(12)
+        station.send_heartbeat()
         station.wait_for("HEARTBEAT")
         assert station.upload(plain_plan(12, start=30)) == 0
         assert station.upload(plain_plan(12)) == 0
-        assert echo.heard == []
-        assert comes(echo.has_data, seconds=0.1) is False
+        assert echo.received == []
+        assert happens(echo.has_data, seconds=0.1) is False
     assert shared.board.records() == kept
 
 
@@ -196,6 +196,6 @@ def test_other_vehicles_on_the_network_do_not_disturb_an_upload(shared: Bench) -
         vehicle.send(m.MAVLink_mission_ack_message(255, 190, 5, 0))
         vehicle.send(m.MAVLink_mission_request_message(255, 190, 3, 0))
         vehicle.send(m.MAVLink_mission_count_message(255, 190, 44, 0))
-        planner.go_on(plan, 10)
+        planner.write_rest(plan, 10)
     assert shared.board.records() == records_of(judge(plan))
     assert not planner.armed

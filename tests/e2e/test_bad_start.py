@@ -87,7 +87,7 @@ def test_the_daemon_works_without_a_state_directory(start: Starter, tmp_path: Pa
     daemon = start.daemon("sim:", state_dir=file / "state")
     daemon.wait()
     with udp_station(daemon.address) as station:
-        station.say_hello()
+        station.send_heartbeat()
         assert "memory" in station.wait_for("STATUSTEXT").text
         assert station.upload(plain_plan(12)) == 0
     assert [mission["outcome"] for mission in daemon.missions()] == ["VERIFIED"]
@@ -102,7 +102,7 @@ def test_the_plain_simulator_takes_a_mission(start: Starter) -> None:
     daemon = start.daemon("sim:")
     daemon.wait()
     with udp_station(daemon.address) as station:
-        station.say_hello()
+        station.send_heartbeat()
         assert station.upload(plain_plan(20)) == 0
     assert daemon.held()["records"] == records_of(judge(plain_plan(20)))
 
@@ -136,7 +136,7 @@ def test_a_missing_port_is_opened_when_it_appears(start: Starter) -> None:
     assert "is missing: plug the flight controller in" in event["why"]
     with udp_station(daemon.address) as station:
         # Ground stations still see a vehicle, which gives the reason for refusing missions.
-        station.say_hello()
+        station.send_heartbeat()
         assert station.upload(plain_plan(12)) == 14
     board = start.board()
     daemon.wait()
@@ -202,7 +202,7 @@ def test_a_corrupt_database_is_set_aside(start: Starter) -> None:
     event = until(lambda: daemon.has_logged("store.damaged"), "a word about the database")
     assert Path(event["kept_as"]).read_bytes() == rubbish
     with udp_station(daemon.address) as station:
-        station.say_hello()
+        station.send_heartbeat()
         assert station.upload(plain_plan(12)) == 0
     assert [mission["outcome"] for mission in daemon.missions()] == ["VERIFIED"]
 

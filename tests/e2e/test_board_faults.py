@@ -63,7 +63,7 @@ def test_a_power_cut_while_a_list_is_written_keeps_the_old_one(
 def test_a_board_that_hangs_while_items_arrive_keeps_the_old_list(bench: Bench, planner: MissionPlanner) -> None:
     planner.write_begun(NEW, 20)
     bench.board.set("hang 1")
-    assert_denied(lambda: planner.go_on(NEW, 20))
+    assert_denied(lambda: planner.write_rest(NEW, 20))
     bench.board.set("hang 0")
     bench.daemon.wait()
     assert_old_list(bench)
@@ -101,7 +101,7 @@ def test_a_line_that_damages_most_frames_damages_no_list(bench: Bench, planner: 
 def test_a_board_is_found_after_unplugging_during_a_write(bench: Bench, planner: MissionPlanner) -> None:
     planner.write_begun(NEW, 20)
     bench.board.set("unplug")
-    assert_denied(lambda: planner.go_on(NEW, 20))
+    assert_denied(lambda: planner.write_rest(NEW, 20))
     planner.wait_for_text("Flight controller lost")
     assert_denied(lambda: planner.write(NEW))
     planner.wait_for_text("No link to the flight controller")
@@ -125,7 +125,7 @@ def test_a_board_left_in_its_command_line_is_reported(start: Starter) -> None:
     assert trouble in done.stdout
     planner = MissionPlanner(daemon.address)
     with planner:
-        planner.be_connected()
+        planner.skip_connecting()
         planner.wait_for_text("is in its command line: type")
         assert_denied(lambda: planner.write(NEW))
         with board.link.open("r+b", buffering=0) as terminal:
@@ -140,7 +140,7 @@ def test_a_replaced_boards_list_is_read(start: Starter) -> None:
     """The bridge uses its copy only while its checksum equals the board's."""
     bench = start.bench()
     with udp_station(bench.daemon.address) as station:
-        station.say_hello()
+        station.send_heartbeat()
         assert station.upload(OLD) is MissionResult.ACCEPTED
         assert len(station.download()) == len(OLD)
         bench.board.end()
@@ -176,7 +176,7 @@ def test_a_harakiri_that_speaks_mavlink_while_armed_is_one_vehicle(start: Starte
     daemon = start.daemon(str(board.link))
     daemon.wait("MAVLink")
     with MissionPlanner(daemon.address) as planner:
-        planner.meet()
+        planner.wait_for_vehicle()
         planner.wait_for_armed(True)
         assert_denied(lambda: planner.write(plain_plan(12)))
         board.set("armed 0")
@@ -203,7 +203,7 @@ def test_a_board_at_an_unexpected_speed_is_found(start: Starter) -> None:
 def test_a_kill_right_after_the_ack_loses_nothing(start: Starter) -> None:
     bench = start.bench()
     with udp_station(bench.daemon.address) as station:
-        station.say_hello()
+        station.send_heartbeat()
         for number in range(3):
             plan = plain_plan(20 + number, start=number)
             assert station.upload(plan) is MissionResult.ACCEPTED

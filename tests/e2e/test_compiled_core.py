@@ -45,7 +45,7 @@ def core(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Bench, Path
         bench.board.assert_was_treated_well()
 
 
-async def hear_of(vehicle: Any, *, armed: bool) -> None:
+async def wait_for_armed(vehicle: Any, *, armed: bool) -> None:
     async for now in TelemetryAsync(vehicle).subscribe_armed():
         if now is armed:
             break
@@ -75,11 +75,11 @@ async def test_a_write_while_armed_is_refused(core: tuple[Bench, Path]) -> None:
     bench.daemon.push(OLD)
     async with vehicle_at(bench.daemon.port) as vehicle:
         bench.board.set("armed 1")
-        await hear_of(vehicle, armed=True)
+        await wait_for_armed(vehicle, armed=True)
         assert await refusal_of(MissionRawAsync(vehicle), NEW) == MissionRawResult.DENIED
         assert bench.board.records() == OLD_RECORDS
         bench.board.set("armed 0")
-        await hear_of(vehicle, armed=False)
+        await wait_for_armed(vehicle, armed=False)
         await MissionRawAsync(vehicle).upload_mission(raw_items(NEW))
     assert bench.board.records() == NEW_RECORDS
 
@@ -124,12 +124,12 @@ async def test_bit_errors_damage_no_list(start: Starter) -> None:
 def test_a_library_that_is_not_the_core_is_refused(tmp_path: Path) -> None:
     wrong = tmp_path / "core.so"
     wrong.write_text("not a library")
-    for options, said in [
+    for options, reason in [
         (("--core", str(wrong)), "the core cannot be loaded"),
         (("--core", str(tmp_path / "none.so")), "does not exist"),
         (("--core", str(library()), "--capacity", "20"), "holds 146 records: omit --capacity"),
     ]:
         result = run_naze_bridge("sim", "--link", str(tmp_path / "naze"), *options)
         assert result.returncode != 0
-        assert said in result.stderr
+        assert reason in result.stderr
         assert "Traceback" not in result.stderr

@@ -46,7 +46,7 @@ BAD_REQUESTS = {
 }
 
 
-def say(daemon: Daemon, line: bytes) -> dict[str, object]:
+def send(daemon: Daemon, line: bytes) -> dict[str, object]:
     with socket.socket(socket.AF_UNIX) as connection:
         connection.connect(str(daemon.state_dir / "control.sock"))
         connection.sendall(line + b"\n")
@@ -61,7 +61,7 @@ def test_bad_requests_are_answered_and_change_nothing(start: Starter) -> None:
     daemon.push(plain_plan(5))
     held = daemon.held()
     for name, line in BAD_REQUESTS.items():
-        answer = say(daemon, line)
+        answer = send(daemon, line)
         assert list(answer) == ["error"], name
         assert len(str(answer["error"])) < 200, name
     with pytest.raises(ControlError, match="limited to 256 kB: no flight controller stores"):

@@ -37,7 +37,7 @@ def test_every_kind_of_link_works_at_once(start: Starter) -> None:
             plan = plain_plan(12, start=20 * number)
             planner.write(plan)
             assert bench.board.records() == records_of(judge(plan))
-        by_udp.say_hello()
+        by_udp.send_heartbeat()
         for number, station in enumerate((by_tcp, by_udp)):
             plan = mixed_plan(13 + number)
             assert station.upload(plan) is MissionResult.ACCEPTED
@@ -54,9 +54,9 @@ def test_a_tcp_client_that_disconnects_during_an_upload_blocks_no_one(start: Sta
     bench = start.bench(gcs=[f"tcpin:127.0.0.1:{port}"])
     plan = plain_plan(30)
     with tcp_station(port) as gone:
-        gone.announce(len(plan))
+        gone.send_count(len(plan))
         gone.wait_for("MISSION_REQUEST")
-        gone.give(plan, 0)
+        gone.send_item(plan, 0)
     with tcp_station(port) as station:
         until(lambda: station.upload(plan) is MissionResult.ACCEPTED, "an upload that is not denied")
     assert bench.board.records() == records_of(judge(plan))
@@ -65,7 +65,7 @@ def test_a_tcp_client_that_disconnects_during_an_upload_blocks_no_one(start: Sta
 def test_a_station_that_supports_only_mavlink_1_writes_and_reads(shared: Bench) -> None:
     plan = mixed_plan(14)
     with udp_station(shared.daemon.address, mavlink_1) as station:
-        station.say_hello()
+        station.send_heartbeat()
         assert station.wait_for("HEARTBEAT").autopilot == mavlink_1.MAV_AUTOPILOT_ARDUPILOTMEGA
         assert station.upload(plan) is MissionResult.ACCEPTED
         assert station.download() == expected_fields(plan)
@@ -83,19 +83,19 @@ def test_a_second_station_waits_2_5_s_while_the_first_writes(shared: Bench) -> N
     first.write_begun(plan, 10)
     with udp_station(shared.daemon.address) as second:
         assert second.upload(plain_plan(12)) is MissionResult.DENIED
-        first.go_on(plan, 10)
+        first.write_rest(plan, 10)
         assert shared.board.records() == records_of(judge(plan))
         assert set(first.acks()) == {MissionResult.ACCEPTED}
         assert second.upload(plain_plan(12)) is MissionResult.ACCEPTED
     # Other stations do not get this text.
-    assert "Another mission transfer" not in first.said()
+    assert "Another mission transfer" not in first.joined_texts()
 
 
 def test_two_simultaneous_writes_of_mission_planner_both_succeed(shared: Bench) -> None:
     plans = [plain_plan(146, start=60), plain_plan(146, start=300)]
     planners = [shared.mission_planner(pace=1.0) for _ in plans]
     for planner in planners:
-        planner.meet()
+        planner.wait_for_vehicle()
     with ThreadPoolExecutor() as both:
         for done in [both.submit(planner.write, plan) for planner, plan in zip(planners, plans, strict=True)]:
             done.result()
@@ -110,8 +110,8 @@ def test_items_from_another_station_are_ignored(shared: Bench) -> None:
     first.write_begun(plan, 10)
     with udp_station(shared.daemon.address) as second:
         for seq in range(len(other)):
-            second.give(other, seq)
-    first.go_on(plan, 10)
+            second.send_item(other, seq)
+    first.write_rest(plan, 10)
     assert shared.board.records() == records_of(judge(plan))
 
 
@@ -131,17 +131,17 @@ def test_a_download_is_consistent_during_an_upload(shared: Bench) -> None:
 
 def test_all_stations_are_told_the_result_of_an_upload(shared: Bench) -> None:
     writer, other = shared.mission_planner(), shared.mission_planner()
-    other.meet()
+    other.wait_for_vehicle()
     writer.write(plain_plan(13, start=60))
     other.wait_for_text("New mission, 13 items, by udp")
-    other.wait_until(lambda: 12 in [message.total for message in other.heard_of("MISSION_CURRENT")], "the new total")
+    other.wait_until(lambda: 12 in [message.total for message in other.messages("MISSION_CURRENT")], "the new total")
 
 
 def test_many_former_stations_do_not_lock_out_a_new_one(bench: Bench) -> None:
     for _ in range(40):
         with udp_station(bench.daemon.address) as passer_by:
-            passer_by.say_hello()
+            passer_by.send_heartbeat()
     planner = bench.mission_planner()
-    planner.meet()
+    planner.wait_for_vehicle()
     planner.write(plain_plan(12))
     assert bench.board.records() == records_of(judge(plain_plan(12)))

@@ -21,7 +21,7 @@ def _by_incident(daemon: Daemon) -> dict[str, list[str]]:
 def test_the_lines_of_one_incident_have_one_id(start: Starter) -> None:
     bench = start.bench()
     with udp_station(bench.daemon.address) as station:
-        station.say_hello()
+        station.send_heartbeat()
         station.wait_for("HEARTBEAT")
         station.upload(plain_plan(5))
         station.upload(plain_plan(147))

@@ -36,7 +36,7 @@ def answer_requests(station: PlainStation, plan: list[PlanRow], until_seq: int |
             return MissionResult(message.type)
         if message.seq == until_seq:
             return None
-        station.give(plan, message.seq)
+        station.send_item(plan, message.seq)
 
 
 # -- the flight controller's side ----------------------------------------------------------------------------
@@ -50,7 +50,7 @@ def test_a_port_returns_under_another_name_behind_the_same_link(start: Starter, 
     daemon = start.daemon(str(by_id))
     daemon.wait()
     with udp_station(daemon.address) as station:
-        station.say_hello()
+        station.send_heartbeat()
         for number in range(3):
             name = by_id.resolve()
             board.set("unplug")
@@ -70,15 +70,15 @@ def test_a_port_returns_under_another_name_behind_the_same_link(start: Starter, 
 
 def test_a_ground_station_keeps_the_vehicle_through_a_reset(bench: Bench) -> None:
     planner = bench.mission_planner()
-    planner.meet()
+    planner.wait_for_vehicle()
     planner.write(PLAN)
     for _ in range(3):
-        planner.heard.clear()
+        planner.received.clear()
         bench.board.set("power off")
         bench.board.set("power on")
-        planner.wait_until(lambda: len(planner.heard_of("HEARTBEAT")) >= 2, "the vehicle")
-        planner.wait_until(lambda: len(planner.heard_of("ATTITUDE")) >= 10, "its telemetry")
-        assert {(beat.get_srcSystem(), beat.get_srcComponent()) for beat in planner.heard_of("HEARTBEAT")} == {(1, 1)}
+        planner.wait_until(lambda: len(planner.messages("HEARTBEAT")) >= 2, "the vehicle")
+        planner.wait_until(lambda: len(planner.messages("ATTITUDE")) >= 10, "its telemetry")
+        assert {(beat.get_srcSystem(), beat.get_srcComponent()) for beat in planner.messages("HEARTBEAT")} == {(1, 1)}
     bench.daemon.wait()
     planner.write(plain_plan(41))
     assert bench.board.records() == records_of(judge(plain_plan(41)))
@@ -90,10 +90,10 @@ def test_a_ground_station_keeps_the_vehicle_through_a_reset(bench: Bench) -> Non
 def test_an_upload_continues_from_another_address(bench: Bench) -> None:
     """The same ids at a new address, as after Wi-Fi roaming."""
     with udp_station(bench.daemon.address) as there:
-        there.announce(len(PLAN))
+        there.send_count(len(PLAN))
         assert answer_requests(there, PLAN, until_seq=20) is None
     with udp_station(bench.daemon.address) as here:
-        here.say_hello()
+        here.send_heartbeat()
         here.wait_for("HEARTBEAT")
         assert answer_requests(here, PLAN) is MissionResult.ACCEPTED
         assert bench.board.records() == records_of(judge(PLAN))
@@ -101,7 +101,7 @@ def test_an_upload_continues_from_another_address(bench: Bench) -> None:
         # The old address is dropped at once, not after a minute as for a silent station.
 
         def is_alone() -> bool:
-            here.say_hello()
+            here.send_heartbeat()
             return len(bench.daemon.ground_stations()) == 1
 
         until(is_alone, "the end of the old address")
@@ -109,17 +109,17 @@ def test_an_upload_continues_from_another_address(bench: Bench) -> None:
 
 def test_a_station_that_moves_during_the_write_gets_its_ack(bench: Bench) -> None:
     with udp_station(bench.daemon.address) as there:
-        there.announce(len(PLAN))
+        there.send_count(len(PLAN))
         assert answer_requests(there, PLAN, until_seq=len(PLAN) - 1) is None
-        there.give(PLAN, len(PLAN) - 1)
+        there.send_item(PLAN, len(PLAN) - 1)
     with udp_station(bench.daemon.address) as here:
-        here.say_hello()
+        here.send_heartbeat()
 
         def is_acked() -> bool:
             """The station has seen no ack and repeats its last item."""
-            here.give(PLAN, len(PLAN) - 1)
+            here.send_item(PLAN, len(PLAN) - 1)
             here.wait_for("HEARTBEAT", "MISSION_ACK")
-            return any(message.get_type() == "MISSION_ACK" and not message.type for message in here.heard)
+            return any(message.get_type() == "MISSION_ACK" and not message.type for message in here.received)
 
         until(is_acked, "the final ack")
     assert bench.board.records() == records_of(judge(PLAN))
@@ -148,7 +148,7 @@ def test_a_client_that_does_not_read_delays_no_one(start: Starter) -> None:
     port, udp = free_port(socket.SOCK_STREAM), free_port()
     bench = start.bench(gcs=[f"tcpin:127.0.0.1:{port}", f"udpin:127.0.0.1:{udp}"])
     with tcp_station(port) as deaf, tcp_station(port) as station, udp_station(("127.0.0.1", udp)) as by_udp:
-        deaf.say_hello()
+        deaf.send_heartbeat()
         for number, writer in enumerate((station, by_udp)):
             plan = plain_plan(50 + number)
             assert writer.upload(plan) is MissionResult.ACCEPTED

@@ -31,20 +31,20 @@ class Autopilot:
         self.path = directory / "autopilot"
         self.path.symlink_to(os.ttyname(self._terminal))
         self._writer = FrameWriter(1, 1)
-        self.said = 0
+        self.sent = 0
         self._over = threading.Event()
-        self._heartbeats = threading.Thread(target=self._beat, daemon=True)
+        self._heartbeats = threading.Thread(target=self._send_heartbeat, daemon=True)
         self._heartbeats.start()
 
-    def say(self, message: Message) -> None:
+    def send(self, message: Message) -> None:
         os.write(self._wire, self._writer.frame(pack(message), 2))
 
-    def say_attitudes(self, count: int, rate_hz: int) -> None:
+    def send_attitudes(self, count: int, rate_hz: int) -> None:
         began_at = time.monotonic()
         for index in range(count):
             time.sleep(max(0.0, began_at + index / rate_hz - time.monotonic()))
-            self.say(m.MAVLink_attitude_message(self.said, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6))
-            self.said += 1
+            self.send(m.MAVLink_attitude_message(self.sent, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6))
+            self.sent += 1
 
     def close(self) -> None:
         self._over.set()
@@ -52,7 +52,7 @@ class Autopilot:
         os.close(self._wire)
         os.close(self._terminal)
 
-    def _beat(self) -> None:
+    def _send_heartbeat(self) -> None:
         writer = FrameWriter(1, 1)
         while not self._over.wait(0.5):
             os.write(self._wire, writer.frame(pack(m.MAVLink_heartbeat_message(2, 3, 81, 0, 3, 3)), 2))
@@ -121,7 +121,7 @@ def test_nothing_is_lost_at_any_rate_and_a_stalled_client_gets_its_acks(start: S
         PlainStation(by_udp_socket, sysid=7) as by_udp,
     ):
         for station in (stalled, reading, by_udp):
-            station.say_hello()
+            station.send_heartbeat()
             station.wait_for("HEARTBEAT")
         rates = ((9000, 3000), (40, 50), (9000, 3000), (40, 50))
         total = sum(count for count, _ in rates)
@@ -129,8 +129,8 @@ def test_nothing_is_lost_at_any_rate_and_a_stalled_client_gets_its_acks(start: S
         for reader in readers:
             reader.start()
         for number, (count, rate_hz) in enumerate(rates):
-            autopilot.say(m.MAVLink_command_ack_message(400 + number, 0, 0, 0, DEAF, 191))
-            autopilot.say_attitudes(count, rate_hz)
+            autopilot.send(m.MAVLink_command_ack_message(400 + number, 0, 0, 0, DEAF, 191))
+            autopilot.send_attitudes(count, rate_hz)
         for reader in readers:
             reader.join(TIMEOUT_S)
             reader.assert_frames_are_whole()

@@ -9,7 +9,7 @@ from protocols.mission_item import Command
 from tests.support.benches import Bench
 from tests.support.mavproxy import MavProxy
 from tests.support.plan import HOME, PlanRow, expected_fields, judge, mixed_plan, plain_plan, records_of, waypoint
-from tests.support.programs import comes
+from tests.support.programs import happens
 
 
 @pytest.mark.parametrize("version", ["--mav10", "--mav20"])
@@ -71,7 +71,7 @@ def test_load_and_list_work_over_a_bad_link(shared: Bench, tmp_path: Path) -> No
     with MavProxy(tmp_path, link.address[1]) as mavproxy:
         for _ in range(10):
             mavproxy.load(plan)
-            if comes(lambda: shared.board.records() == expected, seconds=4.0):
+            if happens(lambda: shared.board.records() == expected, seconds=4.0):
                 break
         assert shared.board.records() == expected
         assert mavproxy.list(len(plan)) == expected_fields(plan)

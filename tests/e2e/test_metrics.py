@@ -46,7 +46,7 @@ async def test_prometheus_reads_the_counters_of_a_daemon(tmp_path: Path) -> None
 
     def write() -> list[MissionResult]:
         with udp_station((link.host, link.port)) as station:
-            station.say_hello()
+            station.send_heartbeat()
             station.wait_for("HEARTBEAT")
             return [station.upload(plain_plan(count)) for count in (12, 1, 147)]
 

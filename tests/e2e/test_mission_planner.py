@@ -63,7 +63,7 @@ def test_every_request_while_connecting_is_answered(shared: Bench) -> None:
     assert not planner.capabilities & messages.MAV_PROTOCOL_CAPABILITY_FTP
     assert planner.parameters["WPNAV_RADIUS"] == 200
     assert not {"FENCE_TOTAL", "RALLY_TOTAL"} & planner.parameters.keys()
-    heartbeat = planner.heard_of("HEARTBEAT")[-1]
+    heartbeat = planner.messages("HEARTBEAT")[-1]
     assert (heartbeat.autopilot, heartbeat.type) == (messages.MAV_AUTOPILOT_ARDUPILOTMEGA, 2)
     assert planner.texts
 
@@ -71,19 +71,19 @@ def test_every_request_while_connecting_is_answered(shared: Bench) -> None:
 def test_the_vehicle_moves_on_its_map(shared: Bench) -> None:
     planner = shared.mission_planner()
     for kind in ("ATTITUDE", "GPS_RAW_INT", "GLOBAL_POSITION_INT", "SYS_STATUS", "MISSION_CURRENT"):
-        planner.wait_until(lambda: bool(planner.heard_of(kind)), kind)  # noqa: B023 - called at once
+        planner.wait_until(lambda: bool(planner.messages(kind)), kind)  # noqa: B023 - called at once
 
 
 def test_it_speaks_mavlink_1_until_it_has_seen_mavlink_2(shared: Bench) -> None:
     with MissionPlanner(shared.daemon.address) as planner:
-        planner.meet()
-        assert planner.heard_in(1)
-        assert planner.heard_in(2)
+        planner.wait_for_vehicle()
+        assert planner.messages_of_version(1)
+        assert planner.messages_of_version(2)
         planner.connect()
-        planner.heard.clear()
-        planner.look_around(1.2)
-        assert planner.heard_in(2)
-        assert not planner.heard_in(1)
+        planner.received.clear()
+        planner.listen(1.2)
+        assert planner.messages_of_version(2)
+        assert not planner.messages_of_version(1)
 
 
 def test_an_old_version_on_mavlink_1_writes_and_reads(shared: Bench) -> None:
@@ -92,7 +92,7 @@ def test_an_old_version_on_mavlink_1_writes_and_reads(shared: Bench) -> None:
     plan = mixed_plan(14)
     planner.write(plan)
     assert_reads(planner, plan)
-    kinds = {message.get_type() for message in planner.heard_in(2)}
+    kinds = {message.get_type() for message in planner.messages_of_version(2)}
     assert kinds == {"HEARTBEAT"}
 
 
@@ -114,7 +114,7 @@ def test_a_write_is_stored_with_the_rules_applied(shared: Bench, count: int, use
     # Every important change and drop was reported.
     lines = finding_lines(verdict.findings)
     assert lines
-    assert all(line in planner.said() for _, line in lines)
+    assert all(line in planner.joined_texts() for _, line in lines)
 
 
 def test_a_read_of_float_items_shows_the_same_list(shared: Bench) -> None:
@@ -166,7 +166,7 @@ def test_write_fast_is_written_and_verified(shared: Bench, count: int) -> None:
     planner.write_fast(plan)
     until(lambda: shared.board.records() == records_of(judge(plan)), "the list on the board")
     planner.wait_for_text("Mission verified")
-    requested = [message.seq for message in planner.heard_of("MISSION_REQUEST")]
+    requested = [message.seq for message in planner.messages("MISSION_REQUEST")]
     assert max(requested) < count
     assert MissionResult.INVALID_SEQUENCE not in planner.acks()
 
@@ -270,8 +270,8 @@ def test_refused_fence_and_rally_points_keep_their_mission_type(shared: Bench, k
         planner.send(messages.MAVLink_mission_count_message(1, 1, 5, mission_type))
         planner.send(messages.MAVLink_mission_request_list_message(1, 1, mission_type))
         planner.send(messages.MAVLink_mission_clear_all_message(1, 1, mission_type))
-    planner.look_around(0.5)
-    acks = [(message.type, message.mission_type) for message in planner.heard_of("MISSION_ACK")]
+    planner.listen(0.5)
+    acks = [(message.type, message.mission_type) for message in planner.messages("MISSION_ACK")]
     assert acks == [(MissionResult.UNSUPPORTED, 1)] * 3 + [(MissionResult.UNSUPPORTED, 2)] * 3
     assert shared.board.records() == kept
 
@@ -374,8 +374,8 @@ def test_a_late_duplicate_of_a_count_does_no_harm(shared: Bench) -> None:
     plan = plain_plan(30, start=140)
     planner.write_begun(plan, 6)
     planner.send(messages.MAVLink_mission_count_message(1, 1, len(plan), 0))
-    planner.look_around(0.1)
-    planner.go_on(plan, 6)
+    planner.listen(0.1)
+    planner.write_rest(plan, 6)
     assert shared.board.records() == records_of(judge(plan))
 
 
@@ -384,5 +384,5 @@ def test_an_item_sent_before_its_request_is_accepted(shared: Bench) -> None:
     planner = shared.mission_planner()
     plan = plain_plan(20, start=180)
     planner.send(messages.MAVLink_mission_count_message(1, 1, len(plan), 0))
-    planner.go_on(plan, 0)
+    planner.write_rest(plan, 0)
     assert shared.board.records() == records_of(judge(plan))

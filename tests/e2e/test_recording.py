@@ -35,14 +35,14 @@ class Listener:
         self._socket.connect(address)
         self._socket.setblocking(False)
         self._codec = messages.MAVLink(None, srcSystem=STATION, srcComponent=190)
-        self.heard: list[bytes] = []
-        self.said: list[bytes] = []
+        self.received: list[bytes] = []
+        self.sent: list[bytes] = []
 
-    def say(self, *what: Any) -> None:
+    def send(self, *what: Any) -> None:
         for message in what:
             frame = bytes(message.pack(self._codec))
             self._socket.send(frame)
-            self.said.append(frame)
+            self.sent.append(frame)
 
     def listen(self) -> None:
         while True:
@@ -52,12 +52,12 @@ class Listener:
                 return
             while data:
                 size = data[1] + (8 if data[0] == 0xFE else 12)
-                self.heard.append(data[:size])
+                self.received.append(data[:size])
                 data = data[size:]
 
-    def has_heard(self, msgid: int, count: int) -> bool:
+    def has_received(self, msgid: int, count: int) -> bool:
         self.listen()
-        return sum(msgid_of(frame) == msgid for frame in self.heard) >= count
+        return sum(msgid_of(frame) == msgid for frame in self.received) >= count
 
     def close(self) -> None:
         self._socket.close()
@@ -74,7 +74,7 @@ def connect() -> Iterator[Connect]:
         def connected(daemon: Daemon) -> Listener:
             listener = Listener(daemon.address)
             stack.callback(listener.close)
-            listener.say(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
+            listener.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
             return listener
 
         yield connected
@@ -94,10 +94,10 @@ def test_a_telemetry_log_holds_received_and_sent_frames(start: Starter, connect:
     daemon = start.daemon(str(board.link))
     daemon.wait(protocol)
     listener = connect(daemon)
-    listener.say(messages.MAVLink_command_long_message(1, 1, 512, 0, 148, 0, 0, 0, 0, 0, 0))
-    listener.say(messages.MAVLink_setup_signing_message(1, 1, bytes(range(32)), 1))
-    listener.say(messages.MAVLink_mission_request_list_message(1, 1))
-    until(lambda: listener.has_heard(HEARTBEAT, 4), "telemetry")
+    listener.send(messages.MAVLink_command_long_message(1, 1, 512, 0, 148, 0, 0, 0, 0, 0, 0))
+    listener.send(messages.MAVLink_setup_signing_message(1, 1, bytes(range(32)), 1))
+    listener.send(messages.MAVLink_mission_request_list_message(1, 1))
+    until(lambda: listener.has_received(HEARTBEAT, 4), "telemetry")
     assert daemon.end() == 0
     listener.listen()
 
@@ -105,15 +105,15 @@ def test_a_telemetry_log_holds_received_and_sent_frames(start: Starter, connect:
     records = records_of(path)
     recorded = [record.frame.raw for record in records if record.frame.sysid == 1]
     if protocol == "MSP":
-        assert recorded == listener.heard
+        assert recorded == listener.received
     else:
         # A flight is logged at the default rates, independently of a ground station's own rates.
-        assert {msgid_of(frame) for frame in listener.heard} <= {msgid_of(frame) for frame in recorded}
+        assert {msgid_of(frame) for frame in listener.received} <= {msgid_of(frame) for frame in recorded}
     # A log begins with the vehicle's heartbeat, not the ground station's, and never contains the key.
     assert (records[0].frame.sysid, records[0].frame.msgid) == (1, HEARTBEAT)
-    said = [frame for frame in listener.said if bytes(range(32)) not in frame]
-    assert len(said) == len(listener.said) - 1
-    assert [record.frame.raw for record in records if record.frame.sysid == STATION] == said
+    sent = [frame for frame in listener.sent if bytes(range(32)) not in frame]
+    assert len(sent) == len(listener.sent) - 1
+    assert [record.frame.raw for record in records if record.frame.sysid == STATION] == sent
 
     reader = mavutil.mavlink_connection(str(path))
     for record in records:
@@ -132,14 +132,14 @@ def test_a_killed_daemon_loses_at_most_the_last_second(start: Starter, connect: 
     daemon.wait()
     listener = connect(daemon)
     until(lambda: logs_of(daemon), "a log")
-    until(lambda: listener.has_heard(SYSTEM_STATE, 4), "telemetry")
+    until(lambda: listener.has_received(SYSTEM_STATE, 4), "telemetry")
     daemon.end(signal.SIGKILL)
     listener.listen()
     (path,) = logs_of(daemon)
     recorded = [record.frame.raw for record in records_of(path) if record.frame.sysid == 1]
     assert recorded
-    assert recorded == listener.heard[: len(recorded)]
-    lost = [frame for frame in listener.heard[len(recorded) :] if msgid_of(frame) == SYSTEM_STATE]
+    assert recorded == listener.received[: len(recorded)]
+    lost = [frame for frame in listener.received[len(recorded) :] if msgid_of(frame) == SYSTEM_STATE]
     # One is sent each second. (Heartbeats are faster at first, for a new station.)
     assert len(lost) <= 2
 
@@ -161,8 +161,8 @@ def test_unwritable_logs_are_reported_once_and_delay_nothing(start: Starter, con
     listener = connect(daemon)
     until(lambda: daemon.has_logged("tlog.stopped"), "a failed write")
     listener.listen()
-    listener.heard.clear()
-    until(lambda: listener.has_heard(HEARTBEAT, 2), "telemetry after it")
+    listener.received.clear()
+    until(lambda: listener.has_received(HEARTBEAT, 2), "telemetry after it")
     shown = run_naze_bridge("status", "--state-dir", daemon.state_dir).stdout
     assert "telemetry log: stopped, File exists" in shown
     assert daemon.end() == 0
@@ -177,8 +177,8 @@ def test_the_status_names_the_recordings(start: Starter, connect: Connect) -> No
     until(lambda: logs_of(daemon), "a log")
     (path,) = logs_of(daemon)
     shown = run_naze_bridge("status", "--state-dir", daemon.state_dir).stdout
-    told = [line.split(maxsplit=1)[1] for line in shown.splitlines() if line.startswith("Recording ")]
-    assert told == [f"telemetry log: {path}", f"UART capture: {capture}, 0.0 of 67 MB"]
+    recordings = [line.split(maxsplit=1)[1] for line in shown.splitlines() if line.startswith("Recording ")]
+    assert recordings == [f"telemetry log: {path}", f"UART capture: {capture}, 0.0 of 67 MB"]
     listener.close()
 
 
@@ -188,7 +188,7 @@ def test_recording_can_be_switched_off(start: Starter, connect: Connect) -> None
     daemon = start.daemon("sim:", options=("--config", str(config)))
     daemon.wait()
     listener = connect(daemon)
-    until(lambda: listener.has_heard(HEARTBEAT, 3), "telemetry")
+    until(lambda: listener.has_received(HEARTBEAT, 3), "telemetry")
     assert daemon.ask({"do": "status"})["recording"] == []
     assert daemon.end() == 0
     assert logs_of(daemon) == []
@@ -203,7 +203,7 @@ def test_a_recorded_flight_controller_is_found_in_the_replay(start: Starter, con
     recorded = start.daemon("sim:", options=("--record-uart", str(capture)))
     recorded.wait()
     listener = connect(recorded)
-    until(lambda: listener.has_heard(HEARTBEAT, 3), "telemetry")
+    until(lambda: listener.has_received(HEARTBEAT, 3), "telemetry")
     # The last second may be lost, which in such a short run includes the beginning.
     until(lambda: UartAction.READ in [event.action for event in read_capture(capture.read_bytes())], "a capture")
     recorded.kill_and_restart()
@@ -226,7 +226,7 @@ def test_a_recorded_flight_controller_is_found_in_the_replay(start: Starter, con
     assert found is not None
     assert found["name"] == "Harakiri with the mission extension"
     listener = connect(daemon)
-    until(lambda: listener.has_heard(messages.MAVLINK_MSG_ID_ATTITUDE, 3), "the recorded attitude")
+    until(lambda: listener.has_received(messages.MAVLINK_MSG_ID_ATTITUDE, 3), "the recorded attitude")
     until(lambda: "The capture has ended" in player.printed, "the end")
     # It keeps giving its last replies.
     daemon.wait()

@@ -54,19 +54,19 @@ def daemon(start: Starter) -> ConfiguredDaemon:
 
 def test_links_come_and_go_while_the_others_continue(daemon: ConfiguredDaemon) -> None:
     with udp_station(("127.0.0.1", daemon.port)) as first:
-        first.say_hello()
+        first.send_heartbeat()
         first.wait_for("HEARTBEAT")
         daemon.write(f'{daemon.first_link}, "udpin:127.0.0.1:{daemon.second}", "tcpin:127.0.0.1:{daemon.tcp}"')
         daemon.reload("config.reloaded")
         with udp_station(("127.0.0.1", daemon.second)) as second, tcp_station(daemon.tcp) as third:
             for station in (second, third):
-                station.say_hello()
+                station.send_heartbeat()
                 station.wait_for("HEARTBEAT")
             assert len(daemon.stations()) == 3
             daemon.write(daemon.first_link)
             daemon.reload("config.reloaded")
             assert [station.split(":")[2].split()[0] for station in daemon.stations()] == [str(daemon.port)]
-        first.heard.clear()
+        first.received.clear()
         first.wait_for("HEARTBEAT")
     assert "config.needs_restart" not in daemon.log
 
@@ -76,7 +76,7 @@ def test_an_occupied_port_affects_only_its_link(daemon: ConfiguredDaemon) -> Non
         own_port = taken.own_address[1]
         daemon.write(f'{daemon.first_link}, "udpin:127.0.0.1:{own_port}"')
         daemon.reload("gcs.unavailable")
-        taken.say_hello()
+        taken.send_heartbeat()
         taken.wait_for("HEARTBEAT")
 
 
@@ -86,7 +86,7 @@ def test_settings_that_need_a_restart_are_named(daemon: ConfiguredDaemon) -> Non
     assert '"settings": ["sysid", "takeoff_max_m", "zenoh"]' in daemon.log
     assert '"taken_over": ["log_level"]' in daemon.log
     with udp_station(("127.0.0.1", daemon.port)) as station:
-        station.say_hello()
+        station.send_heartbeat()
         assert station.wait_for("HEARTBEAT").get_srcSystem() == 1
 
 
@@ -103,7 +103,7 @@ def test_an_invalid_file_changes_nothing_and_is_explained(daemon: ConfiguredDaem
     assert "gcs is empty" in daemon.log
     assert "did you mean 'sysid'?" in daemon.log
     with udp_station(("127.0.0.1", daemon.port)) as station:
-        station.say_hello()
+        station.send_heartbeat()
         station.wait_for("HEARTBEAT")
 
 

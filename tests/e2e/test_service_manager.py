@@ -37,7 +37,7 @@ class Systemd:
 
     def __init__(self, directory: Path) -> None:
         self.path = directory / "notify"
-        self.heard: list[str] = []
+        self.received: list[str] = []
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
         self._socket.bind(str(self.path))
 
@@ -45,13 +45,13 @@ class Systemd:
         """All notifications so far."""
         while True:
             try:
-                self.heard.append(self._socket.recv(4096).decode())
+                self.received.append(self._socket.recv(4096).decode())
             except BlockingIOError:
-                return self.heard
+                return self.received
 
     def status(self) -> str:
-        told = [text for text in self.listen() if text.startswith("STATUS=")]
-        return told[-1].removeprefix("STATUS=") if told else ""
+        texts = [text for text in self.listen() if text.startswith("STATUS=")]
+        return texts[-1].removeprefix("STATUS=") if texts else ""
 
     def close(self) -> None:
         self._socket.close()
@@ -75,7 +75,7 @@ def test_the_daemon_is_ready_without_a_flight_controller(start: Starter, systemd
     daemon.wait()
     until(lambda: "(MSP, 115200 baud, disarmed); 0 ground stations" in systemd.status(), "the link in the status")
     with udp_station(daemon.address) as station:
-        station.say_hello()
+        station.send_heartbeat()
         until(lambda: systemd.status().endswith("; 1 ground station"), "the ground station in the status")
     assert daemon.end() == 0
     assert systemd.listen().count("READY=1") == systemd.listen().count("STOPPING=1") == 1
@@ -137,7 +137,7 @@ async def test_a_bug_does_not_prevent_a_stop(tmp_path: Path, monkeypatch: pytest
 def test_a_failed_start_is_never_ready(start: Starter, systemd: Systemd) -> None:
     first = start.daemon("sim:")
     until(lambda: "READY=1" in systemd.listen(), "READY")
-    systemd.heard.clear()
+    systemd.received.clear()
     link = f"udpin:127.0.0.1:{first.port}"
     ended = run_naze_bridge("run", "--fc", "sim:", "--gcs", link, "--state-dir", start.directory / "other")
     assert ended.returncode == 1
@@ -241,11 +241,11 @@ def test_a_ground_station_is_told_of_the_stop(start: Starter) -> None:
     """Its upload is refused with the reason."""
     bench = start.bench()
     with udp_station(bench.daemon.address) as station:
-        station.say_hello()
-        station.announce(20)
+        station.send_heartbeat()
+        station.send_count(20)
         station.wait_for("MISSION_REQUEST")
         bench.daemon.process.send_signal(signal.SIGTERM)
         assert station.wait_for("MISSION_ACK").type == MissionResult.OPERATION_CANCELLED
         assert "Upload ended: naze-bridge stops" in " ".join(
-            message.text for message in station.heard if message.get_type() == "STATUSTEXT"
+            message.text for message in station.received if message.get_type() == "STATUSTEXT"
         )

@@ -25,7 +25,7 @@ from tests.e2e.test_mavsdk import vehicle_at
 from tests.support import dronekit
 from tests.support.benches import Bench
 from tests.support.mavproxy import MavProxy
-from tests.support.programs import TIMEOUT_S, comes
+from tests.support.programs import TIMEOUT_S, happens
 
 POSITION_M = 1.5
 HEIGHT_M = 1.0
@@ -180,7 +180,7 @@ def check_position(bench: Bench, mavproxy: MavProxy) -> None:
         high = abs(position["relative_alt"] / 1000 - now["height_m"]) <= HEIGHT_M
         return near and high and degrees_between(position["hdg"] / 100, now["heading"]) <= DIRECTION_DEG
 
-    assert comes(agrees_now, seconds=3.0)
+    assert happens(agrees_now, seconds=3.0)
 
 
 def shows_mode(vehicle: Any, name: str) -> bool:
@@ -195,7 +195,7 @@ def test_dronekit_shows_the_flight_correctly(bench: Bench) -> None:
         assert (vehicle.gps_0.fix_type, vehicle.gps_0.satellites_visible) == (3, 9)
         for boxes, mode in ((1 << 7, "LOITER"), (1 << 6, "RTL"), (0, "ACRO")):
             bench.board.set(f"boxes {boxes}")
-            assert comes(partial(shows_mode, vehicle, mode))
+            assert happens(partial(shows_mode, vehicle, mode))
         assert (vehicle.armed, vehicle.system_status.state) == (True, "ACTIVE")
 
         def agrees_now() -> bool:
@@ -215,4 +215,4 @@ def test_dronekit_shows_the_flight_correctly(bench: Bench) -> None:
             )
 
         for _ in range(5):
-            assert comes(agrees_now)
+            assert happens(agrees_now)

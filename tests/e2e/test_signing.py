@@ -22,7 +22,7 @@ PASSPHRASE = "loop the loop"  # noqa: S105 - it is only ours
 KEY = key_from_passphrase(PASSPHRASE)
 
 
-class Field:
+class SignedBench:
     """A board, its daemon with one protected UDP link, and ground stations."""
 
     def __init__(self, start: Starter, stack: ExitStack, guard: str) -> None:
@@ -61,32 +61,32 @@ def stack() -> Iterator[ExitStack]:
 
 
 @pytest.fixture
-def keyed(start: Starter, stack: ExitStack, tmp_path: Path) -> Field:
+def keyed(start: Starter, stack: ExitStack, tmp_path: Path) -> SignedBench:
     key_file = tmp_path / "gcs.key"
     key_file.write_text(PASSPHRASE + "\n")
     key_file.chmod(0o600)
-    return Field(start, stack, f'key_file = "{key_file}"')
+    return SignedBench(start, stack, f'key_file = "{key_file}"')
 
 
 def signed(station: PlainStation, message: Any) -> bytes:
     return bytes(message.pack(station._codec))
 
 
-def assert_key_is_not_leaked(field: Field) -> None:
+def assert_key_is_not_leaked(bench: SignedBench) -> None:
     """It is neither in the log nor in any stored file."""
-    places = [path for path in field.daemon.state_dir.rglob("*") if path.is_file()]
+    places = [path for path in bench.daemon.state_dir.rglob("*") if path.is_file()]
     assert any(path.suffix == ".tlog" and path.stat().st_size for path in places)
-    for content in [field.daemon.printed.encode(), *(path.read_bytes() for path in places)]:
+    for content in [bench.daemon.printed.encode(), *(path.read_bytes() for path in places)]:
         for secret in (KEY, KEY.hex().encode(), repr(KEY).encode(), PASSPHRASE.encode()):
             assert secret not in content
 
 
-def test_only_the_key_allows_writing(keyed: Field) -> None:
+def test_only_the_key_allows_writing(keyed: SignedBench) -> None:
     thief, pilot, other = keyed.station(), keyed.station(KEY), keyed.station(key_from_passphrase("guessed"), sysid=251)
     plan = plain_plan(9)
     assert thief.upload(plan) is MissionResult.DENIED
     # A station with another key would drop all frames, so this one ignores signatures.
-    other.announce(9)
+    other.send_count(9)
     until(lambda: any("another key" in line for line in keyed.refused()), "the refusal")
     assert keyed.board.records() == []
     assert pilot.upload(plan) is MissionResult.ACCEPTED
@@ -111,7 +111,7 @@ def test_only_the_key_allows_writing(keyed: Field) -> None:
     assert_key_is_not_leaked(keyed)
 
 
-def test_replayed_frames_are_refused_even_after_a_restart(keyed: Field) -> None:
+def test_replayed_frames_are_refused_even_after_a_restart(keyed: SignedBench) -> None:
     pilot = keyed.station(KEY)
     assert pilot.upload(plain_plan(5)) is MissionResult.ACCEPTED
     clear = signed(pilot, messages.MAVLink_mission_clear_all_message(1, 1))
@@ -134,12 +134,12 @@ def test_replayed_frames_are_refused_even_after_a_restart(keyed: Field) -> None:
 
 
 def test_only_listed_addresses_may_write(start: Starter, stack: ExitStack) -> None:
-    field = Field(start, stack, 'writers = ["127.0.0.2/32"]')
-    guest, pilot = field.station(host="127.0.0.1"), field.station(host="127.0.0.2")
+    bench = SignedBench(start, stack, 'writers = ["127.0.0.2/32"]')
+    guest, pilot = bench.station(host="127.0.0.1"), bench.station(host="127.0.0.2")
     assert guest.upload(plain_plan(3)) is MissionResult.DENIED
     assert pilot.upload(plain_plan(6)) is MissionResult.ACCEPTED
     assert len(guest.download()) == 6
-    assert field.daemon.has_logged("gcs.open") is None
+    assert bench.daemon.has_logged("gcs.open") is None
 
 
 def test_an_open_link_is_reported_once(start: Starter) -> None:

@@ -42,8 +42,8 @@ def error(answers: list[Any]) -> str:
     (answer,) = [each for each in answers if "error" in each]
     assert len(answer["error"]) < 250
     assert "\n" not in answer["error"]
-    said: str = answer["error"]
-    return said
+    reason: str = answer["error"]
+    return reason
 
 
 def test_an_upload_reports_its_progress_and_result(commanded: tuple[Bench, zenoh.Session]) -> None:
@@ -167,8 +167,8 @@ def test_nothing_is_written_while_armed(start: Starter) -> None:
         bench.board.set("armed 1")
         for suffix in (UPLOAD, CLEAR, f"{RESTORE}?number=1"):
             payload = mission_file(5) if suffix == UPLOAD else None
-            said = error(ask(opened, suffix, payload))
-            assert "rmed" in said or "No link" in said, suffix
+            reason = error(ask(opened, suffix, payload))
+            assert "rmed" in reason or "No link" in reason, suffix
         until(lambda: bench.daemon.has_logged("zenoh.refused"), "a log entry")
         assert bench.board.records() == before
     bench.board.assert_was_treated_well()

@@ -21,11 +21,11 @@ from tests.support.zenoh_router import running_router
 DAY = timedelta(days=1)
 
 
-def recovering(opened: zenoh.Session, suffix: str, heard: list[Any]) -> ext.AdvancedSubscriber[None]:
+def recovering(opened: zenoh.Session, suffix: str, received: list[Any]) -> ext.AdvancedSubscriber[None]:
     return ext.declare_advanced_subscriber(
         opened,
         key(suffix),
-        lambda sample: heard.append(body(sample)),
+        lambda sample: received.append(body(sample)),
         history=ext.HistoryConfig(detect_late_publishers=True),
         recovery=ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
     )
@@ -59,12 +59,12 @@ def test_a_late_subscriber_gets_earlier_events(start: Starter) -> None:
     where = endpoint()
     bench = zenoh_bench(start, f'listen = ["{where}"]')
     bench.daemon.push(plain_plan(7))
-    heard: dict[str, list[Any]] = {name: [] for name in ("event", "mission/report", "mission/current", "state")}
+    received: dict[str, list[Any]] = {name: [] for name in ("event", "mission/report", "mission/current", "state")}
     with session(connect=where) as opened:
-        subscribers = [recovering(opened, name, found) for name, found in heard.items()]
-        until(lambda: all(heard.values()), "the past")
-        assert len(heard["mission/report"][0]["stored"]) == 7
-        assert heard["mission/current"][-1]["count"] == 7
+        subscribers = [recovering(opened, name, found) for name, found in received.items()]
+        until(lambda: all(received.values()), "the past")
+        assert len(received["mission/report"][0]["stored"]) == 7
+        assert received["mission/current"][-1]["count"] == 7
         del subscribers
 
 

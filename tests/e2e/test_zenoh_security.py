@@ -98,9 +98,9 @@ def test_vehicles_with_invalid_certificates_report_it(tls: Fleet, stack: ExitSta
         (tmp_path / name).mkdir()
         config = write_config(tmp_path / name, f'config_file = "{tls.config("vehicle", name)}"')
         daemons[name] = Starter(tmp_path / name, stack).daemon("sim:", options=("--config", str(config)))
-    for name, said in wrong.items():
+    for name, reason in wrong.items():
         alone = until(partial(daemons[name].has_logged, "zenoh.alone"), "a log entry about the certificate")
-        assert said in alone["why"]
+        assert reason in alone["why"]
         daemons[name].wait()
         daemons[name].push(plain_plan(9))
         assert daemons[name].end() == 0
@@ -133,14 +133,14 @@ SETTINGS_THAT_END_IT = {
 
 @pytest.mark.parametrize("name", SETTINGS_THAT_END_IT)
 def test_invalid_settings_stop_the_start_with_one_sentence(tmp_path: Path, name: str) -> None:
-    table, zenoh_file, said = SETTINGS_THAT_END_IT[name]
+    table, zenoh_file, reason = SETTINGS_THAT_END_IT[name]
     if zenoh_file is not None:
         (tmp_path / "zenoh.json5").write_text(zenoh_file)
     config = write_config(tmp_path, table, vehicle="")
     with pytest.raises(SettingsError) as caught:
         load_settings(config, "sim:", (), tmp_path)
     (problem,) = caught.value.problems
-    assert said in problem.text
+    assert reason in problem.text
     assert "\n" not in problem.text
     assert str(config) in problem.where
 

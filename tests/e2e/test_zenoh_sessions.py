@@ -72,10 +72,10 @@ def test_the_daemon_joins_a_router_that_starts_late_or_restarts(start: Starter, 
         router.stop()
         until(lambda: count(bench, "zenoh.left") == 1, "the loss")
         bench.daemon.push(plain_plan(12))
-        heard = len(reader.samples)
+        received = len(reader.samples)
         router.start_again()
         until(lambda: count(bench, "zenoh.joined") == 2, "the daemon's return")
-        until(lambda: len(reader.samples) > heard, "samples through the new router")
+        until(lambda: len(reader.samples) > received, "samples through the new router")
         (state,) = until(lambda: ask(opened, "state"), "a reply through the new router")
         assert state["mission"]["count"] == 12
 
@@ -101,7 +101,7 @@ def upload_while(bench: Bench, router: Router, blow: signal.Signals) -> None:
     plan = plain_plan(146)
     planner._start_upload(len(plan))
     router.process.send_signal(blow)
-    planner.go_on(plan, 0)
+    planner.write_rest(plan, 0)
     assert bench.board.records() == records_of(judge(plan))
     bench.board.assert_was_treated_well()
 
@@ -131,8 +131,8 @@ def test_a_stalled_subscriber_delays_nothing(start: Starter) -> None:
         reader = Reader(opened, "fleet/*/v1/telemetry/*")
         for number in range(6):
             bench.daemon.push(plain_plan(146, number))
-        heard = len(reader.samples)
-        until(lambda: len(reader.samples) > heard + 20, "telemetry for the other subscriber")
+        received = len(reader.samples)
+        until(lambda: len(reader.samples) > received + 20, "telemetry for the other subscriber")
         until(lambda: len(ask(opened, "state")) == 1, "a reply to the other subscriber")
         bench.board.assert_was_treated_well()
         assert bench.daemon.end() == 0

@@ -117,9 +117,9 @@ def test_an_armed_vehicle_refuses_a_push_to_all(fleet: Fleet, tmp_path: Path) ->
         assert {name: each["ok"] for name, each in pushed.items()} == {"kite": True, "owl": True, "swift": False}
         assert "rmed" in pushed["swift"]["error"]
         assert board.records() == before
-        told = fleet.ask("push", file, "--all")
-        assert told.returncode == 1
-        assert told.stdout.endswith("2 of 3 vehicles hold the mission, verified; 1 failed\n")
+        result = fleet.ask("push", file, "--all")
+        assert result.returncode == 1
+        assert result.stdout.endswith("2 of 3 vehicles hold the mission, verified; 1 failed\n")
     finally:
         board.set("armed 0")
         until(lambda: (swift.status() or {}).get("armed") is False, "the landing")
@@ -219,5 +219,5 @@ def test_a_vehicle_without_commands_is_reported(fleet: Fleet, tmp_path: Path) ->
 
 
 def test_help_lists_every_command() -> None:
-    told = run_naze_bridge("fleet", "--help").stdout
-    assert [name for name in ("list", "watch", "push", "pull") if f"  {name} " not in told] == []
+    result = run_naze_bridge("fleet", "--help").stdout
+    assert [name for name in ("list", "watch", "push", "pull") if f"  {name} " not in result] == []

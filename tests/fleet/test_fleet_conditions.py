@@ -30,7 +30,7 @@ def test_a_condition_selects_vehicles(text: str, found: list[FleetVehicle]) -> N
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "reason"),
     [
         ("armed", "not a condition"),
         ("colour=red", "no 'colour'"),
@@ -41,6 +41,6 @@ def test_a_condition_selects_vehicles(text: str, found: list[FleetVehicle]) -> N
         ("session_id=1", "no 'session_id'"),
     ],
 )
-def test_an_invalid_condition_is_refused(text: str, said: str) -> None:
-    with pytest.raises(ValueError, match=said):
+def test_an_invalid_condition_is_refused(text: str, reason: str) -> None:
+    with pytest.raises(ValueError, match=reason):
         parse_condition(text)

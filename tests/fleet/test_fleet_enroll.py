@@ -50,7 +50,7 @@ def replies_with(text: str) -> Any:
     return reply
 
 
-def asked(session: zenoh.Session, key: str) -> list[str]:
+def replies(session: zenoh.Session, key: str) -> list[str]:
     return [each.ok.payload.to_string() for each in session.get(key, timeout=5.0) if each.ok]
 
 
@@ -60,15 +60,15 @@ def test_a_vehicle_publishes_only_under_its_own_name(enrolled: Enrolled) -> None
         owl.declare_queryable(key, replies_with("owl"))
         for key in ("fleet/owl/v1/state", "fleet/kite/v1/state", "fleet/kite/@cmd/v1/mission/upload")
     ]
-    until(lambda: asked(pilot, "fleet/owl/v1/state") == ["owl"], "its own state")
-    assert asked(pilot, "fleet/kite/v1/state") == asked(pilot, "fleet/kite/@cmd/v1/mission/upload") == []
-    heard: list[str] = []
-    with pilot.declare_subscriber("fleet/**", lambda sample: heard.append(str(sample.key_expr))):
-        until(lambda: (owl.put("fleet/owl/v1/event", "{}"), heard)[1], "its own event")
+    until(lambda: replies(pilot, "fleet/owl/v1/state") == ["owl"], "its own state")
+    assert replies(pilot, "fleet/kite/v1/state") == replies(pilot, "fleet/kite/@cmd/v1/mission/upload") == []
+    received: list[str] = []
+    with pilot.declare_subscriber("fleet/**", lambda sample: received.append(str(sample.key_expr))):
+        until(lambda: (owl.put("fleet/owl/v1/event", "{}"), received)[1], "its own event")
         owl.put("fleet/kite/v1/telemetry/position", "{}")
         owl.put("fleet/owl/v1/telemetry/gps", "{}")
-        until(lambda: "fleet/owl/v1/telemetry/gps" in heard, "the last one")
-    assert not [key for key in heard if "kite" in key]
+        until(lambda: "fleet/owl/v1/telemetry/gps" in received, "the last one")
+    assert not [key for key in received if "kite" in key]
     del queryables
 
 
@@ -83,18 +83,18 @@ def test_a_guest_may_only_read(enrolled: Enrolled) -> None:
         kite.declare_queryable(key, replies_with("kite"))
         for key in ("fleet/kite/v1/state", "fleet/kite/@cmd/v1/mission/clear")
     ]
-    heard: list[str] = []
-    looks = guest.declare_subscriber("fleet/*/v1/**", lambda sample: heard.append(str(sample.key_expr)))
-    until(lambda: asked(guest, "fleet/kite/v1/state") == ["kite"], "the state")
-    until(lambda: (kite.put("fleet/kite/v1/telemetry/position", "{}"), heard)[1], "telemetry")
-    assert asked(guest, "fleet/kite/@cmd/v1/mission/clear") == []
+    received: list[str] = []
+    looks = guest.declare_subscriber("fleet/*/v1/**", lambda sample: received.append(str(sample.key_expr)))
+    until(lambda: replies(guest, "fleet/kite/v1/state") == ["kite"], "the state")
+    until(lambda: (kite.put("fleet/kite/v1/telemetry/position", "{}"), received)[1], "telemetry")
+    assert replies(guest, "fleet/kite/@cmd/v1/mission/clear") == []
     forged = guest.declare_queryable("fleet/kite/v1/mission/current", replies_with("forged"))
     token = guest.liveliness().declare_token("fleet/ghost/v1/alive/1")
     guest.put("fleet/kite/@mavlink/v1/in", "disarm")
     guest.put("fleet/kite/v1/event", "{}")
     until(lambda: (pilot.put("fleet/kite/@mavlink/v1/in", "hello"), taken)[1], "the pilot's frame")
     assert set(taken) == {"fleet/kite/@mavlink/v1/in"}
-    assert asked(pilot, "fleet/kite/v1/mission/current") == []
+    assert replies(pilot, "fleet/kite/v1/mission/current") == []
     assert not [each for each in pilot.liveliness().get("fleet/ghost/**") if each.ok]
     del inputs, queryables, looks, forged, token
 

@@ -59,8 +59,8 @@ def test_a_mission_is_verified_by_checksum(fleet: Fleet, tmp_path: Path) -> None
     checked = json.loads(run_naze_bridge("check", file, "--json").stdout)
     assert checked["checksum"] == vehicles["swift"]["checksum"] == fleet.daemons["kite"].held()["checksum"]
     assert "holds no mission" in fleet.ask("verify", file, "--vehicle", "swift").stdout
-    told = fleet.ask("verify", file, "--vehicle", "kite", "--vehicle", "owl")
-    assert (told.returncode, told.stdout.splitlines()[-1]) == (0, "2 of 2 vehicles hold the mission")
+    result = fleet.ask("verify", file, "--vehicle", "kite", "--vehicle", "owl")
+    assert (result.returncode, result.stdout.splitlines()[-1]) == (0, "2 of 2 vehicles hold the mission")
 
 
 def test_a_staged_push_stops_at_the_first_failure(fleet: Fleet, tmp_path: Path) -> None:

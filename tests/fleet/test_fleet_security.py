@@ -66,7 +66,7 @@ def fake_bridge(stack: ExitStack, session: zenoh.Session, vehicle: str) -> None:
     stack.enter_context(session.liveliness().declare_token(f"fleet/{vehicle}/v1/alive/{session.zid()}"))
 
 
-def asks(session: zenoh.Session, key: str) -> int:
+def replies(session: zenoh.Session, key: str) -> int:
     return sum(reply.ok is not None for reply in session.get(key, timeout=5.0))
 
 
@@ -75,20 +75,20 @@ def test_all_members_see_a_vehicle_and_the_pilot_commands_it(secured: Fleet) -> 
         vehicle = stack.enter_context(secured.open("vehicle", "naze-1"))
         fake_bridge(stack, vehicle, "naze-1")
         pilot, guest = (stack.enter_context(secured.open("pilot", name)) for name in ("pilot", "guest"))
-        until(lambda: asks(pilot, "fleet/naze-1/@cmd/v1/status") == 1, "the pilot's command")
-        assert asks(guest, "fleet/naze-1/v1/state") == 1
-        assert asks(guest, "fleet/naze-1/@cmd/v1/status") == 0
-        heard: list[str] = []
+        until(lambda: replies(pilot, "fleet/naze-1/@cmd/v1/status") == 1, "the pilot's command")
+        assert replies(guest, "fleet/naze-1/v1/state") == 1
+        assert replies(guest, "fleet/naze-1/@cmd/v1/status") == 0
+        received: list[str] = []
         stack.enter_context(
-            guest.declare_subscriber("fleet/*/v1/telemetry/*", lambda sample: heard.append(str(sample)))
+            guest.declare_subscriber("fleet/*/v1/telemetry/*", lambda sample: received.append(str(sample)))
         )
         publisher = stack.enter_context(vehicle.declare_publisher("fleet/naze-1/v1/telemetry/position"))
 
-        def hears() -> bool:
+        def is_received() -> bool:
             publisher.put("{}")
-            return bool(heard)
+            return bool(received)
 
-        until(hears, "a sample")
+        until(is_received, "a sample")
         listed = secured.fleet_list(secured.config("pilot", "pilot"))
         assert (listed.returncode, "naze-1" in listed.stdout) == (0, True), listed
 
@@ -113,8 +113,8 @@ def test_a_vehicle_cannot_impersonate_another(secured: Fleet) -> None:
         fake_bridge(stack, vehicle, "naze-1")
         fake_bridge(stack, vehicle, "naze-2")
         pilot = stack.enter_context(secured.open("pilot", "pilot"))
-        until(lambda: asks(pilot, "fleet/naze-2/@cmd/v1/status") == 1, "the reply under its own name")
-        assert asks(pilot, "fleet/naze-1/@cmd/v1/status") == 0
+        until(lambda: replies(pilot, "fleet/naze-2/@cmd/v1/status") == 1, "the reply under its own name")
+        assert replies(pilot, "fleet/naze-1/@cmd/v1/status") == 0
         tokens = [str(reply.ok.key_expr) for reply in pilot.liveliness().get("fleet/*/v1/alive/*") if reply.ok]
         assert [key.split("/")[1] for key in tokens] == ["naze-2"]
 
@@ -124,8 +124,8 @@ def test_a_stranger_with_a_certificate_may_do_nothing(tls: Fleet) -> None:
         vehicle = stack.enter_context(tls.open("vehicle", "naze-1"))
         fake_bridge(stack, vehicle, "naze-1")
         pilot, stranger = (stack.enter_context(tls.open("pilot", name)) for name in ("pilot", "stranger"))
-        until(lambda: asks(pilot, "fleet/naze-1/v1/state") == 1, "the pilot's question")
-        assert asks(stranger, "fleet/naze-1/v1/state") == asks(stranger, "fleet/naze-1/@cmd/v1/status") == 0
+        until(lambda: replies(pilot, "fleet/naze-1/v1/state") == 1, "the pilot's question")
+        assert replies(stranger, "fleet/naze-1/v1/state") == replies(stranger, "fleet/naze-1/@cmd/v1/status") == 0
 
 
 def refused(listed: subprocess.CompletedProcess[str]) -> str:
@@ -151,16 +151,16 @@ def write(folder: Path, name: str, issued: trustme.LeafCert) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "issue", "said"),
+    ("name", "issue", "reason"),
     [
         ("foreign", lambda _, other: other.issue_cert("pilot", common_name="pilot"), "refuses our certificate"),
         ("old", lambda own, _: own.issue_cert("pilot", common_name="pilot", **_PAST), "certificate expired"),
     ],
 )
-def test_an_invalid_certificate_of_a_pilot_is_explained(tls: Fleet, name: str, issue: Issue, said: str) -> None:
+def test_an_invalid_certificate_of_a_pilot_is_explained(tls: Fleet, name: str, issue: Issue, reason: str) -> None:
     own = trustme.CA.from_pem((tls.folder / "ca.pem").read_bytes(), (tls.folder / "ca.key").read_bytes())
     write(tls.folder, name, issue(own, trustme.CA()))
-    assert said in refused(tls.fleet_list(tls.config("pilot", name)))
+    assert reason in refused(tls.fleet_list(tls.config("pilot", name)))
 
 
 def test_a_missing_certificate_is_named(tls: Fleet) -> None:
@@ -169,7 +169,7 @@ def test_a_missing_certificate_is_named(tls: Fleet) -> None:
 
 
 @pytest.mark.parametrize(
-    ("issue", "said"),
+    ("issue", "reason"),
     [
         (lambda own, _: own.issue_cert("localhost", **_PAST), "certificate has expired"),
         (lambda own, _: own.issue_cert("elsewhere.example"), "Hostname mismatch"),
@@ -177,7 +177,9 @@ def test_a_missing_certificate_is_named(tls: Fleet) -> None:
     ],
     ids=["expired", "another name", "not ours"],
 )
-def test_an_invalid_certificate_of_the_router_is_explained(tls: Fleet, tmp_path: Path, issue: Issue, said: str) -> None:
+def test_an_invalid_certificate_of_the_router_is_explained(
+    tls: Fleet, tmp_path: Path, issue: Issue, reason: str
+) -> None:
     endpoint = f"tls/localhost:{free_port(socket.SOCK_STREAM)}"
     shutil.copytree(tls.folder, tmp_path, dirs_exist_ok=True)
     own = trustme.CA.from_pem((tmp_path / "ca.pem").read_bytes(), (tmp_path / "ca.key").read_bytes())
@@ -186,4 +188,4 @@ def test_an_invalid_certificate_of_the_router_is_explained(tls: Fleet, tmp_path:
     for path in tmp_path.glob("*.json5"):
         path.write_text(path.read_text().replace(str(tls.folder), str(tmp_path)).replace(f":{port}", f":{new_port}"))
     with running_router(tmp_path, endpoint, tmp_path / "router.json5"):
-        assert said in refused(run_naze_bridge("fleet", "list", "--zenoh-config", tmp_path / "pilot.json5"))
+        assert reason in refused(run_naze_bridge("fleet", "list", "--zenoh-config", tmp_path / "pilot.json5"))

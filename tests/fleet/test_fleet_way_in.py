@@ -61,22 +61,22 @@ def test_another_program_on_the_routers_port_is_reported() -> None:
 
 
 @pytest.mark.parametrize(
-    ("endpoint", "said"),
+    ("endpoint", "reason"),
     [
         ("tcp/no-such-host.invalid:7447", "the host name 'no-such-host.invalid'"),
         ("smoke/127.0.0.1:7447", "smoke/127.0.0.1:7447"),
         ("tcp/127.0.0.1:99999", "99999"),
     ],
 )
-def test_an_invalid_endpoint_is_one_sentence(endpoint: str, said: str) -> None:
-    assert said in sentence_of("list", "--connect", endpoint)
+def test_an_invalid_endpoint_is_one_sentence(endpoint: str, reason: str) -> None:
+    assert reason in sentence_of("list", "--connect", endpoint)
 
 
 @pytest.mark.parametrize("endpoint", ["192.168.4.1:7447", "tcp/127.0.0.1", "router", ""])
 @pytest.mark.parametrize("arguments", [("list", "--connect"), ("enroll", "kite", "--router")])
 def test_an_option_that_is_no_endpoint_is_a_usage_error(arguments: tuple[str, ...], endpoint: str) -> None:
-    said = f"Invalid value for '{arguments[-1]}': {endpoint!r} is not an endpoint: write one like tcp/localhost:7447"
-    assert sentence_of(*arguments, endpoint, code=2) == f"naze-bridge: {said}"
+    reason = f"Invalid value for '{arguments[-1]}': {endpoint!r} is not an endpoint: write one like tcp/localhost:7447"
+    assert sentence_of(*arguments, endpoint, code=2) == f"naze-bridge: {reason}"
 
 
 @pytest.mark.parametrize("prefix", ["fleet/*", "a/b", "@fleet", "fl eet", "fleet?x"])
@@ -110,11 +110,11 @@ def test_a_file_that_is_not_a_mission_is_not_sent(tmp_path: Path) -> None:
 
 
 def test_an_unusable_name_is_one_sentence() -> None:
-    said = sentence_of("enroll", "my plane", code=2)
-    assert said.startswith("naze-bridge: the name is 'my plane', with ' ' in it: make a name of letters")
+    reason = sentence_of("enroll", "my plane", code=2)
+    assert reason.startswith("naze-bridge: the name is 'my plane', with ' ' in it: make a name of letters")
 
 
 def test_an_unusable_folder_is_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    said = sentence_of("enroll", "kite", "--folder", tmp_path / "file")
-    assert said.endswith("members.json cannot be read: not a directory")
+    reason = sentence_of("enroll", "kite", "--folder", tmp_path / "file")
+    assert reason.endswith("members.json cannot be read: not a directory")

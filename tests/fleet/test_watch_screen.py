@@ -52,7 +52,7 @@ def test_vehicles_with_problems_are_marked() -> None:
     assert [bool(row.problem) for row in rows] == [True] * 4 + [False]
     text = "\n".join(lines(rows, 0))
     assert "5 vehicles, 0 armed, 4 with problems" in text
-    assert [said in text for said in ("2 bridges use", "sends no state", "silent", "no flight")] == [True] * 4
+    assert [part in text for part in ("2 bridges use", "sends no state", "silent", "no flight")] == [True] * 4
 
 
 class Sample:
@@ -76,16 +76,16 @@ def test_a_backlog_is_shown_with_its_true_age() -> None:
     watch = Watch(None, "fleet", lambda: now)  # type: ignore[arg-type]
     watch.token(Sample("fleet/kite/v1/alive/1", kind=zenoh.SampleKind.PUT))  # type: ignore[arg-type]
 
-    def heard(made_at: float) -> float | None:
+    def age_s(made_at: float) -> float | None:
         watch.sample(Sample("fleet/kite/v1/state", {"time_s": made_at}))  # type: ignore[arg-type]
         return watch.look()[1][0]
 
-    assert heard(1400.0) == 0
+    assert age_s(1400.0) == 0
     now = 5008.0
-    assert heard(1401.0) == 7
-    assert heard(1408.0) == 0
+    assert age_s(1401.0) == 7
+    assert age_s(1408.0) == 0
     now = 5009.0
-    assert heard(200.0) == 0, "its clock was set back"
+    assert age_s(200.0) == 0, "its clock was set back"
 
 
 def test_only_vehicles_on_the_screen_send_their_states() -> None:

@@ -38,7 +38,7 @@ class Line:
         os.set_blocking(self.wire, False)
         self.path = directory / "port"
         self.path.symlink_to(os.ttyname(self._terminal))
-        self.heard = bytearray()
+        self.received = bytearray()
         self.opened = 0
         self.lost: list[str] = []
         #: The number of reads.
@@ -68,13 +68,13 @@ class Line:
 
     def numbers(self) -> list[int]:
         """The numbers of the received frames; nothing else may have been received."""
-        frames = MavlinkSplitter().feed(bytes(self.heard))
-        assert b"".join(frame.raw for frame in frames) == self.heard
+        frames = MavlinkSplitter().feed(bytes(self.received))
+        assert b"".join(frame.raw for frame in frames) == self.received
         return [int.from_bytes(frame.payload[:4].ljust(4, b"\0"), "little") for frame in frames]
 
     async def has_come(self, count: int) -> None:
         """Wait until `count` frames have arrived in total."""
-        await until_async(lambda: len(MavlinkSplitter().feed(bytes(self.heard))) == count, "the sent frames")
+        await until_async(lambda: len(MavlinkSplitter().feed(bytes(self.received))) == count, "the sent frames")
         self.numbers()
 
     async def feed(self, first: int, count: int, rate_hz: int) -> int:
@@ -106,7 +106,7 @@ class Line:
 
     def _on_data(self, data: bytes) -> None:
         self.reads += 1
-        self.heard += data
+        self.received += data
 
 
 @pytest.fixture
@@ -156,7 +156,7 @@ async def test_a_port_that_disconnects_during_batched_reads_is_reopened(line: Li
     again = Line(tmp_path)
     line.wire, line._terminal = again.wire, again._terminal
     await until_async(lambda: line.opened == 2, "the port")
-    line.heard.clear()
+    line.received.clear()
     await line.feed(7, 1, 50)
     await until_async(lambda: line.numbers() == [7], "a frame")
     await line.stop()

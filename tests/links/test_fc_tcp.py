@@ -24,11 +24,11 @@ async def test_received_bytes_are_acknowledged_at_once() -> None:
     loop = asyncio.get_running_loop()
     with socket.create_server(("127.0.0.1", 0)) as listener:
         listener.setblocking(False)
-        heard: asyncio.Queue[int] = asyncio.Queue()
+        received: asyncio.Queue[int] = asyncio.Queue()
         port = FcPort(
             device_opener(TcpFc("127.0.0.1", listener.getsockname()[1])),
             lambda: None,
-            lambda data: heard.put_nowait(unacknowledged(board)),
+            lambda data: received.put_nowait(unacknowledged(board)),
             lambda _: None,
             Traffic(),
         )
@@ -39,7 +39,7 @@ async def test_received_bytes_are_acknowledged_at_once() -> None:
             # Linux delays acknowledgements only on connections that carry traffic both ways.
             for _ in range(30):
                 board.send(b"$")
-                left.append(await asyncio.wait_for(heard.get(), TIMEOUT_S))
+                left.append(await asyncio.wait_for(received.get(), TIMEOUT_S))
                 port.write(b"?")
                 board.setblocking(True)
                 assert board.recv(1) == b"?"

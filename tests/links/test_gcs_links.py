@@ -22,16 +22,16 @@ from tests.support.programs import TIMEOUT_S, free_port, until_async
 FRAME = bytes.fromhex("fe09000101000000000002030000030346f1")
 
 
-class Ears:
+class RecordedEvents:
     """Records a link's events and its default peers."""
 
     def __init__(self) -> None:
-        self.heard: list[tuple[Peer, bytes]] = []
+        self.received: list[tuple[Peer, bytes]] = []
         self.default_peers: dict[Peer, bool] = {}
         self.gone: list[Peer] = []
 
     def gcs_data(self, peer: Peer, data: bytes, *, datagram: bool) -> None:
-        self.heard.append((peer, data))
+        self.received.append((peer, data))
 
     def gcs_gone(self, peer: Peer) -> None:
         self.gone.append(peer)
@@ -50,11 +50,11 @@ class Links:
     """Opens links and sockets that are closed after the test."""
 
     def __init__(self) -> None:
-        self.ears = Ears()
+        self.events = RecordedEvents()
         self._stack = ExitStack()
 
     def open(self, text: str) -> GcsLink:
-        link = open_link(parse_gcs(text), self.ears)
+        link = open_link(parse_gcs(text), self.events)
         self._stack.callback(link.close)
         return link
 
@@ -93,8 +93,8 @@ async def test_udpin_answers_to_the_senders_address(links: Links, host: str) -> 
     clients = [links.udp(host) for _ in range(2)]
     for client in clients:
         client.sendto(FRAME, (host, port))
-    await until_async(lambda: len(links.ears.heard) == 2, "both datagrams")
-    for (peer, data), client in zip(links.ears.heard, clients, strict=True):
+    await until_async(lambda: len(links.events.received) == 2, "both datagrams")
+    for (peer, data), client in zip(links.events.received, clients, strict=True):
         assert data == FRAME
         link.send(peer, str(peer).encode())
         assert await received(client) == str(peer).encode()
@@ -105,13 +105,13 @@ async def test_tcpin_serves_each_client(links: Links, host: str) -> None:
     port = free_port(socket.SOCK_STREAM, host)
     link = links.open(f"tcpin:{f'[{host}]' if ':' in host else host}:{port}")
     client = links.tcp(port, host)
-    await until_async(lambda: links.ears.default_peers, "the client")
-    (peer,) = links.ears.default_peers
+    await until_async(lambda: links.events.default_peers, "the client")
+    (peer,) = links.events.default_peers
     link.send(peer, FRAME)
     assert await received(client) == FRAME
     client.close()
-    await until_async(lambda: links.ears.gone == [peer], "its end")
-    assert links.ears.default_peers == {}
+    await until_async(lambda: links.events.gone == [peer], "its end")
+    assert links.events.default_peers == {}
 
 
 async def test_ipv4_and_ipv6_have_a_port_each(links: Links) -> None:
@@ -143,8 +143,8 @@ async def test_a_host_name_is_used_once_it_resolves(links: Links, monkeypatch: p
     link = links.open("udpout:laptop.local:14550")
     seen: list[list[Peer]] = []
     while not seen or asked <= len(answers):
-        if not seen or seen[-1] != list(links.ears.default_peers):
-            seen.append(list(links.ears.default_peers))
+        if not seen or seen[-1] != list(links.events.default_peers):
+            seen.append(list(links.events.default_peers))
         await asyncio.sleep(0)
     assert [[peer.key for peer in peers] for peers in seen] == [[], [first.getsockname()], [second.getsockname()]]
     link.send(seen[-1][0], FRAME)
@@ -164,7 +164,7 @@ def test_a_name_server_that_is_silent_does_not_delay_the_end(kind: str, monkeypa
 
     async def main() -> None:
         if kind == "gcs":
-            link = open_link(parse_gcs("udpout:laptop.local:14550"), Ears())
+            link = open_link(parse_gcs("udpout:laptop.local:14550"), RecordedEvents())
             await until_async(asked.is_set, "the lookup")
             link.close()
         else:
@@ -185,8 +185,8 @@ async def test_localhost_is_resolved(links: Links) -> None:
     client = links.udp()
     port = client.getsockname()[1]
     link = links.open(f"udpout:localhost:{port}")
-    await until_async(lambda: links.ears.default_peers, "the address")
-    (peer,) = links.ears.default_peers
+    await until_async(lambda: links.events.default_peers, "the address")
+    (peer,) = links.events.default_peers
     assert peer.key == ("127.0.0.1", port)
     link.send(peer, FRAME)
     assert await received(client) == FRAME
@@ -216,10 +216,10 @@ async def test_a_client_above_the_limit_displaces_another(links: Links) -> None:
     port = free_port(socket.SOCK_STREAM)
     links.open(f"tcpin:127.0.0.1:{port}")
     clients = [links.tcp(port) for _ in range(tcp_link._MAX_CLIENTS)]
-    await until_async(lambda: len(links.ears.default_peers) == len(clients), "all clients")
+    await until_async(lambda: len(links.events.default_peers) == len(clients), "all clients")
     links.tcp(port)
-    await until_async(lambda: links.ears.gone, "the end of another")
-    assert len(links.ears.default_peers) == len(clients)
+    await until_async(lambda: links.events.gone, "the end of another")
+    assert len(links.events.default_peers) == len(clients)
     # The first half keeps its places; the oldest of the others is displaced.
     assert await received(clients[len(clients) // 2]) == b""
 
@@ -229,16 +229,16 @@ async def test_a_client_that_does_not_read_is_disconnected(links: Links, monkeyp
     port = free_port(socket.SOCK_STREAM)
     link = links.open(f"tcpin:127.0.0.1:{port}")
     links.tcp(port)
-    await until_async(lambda: links.ears.default_peers, "the client")
-    (peer,) = links.ears.default_peers
+    await until_async(lambda: links.events.default_peers, "the client")
+    (peer,) = links.events.default_peers
 
     def sends_on() -> bool:
         for _ in range(100):
             link.send(peer, FRAME * 10)
-        return bool(links.ears.gone)
+        return bool(links.events.gone)
 
     await until_async(sends_on, "the end")
-    assert links.ears.default_peers == {}
+    assert links.events.default_peers == {}
 
 
 async def test_clients_that_do_not_read_are_disconnected_after_a_round(links: Links) -> None:
@@ -246,13 +246,13 @@ async def test_clients_that_do_not_read_are_disconnected_after_a_round(links: Li
     port = free_port(socket.SOCK_STREAM)
     link = links.open(f"tcpin:127.0.0.1:{port}")
     links.tcp(port)
-    await until_async(lambda: links.ears.default_peers, "the client")
-    (peer,) = links.ears.default_peers
+    await until_async(lambda: links.events.default_peers, "the client")
+    (peer,) = links.events.default_peers
     ack = FrameWriter(1, 1).frame(pack(m.MAVLink_mission_ack_message(255, 190, 1, 0)), 2)
     for _ in range(200000):
         link.send(peer, ack)
-        assert not links.ears.gone
-    await until_async(lambda: links.ears.gone == [peer], "the end")
+        assert not links.events.gone
+    await until_async(lambda: links.events.gone == [peer], "the end")
 
 
 @pytest.mark.parametrize(

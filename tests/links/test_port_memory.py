@@ -25,7 +25,7 @@ def test_finds_in_quick_succession_are_all_kept(tmp_path: Path) -> None:
 @pytest.mark.parametrize("content", ["", "[]", '{"others": {}}', '{"flight_controller": "", "others": []}', "\xff"])
 def test_a_damaged_file_is_reported_and_ignored(tmp_path: Path, content: str) -> None:
     (tmp_path / PORTS_FILE).write_bytes(content.encode("latin-1"))
-    with capture_logs() as told:
+    with capture_logs() as logged:
         memory = PortMemory(tmp_path)
     assert (memory.flight_controller, memory.others) == ("", {})
-    assert [entry["event"] for entry in told] == ["state.lost"]
+    assert [entry["event"] for entry in logged] == ["state.lost"]

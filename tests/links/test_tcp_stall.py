@@ -79,7 +79,7 @@ async def test_a_stalled_client_loses_only_old_telemetry() -> None:
     stalled, stalled_peer = await connected(listener, link, port)
     reading, reading_peer = await connected(listener, link, port)
     writer = FrameWriter(1, 1)
-    heard: list[MavlinkFrame] = []
+    received: list[MavlinkFrame] = []
     count = 20000
     for number in range(count):
         frame = writer.frame(pack(m.MAVLink_attitude_message(number, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)), 2)
@@ -88,9 +88,9 @@ async def test_a_stalled_client_loses_only_old_telemetry() -> None:
         if number % 500 == 0:
             ack = writer.frame(pack(m.MAVLink_mission_request_message(255, 190, number // 500, 0)), 2)
             link.send(stalled_peer, ack)
-            heard += await read_to(reading, number)
-    heard += await read_to(reading, count - 1)
-    assert len(heard) == count
+            received += await read_to(reading, number)
+    received += await read_to(reading, count - 1)
+    assert len(received) == count
     late = await read_to(stalled, count - 1)
     assert [f.payload[0] for f in late if f.msgid == m.MAVLINK_MSG_ID_MISSION_REQUEST] == list(range(count // 500))
     attitudes = [shown for frame in late if (shown := number_of(frame)) is not None]

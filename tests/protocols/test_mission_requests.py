@@ -40,16 +40,16 @@ identities = st.builds(ListIdentity, st.integers(0, 65535), st.integers(0, 2**32
 def received(frame: bytes) -> tuple[int, bytes]:
     """A frame as decoded by the firmware's receiver."""
     receiver = MspReceiver(3 + 15 * RECORD_SIZE)
-    heard = [request for byte in frame if (request := receiver.push(byte)) is not None]
-    assert len(heard) == 1
-    return heard[0]
+    requests = [request for byte in frame if (request := receiver.push(byte)) is not None]
+    assert len(requests) == 1
+    return requests[0]
 
 
 def body_of(frame: bytes, command: MissionCommand) -> bytes:
     assert is_clean(frame)
     assert [type(found) for found in MspParser().feed(frame)] == [MspFrame]
-    heard, payload = received(frame)
-    assert heard == command
+    requests, payload = received(frame)
+    assert requests == command
     body = unmask(payload)
     assert body is not None
     return body

@@ -71,12 +71,12 @@ def test_an_upload_interrupted_by_a_reset_is_settled(
     world.wait_until(moment(world.naze), 5)
     world.naze.reset(world.now)
     began = world.now
-    world.wait_until(lambda _: "The mission did" in said(station), _BOOT_S)
+    world.wait_until(lambda _: "The mission did" in joined_texts(station), _BOOT_S)
     figure(f"reset in mid upload: '{last_word}'", f"after {world.now - began:.1f} s")
     assert ended
     assert world.naze.stored_records == [record.pack() for record in records_of(stored)]
     world.run(_SETTLED_S)
-    assert said(station).endswith(last_word)
+    assert joined_texts(station).endswith(last_word)
 
 
 @pytest.mark.parametrize("tele_prot", [2, 3])
@@ -105,7 +105,7 @@ def test_arming_into_mavlink_on_a_slow_line(image: Image, flash: bytes, figure: 
     figure(f"armed at {_SLOW_BAUD} baud with tele_prot {tele_prot}", f"found in {found_s:.1f} s, MSP in {back_s:.1f} s")
 
 
-def said(station: GroundStation) -> str:
+def joined_texts(station: GroundStation) -> str:
     """All texts joined; each has at most 50 characters."""
     return " ".join(station.texts())
 

@@ -14,7 +14,7 @@ import pytest
 
 from tests.support.benches import Starter
 from tests.support.plan import judge, plain_plan, records_of
-from tests.support.programs import comes, control
+from tests.support.programs import control, happens
 from tests.support.real_bench import Figure
 
 #: Short enough for the daemon's time limit even if a slow computer emulates the board at a tenth of its speed.
@@ -33,7 +33,7 @@ class RealProgram:
         (folder / "flash").write_bytes(flash)
         options = ("--flash", str(folder / "flash"), "--link", str(link), "--control", str(self._control))
         board = start.program("board.log", "sim", "--image", os.environ["NAZE_IMAGE"], *options)
-        assert comes(lambda: "Simulated " in board.printed or not board.is_alive, _TIMEOUT_S)
+        assert happens(lambda: "Simulated " in board.printed or not board.is_alive, _TIMEOUT_S)
         assert board.is_alive, board.printed
         self.daemon = start.daemon(str(link))
         self.wait_ready()
@@ -47,7 +47,7 @@ class RealProgram:
         return found
 
     def wait_ready(self) -> None:
-        assert comes(lambda: (self.daemon.status() or {}).get("state") == "MSP", _TIMEOUT_S), self.daemon.printed
+        assert happens(lambda: (self.daemon.status() or {}).get("state") == "MSP", _TIMEOUT_S), self.daemon.printed
 
 
 @pytest.fixture
@@ -62,11 +62,11 @@ def test_an_upload_interrupted_by_a_power_cut_is_settled(program: RealProgram, f
     program.line(f"power_cut_at_flash_operation {_OPERATION}")
     with ThreadPoolExecutor() as pool:
         pushed = pool.submit(daemon.push, _NEW)
-        assert comes(lambda: program.stats["power"] == "OFF", _TIMEOUT_S)
+        assert happens(lambda: program.stats["power"] == "OFF", _TIMEOUT_S)
         program.line("power on")
         began = time.monotonic()
         assert pushed.exception()
-    assert comes(lambda: daemon.missions()[0]["outcome"] == "FAILED", _TIMEOUT_S), daemon.printed
+    assert happens(lambda: daemon.missions()[0]["outcome"] == "FAILED", _TIMEOUT_S), daemon.printed
     last_word = daemon.missions()[0]["detail"]
     figure(f"the daemon, power cut in mid upload: '{last_word}'", f"after {time.monotonic() - began:.1f} s")
     assert last_word == "The mission did not arrive: old mission kept, write it again"

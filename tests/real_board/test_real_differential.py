@@ -76,9 +76,9 @@ def requests(dice: random.Random, records: list[WpRecord]) -> list[bytes]:
 
 def ask(bench: WireBench, frame: bytes) -> MspFrame | bytes | None:
     """The reply, or its bytes if malformed."""
-    before = len(bench.heard)
+    before = len(bench.received)
     answer = bench.ask(frame, 0.4)
-    return answer or bytes(bench.heard[before:]) or None
+    return answer or bytes(bench.received[before:]) or None
 
 
 def comparable(frame: bytes, answer: MspFrame | bytes | None) -> object:

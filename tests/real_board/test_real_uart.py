@@ -13,10 +13,10 @@ from tests.support.naze_bench import mission
 from tests.support.real_bench import IDENT, Figure, RealBench
 
 
-def has_frsky(heard: bytes) -> bool:
+def has_frsky(received: bytes) -> bool:
     """True if there are consecutive values of the FrSky hub protocol."""
     watch, longest = FrskyParser(), 0
-    for byte in heard:
+    for byte in received:
         watch.feed(bytes((byte,)))
         longest = max(longest, watch.values_in_a_row)
     return longest >= 3
@@ -35,9 +35,9 @@ def test_requests_during_boot_are_answered_in_one_burst(bench: RealBench, figure
     for _ in range(12):
         bench.run(0.5)
         bench.send(IDENT)
-    heard = bench.run(6.0).count(b"$M>")
-    figure("requests during boot answered", f"{heard} of 12")
-    assert heard >= 10
+    received = bench.run(6.0).count(b"$M>")
+    figure("requests during boot answered", f"{received} of 12")
+    assert received >= 10
 
 
 @pytest.mark.parametrize("protocol", TelemetryProtocol)
@@ -50,26 +50,26 @@ def test_arming_by_stick_selects_protocol_and_speed(
     bench.run(3.0)
     expected = {TelemetryProtocol.FRSKY_9600: 9600, TelemetryProtocol.MAVLINK_57600: 57600}.get(protocol, 115200)
     assert bench.naze.baud == expected
-    before = len(bench.heard)
+    before = len(bench.received)
     answers = bench.ask(IDENT) is not None
-    heard = bytes(bench.heard[before:]) + bench.run(1.0)
-    mavlink = [frame.msgid for frame in MavlinkSplitter().feed(heard)]
-    figure(f"armed with tele_prot {protocol.value}", f"{bench.naze.baud} baud, {kind(answers, mavlink, heard)}")
+    received = bytes(bench.received[before:]) + bench.run(1.0)
+    mavlink = [frame.msgid for frame in MavlinkSplitter().feed(received)]
+    figure(f"armed with tele_prot {protocol.value}", f"{bench.naze.baud} baud, {kind(answers, mavlink, received)}")
     # FrSky frames are sent in addition to the previous protocol.
     speaks_mavlink = protocol in (TelemetryProtocol.MAVLINK, TelemetryProtocol.MAVLINK_57600)
     assert answers is not speaks_mavlink
     assert bool(mavlink) is speaks_mavlink
-    assert has_frsky(heard) is (protocol is TelemetryProtocol.FRSKY_9600)
+    assert has_frsky(received) is (protocol is TelemetryProtocol.FRSKY_9600)
     bench.arm(False)
     bench.run(5.0)
     assert bench.naze.baud == 115200
     assert bench.ask(IDENT) is not None
 
 
-def kind(answers: bool, mavlink: list[int], heard: bytes) -> str:
+def kind(answers: bool, mavlink: list[int], received: bytes) -> str:
     if mavlink:
         return f"MAVLink, messages {sorted(set(mavlink))}"
-    return f"{'MSP' * answers}{', FrSky' * has_frsky(heard)}"
+    return f"{'MSP' * answers}{', FrSky' * has_frsky(received)}"
 
 
 def test_the_cli_works_and_saves(bench: RealBench, figure: Figure) -> None:

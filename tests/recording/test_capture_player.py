@@ -41,7 +41,7 @@ class Listener:
     def __init__(self, events: Sequence[UartEvent], tempo: float = 1.0) -> None:
         self.player = CapturePlayer(events, tempo)
         self.player.power_on_booted(1000.0)
-        self.heard: list[tuple[float, bytes]] = []
+        self.received: list[tuple[float, bytes]] = []
         self._now = 0.0
 
     def ask(self, at: float, data: bytes) -> None:
@@ -50,14 +50,14 @@ class Listener:
 
     def listen(self, until: float) -> list[tuple[float, bytes]]:
         """The data received since the last call."""
-        self.heard = []
+        self.received = []
         while (wakeup := self.player.next_wakeup(1000.0 + self._now) - 1000.0) <= until:
             self._now = max(wakeup, self._now + 1e-6)
             data = self.player.advance(1000.0 + self._now)
             if data:
-                self.heard.append((round(self._now, 3), data))
+                self.received.append((round(self._now, 3), data))
         self._now = until
-        return self.heard
+        return self.received
 
 
 def test_a_reply_comes_on_request_with_its_delay_and_in_the_same_pieces() -> None:
@@ -172,7 +172,7 @@ def test_recorded_data_is_replayed_byte_for_byte(data: st.DataObject) -> None:
     frames = st.sampled_from([reply(Msp.STATUS, 1), reply(Msp.IDENT), reply(Msp.STATUS, 2), b"$M>", b"$", b"\xfe\x09"])
     actions = st.one_of(
         st.sampled_from([STATUS, IDENT, STATUS + IDENT]).map(lambda asked: (UartAction.WRITE, asked)),
-        st.one_of(frames, st.binary(min_size=1, max_size=12)).map(lambda heard: (UartAction.READ, heard)),
+        st.one_of(frames, st.binary(min_size=1, max_size=12)).map(lambda received: (UartAction.READ, received)),
     )
     drawn = data.draw(st.lists(st.tuples(st.integers(1, 200), actions), max_size=30))
     events, at = [opened(0.0)], 0.0
@@ -181,13 +181,13 @@ def test_recorded_data_is_replayed_byte_for_byte(data: st.DataObject) -> None:
         events.append(UartEvent(at, 115200, action, content))
     events.append(closed(at + 1.0))
     listener = Listener(events)
-    heard = b""
+    received = b""
     for event in events:
         if event.action is UartAction.WRITE:
             listener.ask(event.at, event.data)
-            heard += b"".join(piece for _, piece in listener.heard)
-    heard += b"".join(piece for _, piece in listener.listen(at + 10))
-    assert heard == b"".join(event.data for event in events if event.action is UartAction.READ)
+            received += b"".join(piece for _, piece in listener.received)
+    received += b"".join(piece for _, piece in listener.listen(at + 10))
+    assert received == b"".join(event.data for event in events if event.action is UartAction.READ)
 
 
 @pytest.mark.parametrize("rest", [[], [closed(2.002)], [closed(2.002), opened(2.5), wrote(2.6, IDENT)]])

@@ -46,7 +46,7 @@ def kept(*items: MissionItem, rules: NavRules = INAV) -> tuple[NavRecord, ...]:
     return verdict.records
 
 
-def said(*items: MissionItem, rules: NavRules = INAV) -> list[tuple[Any, ...]]:
+def findings_for(*items: MissionItem, rules: NavRules = INAV) -> list[tuple[Any, ...]]:
     return [(f.seq, f.field, f.was, f.becomes) for f in verdict_on(*items, rules=rules).findings]
 
 
@@ -104,7 +104,7 @@ def test_supported_items_are_stored_and_read_back_unchanged(sent: MissionItem, r
 )  # fmt: skip
 def test_unsupported_values_are_reported(sent: MissionItem, record: NavAction, findings: list[tuple[Any, ...]]) -> None:
     assert kept(WP, sent, WP)[1].action == record
-    assert [told[1:] for told in said(WP, sent, WP)] == findings
+    assert [finding[1:] for finding in findings_for(WP, sent, WP)] == findings
 
 
 @pytest.mark.parametrize(
@@ -124,13 +124,13 @@ def test_unsupported_values_are_reported(sent: MissionItem, record: NavAction, f
 )
 def test_unsupported_commands_are_dropped(sent: MissionItem) -> None:
     assert kept(WP, sent, WP) == kept(WP, WP)
-    assert [(told[0], told[3]) for told in said(WP, sent, WP)] == [(2, DROPPED)]
+    assert [(finding[0], finding[3]) for finding in findings_for(WP, sent, WP)] == [(2, DROPPED)]
 
 
 def test_a_landing_without_a_position_after_rtl_is_merged_into_it() -> None:
     rtl, land = item(C.NAV_RETURN_TO_LAUNCH, at=False), item(C.NAV_LAND, at=False)
     assert kept(WP, rtl, land)[1:] == (NavRecord(A.RTH, p1=1, flag=LAST),)
-    assert said(WP, rtl, land) == [(3, "command", 21, DROPPED)]
+    assert findings_for(WP, rtl, land) == [(3, "command", 21, DROPPED)]
 
 
 def test_speeds_are_stored_in_the_legs_and_shown_as_items() -> None:
@@ -149,13 +149,13 @@ def test_a_speed_can_return_to_the_default() -> None:
 
 
 def test_lost_parts_of_a_speed_are_reported() -> None:
-    assert said(speed(0.1, 0, 50), WP) == [
+    assert findings_for(speed(0.1, 0, 50), WP) == [
         (1, "p3", 50, 0),
         (1, "p1", 0, 1),
         (1, "p2", 0.1, 0.5),
     ]
-    assert said(WP, speed(5), item(C.NAV_RETURN_TO_LAUNCH, at=False)) == [(2, "command", 178, DROPPED)]
-    assert said(speed(1e30), WP) == [(1, "p2", 1e30, 327.67)]
+    assert findings_for(WP, speed(5), item(C.NAV_RETURN_TO_LAUNCH, at=False)) == [(2, "command", 178, DROPPED)]
+    assert findings_for(speed(1e30), WP) == [(1, "p2", 1e30, 327.67)]
 
 
 def test_a_jump_target_is_renumbered_for_the_flight_controller() -> None:
@@ -171,8 +171,8 @@ def test_a_warning_for_legs_at_which_a_multiwii_stops() -> None:
     second, third = (replace(WP, lat_e7=LAT + 36_000 * place) for place in (1, 2))
     yaw = item(C.CONDITION_YAW, at=False, p1=90.0)
     legs = (WP, second, yaw, third, jump(1), third)
-    assert said(*legs, rules=MULTIWII) == [(5, "lat_e7", 0, 0)]
-    assert said(*legs) == []
+    assert findings_for(*legs, rules=MULTIWII) == [(5, "lat_e7", 0, 0)]
+    assert findings_for(*legs) == []
 
 
 def test_a_warning_for_legs_that_a_multiwii_ends_at_a_region_of_interest() -> None:
@@ -201,7 +201,7 @@ def test_a_jump_to_a_merged_or_dropped_item_goes_to_the_next() -> None:
     assert kept(WP, speed(5), WP, WP, jump(2, -1))[3] == NavRecord(A.JUMP, p1=2, p2=-1, flag=LAST)
     takeoff = item(C.NAV_TAKEOFF, at=False, alt_m=5.0)
     assert kept(takeoff, WP, WP, jump(1))[2].p1 == 1
-    assert said(takeoff, WP, WP, jump(1))[-1] == (4, "p1", 1, 2)
+    assert findings_for(takeoff, WP, WP, jump(1))[-1] == (4, "p1", 1, 2)
 
 
 def test_a_jump_may_go_forward_on_inav_and_only_back_on_multiwii() -> None:
@@ -293,8 +293,8 @@ def test_multiwii_has_an_endless_hold_an_rtl_height_and_no_speeds() -> None:
     assert verdict.findings == ()
     assert [(r.action, r.alt_cm) for r in verdict.records] == [(1, 5000), (2, 5000), (4, 3000)]
     assert list(verdict.items[1:]) == [replace(it, seq=n) for n, it in enumerate(sent, 1)]
-    assert said(speed(5), WP, rules=MULTIWII) == [(1, "command", 178, DROPPED)]
-    assert said(replace(WP, frame=0), rules=MULTIWII) == [(1, "frame", 0, 3)]
+    assert findings_for(speed(5), WP, rules=MULTIWII) == [(1, "command", 178, DROPPED)]
+    assert findings_for(replace(WP, frame=0), rules=MULTIWII) == [(1, "frame", 0, 3)]
 
 
 # -- flown differently than it reads ---------------------------------------------------------------------------
@@ -305,10 +305,10 @@ RTL, RTL_LANDS = (item(C.NAV_RETURN_TO_LAUNCH, at=False, p1=p1) for p1 in (0.0, 
 @pytest.mark.parametrize("rules", [INAV, MULTIWII])
 def test_items_after_an_rtl_are_dropped(rules: NavRules) -> None:
     assert [r.action for r in kept(WP, WP, RTL_LANDS, WP, WP, rules=rules)] == [1, 1, 4]
-    assert said(WP, RTL, WP, WP, rules=rules) == [(3, "command", 16, DROPPED), (4, "command", 16, DROPPED)]
+    assert findings_for(WP, RTL, WP, WP, rules=rules) == [(3, "command", 16, DROPPED), (4, "command", 16, DROPPED)]
     # Unless a jump leads there.
     over = (WP, WP, WP, jump(1), WP) if rules is MULTIWII else (WP, jump(4), RTL, WP, WP)
-    assert said(*over, rules=rules) == []
+    assert findings_for(*over, rules=rules) == []
 
 
 def test_an_rtl_whose_ending_the_last_item_would_change_is_rejected_on_inav() -> None:
@@ -357,7 +357,7 @@ def test_multiwii_holds_at_most_65_s(seconds: float, held: int) -> None:
 def test_an_unused_height_may_have_any_value() -> None:
     for unused in (item(C.NAV_ROI, alt_m=math.nan), replace(RTL, alt_m=math.nan)):
         assert len(kept(WP, unused, *((WP,) if unused.command == C.NAV_ROI else ()))) >= 2
-        assert said(WP, WP, unused) == []
+        assert findings_for(WP, WP, unused) == []
     assert kept(WP, replace(RTL, alt_m=math.nan), rules=MULTIWII)[1].alt_cm == 0
 
 
@@ -382,8 +382,8 @@ def test_legs_after_a_jump_keep_their_own_speeds_which_is_reported() -> None:
     assert shown == [(178, 1, -2), (16, 0, 0), (16, 0, 0), (178, 1, 5), (16, 0, 0), (16, 0, 0), (177, 1, 2)]
     again = check_list(verdict.items, INAV)
     assert (again.records, again.findings) == (verdict.records, ())
-    assert said(WP, speed(5), WP, WP, WP, jump(2)) == []
-    assert said(speed(5), WP, WP, WP, jump(2)) == []
+    assert findings_for(WP, speed(5), WP, WP, WP, jump(2)) == []
+    assert findings_for(speed(5), WP, WP, WP, jump(2)) == []
 
 
 def test_any_record_of_another_planner_is_shown() -> None:
@@ -477,8 +477,8 @@ def through_the_wire(shown: MissionItem) -> MissionItem:
     packed = messages.MAVLink_mission_item_message(
         1, 1, shown.seq, shown.frame, shown.command, 0, 1, *params, 0, 0, shown.alt_m
     ).pack(link)
-    heard = item_from_float_message(link.parse_char(packed))
-    return replace(heard, lat_e7=shown.lat_e7, lon_e7=shown.lon_e7)
+    decoded = item_from_float_message(link.parse_char(packed))
+    return replace(decoded, lat_e7=shown.lat_e7, lon_e7=shown.lon_e7)
 
 
 @given(st.lists(flyable, min_size=1, max_size=10))

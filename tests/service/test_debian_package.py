@@ -157,8 +157,8 @@ def test_it_is_installed_used_upgraded_removed_and_purged(root: BareRoot) -> Non
     root.run("ls /usr/lib/naze-bridge", status=2)
 
     root.run("mkdir /var/lib/private; mv /var/lib/naze-bridge /var/lib/private/")
-    said = root.run("dpkg --purge naze-bridge")
-    assert "missions and logs stay in /var/lib/private/naze-bridge" in said
+    output = root.run("dpkg --purge naze-bridge")
+    assert "missions and logs stay in /var/lib/private/naze-bridge" in output
     assert "missions.db" in root.run("ls /var/lib/private/naze-bridge")
     left = root.run("find /etc /usr /var /opt -xdev -name '*naze-bridge*' -not -path '/var/lib/private/*'")
     assert left == ""

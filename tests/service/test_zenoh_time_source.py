@@ -15,7 +15,7 @@ from service.zenoh_link.time_source import SampleClock
 NOW = 1000.0
 
 
-def heard(fix: Fix, wrong_by_s: float, age_s: float = 1.0) -> Vehicle:
+def vehicle_with(fix: Fix, wrong_by_s: float, age_s: float = 1.0) -> Vehicle:
     """A vehicle whose GPS time differed from the Pi's by `wrong_by_s`, received `age_s` ago."""
     vehicle = Vehicle()
     vehicle.hear(GpsFix(NOW - age_s, Source.MAVLINK, fix, 9))
@@ -26,7 +26,7 @@ def heard(fix: Fix, wrong_by_s: float, age_s: float = 1.0) -> Vehicle:
 @pytest.mark.parametrize("wrong_by_s", [0.0, 0.2, 7200.0, -30.0])
 def test_a_3d_fix_corrects_a_wrong_clock(tmp_path: Path, wrong_by_s: float) -> None:
     clock = SampleClock(lambda: NOW, tmp_path / "synchronized")
-    assert clock.source(heard(Fix.THREE_D, wrong_by_s)) == "gps"
+    assert clock.source(vehicle_with(Fix.THREE_D, wrong_by_s)) == "gps"
     corrected_by_s = clock.unix_s() - time.time()
     if abs(wrong_by_s) < 0.5:
         assert corrected_by_s <= 0.001  # the Pi's clock
@@ -41,7 +41,7 @@ def test_a_3d_fix_corrects_a_wrong_clock(tmp_path: Path, wrong_by_s: float) -> N
 @pytest.mark.parametrize(("fix", "age_s"), [(Fix.TWO_D, 1.0), (Fix.NO_FIX, 1.0), (Fix.THREE_D, 9.0)])
 def test_without_a_recent_fix_there_is_no_gps_time(tmp_path: Path, fix: Fix, age_s: float) -> None:
     clock = SampleClock(lambda: NOW, tmp_path / "synchronized")
-    assert clock.source(heard(fix, 7200.0, age_s)) == "pi"
+    assert clock.source(vehicle_with(fix, 7200.0, age_s)) == "pi"
     assert clock.unix_s() <= time.time() + 0.001
 
 
@@ -50,8 +50,8 @@ def test_a_mavlink_autopilots_time_is_used_once_it_has_one(unix_s: float, known:
     """Until it has the time, ArduPilot counts from its start."""
     vehicle, codec = Vehicle(), m.MAVLink(None, srcSystem=1, srcComponent=1)
     telemetry = MavlinkTelemetry(vehicle, is_harakiri=False)
-    said = m.MAVLink_heartbeat_message(2, 3, 0, 0, 4, 3), m.MAVLink_system_time_message(round(unix_s * 1e6), 9)
-    telemetry.take(MavlinkSplitter().feed(b"".join(bytes(each.pack(codec)) for each in said)), NOW)
+    sent = m.MAVLink_heartbeat_message(2, 3, 0, 0, 4, 3), m.MAVLink_system_time_message(round(unix_s * 1e6), 9)
+    telemetry.take(MavlinkSplitter().feed(b"".join(bytes(each.pack(codec)) for each in sent)), NOW)
     telemetry.settle()
     heard_time = vehicle.last(GpsTime)
     assert (None if heard_time is None else heard_time.unix_s) == known

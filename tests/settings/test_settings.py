@@ -94,7 +94,7 @@ takeof_max_m = 15
 vehicle = "a/b"
 encodings = "json"
 """
-    told = problems(folder, text, late="tlog_days = 'all'")
+    lines = problems(folder, text, late="tlog_days = 'all'")
     wanted = [
         "naze.toml:8: 'takeof_max_m' is not a setting; did you mean 'takeoff_max_m'?",
         "naze.toml:11: 'zenoh.encodings' is not a setting; did you mean 'zenoh.encoding'?",
@@ -103,7 +103,7 @@ encodings = "json"
         "conf.d/late.toml:1: tlog_days is 'all', but must be a whole number, 1..3650 (How long",
         "naze.toml:10: zenoh.vehicle is 'a/b', with '/' in it: make a name of letters, digits and dashes",
     ]
-    assert [line[: len(words)] for line, words in zip(told, wanted, strict=True)] == wanted
+    assert [line[: len(words)] for line, words in zip(lines, wanted, strict=True)] == wanted
 
 
 def test_a_value_in_place_of_a_table_is_an_error(folder: Path) -> None:
@@ -217,10 +217,10 @@ def test_unlistable_drop_ins_are_an_error(folder: Path) -> None:
 
 
 def test_a_file_of_unknown_settings_gives_21_errors_at_most(folder: Path) -> None:
-    told = problems(folder, "\n".join(f"option{number} = 1" for number in range(5000)))
-    assert len(told) == 21
-    assert told[19].startswith("naze.toml:20: 'option19' is not a setting")
-    assert told[20] == "naze.toml: 4980 more are not settings: is this naze-bridge's file?"
+    lines = problems(folder, "\n".join(f"option{number} = 1" for number in range(5000)))
+    assert len(lines) == 21
+    assert lines[19].startswith("naze.toml:20: 'option19' is not a setting")
+    assert lines[20] == "naze.toml: 4980 more are not settings: is this naze-bridge's file?"
 
 
 def test_check_config_reports_success_or_errors(folder: Path) -> None:

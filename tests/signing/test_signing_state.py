@@ -70,15 +70,15 @@ async def until_written(pi: Pi, least: int) -> None:
 async def test_timestamps_continue_after_a_restart_without_a_clock(tmp_path: Path) -> None:
     pi = Pi(tmp_path)
     state = pi.boot()
-    heard = frame(ticks(NOON) + 5)
-    assert signing(state).check(heard) is Check.VALID
+    received = frame(ticks(NOON) + 5)
+    assert signing(state).check(received) is Check.VALID
     last = our_timestamp(state)
     state.close()
     assert pi.stored()["timestamp"] == last
     pi.unix_s = 0.0
     state = pi.boot()
     assert our_timestamp(state) == last + 1
-    assert signing(state).check(heard) is Check.REPLAYED
+    assert signing(state).check(received) is Check.REPLAYED
     assert signing(state).check(frame(last + 1)) is Check.VALID
     state.close()
 
@@ -179,21 +179,21 @@ async def test_without_a_key_there_is_no_file(tmp_path: Path) -> None:
 async def test_a_damaged_file_is_reported_and_replaced(tmp_path: Path, content: str) -> None:
     pi = Pi(tmp_path)
     pi.path.write_bytes(content.encode("latin-1"))
-    with capture_logs() as told:
+    with capture_logs() as logged:
         state = pi.boot()
         assert signing(state).check(frame(ticks(NOON))) is Check.VALID
         state.close()
     assert pi.stored()["timestamp"] == ticks(NOON)
-    assert [entry["event"] for entry in told] == ["state.lost"]
+    assert [entry["event"] for entry in logged] == ["state.lost"]
 
 
 async def test_an_unwritable_disk_does_not_stop_signing(tmp_path: Path) -> None:
     pi = Pi(tmp_path / "missing")
-    with capture_logs() as told:
+    with capture_logs() as logged:
         state = pi.boot()
         assert signing(state).check(frame(ticks(NOON))) is Check.VALID
         state.close()
-    assert "state.not_stored" in [entry["event"] for entry in told]
+    assert "state.not_stored" in [entry["event"] for entry in logged]
 
 
 async def test_the_file_is_private_and_holds_no_key(tmp_path: Path) -> None:

@@ -89,7 +89,7 @@ def test_with_an_empty_list_no_address_may_write(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("entry", "said"),
+    ("entry", "reason"),
     [
         ("7", "neither text nor a table"),
         ("{}", "neither text nor a table"),
@@ -105,8 +105,8 @@ def test_with_an_empty_list_no_address_may_write(tmp_path: Path) -> None:
         (f'{{address = "{LINK}", writers = ["laptop"]}}', "write 192.168.4.0/24"),
     ],
 )
-def test_an_invalid_table_is_one_sentence(tmp_path: Path, entry: str, said: str) -> None:
-    assert said in complaint(tmp_path, entry)
+def test_an_invalid_table_is_one_sentence(tmp_path: Path, entry: str, reason: str) -> None:
+    assert reason in complaint(tmp_path, entry)
 
 
 @pytest.mark.parametrize("mode", [0o604, 0o602, 0o644, 0o777])

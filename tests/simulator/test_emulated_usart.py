@@ -35,8 +35,8 @@ def test_bytes_are_sent_one_by_one() -> None:
         steps.wait(SR, TXE).store(DR, byte)
     rig = Rig(steps.wait(SR, TC).load(SR)).run(3.5 * BYTE_S)
     assert rig.board.baud == 9600
-    assert rig.heard == b"hel"
-    assert rig.run(3 * BYTE_S).heard == b"hello"
+    assert rig.received == b"hel"
+    assert rig.run(3 * BYTE_S).received == b"hello"
     assert rig.log(1) == [TC | TXE]
 
 
@@ -64,7 +64,7 @@ def test_dma_sends_from_memory_and_interrupts_at_the_end() -> None:
     steps = open_port().store(CR3, 1 << 7).store(0xE000_E100, 1 << 14).store(BUFFER, int.from_bytes(b"ping", "little"))
     steps.store(cpar, DR).store(cmar, BUFFER).store(cndtr, 4).store(ccr, 1 << 7 | 1 << 4 | 1 << 1 | 1)
     rig = Rig(steps, handler=Steps().load(DMA_FLAGS).store(DMA_CLEAR, 1 << 12).store(ccr, 0)).run(6 * BYTE_S)
-    assert rig.heard == b"ping"
+    assert rig.received == b"ping"
     (flags,) = rig.handler_log()
     assert flags & 0xF << 12 == (1 << 2 | 1 << 1 | 1) << 12
 

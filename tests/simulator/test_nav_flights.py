@@ -90,7 +90,7 @@ class Flight:
         self.bench.run(0.5)
         return before == self._height()
 
-    def told(self) -> str:
+    def summary(self) -> str:
         """The table's text: only unusual facts are given."""
         if self.end == "never ends":
             return self.end
@@ -119,7 +119,7 @@ def test_each_row_is_flown_as_documented(row: Row, kind: str) -> None:
         assert verdict.result is Result.REJECTED
         return
     assert verdict.result is Result.ACCEPTED, verdict.findings
-    flown = Flight(kind, verdict.records).told()
+    flown = Flight(kind, verdict.records).summary()
     assert flown == expected
 
 

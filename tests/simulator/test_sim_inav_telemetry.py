@@ -53,7 +53,7 @@ def test_unknown_requests_are_errors(command: int) -> None:
 def test_the_mode_names_need_a_jumbo_frame(version: str) -> None:
     bench = MspBench("inav", MspOptions(version=version))
     names = bench.payload(116).split(b";")
-    assert bytes(bench.heard[3:5]) == b"\xff\x74"
+    assert bytes(bench.received[3:5]) == b"\xff\x74"
     assert len(names) == len(bench.payload(119)) + 1
 
 

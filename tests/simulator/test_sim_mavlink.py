@@ -77,11 +77,11 @@ def test_the_stream_has_the_firmwares_rates() -> None:
         bench.send(ground_station_heartbeat())
         bench.run(1.0)
     assert bench.naze.protocol is Protocol.MAVLINK
-    bench.heard.clear()
+    bench.received.clear()
     for _ in range(30):
         bench.send(ground_station_heartbeat())
         bench.run(1.0)
-    rates = {name: count / 30 for name, count in Counter(m.get_type() for m in decode(bytes(bench.heard))).items()}
+    rates = {name: count / 30 for name, count in Counter(m.get_type() for m in decode(bytes(bench.received))).items()}
     expected = {
         "HEARTBEAT": 0.99, "SYS_STATUS": 1.87, "GPS_RAW_INT": 2.1, "RC_CHANNELS_RAW": 2.2, "VFR_HUD": 8.6,
         "ATTITUDE": 28.5, "SCALED_PRESSURE": 0.5,
@@ -128,9 +128,9 @@ def test_arming_selects_protocol_and_speed(tele_prot: TelemetryProtocol, baud: i
     bench = Bench(SimOptions(tele_prot=tele_prot))
     assert bench.ask(IDENT) is not None
     bench.naze.faults.armed = True
-    heard = bench.run(10)
+    received = bench.run(10)
     assert (bench.naze.armed, bench.naze.baud, bench.naze.protocol) == (True, baud, protocol)
-    assert (len(decode(heard)) > 300) is (protocol is Protocol.MAVLINK)
+    assert (len(decode(received)) > 300) is (protocol is Protocol.MAVLINK)
     assert (bench.ask(IDENT, timeout=0.3) is not None) is (protocol is Protocol.MSP)
     bench.naze.faults.armed = False
     bench.run(0.5)
@@ -144,11 +144,11 @@ def test_frsky_is_sent_at_9600_eight_times_a_second() -> None:
     bench = Bench(SimOptions(tele_prot=TelemetryProtocol.FRSKY_9600))
     assert bench.ask(IDENT) is not None
     bench.naze.faults.armed = True
-    heard = bench.run(4.0)
+    received = bench.run(4.0)
     assert bench.naze.baud == 9600
-    assert heard[:2] == b"\x5e\x24"
+    assert received[:2] == b"\x5e\x24"
     # A frame ends with a single mark byte, and the next begins with one.
-    assert heard.count(b"\x5e\x5e\x24") in (30, 31, 32)
+    assert received.count(b"\x5e\x5e\x24") in (30, 31, 32)
 
 
 def test_arming_is_refused_while_a_configuration_write_is_scheduled() -> None:

@@ -141,9 +141,9 @@ def test_a_reply_arrives_at_line_rate() -> None:
     bench.send(IDENT)
     up, loop, down = 6 * 10 / 9600, 0.003, 13 * 10 / 9600
     bench.run(up + down - 10 / 9600)
-    assert len(bench.heard) < 13
+    assert len(bench.received) < 13
     bench.run(loop + 10 / 9600 + 0.005)
-    assert len(bench.heard) == 13
+    assert len(bench.received) == 13
 
 
 def test_the_main_loop_answers_at_most_every_looptime() -> None:
@@ -180,14 +180,14 @@ def test_too_many_requests_at_once_corrupt_the_replies() -> None:
     bench.run(0.5)
     assert bench.naze.counters.tx_overflows > 0
     assert bench.naze.counters.max_outstanding_reply_bytes > 255
-    assert bench.heard.count(b"ANGLE;HORIZON;BARO;") < 4
+    assert bench.received.count(b"ANGLE;HORIZON;BARO;") < 4
 
 
 def test_without_power_nothing_is_received_or_answered() -> None:
     bench = Bench()
     bench.naze.power_off(bench.now)
     assert bench.ask(IDENT, timeout=5.0) is None
-    assert bench.heard == b""
+    assert bench.received == b""
     assert bench.naze.power is Power.OFF
 
 
@@ -198,9 +198,9 @@ def test_requests_during_boot_are_answered_in_a_burst_afterwards() -> None:
     for _ in range(14):
         bench.send(IDENT)
         bench.run(0.5)
-    assert bench.heard.count(b"$M>") == 0
+    assert bench.received.count(b"$M>") == 0
     bench.run(0.15)
-    assert bench.heard.count(b"$M>") == 13
+    assert bench.received.count(b"$M>") == 13
 
 
 def test_input_beyond_the_ring_is_lost_during_boot() -> None:
@@ -210,7 +210,7 @@ def test_input_beyond_the_ring_is_lost_during_boot() -> None:
     bench.run(1.0)
     bench.send(IDENT * 44)
     bench.run(BOOT_SECONDS)
-    assert bench.heard.count(b"$M>") == 0
+    assert bench.received.count(b"$M>") == 0
     assert bench.ask(IDENT) is not None
 
 
@@ -234,7 +234,7 @@ def test_lost_bytes_and_flipped_bits_follow_the_seed() -> None:
         for _ in range(20):
             bench.send(IDENT)
             bench.run(0.05)
-        return bytes(bench.heard)
+        return bytes(bench.received)
 
     clean = talk(1, Faults())
     for faults in (Faults(bit_error_rate=0.01), Faults(lost_byte_rate=0.03)):
@@ -263,7 +263,7 @@ def test_late_reading_changes_nothing(schedule: list[tuple[bytes, float]]) -> No
         late.now = punctual.now
     for bench in (punctual, late):
         bench.run(0.5)
-    assert punctual.heard == late.heard
+    assert punctual.received == late.received
 
 
 @given(st.binary(max_size=400))

@@ -132,8 +132,8 @@ def test_in_a_mission_writes_get_no_reply_and_reads_are_empty() -> None:
     bench = flying()
     assert status(bench)[:2] == (3, 5)
     assert bench.ask(SET_WP, waypoint(9).pack(1)) is None
-    told = bench.read(2)
-    assert (told.action, told.flag) == (0, IN_PROGRESS)
+    record = bench.read(2)
+    assert (record.action, record.flag) == (0, IN_PROGRESS)
     bench.faults.armed = False
     bench.run(1)
     assert bench.read(1) == waypoint(10)

@@ -56,15 +56,15 @@ class Client:
         """The reply; None after the timeout, ConnectionError if disconnected."""
         self.socket.sendall(request(command, payload))
         self.socket.settimeout(timeout)
-        heard = b""
-        while not (frames := take_apart(heard)):
+        received = b""
+        while not (frames := take_apart(received)):
             try:
                 data = self.socket.recv(4096)
             except TimeoutError:
                 return None
             if not data:
                 raise ConnectionError
-            heard += data
+            received += data
         return frames[0]
 
     def payload(self, command: int, payload: bytes = b"") -> bytes:

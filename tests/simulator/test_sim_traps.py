@@ -30,10 +30,10 @@ def test_three_returns_spread_over_frames_enter_the_cli() -> None:
     assert ENDS_IN_CR[-1] == 0x0D
     assert bench.ask(ENDS_IN_CR) is not None
     bench.send(b"\r\r")
-    heard = bench.run(0.1)
+    received = bench.run(0.1)
     assert bench.naze.counters.cli_entered
     assert bench.naze.power is Power.CLI
-    assert b"# " in heard
+    assert b"# " in received
     assert not speaks_msp(bench)
     bench.run(10)
     assert not speaks_msp(bench)
@@ -113,9 +113,9 @@ def test_a_reset_is_silent_for_two_seconds_and_loses_the_ram() -> None:
     assert bench.naze.protocol is Protocol.AUTOSENSE
     bench.send(b"RRR")
     bench.run(0.05)
-    bench.heard.clear()
+    bench.received.clear()
     assert bench.ask(IDENT, timeout=BOOT_SECONDS - 0.1) is None
-    assert bench.heard == b""
+    assert bench.received == b""
     bench.run(0.1)
     info = decode_info(bench.payload(INFO_REQUEST))
     assert info is not None

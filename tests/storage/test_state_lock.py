@@ -41,7 +41,7 @@ def start(directory: Path) -> subprocess.Popen[str]:
     )
 
 
-def said_by(daemon: subprocess.Popen[str]) -> str:
+def first_line(daemon: subprocess.Popen[str]) -> str:
     assert daemon.stdout is not None
     return daemon.stdout.readline().strip()
 
@@ -49,27 +49,27 @@ def said_by(daemon: subprocess.Popen[str]) -> str:
 def test_the_second_daemon_is_told_the_first_ones_process_id(tmp_path: Path) -> None:
     directory = tmp_path / "state"
     with start(directory) as first:
-        assert said_by(first) == "1"
+        assert first_line(first) == "1"
         with start(directory) as second:
-            assert said_by(second) == (
+            assert first_line(second) == (
                 f"the state directory {directory} is in use by process {first.pid}; "
                 f"stop it, or use another directory with --state-dir"
             )
         assert first.poll() is None
         first.kill()
     with start(directory) as third:  # a dead process's lock does not count
-        assert said_by(third) == "2"
+        assert first_line(third) == "2"
     with state_lock(directory), open_store(directory / "missions.db", now=0.0).store as store:
         assert [summary.number for summary in store.list(9)] == [2, 1]
 
 
 def test_of_many_processes_started_at_once_one_gets_the_lock(tmp_path: Path) -> None:
     daemons = [start(tmp_path) for _ in range(5)]
-    said = [said_by(daemon) for daemon in daemons]
+    lines = [first_line(daemon) for daemon in daemons]
     for daemon in daemons:
         daemon.communicate()
-    assert sum(line == "1" for line in said) == 1
-    assert sum("is in use by" in line for line in said) == 4
+    assert sum(line == "1" for line in lines) == 1
+    assert sum("is in use by" in line for line in lines) == 4
 
 
 def test_the_lock_can_be_released_and_taken_again(tmp_path: Path) -> None:

@@ -47,12 +47,12 @@ def test_kill_9_loses_nothing_that_was_acknowledged(tmp_path: Path, capsys: pyte
         )
         assert writer.stdout is not None
         with writer, writer.stdout:
-            said = [writer.stdout.readline() for _ in range(chance.randrange(1, 120))]
+            lines = [writer.stdout.readline() for _ in range(chance.randrange(1, 120))]
             time.sleep(chance.random() * 0.005)  # anywhere within the next write
             writer.kill()
-            said += writer.stdout.readlines()
+            lines += writer.stdout.readlines()
         # An incomplete last line does not count.
-        acknowledged.update((int(number), outcome) for number, outcome in map(str.split, filter(_whole, said)))
+        acknowledged.update((int(number), outcome) for number, outcome in map(str.split, filter(_whole, lines)))
 
         opened = open_store(path, now=0.0)
         with opened.store as store:

@@ -105,11 +105,11 @@ def test_a_directory_without_write_permission_is_reported(with_store: bool) -> N
                 store.add(mission(1))
             (directory / "missions.db").chmod(0o444)
         directory.chmod(0o555)
-        said = run(AS_NOBODY, "store", cwd=directory).stdout
+        output = run(AS_NOBODY, "store", cwd=directory).stdout
         lock_said = run(AS_NOBODY, "lock", cwd=directory).stdout
         directory.chmod(0o755)
-    assert said.startswith("cannot open the mission store missions.db: it ")
-    assert "check" in said
+    assert output.startswith("cannot open the mission store missions.db: it ")
+    assert "check" in output
     assert lock_said.startswith("cannot use the state directory .: Permission denied")
 
 

@@ -33,14 +33,14 @@ class Stranger:
         self._socket.connect(address)
         self._codec: Any = m.MAVLink(None, srcSystem=sysid, srcComponent=compid)
 
-    def send(self, *spoken: Message) -> None:
-        for message in spoken:
+    def send(self, *messages: Message) -> None:
+        for message in messages:
             try:
                 self._socket.send(bytes(message.pack(self._codec)))
             except ConnectionRefusedError:
                 continue
 
-    def heard(self) -> list[Any]:
+    def received(self) -> list[Any]:
         found: list[Any] = []
         self._socket.setblocking(False)
         while True:
@@ -56,9 +56,9 @@ class Stranger:
 class Attack(threading.Thread):
     """A context in which an action is repeated `per_s` times a second."""
 
-    def __init__(self, deed: Callable[[], None], per_s: float) -> None:
+    def __init__(self, action: Callable[[], None], per_s: float) -> None:
         super().__init__(daemon=True)
-        self._deed = deed
+        self._action = action
         self._pause_s = 1 / per_s
         self._over = threading.Event()
         self.count = 0
@@ -76,7 +76,7 @@ class Attack(threading.Thread):
     def run(self) -> None:
         due = time.monotonic()
         while not self._over.is_set():
-            self._deed()
+            self._action()
             self.count += 1
             due = max(due + self._pause_s, time.monotonic() - 0.1)
             self._over.wait(max(0.0, due - time.monotonic()))
@@ -115,7 +115,7 @@ class Watch:
 def assert_uploads(pilot: PlainStation, board: Board, plan: Sequence[PlanRow]) -> None:
     """The pilot's list is accepted and stored on the board."""
     result = pilot.upload(plan)
-    texts = [message.text for message in pilot.heard if message.get_type() == "STATUSTEXT"]
+    texts = [message.text for message in pilot.received if message.get_type() == "STATUSTEXT"]
     assert result is MissionResult.ACCEPTED, (result.name, texts)
     assert board.records() == records_of(judge(plan))
 

@@ -26,7 +26,7 @@ class Bench:
     def mission_planner(self, address: tuple[str, int] | None = None, **habits: Any) -> MissionPlanner:
         """A connected Mission Planner; `habits` are the arguments of MissionPlanner."""
         planner = self.stack.enter_context(MissionPlanner(address or self.daemon.address, **habits))
-        planner.be_connected()
+        planner.skip_connecting()
         return planner
 
     def lossy_link(self, **faults: float) -> LossyUdp:

@@ -118,6 +118,6 @@ class CCore:
         return bytes(buffer[: self._c.sim_list(self._board, buffer) * RECORD_SIZE])
 
     @property
-    def sound(self) -> bool:
+    def is_intact(self) -> bool:
         """True if every flash operation was allowed and the configuration is untouched."""
         return bool(self._c.sim_config_intact(self._board)) and self._c.sim_violations(self._board) == 0

@@ -28,14 +28,14 @@ class Browser:
     def open(self) -> None:
         """Load the page and wait until it shows the daemon's state."""
         self.driver.get(self.url)
-        self.wait_for_looks(1)
+        self.wait_for_updates(1)
 
-    def wait_for_looks(self, more: int) -> None:
+    def wait_for_updates(self, more: int) -> None:
         """Wait until the page has requested the state this many more times."""
-        wanted = self._looks() + more
-        until(lambda: self._looks() >= wanted, "another state request from the page")
+        wanted = self._updates() + more
+        until(lambda: self._updates() >= wanted, "another state request from the page")
 
-    def _looks(self) -> int:
+    def _updates(self) -> int:
         return int(self.run("return document.body ? document.body.dataset.looks || 0 : 0"))
 
     def run(self, script: str, *arguments: object) -> Any:
@@ -65,7 +65,7 @@ class Browser:
         script = "return [...document.querySelectorAll('dt')].find(e => e.innerText === arguments[0])"
         return str(self.run(f"{script}?.nextElementSibling.innerText ?? ''", name))
 
-    def complaints(self) -> list[str]:
+    def errors(self) -> list[str]:
         """Errors and Content-Security-Policy violations that the browser logged since the last call."""
         return [entry["message"] for entry in self._log("browser") if entry["level"] in ("SEVERE", "WARNING")]
 
@@ -109,7 +109,7 @@ class Browsers:
         driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
         page = Browser(driver, port)
         page.traffic()
-        page.complaints()
+        page.errors()
         try:
             yield page
         finally:

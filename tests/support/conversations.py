@@ -101,7 +101,7 @@ class Upload:
         self._last: Callable[[], None] = self._count
         self._turn = 0
         station.on_message.append(self._react)
-        self._say(self._count)
+        self._send(self._count)
 
     @property
     def is_over(self) -> bool:
@@ -123,17 +123,17 @@ class Upload:
         self.station.send(item_message(seq, self.items[seq], as_int=self.as_int))
 
     def _react(self, message: Message) -> None:
-        if self.is_over or not self.station.is_meant(message):
+        if self.is_over or not self.station.is_target_of(message):
             return
         match message.get_type():
             case "MISSION_REQUEST" | "MISSION_REQUEST_INT":
                 self.requested.append(message.seq)
                 self._silent = 0
-                self._say(lambda seq=message.seq: self._item(seq))  # type: ignore[misc]
+                self._send(lambda seq=message.seq: self._item(seq))  # type: ignore[misc]
             case "MISSION_ACK" if message.mission_type == MISSION:
                 self.result = MissionResult(message.type)
 
-    def _say(self, what: Callable[[], None]) -> None:
+    def _send(self, what: Callable[[], None]) -> None:
         self._last = what
         self._turn += 1
         what()
@@ -192,7 +192,7 @@ class Download:
         self.station.world.after(self._repeat_s, lambda: self._repeat(turn, silent + 1))
 
     def _react(self, message: Message) -> None:
-        if self.is_over or not self.station.is_meant(message):
+        if self.is_over or not self.station.is_target_of(message):
             return
         match message.get_type():
             case "MISSION_COUNT" if self.count is None:

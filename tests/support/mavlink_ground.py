@@ -41,11 +41,11 @@ class MavlinkGround:
         """Upload waypoints; return the result of the ACK, None if the upload was broken off."""
         self.send(m.MAVLink_mission_count_message(*_BOARD, count))
         for _ in range(count + 1):
-            asked = self.wait(m.MAVLINK_MSG_ID_MISSION_REQUEST, m.MAVLINK_MSG_ID_MISSION_ACK)
-            assert asked is not None, "no reply"
-            if asked.get_msgId() == m.MAVLINK_MSG_ID_MISSION_ACK:
-                return int(asked.type)
-            if asked.seq == stop_after:
+            reply = self.wait(m.MAVLINK_MSG_ID_MISSION_REQUEST, m.MAVLINK_MSG_ID_MISSION_ACK)
+            assert reply is not None, "no reply"
+            if reply.get_msgId() == m.MAVLINK_MSG_ID_MISSION_ACK:
+                return int(reply.type)
+            if reply.seq == stop_after:
                 return None
-            self.send(item(asked.seq))
+            self.send(item(reply.seq))
         raise AssertionError("no end")

@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import Self
 
 from tests.support.plan import PlanRow
-from tests.support.programs import TIMEOUT_S, comes
+from tests.support.programs import TIMEOUT_S, happens
 
 _LISTED = re.compile(
     r"^(?P<command>\d+) (?P<frame>\d+) (?P<lat>\S+) (?P<lon>\S+) (?P<alt>\S+) "
@@ -96,7 +96,7 @@ class MavProxy:
 
     def _answer(self, part: str, seconds: float) -> str:
         """The output since the last typed line, once it contains `part`."""
-        comes(lambda: part in self._printed()[self._seen :], seconds)
+        happens(lambda: part in self._printed()[self._seen :], seconds)
         return self._printed()[self._seen :]
 
     def _printed(self) -> str:

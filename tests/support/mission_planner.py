@@ -77,7 +77,7 @@ class MissionPlanner:
         self.texts: list[str] = []
         self.armed = False
         #: Every received message, whether a loop was waiting for it or not.
-        self.heard: list[Message] = []
+        self.received: list[Message] = []
         self.unacked_commands: list[int] = []
         # Read by "Write Fast"; no loop can take it away.
         self._requested, self._answer = 0, MissionResult.ACCEPTED
@@ -139,7 +139,7 @@ class MissionPlanner:
 
     def _note(self, message: Message) -> None:
         """Process a packet before any loop gets it."""
-        self.heard.append(message)
+        self.received.append(message)
         self._sees_mavlink_2 |= message.get_msgbuf()[0] == 0xFD
         match message.get_type():
             case "HEARTBEAT":
@@ -167,18 +167,18 @@ class MissionPlanner:
         assert self.vehicle is not None, "no vehicle has been found"
         return self.vehicle
 
-    def look_around(self, seconds: float) -> None:
+    def listen(self, seconds: float) -> None:
         """Only listen, for a time in real seconds."""
         for _ in self._packets(seconds / self._pace):
             pass
 
-    def said(self) -> str:
+    def joined_texts(self) -> str:
         """All texts of the vehicle joined, because long ones arrive in pieces."""
         return " ".join(self.texts)
 
     def wait_for_text(self, part: str) -> None:
         """Wait until `part` occurs in the vehicle's texts."""
-        self.wait_until(lambda: part in self.said(), f"the text {part!r}")
+        self.wait_until(lambda: part in self.joined_texts(), f"the text {part!r}")
 
     def wait_for_ack(self, result: MissionResult) -> None:
         self.wait_until(lambda: result in self.acks(), result.name)
@@ -194,7 +194,7 @@ class MissionPlanner:
 
     # -- connecting ------------------------------------------------------------------------------------------
 
-    def meet(self) -> None:
+    def wait_for_vehicle(self) -> None:
         """Wait for two heartbeats of an autopilot's component 1; until then nothing is sent to a vehicle."""
         seen = 0
         for message in self._packets(TIMEOUT_S / self._pace):
@@ -205,7 +205,7 @@ class MissionPlanner:
                     return
         raise TimedOut("No Heartbeat Packets Received")
 
-    def be_connected(self) -> None:
+    def skip_connecting(self) -> None:
         """Continue as if the daemon's vehicle had been found earlier."""
         self.vehicle = (1, 1)
         self._sees_mavlink_2 = True
@@ -213,7 +213,7 @@ class MissionPlanner:
     def connect(self) -> None:
         """All of its requests in the first seconds."""
         m = messages
-        self.meet()
+        self.wait_for_vehicle()
         system, component = self._target
         for _ in range(2):
             self.send(m.MAVLink_statustext_message(6, b"Mission Planner"))
@@ -288,9 +288,9 @@ class MissionPlanner:
     def write(self, rows: Sequence[PlanRow], *, use_int: bool = True) -> None:
         """Its Write button; rows[0] is home. UploadFailed is the dialogue its user would see."""
         self._start_upload(len(rows))
-        self.go_on(rows, 0, use_int=use_int)
+        self.write_rest(rows, 0, use_int=use_int)
 
-    def go_on(self, rows: Sequence[PlanRow], at: int, *, use_int: bool = True) -> None:
+    def write_rest(self, rows: Sequence[PlanRow], at: int, *, use_int: bool = True) -> None:
         """Write the rest of a list whose upload has begun."""
         while at < len(rows):
             result = self._write_item(rows, at, use_int)
@@ -447,17 +447,17 @@ class MissionPlanner:
 
     # -- inspection by tests -----------------------------------------------------------------------------
 
-    def heard_of(self, kind: str) -> list[Any]:
+    def messages(self, kind: str) -> list[Any]:
         """All received messages of one type, whichever loop took them."""
-        return [message for message in self.heard if message.get_type() == kind]
+        return [message for message in self.received if message.get_type() == kind]
 
-    def heard_in(self, version: int) -> list[Any]:
+    def messages_of_version(self, version: int) -> list[Any]:
         """All messages received in one version of MAVLink."""
         magic = 0xFD if version == 2 else 0xFE
-        return [message for message in self.heard if message.get_msgbuf()[0] == magic]
+        return [message for message in self.received if message.get_msgbuf()[0] == magic]
 
     def acks(self) -> list[MissionResult]:
-        return [MissionResult(message.type) for message in self.heard_of("MISSION_ACK")]
+        return [MissionResult(message.type) for message in self.messages("MISSION_ACK")]
 
 
 def _has_the_right_size(message: Message) -> bool:

@@ -24,7 +24,7 @@ class Frame(NamedTuple):
 
 
 class MspBench:
-    """A board that has just booted at time 0. `heard` has all bytes received from it."""
+    """A board that has just booted at time 0. `received` has all bytes received from it."""
 
     def __init__(
         self, kind: str, options: MspOptions | None = None, faults: Faults | None = None, eeprom: bytes | None = None
@@ -33,7 +33,7 @@ class MspBench:
         self.board.power_on_booted(0.0)
         self.board.advance(0.0)
         self.now = 0.0
-        self.heard = bytearray()
+        self.received = bytearray()
 
     @property
     def faults(self) -> Faults:
@@ -44,18 +44,18 @@ class MspBench:
 
     def run(self, seconds: float) -> bytes:
         """Let time pass; return the received bytes."""
-        end, before = self.now + seconds, len(self.heard)
+        end, before = self.now + seconds, len(self.received)
         while self.now < end:
             self._step(end)
-        return bytes(self.heard[before:])
+        return bytes(self.received[before:])
 
     def ask(self, command: int, payload: bytes = b"", timeout: float = 0.5) -> Frame | None:
         """Send a request and return the next frame; None after `timeout` seconds."""
-        before, end = len(self.heard), self.now + timeout
+        before, end = len(self.received), self.now + timeout
         self.send(request(command, payload))
         while self.now < end:
             self._step(end)
-            frames = take_apart(bytes(self.heard[before:]))
+            frames = take_apart(bytes(self.received[before:]))
             if frames:
                 return frames[0]
         return None
@@ -99,7 +99,7 @@ class MspBench:
 
     def _step(self, end: float) -> None:
         self.now = min(max(self.board.next_wakeup(self.now), self.now + 1e-6), end)
-        self.heard += self.board.advance(self.now)
+        self.received += self.board.advance(self.now)
 
 
 def take_apart(data: bytes) -> list[Frame]:

@@ -141,12 +141,12 @@ def table() -> str:
 
 
 def _records(verdict: Verdict[NavRecord]) -> str:
-    told = [f"{'**' * (f.news is News.WARNING)}{f.text()}{'**' * (f.news is News.WARNING)}"
+    texts = [f"{'**' * (f.news is News.WARNING)}{f.text()}{'**' * (f.news is News.WARNING)}"
             for f in verdict.findings if f.news is not News.NONE]  # fmt: skip
     if verdict.result is not Result.ACCEPTED:
-        return "; ".join(told)
+        return "; ".join(texts)
     records = ", ".join(_record(record) for record in verdict.records)
-    return "; ".join([records, *told])
+    return "; ".join([records, *texts])
 
 
 def _record(record: NavRecord) -> str:

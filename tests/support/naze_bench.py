@@ -26,12 +26,12 @@ BOOT_SECONDS = SimOptions().boot_ms / 1000
 
 
 class WireBench:
-    """A client on the UART of a given, booted board. `heard` has all bytes received from it."""
+    """A client on the UART of a given, booted board. `received` has all bytes received from it."""
 
     def __init__(self, board: FarEnd, now: float = 0.0) -> None:
         self._board = board
         self.now = now
-        self.heard = bytearray()
+        self.received = bytearray()
         self._parser = MspParser()
         self._frames: list[MspFrame] = []
 
@@ -41,11 +41,11 @@ class WireBench:
     def run(self, seconds: float) -> bytes:
         """Let time pass; return the received bytes."""
         end = self.now + seconds
-        before = len(self.heard)
+        before = len(self.received)
         while self.now < end:
             self.now = min(max(self._board.next_wakeup(self.now), self.now + 1e-6), end)
             self._collect()
-        return bytes(self.heard[before:])
+        return bytes(self.received[before:])
 
     def ask(self, frame: bytes, timeout: float = 1.0) -> MspFrame | None:
         """Send a request and return the first frame received; None after `timeout` seconds."""
@@ -100,7 +100,7 @@ class WireBench:
 
     def _collect(self) -> None:
         data = self._board.advance(self.now)
-        self.heard += data
+        self.received += data
         self._frames += self._parser.feed(data)
 
 

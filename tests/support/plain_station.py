@@ -20,7 +20,7 @@ _RETRY_S = 0.5
 class PlainStation:
     """A station on a connected socket, which it then owns. `dialect` None: MAVLink 2.
 
-    `heard` has every received message, also those not waited for.
+    `received` has every received message, also those not waited for.
     """
 
     def __init__(
@@ -34,7 +34,7 @@ class PlainStation:
         self._dialect: Any = dialect or v20
         self._codec = self._dialect.MAVLink(None, srcSystem=sysid, srcComponent=compid)
         self._codec.robust_parsing = True
-        self.heard: list[Any] = []
+        self.received: list[Any] = []
 
     def __enter__(self) -> Self:
         return self
@@ -52,7 +52,7 @@ class PlainStation:
     def send(self, message: Any) -> None:
         self._socket.sendall(bytes(message.pack(self._codec)))
 
-    def say_hello(self) -> None:
+    def send_heartbeat(self) -> None:
         self.send(self._dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
 
     def has_data(self) -> bool:
@@ -70,19 +70,19 @@ class PlainStation:
         is_asked = False
         for _ in range(20 * len(plan)):
             if not is_asked:
-                self.announce(len(plan))
+                self.send_count(len(plan))
             for message in self._messages(_RETRY_S):
                 if message.get_type() == "MISSION_ACK":
                     return MissionResult(message.type)
                 if message.get_type() in ("MISSION_REQUEST", "MISSION_REQUEST_INT"):
                     is_asked = True
-                    self.give(plan, message.seq)
+                    self.send_item(plan, message.seq)
         raise AssertionError("no final MISSION_ACK received")
 
-    def announce(self, count: int) -> None:
+    def send_count(self, count: int) -> None:
         self.send(self._dialect.MAVLink_mission_count_message(1, 1, count))
 
-    def give(self, plan: Sequence[PlanRow], seq: int) -> None:
+    def send_item(self, plan: Sequence[PlanRow], seq: int) -> None:
         row = plan[seq]
         parameters = (row.p1, row.p2, row.p3, row.p4, int(row.lat * 1e7), int(row.lng * 1e7), row.alt)
         self.send(self._dialect.MAVLink_mission_item_int_message(1, 1, seq, row.frame, row.command, 0, 1, *parameters))
@@ -113,7 +113,7 @@ class PlainStation:
             assert data, "the daemon disconnected"
             for message in self._codec.parse_buffer(data) or []:
                 if message.get_type() != "BAD_DATA":
-                    self.heard.append(message)
+                    self.received.append(message)
                     yield message
 
 

@@ -27,12 +27,12 @@ T = TypeVar("T")
 
 def until(condition: Callable[[], T | None], what: str) -> T:
     """Wait for a true value and return it."""
-    found = comes(condition)
+    found = happens(condition)
     assert found, f"timed out waiting for {what}"
     return found
 
 
-def comes(condition: Callable[[], T | None], seconds: float = TIMEOUT_S) -> T | None:
+def happens(condition: Callable[[], T | None], seconds: float = TIMEOUT_S) -> T | None:
     """Wait for a true value; return the last value after a timeout."""
     deadline = time.monotonic() + seconds
     while True:

@@ -198,12 +198,20 @@ class Crowd:
         self._tcp_port = tcp_port
         self._chance = chance
         self._stalled: list[socket.socket] = []
-        self._dawdlers: list[socket.socket] = []
+        self._abandoned: list[socket.socket] = []
         self.happened: Counter[str] = Counter()
         self.uploads: Counter[str] = Counter()
         self._kinds: list[Callable[[Board], None]] = [self._upload, self._upload, self._upload, self._download]
-        self._kinds += [self._pass_by, self._move, self._babble, self._look_in, self._stall, self._stall, self._hammer]
-        self._kinds += [self._flood, self._change_addresses, self._dawdle]
+        self._kinds += [
+            self._visit,
+            self._move,
+            self._send_garbage,
+            self._connect_by_tcp,
+            self._stall,
+            self._stall,
+            self._request_without_reading,
+        ]
+        self._kinds += [self._flood, self._change_addresses, self._abandon_upload]
 
     def act(self, board: Board) -> None:
         kind = self._chance.choice(self._kinds)
@@ -211,17 +219,17 @@ class Crowd:
         self.happened[kind.__name__.strip("_")] += 1
 
     def leave(self) -> None:
-        for client in (*self._stalled, *self._dawdlers):
+        for client in (*self._stalled, *self._abandoned):
             client.close()
         self._stalled.clear()
-        self._dawdlers.clear()
+        self._abandoned.clear()
 
     def writes(self, board: Board) -> bool:
         """Write a mission; True if accepted, after checking that the board holds it."""
         plan = plain_plan(self._chance.randrange(2, 80), start=self._chance.randrange(100))
         by_tcp = self._chance.random() < 0.5
         with tcp_station(self._tcp_port) if by_tcp else udp_station(self._address) as station:
-            station.say_hello()
+            station.send_heartbeat()
             result = station.upload(plan)
         if result is MissionResult.ACCEPTED:
             assert _near(board.records(), records_of(judge(plan))), f"{len(plan)} accepted items are not there"
@@ -237,26 +245,26 @@ class Crowd:
     def _download(self, board: Board) -> None:
         """Request the list and some of its items, without a final ack."""
         with self._udp() as client:
-            self._say(client, m.MAVLink_mission_request_list_message(1, 1))
+            self._send(client, m.MAVLink_mission_request_list_message(1, 1))
             for seq in range(5):
-                self._say(client, m.MAVLink_mission_request_int_message(1, 1, seq))
+                self._send(client, m.MAVLink_mission_request_int_message(1, 1, seq))
 
-    def _pass_by(self, board: Board) -> None:
+    def _visit(self, board: Board) -> None:
         with self._udp() as client:
-            self._say(client, m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), sysid=self._chance.randrange(2, 255))
-            self._say(client, m.MAVLink_param_request_list_message(1, 1))
+            self._send(client, m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), sysid=self._chance.randrange(2, 255))
+            self._send(client, m.MAVLink_param_request_list_message(1, 1))
             self._rest()
 
     def _move(self, board: Board) -> None:
         """One ground station moving between addresses; sometimes it abandons an upload."""
         for _ in range(5):
             with self._udp() as client:
-                self._say(client, m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), sysid=77)
+                self._send(client, m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), sysid=77)
                 if self._chance.random() < 0.02:
-                    self._say(client, m.MAVLink_mission_count_message(1, 1, 9), sysid=77)
+                    self._send(client, m.MAVLink_mission_count_message(1, 1, 9), sysid=77)
                 self._rest()
 
-    def _babble(self, board: Board) -> None:
+    def _send_garbage(self, board: Board) -> None:
         frame = FrameWriter(9, 9).frame(pack(m.MAVLink_mission_count_message(1, 1, 9)), 2)
         with self._udp() as client:
             for _ in range(20):
@@ -265,10 +273,10 @@ class Crowd:
                     self._chance.choice((noise, frame[: self._chance.randrange(len(frame))], noise + frame[:9]))
                 )
 
-    def _look_in(self, board: Board) -> None:
+    def _connect_by_tcp(self, board: Board) -> None:
         """Connect by TCP, read whole frames for a while, and disconnect in one of several ways."""
         with self._tcp() as client:
-            self._say(client, m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+            self._send(client, m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
             self._rest()
             self._read_whole_frames(client)
             if self._chance.random() < 0.5:
@@ -278,7 +286,7 @@ class Crowd:
     def _stall(self, board: Board) -> None:
         """Connect by TCP without reading; earlier such clients resume reading or disconnect."""
         client = self._tcp()
-        self._say(client, m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+        self._send(client, m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
         self._stalled.append(client)
         if len(self._stalled) > _MAX_STALLED:
             earlier = self._stalled.pop(self._chance.randrange(_MAX_STALLED))
@@ -286,27 +294,27 @@ class Crowd:
                 self._read_whole_frames(earlier)
             earlier.close()
 
-    def _hammer(self, board: Board) -> None:
+    def _request_without_reading(self, board: Board) -> None:
         """Request everything over TCP without reading a reply."""
         with self._tcp() as client:
             client.settimeout(0.2)
             for _ in range(300):
                 try:
-                    self._say(client, m.MAVLink_param_request_list_message(1, 1))
+                    self._send(client, m.MAVLink_param_request_list_message(1, 1))
                 except OSError:
                     # The daemon has stopped reading or disconnected.
                     return
 
     def _flood(self, board: Board) -> None:
         """Request everything as fast as possible."""
-        asked = [
+        requests = [
             m.MAVLink_param_request_list_message(1, 1),
             m.MAVLink_mission_count_message(1, 1, 9),
             m.MAVLink_mission_request_list_message(1, 1),
             m.MAVLink_command_long_message(1, 1, 42428, 0, 0, 0, 0, 0, 0, 0, 0),
             m.MAVLink_command_long_message(1, 1, 511, 0, 30, 1, 0, 0, 0, 0, 0),
         ]
-        frames = [FrameWriter(66, 190).frame(pack(message), 2) for message in asked]
+        frames = [FrameWriter(66, 190).frame(pack(message), 2) for message in requests]
         with self._udp() as client:
             for number in range(2000):
                 client.send(frames[number % len(frames)])
@@ -315,17 +323,17 @@ class Crowd:
         """Send once from each of hundreds of addresses."""
         for _ in range(300):
             with self._udp() as client:
-                self._say(client, m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), sysid=65)
+                self._send(client, m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), sysid=65)
 
-    def _dawdle(self, board: Board) -> None:
+    def _abandon_upload(self, board: Board) -> None:
         """Announce a list and send only its first item."""
         client = self._udp()
-        self._say(client, m.MAVLink_mission_count_message(1, 1, 100), sysid=64)
+        self._send(client, m.MAVLink_mission_count_message(1, 1, 100), sysid=64)
         self._rest()
-        self._say(client, m.MAVLink_mission_item_int_message(1, 1, 0, 3, 16, 0, 1, 0, 0, 0, 0, 1, 1, 9.0), sysid=64)
-        self._dawdlers.append(client)
-        if len(self._dawdlers) > _MAX_STALLED:
-            self._dawdlers.pop(0).close()
+        self._send(client, m.MAVLink_mission_item_int_message(1, 1, 0, 3, 16, 0, 1, 0, 0, 0, 0, 1, 1, 9.0), sysid=64)
+        self._abandoned.append(client)
+        if len(self._abandoned) > _MAX_STALLED:
+            self._abandoned.pop(0).close()
 
     def _rest(self) -> None:
         time.sleep(self._chance.uniform(0.0, 0.5))
@@ -341,7 +349,7 @@ class Crowd:
         client.connect(("127.0.0.1", self._tcp_port))
         return client
 
-    def _say(self, client: socket.socket, message: Message, sysid: int = 251) -> None:
+    def _send(self, client: socket.socket, message: Message, sysid: int = 251) -> None:
         client.send(FrameWriter(sysid, 190).frame(pack(message), 2))
 
     def _read_whole_frames(self, client: socket.socket) -> None:

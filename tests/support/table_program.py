@@ -77,12 +77,12 @@ class Rig:
             program[at : at + len(data)] = data
         self.board = EmulatedNaze(Image(bytes(program)), EmulatedFaults(), flash)
         self.now = 0.0
-        self.heard = bytearray()
+        self.received = bytearray()
         self.board.power_on(0.0)
 
     def run(self, seconds: float) -> "Rig":
         self.now += seconds
-        self.heard += self.board.advance(self.now)
+        self.received += self.board.advance(self.now)
         return self
 
     def send(self, data: bytes) -> "Rig":

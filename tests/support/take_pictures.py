@@ -22,18 +22,18 @@ def take_pictures(folder: Path) -> None:
         bench.push_example()
         with browsers.tab(bench.port, _LAPTOP) as laptop:
             laptop.open()
-            laptop.wait_for_looks(2)
+            laptop.wait_for_updates(2)
             laptop.picture(folder / "status-page.png")
             laptop.run("document.getElementById('upload-title').scrollIntoView()")
             laptop.picture(folder / "sent-and-stored.png")
             laptop.find("#file").send_keys(str(EXAMPLE))
             laptop.wait_text("#checked", "14 items")
-            laptop.wait_for_looks(2)
+            laptop.wait_for_updates(2)
             laptop.run("document.getElementById('file-title').scrollIntoView()")
             laptop.picture(folder / "checked-file.png")
         with browsers.tab(bench.port, PHONE, dark=True) as phone:
             phone.open()
-            phone.wait_for_looks(2)
+            phone.wait_for_updates(2)
             phone.run("document.getElementById('map-title').scrollIntoView()")
             phone.picture(folder / "on-a-phone.png")
 

@@ -204,12 +204,12 @@ class World:
         """Wait until the flight controller is found and its list is read."""
         return self.wait_until(lambda world: world.is_found and not world.bridge.runner.is_busy, seconds)
 
-    def hear(self, data: bytes) -> None:
+    def receive_from_fc(self, data: bytes) -> None:
         """Let the bridge read bytes that are not from the simulated board."""
         self.bridge.fc_received(data, self.now)
         self._flush()
 
-    def spoken_by(self, station: "GroundStation", data: bytes, *, datagram: bool = True) -> None:
+    def receive_from(self, station: "GroundStation", data: bytes, *, datagram: bool = True) -> None:
         """Let bytes from a ground station arrive at the bridge now."""
         self.bridge.gcs_received(station.peer, data, self.now, datagram=datagram)
         self._flush()
@@ -261,9 +261,9 @@ class World:
         data = self.naze.advance(self.now)
         if data and self._plugged:
             speed = self.bridge.session.state.speed
-            heard = garble(data, self.naze.baud, speed) if speed else data
-            if heard:
-                self.bridge.fc_received(heard, self.now)
+            received = garble(data, self.naze.baud, speed) if speed else data
+            if received:
+                self.bridge.fc_received(received, self.now)
                 self._flush()
         while self._events and self._events[0][0] <= self.now:
             heapq.heappop(self._events)[2]()
@@ -343,7 +343,7 @@ def flash_holding(records: Sequence[WpRecord], options: SimOptions | None = None
 
 
 class GroundStation:
-    """A MAVLink ground station on a radio link. `heard` has all received messages; `on_message` reacts to them."""
+    """A MAVLink ground station on a radio link. `received` has all received messages; `on_message` reacts to them."""
 
     def __init__(
         self,
@@ -359,8 +359,8 @@ class GroundStation:
         self.peer = Peer("udp", name)
         self.version = version
         self.air = air or Air()
-        self.heard: list[tuple[float, Message]] = []
-        self.frames_heard: list[bytes] = []
+        self.received: list[tuple[float, Message]] = []
+        self.frames: list[bytes] = []
         self.on_message: list[Callable[[Message], None]] = []
         self._mavlink = messages.MAVLink(None, srcSystem=sysid, srcComponent=compid)
         #: Dialect `all`, which has more messages than the bridge's own dialect.
@@ -370,7 +370,7 @@ class GroundStation:
 
     def send(self, message: Message) -> None:
         data = self.pack(message)
-        self._through_the_air(lambda: self.world.spoken_by(self, data))
+        self._through_the_air(lambda: self.world.receive_from(self, data))
 
     def sign(self, key: bytes, timestamp: int, link_id: int = 0) -> None:
         signing = self._mavlink.signing
@@ -387,30 +387,30 @@ class GroundStation:
 
     def take(self, *types: str) -> list[Message]:
         """Return the received messages of these types and clear all received ones."""
-        found = self.said(*types)
-        self.heard.clear()
+        found = self.messages(*types)
+        self.received.clear()
         return found
 
-    def said(self, *types: str) -> list[Message]:
-        return [message for _, message in self.heard if not types or message.get_type() in types]
+    def messages(self, *types: str) -> list[Message]:
+        return [message for _, message in self.received if not types or message.get_type() in types]
 
-    def is_meant(self, message: Message) -> bool:
+    def is_target_of(self, message: Message) -> bool:
         """True if a message is addressed to exactly this station, as Mission Planner requires."""
         address = (getattr(message, "target_system", None), getattr(message, "target_component", None))
         return address == (self.sysid, self.compid)
 
     def texts(self) -> list[str]:
         """All texts; the pieces of long ones separately, without their padding."""
-        return [message.text.rstrip() for message in self.said("STATUSTEXT")]
+        return [message.text.rstrip() for message in self.messages("STATUSTEXT")]
 
     def _arrived(self, frame: bytes) -> None:
         found = MavlinkSplitter().feed(frame)
         assert b"".join(each.raw for each in found) == frame, f"not whole frames: {frame.hex()}"
         assert len(found) == 1 or len(frame) <= MAX_DATAGRAM_SIZE
         for each in found:
-            self.frames_heard.append(each.raw)
+            self.frames.append(each.raw)
             message = self._decoder.decode(bytearray(each.raw))
-            self.heard.append((self.world.now, message))
+            self.received.append((self.world.now, message))
             for react in self.on_message:
                 react(message)
 

@@ -72,12 +72,12 @@ def test_only_changes_are_announced_to_screen_readers(lasting_web: WebBench, pag
     assert lasting_web.board is not None
     before = page.run(LIVE)
     assert not any(before)
-    page.wait_for_looks(3)
+    page.wait_for_updates(3)
     assert page.run(LIVE) == before
     lasting_web.board.set("armed 1")
     page.wait_text("#spoken", "armed")
     spoken = page.run(LIVE)
-    page.wait_for_looks(3)
+    page.wait_for_updates(3)
     assert page.run(LIVE) == spoken
     lasting_web.board.set("armed 0")
 
@@ -88,13 +88,13 @@ def test_a_selection_survives_updates(lasting_web: WebBench, page: Browser) -> N
         getSelection().selectAllChildren(all);""")
     lasting_web.daemon.push(plain_plan(9))
     page.wait_text("#held-text", "9 records")
-    page.wait_for_looks(2)
+    page.wait_for_updates(2)
     assert page.run("return String(getSelection())") == "Harakiri with the mission extension"
 
 
 def test_an_upload_in_progress_has_a_bar(lasting_web: WebBench, page: Browser) -> None:
     with PlainStation(udp_to(lasting_web.daemon.address)) as station:
-        station.say_hello()
+        station.send_heartbeat()
         station.send(messages.MAVLink_mission_count_message(1, 1, 20, 0))
         station.wait_for("MISSION_REQUEST")  # and then falls silent
         page.wait_text("#transfer-text", "Receiving items: 0 of 20")

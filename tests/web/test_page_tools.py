@@ -38,7 +38,7 @@ def test_the_map_is_zoomed_and_panned(browsers: Browsers, lasting_web: WebBench)
         ActionChains(page.driver).move_to_element(canvas).click_and_hold().move_by_offset(50, 30).release().perform()
         dragged = place(page)
         assert [round(new - old) for new, old in zip(dragged, panned, strict=True)] == [50, 30]
-        page.wait_for_looks(2)
+        page.wait_for_updates(2)
         assert place(page) == dragged  # an update does not move it back
         page.press("#map button:last-child")
         assert place(page) == fit
@@ -61,4 +61,4 @@ def test_a_log_is_downloaded(browsers: Browsers, lasting_web: WebBench, tmp_path
         until(lambda: (downloads / name).exists() and (downloads / name).read_bytes() == contents, "the log")
         page.wait_text("#logs", "Downloaded")
         assert page.run("return document.documentElement.scrollWidth") <= PHONE[0]
-        assert page.complaints() == []
+        assert page.errors() == []

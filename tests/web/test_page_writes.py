@@ -47,7 +47,7 @@ def test_a_stored_mission_is_written_with_the_token(browsers: Browsers, bench: W
 
         bench.restore(1)  # another client's success must not replace the error
         page.wait_text("#upload", "restore of mission 1")
-        page.wait_for_looks(2)
+        page.wait_for_updates(2)
         assert page.text(DETAIL).startswith("Wrong token.")
         bench.push_example()
 
@@ -85,7 +85,7 @@ def test_a_file_is_checked_drawn_and_written(browsers: Browsers, bench: WebBench
         page.wait_text(FILE_RESULT, "13 of 14 stored: 1 dropped")
         assert bench.board.records() != before
         page.wait_text("#upload", "naze-field.waypoints, from the page")
-        assert page.complaints() == []
+        assert page.errors() == []
 
 
 def test_a_file_can_be_dropped_on_the_page(browsers: Browsers, bench: WebBench) -> None:

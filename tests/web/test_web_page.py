@@ -35,11 +35,11 @@ def laptop(browsers: Browsers, bench: WebBench) -> Iterator[Browser]:
 @pytest.fixture
 def page(laptop: Browser) -> Iterator[Browser]:
     """The page, just opened; afterwards the browser must have logged no error."""
-    laptop.complaints()
+    laptop.errors()
     laptop.traffic()
     laptop.open()
     yield laptop
-    assert laptop.complaints() == []
+    assert laptop.errors() == []
 
 
 def test_the_first_paint_is_small_and_loads_nothing_from_elsewhere(page: Browser) -> None:
@@ -122,7 +122,7 @@ def test_two_missions_are_compared(page: Browser) -> None:
     page.find("#second").send_keys("77")
     page.press("#compare-form button")
     page.wait_text("#compared .bad", "there is no mission 77")
-    page.complaints()  # the browser notes the 404
+    page.errors()  # the browser notes the 404
 
 
 @pytest.fixture
@@ -143,7 +143,7 @@ def test_foreign_text_is_not_markup(browsers: Browsers, own_bench: WebBench) -> 
         assert evil in page.text("#missions")
         assert evil in page.text("#upload")
         assert page.all("main img, main script") == []
-        assert page.complaints() == []
+        assert page.errors() == []
 
 
 def test_the_page_fits_a_phone(browsers: Browsers, bench: WebBench) -> None:
@@ -176,7 +176,7 @@ def test_a_page_without_a_mission_and_a_position_says_so(browsers: Browsers, tmp
         assert ended.returncode == 0, ended.stderr
         page.wait_text("#held-text", "146 records")
         assert len(page.all("#map .number")) > 100
-        assert page.complaints() == []
+        assert page.errors() == []
 
 
 def test_every_picture_in_the_docs_is_taken(tmp_path: Path) -> None:

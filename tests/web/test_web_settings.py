@@ -30,7 +30,7 @@ def test_the_environment_variable_is_enough(tmp_path: Path, monkeypatch: pytest.
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "reason"),
     [
         ("web = true", ["web", "a table"]),
         ("[web]\nlisen = 'x'", ["web.lisen", "web.listen"]),
@@ -46,12 +46,12 @@ def test_the_environment_variable_is_enough(tmp_path: Path, monkeypatch: pytest.
         ),
     ],
 )
-def test_an_invalid_table_is_one_sentence(tmp_path: Path, text: str, said: list[str]) -> None:
+def test_an_invalid_table_is_one_sentence(tmp_path: Path, text: str, reason: list[str]) -> None:
     with pytest.raises(SettingsError) as caught:
         load(tmp_path, text)
     (problem,) = map(str, caught.value.problems)
     assert problem.startswith(str(tmp_path / "naze.toml"))
-    for part in said:
+    for part in reason:
         assert part in problem
 
 
@@ -80,7 +80,7 @@ def test_an_invalid_token_file_is_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "empty").touch(0o600)
     (tmp_path / "long").touch(0o600)
     (tmp_path / "long").write_bytes(bytes(5000))
-    for path, said in {
+    for path, reason in {
         tmp_path / "open": f"other users can read the token in {tmp_path}/open: chmod 600 {tmp_path}/open",
         tmp_path / "empty": "is shorter than 12 characters",
         tmp_path / "long": "cannot be read: it is larger than",
@@ -88,5 +88,5 @@ def test_an_invalid_token_file_is_one_sentence(tmp_path: Path) -> None:
         tmp_path / "nowhere" / "token": "a token cannot be written to",
         tmp_path / "open" / "token": "cannot be read: Not a directory",
     }.items():
-        with pytest.raises(TokenError, match=said):
+        with pytest.raises(TokenError, match=reason):
             Token(path)
