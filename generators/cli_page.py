@@ -2,18 +2,27 @@
 """The reference page of the command line, docs/cli.md: the --help text of each command (`make cli-page`)."""
 
 import sys
+import textwrap
 from collections.abc import Iterator
 
 import click
 
 from service.cli.main import main
 
+EXIT_CODES = ", ".join(
+    (
+        "0 done",
+        "1 refused or failed",
+        "2 wrong usage or an unreadable file",
+        "74 the output cannot be written",
+        "130 interrupted.",
+    )
+)
 _WIDTH = 100
-_HEAD = """\
+_HEAD = f"""\
 # The command line
 
-The `--help` text of every command. Common exit codes: 0 done, 1 refused or failed, 2 wrong usage or
-an unreadable file, 74 the output cannot be written, 130 interrupted.
+{textwrap.fill(f"The `--help` text of every command. Common exit codes: {EXIT_CODES}", _WIDTH)}
 """
 
 
