@@ -129,6 +129,11 @@ class _Request:
     exclusive: bool
     reply: _Reply = _Reply.AWAITED
 
+    @property
+    def size_in_ring(self) -> int:
+        """A board that sends longer replies has a larger ring: after a loss there is room for a short question."""
+        return min(self.reply_size, MAX_OUTSTANDING_BYTES - _QUESTION.reply_size)
+
 
 class MspLink:
     """One MSP line. `baud` is None where the line has no speed (TCP, the built-in simulator).
@@ -178,7 +183,7 @@ class MspLink:
         """Replies that may still arrive."""
         pending = PendingReplies()
         for sent in self._sent:
-            pending.add(self._baud, sent.reply_size, sent.sent_at)
+            pending.add(self._baud, sent.size_in_ring, sent.sent_at)
         return pending
 
     def awaits(self, command: int) -> bool:
@@ -259,7 +264,7 @@ class MspLink:
         return limit - pending
 
     def _fits_ring(self, reply_size: int) -> bool:
-        return self.outstanding_bytes + reply_size <= self._ring_size
+        return sum([sent.size_in_ring for sent in self._sent]) + reply_size <= self._ring_size
 
     def _flush(self, now: float) -> None:
         if self._resync_due and self._fits_ring(RESYNC_REPLY_SIZE):
@@ -282,9 +287,9 @@ class MspLink:
         timeout_s = EXCLUSIVE_TIMEOUT_S if message.exclusive else self._timeout_s()
         reply_time = (self.outstanding_bytes + message.reply_size) * self.byte_s + len(self._sent) * self.turn_s
         deadline = self._line_free_at + reply_time + timeout_s
-        # A longer reply, from a board with a larger ring, must not stop the question that shows that it was lost.
-        size = min(message.reply_size, self._ring_size - _QUESTION.reply_size)
-        self._sent.append(_Request(message.command, size, self._line_free_at, deadline, message.exclusive))
+        self._sent.append(
+            _Request(message.command, message.reply_size, self._line_free_at, deadline, message.exclusive)
+        )
 
     def _resync(self, now: float) -> None:
         if any(sent.exclusive and sent.reply is _Reply.AWAITED for sent in self._sent):

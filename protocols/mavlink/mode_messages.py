@@ -28,4 +28,4 @@ def available_mode(index: int, count: int, custom_mode: int, standard_mode: int,
 
 
 def _packed(msgid: int, payload: bytes) -> Packed:
-    return Packed(msgid, payload, payload.rstrip(b"\0"))
+    return Packed(msgid, payload, payload.rstrip(b"\0") or b"\0")

@@ -35,13 +35,19 @@ def test_a_request_with_a_payload_may_only_read(command: int, is_refused: bool) 
     assert bool(world.bridge.sharing.request(frame, lambda _: None, world.now, may_write=False)) == is_refused
 
 
-def test_a_lost_reply_does_not_lose_the_link() -> None:
-    board = FakeInav(drop=lambda frame: "reply" if frame.command == BOXNAMES else "")
+@pytest.mark.parametrize("is_damaged", [False, True])
+@pytest.mark.parametrize("command", [BOXNAMES, DATAFLASH_READ])
+def test_a_lost_reply_does_not_lose_the_link(command: int, is_damaged: bool) -> None:
+    board = FakeInav(drop=lambda frame: "reply" if frame.command == command else "")
     world = World(speeds=(115200,), peer=board)
     world.wait_ready(5)
     for _ in range(5):
-        request = MspFrame(Direction.REQUEST, BOXNAMES)
+        request = MspFrame(Direction.REQUEST, command)
         assert world.bridge.sharing.request(request, lambda _: None, world.now, may_write=False) == ""
+        world.receive_from_fc(b"")  # sends it
+        if is_damaged:
+            world.run(0.1)
+            world.receive_from_fc(MspFrame(Direction.REPLY, command, bytes(MAX_REPLY)).encode()[:-1] + b"\xff")
         world.run(1.0)
     assert world.events("fc.lost") == []
 

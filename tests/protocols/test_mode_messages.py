@@ -23,5 +23,6 @@ from protocols.mavlink.mode_messages import available_mode, current_mode
 @pytest.mark.parametrize("version", [1, 2])
 def test_a_published_dialect_reads_both(packed: Packed, fields: dict[str, int | str], version: int) -> None:
     frame = FrameWriter(1, 1).frame(packed, version)
+    assert frame[1] >= 1  # MAVLink 2 never omits the first byte
     message = development.MAVLink(None).decode(bytearray(frame))
     assert {name: getattr(message, name) for name in message.fieldnames} == fields
