@@ -63,6 +63,10 @@ class MessageRates:
         alike = {peer if peer in self.unwatched or self._has_requests(peer) else None: peer for peer in peers}.values()
         return {msgid: min((self.interval_s(peer, msgid) for peer in alike), default=inf) for msgid in self._defaults}
 
+    def withhold(self, peer: Peer, msgid: int, until: float) -> None:
+        """Send a ground station the next such message at `until`."""
+        self._follower(peer).due[msgid] = until
+
     def take_due(self, msgid: int, peers: Sequence[Peer], now: float) -> list[Peer]:
         """The peers for which the message is due now; schedules the next one for each."""
         taken = []

@@ -74,9 +74,7 @@ class MessageRouter:
             m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST: lambda s, _, now: downloads.request_list(s, now),
             m.MAVLINK_MSG_ID_MISSION_REQUEST: lambda s, msg, now: downloads.request(s, msg.seq, now, as_int=False),
             m.MAVLINK_MSG_ID_MISSION_REQUEST_INT: lambda s, msg, now: downloads.request(s, msg.seq, now, as_int=True),
-            m.MAVLINK_MSG_ID_MISSION_SET_CURRENT: lambda s, _msg, _now: commands.refuse(
-                s, m.MAV_CMD_DO_SET_MISSION_CURRENT
-            ),
+            m.MAVLINK_MSG_ID_MISSION_SET_CURRENT: self._set_current,
             m.MAVLINK_MSG_ID_COMMAND_LONG: lambda s, msg, now: commands.take(
                 s,
                 msg.command,
@@ -126,6 +124,10 @@ class MessageRouter:
             self._ground.mission_ack(station, MissionResult.DENIED)
         else:
             self._uploads.item(station, item, now)
+
+    def _set_current(self, station: Station, _message: Message, now: float) -> None:
+        self._vehicle.refuse_current(station.peer, now)
+        self._commands.refuse(station, m.MAV_CMD_DO_SET_MISSION_CURRENT)
 
     def _data_stream(self, station: Station, message: Message, _now: float) -> None:
         rate_hz = message.req_message_rate if message.start_stop else 0

@@ -37,6 +37,8 @@ _NEWCOMER_S, _NEWCOMER_INTERVAL_S = 3.0, 0.2
 _REPEAT_S = 5.0
 #: Without a reading for this long, SYS_STATUS is sent anyway, to report that nothing is known.
 _SILENT_S = 3.0
+#: Longer than MAVSDK waits for a changed MISSION_CURRENT (2.5 s), and Mission Planner between two tries (2 s).
+_NO_CURRENT_S = 4.0
 #: The shortest interval that a ground station may request.
 _FASTEST_S = 0.01
 _ALL_STREAMS = messages.MAV_DATA_STREAM_ALL
@@ -185,6 +187,13 @@ class OwnVehicle:
         self._rates.request(peer, msgid, None if interval_s is None else max(interval_s, _FASTEST_S))
         self._follow_requests()
         return True
+
+    def refuse_current(self, peer: Peer, now: float) -> None:
+        """Withhold MISSION_CURRENT from a ground station whose MISSION_SET_CURRENT was refused.
+
+        Mission Planner takes any for success. MAVSDK repeats its request at each that has another number, without end.
+        """
+        self._rates.withhold(peer, messages.MAVLINK_MSG_ID_MISSION_CURRENT, now + _NO_CURRENT_S)
 
     def set_stream(self, peer: Peer, stream: int, interval_s: float) -> None:
         """Set the interval of all messages of one of ArduPilot's streams."""

@@ -169,10 +169,22 @@ def test_only_the_sender_gets_the_refusal(refused: Message) -> None:
     assert other.texts() == []
 
 
-def test_the_current_waypoint_cannot_be_set(flying: tuple[World, GroundStation]) -> None:
-    flying[0].run(_SILENCE_S)
-    received = answers(flying, m.MAVLink_mission_set_current_message(1, 1, 3))
-    assert ["cannot be set" in message.text for message in received] == [True]
+def test_the_current_waypoint_cannot_be_set() -> None:
+    """A MISSION_CURRENT would be success to Mission Planner, and another request to MAVSDK."""
+    world = ready_world()
+    asking, other = GroundStation(world, "asking"), GroundStation(world, "other", sysid=254)
+    for station in (asking, other):
+        station.send(m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3))
+    world.run(3)
+    asking.take()
+    other.take()
+    asking.send(m.MAVLink_mission_set_current_message(1, 1, 3))
+    world.run(3)
+    assert any("cannot be set" in text for text in asking.texts())
+    assert asking.said("MISSION_CURRENT") == []
+    assert len(other.said("MISSION_CURRENT")) == 3
+    world.run(3)
+    assert asking.said("MISSION_CURRENT")
 
 
 def test_a_command_for_another_system_is_not_answered(flying: tuple[World, GroundStation]) -> None:

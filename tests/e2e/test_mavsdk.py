@@ -188,6 +188,22 @@ async def test_clear_mission_and_clear_all_clear_the_board(shared: Bench) -> Non
         assert len(await missions.download_mission()) == 1
 
 
+async def test_setting_the_current_item_ends_and_blocks_no_later_call(shared: Bench) -> None:
+    plan = plain_plan(4)
+    async with vehicle_at(shared.daemon.port) as vehicle:
+        missions = MissionRawAsync(vehicle)
+        await missions.upload_mission(raw_items(plan))
+        async for progress in missions.subscribe_mission_progress():
+            if progress.total == len(plan):
+                break
+        # Not while one is under way: MAVSDK would request again and forget its timeout.
+        await anext(MavlinkDirectAsync(vehicle).subscribe_message("MISSION_CURRENT"))
+        with pytest.raises(MissionRawError) as refused:
+            await missions.set_current_mission_item(2)
+        assert refused.value.result == MissionRawResult.TIMEOUT
+        assert len(await missions.download_mission()) == len(plan)
+
+
 async def test_long_texts_arrive_whole_and_once(shared: Bench) -> None:
     """MAVSDK joins the pieces of a STATUSTEXT, like QGroundControl."""
     texts: list[str] = []
