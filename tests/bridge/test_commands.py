@@ -181,10 +181,10 @@ def test_the_current_waypoint_cannot_be_set() -> None:
     asking.send(m.MAVLink_mission_set_current_message(1, 1, 3))
     world.run(3)
     assert any("cannot be set" in text for text in asking.texts())
-    assert asking.said("MISSION_CURRENT") == []
-    assert len(other.said("MISSION_CURRENT")) == 3
+    assert asking.messages("MISSION_CURRENT") == []
+    assert len(other.messages("MISSION_CURRENT")) == 3
     world.run(3)
-    assert asking.said("MISSION_CURRENT")
+    assert asking.messages("MISSION_CURRENT")
 
 
 def test_a_command_for_another_system_is_not_answered(flying: tuple[World, GroundStation]) -> None:
