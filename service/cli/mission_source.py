@@ -40,8 +40,8 @@ def save_mission(path: Path, text: str) -> None:
     """
     name = click.format_filename(path)
     try:
-        target = path.resolve()
-        if target.exists() and not target.is_file():
+        target = Path(os.path.realpath(path))  # still a link if it leads to itself
+        if target.is_symlink() or (target.exists() and not target.is_file()):
             raise MissionFileError(name, "", "it is not a regular file", "name a file for the mission")
         draft = target.with_name(f".naze-bridge-{os.getpid()}")
         with draft.open("x", encoding="utf-8") as file:  # "x": an existing file, above all a link, is not ours
@@ -52,7 +52,7 @@ def save_mission(path: Path, text: str) -> None:
             except OSError:
                 draft.unlink(missing_ok=True)
                 raise
-    except (OSError, ValueError, RuntimeError) as error:  # RuntimeError: a link that leads to itself
+    except (OSError, ValueError) as error:
         raise MissionFileError(name, "", _reason(error), "check the path and its permissions") from None
 
 

@@ -222,7 +222,7 @@ def test_pull_replaces_only_files(daemon: Daemon, tmp_path: Path, make: object) 
 def test_pull_into_a_link_to_itself_is_refused(daemon: Daemon, tmp_path: Path) -> None:
     path = tmp_path / "loop"
     path.symlink_to(path)
-    assert_one_sentence(ask(daemon, "pull", path), 1, str(path), "loop")
+    assert_one_sentence(ask(daemon, "pull", path), 1, str(path), "not a regular file")
     assert path.is_symlink()
 
 

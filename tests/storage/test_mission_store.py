@@ -140,7 +140,7 @@ def test_a_closed_store_reports_it(tmp_path: Path) -> None:
         store.list(1)
 
 
-def test_lookups_take_the_same_steps_at_any_size(store: MissionStore) -> None:
+def test_lookups_take_no_more_steps_in_a_larger_store(store: MissionStore) -> None:
     wanted = mission(999)
     store.conclude(store.add(wanted), "VERIFIED", "", 1.0)
 
@@ -170,7 +170,7 @@ def test_lookups_take_the_same_steps_at_any_size(store: MissionStore) -> None:
     gather(range(30))
     few = [steps(search) for search in searches]
     gather(range(30, 330))
-    assert [steps(search) for search in searches] == few
+    assert all(steps(search) <= before for search, before in zip(searches, few, strict=True))
 
 
 def test_a_store_of_the_first_release_is_migrated(tmp_path: Path) -> None:
