@@ -77,6 +77,7 @@ def test_a_flood_of_counts_is_not_logged() -> None:
     limit = LIMITS[Cost.UPLOAD].each
     assert limit.burst / 2 < len(world.events("mission.refused")) <= limit.burst + limit.per_s * 5
     assert {ack.type for ack in station.messages("MISSION_ACK")} == {m.MAV_MISSION_DENIED}
+    assert "Too many uploads: wait a few seconds" in station.texts()
 
 
 def test_requests_from_strangers_are_not_passed_to_an_armed_board() -> None:

@@ -269,6 +269,15 @@ def test_a_slow_upload_does_not_delay_others() -> None:
     assert world.stored == records_of(waypoints(4, 1))
 
 
+def test_an_upload_started_again_and_again_does_not_delay_others() -> None:
+    world, restless = holding()
+    for again in range(4):
+        world.after(3.4 * again, lambda again=again: restless.send(count_message(9 + again)))  # type: ignore[misc]
+    world.run(3.4 * 3 + 0.1)
+    assert state(world) is Receiving
+    assert Upload(GroundStation(world, "pilot", sysid=254), waypoints(4)).run(2.4) is A.ACCEPTED
+
+
 def test_unfinished_uploads_do_not_delay_others() -> None:
     """The ones with the slowest progress end."""
     world, station = holding()
