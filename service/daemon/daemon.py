@@ -159,8 +159,8 @@ class Daemon:
 
     def change_links(self, gcs: Sequence[GcsAddress]) -> None:
         """Serve ground stations over these links; those that stay are not interrupted."""
-        self.gcs.change(self.settings.gcs, gcs)
-        self.settings = replace(self.settings, gcs=tuple(gcs))
+        # A link that cannot be opened is left out, so that the next reload tries it again.
+        self.settings = replace(self.settings, gcs=self.gcs.change(self.settings.gcs, gcs))
 
     def flush(self) -> None:
         """Carry out the outputs that the bridge has after an input."""

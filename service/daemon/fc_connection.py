@@ -19,6 +19,8 @@ from service.settings.addresses import AutoFc
 
 #: The interval of messages about an unsuccessful search: a silent log looks like a hang.
 _SEARCH_REPORT_S = 60.0
+#: The pause after a bug, before the port is opened again.
+_RESTART_S = 1.0
 
 _log = structlog.get_logger()
 
@@ -78,8 +80,13 @@ class FcConnection:
         return {} if self._finder is None else self._finder.status()
 
     async def run(self) -> None:
-        """Keep the port open; cancel to end."""
-        await self._port.run()
+        """Keep the port open, also after a bug; cancel to end."""
+        while True:
+            try:
+                await self._port.run()
+            except Exception:
+                _log.exception("daemon.fault", what="the flight controller's port")
+            await asyncio.sleep(_RESTART_S)
 
     def close(self) -> None:
         """Stop the timers, and write the rest of the recording. The port closes with `run`."""

@@ -45,8 +45,8 @@ class GcsConnections:
     def add(self, link: GcsLink) -> None:
         self._links[link.name] = link
 
-    def change(self, old: Sequence[GcsAddress], new: Sequence[GcsAddress]) -> None:
-        """Replace links; those that stay are not interrupted."""
+    def change(self, old: Sequence[GcsAddress], new: Sequence[GcsAddress]) -> tuple[GcsAddress, ...]:
+        """Replace links; those that stay are not interrupted. Returns the open ones."""
         for address in old:
             if address not in new and (link := self._links.get(str(address))) is not None:
                 self._bridge.link_closed(link.name, self._loop.time())
@@ -62,6 +62,7 @@ class GcsConnections:
                     _log.error("gcs.unavailable", link=str(address), why=str(error))
                 else:
                     self.warn(address)
+        return tuple(address for address in new if str(address) in self._links)
 
     def send(self) -> None:
         for peer, data in self._bridge.ground.take_datagrams():

@@ -20,6 +20,9 @@ from service.settings.addresses import UNKNOWN_HOST_HINT, AutoFc, FcAddress, Ser
 #: Errors of an open port: pyserial raises the last two if it is unplugged, or its driver refuses the speed.
 DEVICE_ERRORS = (OSError, termios.error, ValueError)
 _TCP_TIMEOUT_S = 3.0
+#: A connection whose other end confirms nothing for this long is lost. After a gap in the Wi-Fi a new one carries data
+#: at once; the old one might wait for as long again as the gap was.
+_TCP_STALL_MS = 5000
 
 
 class Device(Protocol):
@@ -100,4 +103,5 @@ async def _open_tcp(address: TcpFc, resolver: BackgroundThread) -> socket.socket
             raise PortError(f"{address} cannot be reached: {why}{hint}") from error
         unless_connected.pop_all()
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _TCP_STALL_MS)
     return connection

@@ -17,6 +17,7 @@ _LIMIT = Rate(200, 200)
 _READ_SIZE = 512
 #: A client that does not read its replies is disconnected.
 _MAX_UNSENT = 65536
+#: A further client displaces the one that has been silent for longest: its laptop may have been switched off.
 _MAX_CLIENTS = 8
 
 #: Takes a request, and a callback for its reply.
@@ -33,7 +34,7 @@ async def open_share(address: GcsAddress, requested: Requested) -> Callable[[], 
         if address.kind == "udpin":
             port, _ = await loop.create_datagram_endpoint(lambda: _UdpShare(requests), local_addr=where, family=family)
             return port.close
-        clients: set[asyncio.Transport] = set()
+        clients: dict[asyncio.Transport, None] = {}  # the one silent for longest first
         server = await loop.create_server(lambda: _TcpClient(requests, clients), *where, family=family)
     except OSError as error:
         raise LinkError(f"share {address} cannot be opened: {reason(error)}") from error
@@ -64,7 +65,7 @@ class _Requests:
 
 
 class _TcpClient(asyncio.Protocol):
-    def __init__(self, requests: _Requests, clients: set[asyncio.Transport]) -> None:
+    def __init__(self, requests: _Requests, clients: dict[asyncio.Transport, None]) -> None:
         self._requests = requests
         self._clients = clients
         self._parser = MspParser(takes_low_v2=True)
@@ -73,14 +74,17 @@ class _TcpClient(asyncio.Protocol):
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
         if len(self._clients) >= _MAX_CLIENTS:
-            transport.abort()
-        else:
-            self._clients.add(transport)
+            silent = next(iter(self._clients))
+            del self._clients[silent]
+            silent.abort()
+        self._clients[transport] = None
 
     def connection_lost(self, exc: Exception | None) -> None:
-        self._clients.discard(self._transport)
+        self._clients.pop(self._transport, None)
 
     def data_received(self, data: bytes) -> None:
+        del self._clients[self._transport]
+        self._clients[self._transport] = None
         self._requests.take(data, self._parser, self._answer)
 
     def _answer(self, frame: MspFrame) -> None:

@@ -78,6 +78,11 @@ def test_an_occupied_port_affects_only_its_link(daemon: ConfiguredDaemon) -> Non
         daemon.reload("gcs.unavailable")
         taken.send_heartbeat()
         taken.wait_for("HEARTBEAT")
+    # Once the port is free, the same settings open it.
+    daemon.reload("config.reloaded")
+    with udp_station(("127.0.0.1", own_port)) as station:
+        station.say_hello()
+        station.wait_for("HEARTBEAT")
 
 
 def test_settings_that_need_a_restart_are_named(daemon: ConfiguredDaemon) -> None:

@@ -158,6 +158,24 @@ async def test_over_udp_each_program_gets_its_own_replies() -> None:
     assert len(daemon.share_refused) == 1
 
 
+async def test_a_further_client_displaces_the_silent_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A laptop that was switched off never closes its connection."""
+    monkeypatch.setattr("service.links.msp_share._MAX_CLIENTS", 2)
+    async with shared() as (daemon, first):
+        address = daemon.settings.share[0].address
+        silent, silent_writer = await asyncio.open_connection(address.host, address.port)
+        await first.ask(IDENT)
+        further, further_writer = await asyncio.open_connection(address.host, address.port)
+        for program in (Program(further, further_writer), first):
+            (reply,) = await program.ask(IDENT)
+            assert reply.direction is Direction.REPLY
+        async with asyncio.timeout(TIMEOUT_S):
+            with suppress(ConnectionError):
+                assert await silent.read() == b""
+        silent_writer.close()
+        further_writer.close()
+
+
 async def test_a_flood_is_dropped() -> None:
     async with shared() as (daemon, program):
         program._writer.write(MspFrame(Direction.REQUEST, REBOOT).encode() * 50_000)
