@@ -81,7 +81,7 @@ def test_an_occupied_port_affects_only_its_link(daemon: ConfiguredDaemon) -> Non
     # Once the port is free, the same settings open it.
     daemon.reload("config.reloaded")
     with udp_station(("127.0.0.1", own_port)) as station:
-        station.say_hello()
+        station.send_heartbeat()
         station.wait_for("HEARTBEAT")
 
 
