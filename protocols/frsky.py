@@ -25,21 +25,21 @@ _LATITUDE, _LONGITUDE = (0x13, 0x1B, 0x23), (0x12, 0x1A, 0x22)
 _SIGNS = {(_LATITUDE, ord("N")): 1, (_LATITUDE, ord("S")): -1, (_LONGITUDE, ord("E")): 1, (_LONGITUDE, ord("W")): -1}
 _HEIGHT_GROUP = (_HEIGHT_M, _HEIGHT_CM, _HEADING, _HEADING_FRACTION)
 _POWER, _PLACE = (_CELL, _VOLTS, _DECIVOLTS), (*_LATITUDE, *_LONGITUDE)
-#: Their values are missing without a voltage sensor or a GPS.
+#: Without a voltage sensor or a GPS, its values are missing.
 _SLOW_GROUPS = {(_TEMPERATURE, *power, *place) for power in ((), _POWER) for place in ((), _PLACE)}
-#: Groups that end with their last value. Harakiri sends nothing for 0.1 s after most of them: if they counted only when
-#: the next one begins, climb and speed would be derived from the wrong times.
+#: Groups that are complete with their last value. Harakiri pauses for 0.1 s after most of them: if they counted only
+#: when the next group begins, climb and speed would be derived from the wrong times.
 _WHOLE_GROUPS = {_HEIGHT_GROUP, (_TEMPERATURE, *_POWER, *_PLACE)}
 _CELLS = range(2, 7)
 
 
 @dataclass(frozen=True, slots=True)
 class FrskyReport:
-    """One group: height and heading twice a second, or voltage and position once a second. None: not in it, or unknown.
+    """One group: height and heading twice a second, or voltage and position once a second. None: not sent, or unknown.
 
     height_m: above the launch point; Harakiri sends 0 for every height below it, so 0 is unknown. heading_deg: whole
-    degrees, 0 without a compass. voltage_v: to 0.1 V. Degrees * 1e7, to 1/10000 of a minute; Harakiri does not send
-    whether its GPS has a fix.
+    degrees, 0 without a compass. voltage_v: to 0.1 V. place_e7: degrees * 1e7, to 1/10000 of a minute, also after the
+    GPS has lost its fix.
     """
 
     height_m: float | None = None

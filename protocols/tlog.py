@@ -39,7 +39,7 @@ class TlogRecord:
 
 def tlog_record(frame: bytes, at_us: int) -> bytes:
     """Return the record of a complete, valid frame of the dialect; empty for one that must not be logged."""
-    # (MAVLink 1 can neither be signed nor name SETUP_SIGNING.)
+    # MAVLink 1 has neither signatures nor SETUP_SIGNING.
     if frame[0] == MAGIC_V2:
         if frame[_MSGID] == _SETUP_SIGNING:
             return b""

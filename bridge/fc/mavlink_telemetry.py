@@ -150,15 +150,10 @@ class MavlinkTelemetry:
             return
         health = self._vehicle.last(Health)
         is_north_known = not self._is_harakiri or (health is not None and Sensor.COMPASS in health.sensors)
-        rates = (
-            math.degrees(message.rollspeed),
-            math.degrees(message.pitchspeed),
-            math.degrees(message.yawspeed),
-        )
-        has_rates = not self._is_harakiri and all(map(math.isfinite, rates))
-        self._vehicle.hear(
-            Orientation(now, Source.MAVLINK, roll, pitch, yaw % 360, is_north_known, rates if has_rates else None)
-        )
+        rates = None
+        if not self._is_harakiri and math.isfinite(message.rollspeed + message.pitchspeed + message.yawspeed):
+            rates = math.degrees(message.rollspeed), math.degrees(message.pitchspeed), math.degrees(message.yawspeed)
+        self._vehicle.hear(Orientation(now, Source.MAVLINK, roll, pitch, yaw % 360, is_north_known, rates))
 
     def _gps_raw_int(self, message: Message, now: float) -> None:
         if message.fix_type == m.GPS_FIX_TYPE_NO_GPS and not self._is_harakiri:
@@ -177,19 +172,13 @@ class MavlinkTelemetry:
             )
 
     def _global_position_int(self, message: Message, now: float) -> None:
-        if message.lat or message.lon:
-            self._vehicle.hear(Height(now, Source.MAVLINK, message.relative_alt / 1000, -message.vz / 100))
-            self._vehicle.hear(
-                GlobalPosition(
-                    now,
-                    Source.MAVLINK,
-                    message.lat,
-                    message.lon,
-                    message.alt / 1000,
-                    message.vx / 100,
-                    message.vy / 100,
-                )
-            )
+        if not (message.lat or message.lon):
+            return
+        north, east, up = message.vx / 100, message.vy / 100, -message.vz / 100
+        self._vehicle.hear(Height(now, Source.MAVLINK, message.relative_alt / 1000, up))
+        self._vehicle.hear(
+            GlobalPosition(now, Source.MAVLINK, message.lat, message.lon, message.alt / 1000, north, east)
+        )
 
     def _vfr_hud(self, message: Message, now: float) -> None:
         if self._is_harakiri and math.isfinite(message.alt) and math.isfinite(message.climb):

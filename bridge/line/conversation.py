@@ -2,8 +2,8 @@
 """Conversations with the flight controller and the store, written top to bottom without any I/O.
 
 A conversation is a generator. It yields one effect at a time and is sent the effect's answer;
-`bridge.line.runner.Runner` carries the effects out. When the line goes down, LinkLost is raised at the `yield`;
-when the bridge is about to end, its subclass Stopped; when its limit has passed, the subclass OutOfTime.
+`bridge.line.runner.Runner` carries the effects out. At the `yield`, LinkLost is raised when the line goes down, and its
+subclasses Stopped when the bridge is stopping and OutOfTime when the conversation's time limit has passed.
 """
 
 from collections.abc import Generator, Mapping, Sequence
@@ -145,10 +145,9 @@ def ask_surely(
 ) -> Conversation[MspFrame | None]:
     """Ask until two replies in a row are equal; None if they never are, or if a reply is missing.
 
-    lasting: how many bytes of the payload are compared, if the others may change; None: all.
-
-    The checksum of 8 bits lets a pair of flipped bits through: at one wrong bit in a thousand one INFO reply in 500,
-    and one BOXNAMES reply in 25. An error frame is an answer too.
+    The 8-bit checksum misses some pairs of flipped bits: with one wrong bit in a thousand, one INFO reply in 500 and
+    one BOXNAMES reply in 25 are damaged without notice. An error frame is a reply, too.
+    lasting: compare only this many bytes of the payload, because the others may change; None: all.
     """
     before: MspFrame | None = None
     for _ in range(_MAX_ASKS):

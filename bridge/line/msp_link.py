@@ -54,8 +54,8 @@ _RESYNC_COMMANDS = (
 PROBE = request(Msp.IDENT)
 RESYNC = b"".join(request(command) for command in _RESYNC_COMMANDS)
 RESYNC_REPLY_SIZE = sum(_REPLY_SIZES[command] for command in _RESYNC_COMMANDS)
-#: Sent only for the order of its reply, so no other code may use it. Harakiri answers with an error frame; a board that
-#: ignores unknown commands is never identified.
+#: Replies come in order: the reply to this shows that earlier ones are lost. No other code may use this command.
+#: Harakiri answers with an error frame; a board that ignores unknown commands is never identified.
 _QUESTION = Send(request(Msp.API_VERSION), Msp.API_VERSION, FRAME_OVERHEAD)
 #: Upper ends of the classes of round trips, seconds: a reply takes 2 ms over TCP, 10 ms at 115200 baud, 300 ms at 2400.
 BOUNDS_S = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
@@ -69,8 +69,8 @@ def byte_time_s(baud: int | None) -> float:
 class PendingReplies:
     """Replies that a silent board may send all at once when it resumes, in bytes, by the speed of their requests.
 
-    While it is searched for, the replies to probes and to earlier requests must fit its ring together. At another speed
-    it understood nothing.
+    While it is searched for, the replies to probes and to earlier requests must fit its ring together. It understands
+    no request at a wrong speed.
     """
 
     def __init__(self) -> None:
@@ -176,11 +176,9 @@ class MspLink:
 
     @property
     def outstanding_bytes(self) -> int:
-        """The total size of the pending replies, bytes."""
         return sum([sent.reply_size for sent in self._sent])
 
     def unanswered(self) -> PendingReplies:
-        """Replies that may still arrive."""
         pending = PendingReplies()
         for sent in self._sent:
             pending.add(self._baud, sent.size_in_ring, sent.sent_at)

@@ -24,7 +24,7 @@ _LINE_SHARE = 0.6
 _BURST_S = 0.05
 #: The part of that share reserved for STATUS: arming must be noticed at any speed.
 _STATUS_SHARE = 0.25
-#: For a line without a speed (TCP), which has a UART behind it somewhere: Harakiri's default.
+#: A line without a speed (TCP) has a UART somewhere behind it; this is Harakiri's default.
 _ASSUMED_BAUD = 115200
 #: The factor for all rates during a mission transfer.
 _BESIDE_MISSIONS = 0.2
@@ -180,7 +180,7 @@ class PollSchedule:
             slot = max(ready, key=lambda slot: (now - slot.asked_at) / slot.interval_s)
             if slot.is_asked:
                 slot.misses += 1
-                self._bend()
+                self._set_intervals()
             slot.asked(now)
             self._free_at = max(self._free_at, now - _BURST_S) + slot.cost / self._budget
             link.send(slot.request, now)
@@ -191,7 +191,7 @@ class PollSchedule:
         """Take a reply to a command that is polled."""
         slot = self._slots[frame.command]
         slot.is_asked = False
-        is_bent = slot.misses > _TOLERATED_MISSES or self._quality < 1
+        is_slowed = slot.misses > _TOLERATED_MISSES or self._quality < 1
         slot.misses = 0
         self._quality = min(self._quality + _RECOVERY, 1.0)
         size = frame_size(frame.command, len(frame.payload))
@@ -202,7 +202,7 @@ class PollSchedule:
             slot.refusals = 0
             slot.expect(size)
             self._fit()
-        elif is_bent:
+        elif is_slowed:
             # The others follow with their own replies.
             slot.set_interval(self._interval(slot, self._scale))
 
@@ -225,7 +225,7 @@ class PollSchedule:
         if lost or beside_missions != self._beside_missions:
             self._quality = max(self._quality * _LOSS_FACTOR**lost, _WORST_QUALITY)
             self._beside_missions = beside_missions
-            self._bend()
+            self._set_intervals()
 
     def _fit(self) -> None:
         """Scale the requested rates to the line."""
@@ -239,13 +239,12 @@ class PollSchedule:
                 if self._bytes_per_s(self._line_scale + step) <= self._budget:
                     self._line_scale += step
                 step /= 2
-        self._bend()
+        self._set_intervals()
 
     def _bytes_per_s(self, scale: float) -> float:
         return sum(slot.cost / self._interval(slot, scale) for slot in self._slots.values())
 
-    def _bend(self) -> None:
-        """Set the intervals."""
+    def _set_intervals(self) -> None:
         for slot in self._slots.values():
             slot.set_interval(self._interval(slot, self._scale))
 

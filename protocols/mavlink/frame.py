@@ -42,7 +42,6 @@ class MavlinkFrame:
 
     @property
     def version(self) -> int:
-        """1 or 2."""
         return 2 if self.raw[0] == MAGIC_V2 else 1
 
     @property
@@ -84,10 +83,7 @@ class MavlinkFrame:
 
 
 def is_plausible_heartbeat(frame: MavlinkFrame) -> bool:
-    """True for a HEARTBEAT as evidence of MAVLink: its length, and the fields that have few legal values, are right.
-
-    These are type, autopilot, state and MAVLink version (https://mavlink.io/en/messages/common.html#HEARTBEAT).
-    """
+    """True for a HEARTBEAT with legal length, type, autopilot, state and version (common.xml): evidence of MAVLink."""
     payload = frame.payload
     if frame.msgid != _HEARTBEAT or len(payload) != _HEARTBEAT_SIZE:
         return False

@@ -75,7 +75,7 @@ class Check(Enum):
 class Signing:
     """One key and the timestamps used with it. Links with the same key share one instance.
 
-    `refused_until`: an earlier run may have heard frames up to this timestamp without storing that.
+    `refused_until`: frames up to this timestamp are refused, because an earlier run may have accepted them unrecorded.
     """
 
     def __init__(self, key: bytes, timestamps: Timestamps, refused_until: int = -1) -> None:

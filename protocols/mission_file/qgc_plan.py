@@ -3,7 +3,7 @@
 
 Fence and rally points next to a mission are ignored.
 An item's frame and params are as QGroundControl would send them; AltitudeMode only records their origin.
-Surveys and corridor scans contain the plain items they are flown as, which are used. The planned home position becomes
+Surveys and corridor scans list the plain items they are flown as; these are read. The planned home position becomes
 item 0, as QGroundControl sends it to an ArduPilot vehicle.
 """
 

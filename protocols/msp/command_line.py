@@ -21,7 +21,7 @@ _HEADER = b"$M<"
 #: Exactly two requests: noise cannot produce that.
 _EVIDENCE = 10
 _FRAMES_KEPT = 64
-#: The longest line that can be typed: 64 characters on INAV, 48 on Harakiri.
+#: Erases the longest line that can be typed: 64 characters on INAV, 48 on Harakiri.
 RUB_OUT_LINE = _DEL * 64
 
 

@@ -74,8 +74,8 @@ class MspParser:
     """Finds frames in a byte stream. Never raises: bytes outside frames are counted and skipped.
 
     After a bad checksum the search resumes one byte later, so a frame hidden behind a false header is still found.
-    `takes_low_v2`: also v2 frames of v1's commands, as configurators send them; no flight controller sends them
-    unrequested. Call `reset` when the line has been silent: an incomplete frame keeps its bytes.
+    `takes_low_v2`: accept v2 frames of v1's commands, too, as configurators send them; a flight controller sends such
+    frames only in reply to them. Call `reset` when the line has been silent: an incomplete frame keeps its bytes.
     """
 
     def __init__(self, *, takes_low_v2: bool = False) -> None:

@@ -160,7 +160,6 @@ def decode_wp(payload: bytes) -> tuple[int, NavRecord] | None:
 
 
 def decode_info(payload: bytes) -> NavInfo | None:
-    """Read MSP_WP_GETINFO."""
     if len(payload) < _INFO.size:
         return None
     _, capacity, is_valid, count = _INFO.unpack_from(payload)

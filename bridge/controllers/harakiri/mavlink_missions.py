@@ -66,7 +66,7 @@ class HarakiriMavlinkMissions(HarakiriStore):
 
     def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Conversation[PushResult]:
         if self._vehicle.armed is not False:
-            # The firmware does not check this: it would accept a list, or lose its own, in flight.
+            # Nothing is sent to a craft that may be armed; the firmware would refuse it, too.
             return PushResult(PushFailure.ARMED)
         items = [_message(seq, item) for seq, item in enumerate(items_from_records(records))] or _NOTHING
         failure = PushFailure.NO_ANSWER

@@ -32,7 +32,7 @@ class MultiwiiMissions(NavMissions):
     _empty: tuple[NavRecord, ...] = NOTHING
 
     def report(self) -> Conversation[StoreReport | None]:
-        """As on any of these, with the limits of its legs: the pilot may change these settings at any time."""
+        """Also read the limits of its legs: the pilot may change these settings at any time."""
         config = yield from ask(request(Nav.NAV_CONFIG), Nav.NAV_CONFIG, NAV_CONFIG_SIZE)
         limits = None if config is None else decode_nav_limits(config.payload)
         if limits is not None:

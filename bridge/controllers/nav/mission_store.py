@@ -75,7 +75,7 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
         self._known: tuple[NavRecord, ...] | None = None
 
     def report(self) -> Conversation[StoreReport | None]:
-        """Its state from telemetry; the stored list is unknown until it is read."""
+        """Ask if it is armed. The stored list is unknown until it is read."""
         armed = yield from self._ask_armed()
         if armed is None:
             return None

@@ -123,7 +123,7 @@ class State(ABC):
 
     def __init__(self, port: Port, event: Event, now: float) -> None:
         self.port = port
-        #: The port must be set to it, baud; None where it has none.
+        #: The speed that the port must have, baud; None where it has none.
         self.speed = event.speed if isinstance(event, Found) else None
 
     @abstractmethod

@@ -50,5 +50,4 @@ class Frsky(State):
         return Lost(f"no FrSky telemetry for {_SILENCE_S} s") if now >= self._heard_at + _SILENCE_S else None
 
     def deadline(self) -> float:
-        """The next probe, or the end of the line's silence."""
         return min(self._probe_due, self._heard_at + _SILENCE_S)

@@ -119,9 +119,8 @@ class Mavlink(State):
 
     def _profile(self, heard: MavlinkFrame) -> Profile:
         """A board met over MSP stays in its family unless it sends MAVLink 2; otherwise the sender decides."""
-        profiles = [profile for profile in self.port.profiles if profile.spoken is Spoken.MAVLINK]
-        ours = [profile for profile in profiles if not profile.is_passed_through]
-        (other,) = (profile for profile in profiles if profile.is_passed_through)
+        (other,) = (profile for profile in self.port.profiles if profile.is_passed_through)
+        ours = [p for p in self.port.profiles if p.spoken is Spoken.MAVLINK and p is not other]
         if self.port.autopilot is Autopilot.OTHER:
             return other
         if self.port.autopilot is Autopilot.HARAKIRI:
@@ -136,8 +135,8 @@ class _HarakiriSender:
     """Makes frames without three equal hazard bytes in a row, also across the boundary to the previous frame.
 
     Three 0x0D enter the CLI in any protocol; '#' and 'R' count only in AUTOSENSE, but it can fall back to that at any
-    moment. MAVLink has no masking as our MSP extension has: only the sequence number may be chosen, and with it
-    changes the CRC. A run within the payload cannot be avoided.
+    moment. Unlike our MSP extension, MAVLink has no mask: only the sequence number can be chosen, which also changes
+    the CRC. A run within the payload cannot be avoided.
     """
 
     def __init__(self) -> None:

@@ -73,7 +73,6 @@ class MspLine(State):
         return self._end or self._silence(now)
 
     def deadline(self) -> float:
-        """The link's next deadline, or the end of its silence."""
         if self._end is not None:
             return 0.0
         return min(self.link.next_deadline(), self._silent_since() + self._silence_s)
@@ -92,7 +91,6 @@ class MspLine(State):
             self.port.runner.received(frame, now)
 
     def _silent_since(self) -> float:
-        """The time of the last sign of life, or of the first request after it."""
         return self.link.last_heard_at
 
     @property
@@ -115,7 +113,7 @@ class MspLine(State):
         heard = self._foreign.mavlink
         if heard is not None:
             return Found(Spoken.MAVLINK, self.speed, "heard where MSP was answered before", heard)
-        # Much slower than its telemetry, the port reads only a few wrong bytes of it, or none.
+        # At a much lower speed than the telemetry's, the port reads only a few wrong bytes, or none.
         why = "the incoming data is no longer MSP" if self._is_foreign else f"no answer for {MSP_SILENCE_S} s"
         # A board that was armed at the speed of FrSky telemetry has disarmed, and is back at its former, good speed.
         has_disarmed = self.speed == FRSKY_SPEED and self.port.vehicle.armed
@@ -191,7 +189,6 @@ class Polling(MspLine):
         return event
 
     def deadline(self) -> float:
-        """The next poll, or the next deadline of any MSP line."""
         deadline = min(super().deadline(), self.port.polls.next_deadline(self.link))
         return deadline if deadline <= self._check_at or self.port.runner.is_busy else self._check_at
 

@@ -35,7 +35,7 @@ _PROBE_INTERVAL_S = 0.15
 _QUICK_PROBES = 4
 _CONFIRM_S = 0.3
 _ANSWER_SIZE = 13
-#: Harakiri sends three and more every 125 ms. By chance one of four ids and a mark in the right place: 1 in 1024 each.
+#: Harakiri sends three and more every 125 ms. In noise each has a chance of 1 in 1024: one of four ids, and a mark.
 _FRSKY_EVIDENCE = 6
 #: A command line's echo of one probe: `$M<dd`.
 _ECHO_SIZE = 5
@@ -84,7 +84,6 @@ class Searching(State):
         self._visit = self._new_visit(now)
 
     def deadline(self) -> float:
-        """The end of a phase or visit."""
         return min(self._visit.phase_ends, self._visit.ends)
 
     def receive(self, data: bytes, now: float) -> Event | None:
