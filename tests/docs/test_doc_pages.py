@@ -10,6 +10,7 @@ import pytest
 from tests.support.doc_pages import PAGES, blocks, place_of, prose_of, spans, text_of
 from tests.support.programs import REPOSITORY
 
+CODE = ("bridge", "protocols", "service", "simulator", "storage")
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 #: What the blocks of each language are tested by.
 LANGUAGES = {
@@ -25,7 +26,11 @@ PAGE = pytest.mark.parametrize("page", PAGES, ids=place_of)
 def anchors(page: Path) -> set[str]:
     """The anchors of the headings, as GitHub makes them."""
     headings = re.findall(r"^#+ (.*)$", re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.M | re.S), re.MULTILINE)
-    return {re.sub(r"[^\w\- ]", "", heading).lower().replace(" ", "-") for heading in headings}
+    return {*map(_anchor, headings)}
+
+
+def _anchor(heading: str) -> str:
+    return re.sub(r"[^\w\- ]", "", heading).lower().replace(" ", "-")
 
 
 @cache
@@ -40,7 +45,7 @@ def names() -> set[str]:
     """All identifiers in the code."""
     return {
         word
-        for package in ("bridge", "protocols", "service", "simulator", "storage")
+        for package in CODE
         for file in (REPOSITORY / package).rglob("*.py")
         for word in re.findall(r"[A-Za-z_]\w+", file.read_text())
     }
@@ -76,6 +81,19 @@ def test_files_in_the_text_exist(page: Path) -> None:
             assert (REPOSITORY / span).exists() or (page.parent / span).exists(), span
         elif re.fullmatch(r"[\w-]+\.(py|c|h|md)", span):
             assert span in files(), span
+
+
+def test_pages_named_in_the_code_exist() -> None:
+    """With their headings, as in: docs/zenoh.md, "Limits"."""
+    wrong = []
+    for folder in (*CODE, "tests", "firmware", "examples", "systemd", "deb", "generators", "benchmarks"):
+        for file in (REPOSITORY / folder).rglob("*.*"):
+            if file.suffix in {".py", ".c", ".h", ".toml", ".service", ".json5", ".yml"}:
+                for page, heading in re.findall(r'(docs/[a-z/-]+\.md)(?:, "([^"]+)")?', file.read_text()):
+                    named = REPOSITORY / page
+                    if not named.exists() or (heading and _anchor(heading) not in anchors(named)):
+                        wrong.append((str(file), page, heading))
+    assert wrong == []
 
 
 def test_names_in_the_tour_exist() -> None:
