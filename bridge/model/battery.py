@@ -4,6 +4,8 @@
 from itertools import pairwise
 from math import ceil
 
+#: Less than any usable LiPo: the board has power from elsewhere, such as USB.
+LEAST_V = 2.5
 #: The highest voltage of a charged cell.
 _FULL_CELL_V = 4.25
 #: Volts per cell at rest -> percent remaining.

@@ -12,7 +12,7 @@ from enum import Enum, IntEnum
 from typing import TypeVar
 
 from bridge.model.airframe import Airframe
-from bridge.model.battery import least_cells, remaining_percent
+from bridge.model.battery import LEAST_V, least_cells, remaining_percent
 from bridge.model.flight_mode import FlightMode
 from bridge.model.ground_track import GroundTrack, distance_m
 from protocols.mission_item import is_on_earth
@@ -23,6 +23,8 @@ from protocols.msp.telemetry import Sensor
 STALE_S = 1.4
 #: Before the first arming, home follows the craft's position. Smaller moves than this are the receiver's noise.
 _STANDING_M = 10.0
+#: After a longer silence on the ground the battery may be another one.
+_SWAP_S = 10.0
 #: 2020: no GPS reports an earlier time.
 _EARLIEST_UNIX_S = 1_577_836_800
 
@@ -267,8 +269,11 @@ class Vehicle:
 
     def _estimated(self, power: Power) -> Power:
         """Fill in cells and remaining charge if the flight controller does not report them."""
-        if power.voltage_v is None or power.remaining_percent is not None:
+        if power.voltage_v is None or power.voltage_v < LEAST_V or power.remaining_percent is not None:
             return power
+        before = self.last(Power)
+        if before is not None and power.heard_at > before.heard_at + _SWAP_S and not self.armed:
+            self._cells = 1
         # Never fewer than before: a discharging battery does not lose cells.
         self._cells = max(self._cells, power.cells or least_cells(power.voltage_v))
         return replace(power, cells=self._cells, remaining_percent=remaining_percent(power.voltage_v, self._cells))

@@ -14,7 +14,7 @@ from bridge.controllers.table import PROFILES
 from bridge.fc.msp_telemetry import hear_msp
 from bridge.fc.profile import FlightController, Profile, Spoken
 from bridge.model.airframe import Airframe, airframe
-from bridge.model.vehicle import Vehicle
+from bridge.model.vehicle import FlightState, Power, Source, Vehicle
 from bridge.vehicle import vehicle_messages as make
 from bridge.vehicle.telemetry_table import TELEMETRY
 from protocols.mavlink.codec import pack
@@ -340,6 +340,24 @@ def test_remaining_charge_is_estimated(volts: tuple[float, ...], percent: int) -
         with_replies(state, HARAKIRI, ANALOG=struct.pack("<BHH", round(voltage * 10), 0, 0))
     assert make.sys_status(at(state)).battery_remaining == percent
     assert make.battery_status(at(state)).battery_remaining == percent
+
+
+@pytest.mark.parametrize(
+    ("pause_s", "armed", "cells", "percent"), [(15.0, False, 3, 100), (5.0, False, 4, 0), (15.0, True, 4, 0)]
+)
+def test_a_smaller_battery_is_recognised_after_a_pause(pause_s: float, armed: bool, cells: int, percent: int) -> None:
+    state = Vehicle()
+    for now, voltage in ((0.0, 16.8), (pause_s, 12.6)):
+        state.hear(FlightState(now, Source.MSP, armed))
+        state.hear(Power(now, Source.MSP, voltage))
+    power = state.last(Power)
+    assert power is not None
+    assert (power.cells, power.remaining_percent) == (cells, percent)
+
+
+def test_no_charge_is_estimated_on_usb_power() -> None:
+    state = told(Vehicle(), HARAKIRI, STATUS=status(), ANALOG=struct.pack("<BHH", 3, 0, 0))
+    assert (make.battery_status(at(state)).voltages[0], make.sys_status(at(state)).battery_remaining) == (300, -1)
 
 
 def test_a_receiver_is_healthy_while_it_has_a_signal() -> None:
