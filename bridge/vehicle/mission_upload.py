@@ -7,7 +7,6 @@ ack to MISSION_COUNT means "continue" to it; most special cases below respond to
 docs/ground-stations.md.
 """
 
-from collections import Counter
 from collections.abc import Callable, Iterator
 from functools import partial
 from math import inf
@@ -27,6 +26,7 @@ from bridge.model.mission_log import ArrivedMission
 from bridge.model.refusal import Refusal
 from bridge.model.verdict import CLEARED_LIST, Result, Verdict
 from bridge.vehicle.upload_answers import UploadAnswers
+from bridge.vehicle.upload_list import UploadList
 from bridge.vehicle.upload_states import (
     TRANSITIONS,
     Announced,
@@ -47,18 +47,11 @@ from bridge.vehicle.upload_states import (
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionItem, MissionResult
 
+_MISSION = int(messages.MAV_MISSION_TYPE_MISSION)
 _TOO_MANY_UPLOADS = Refusal(MissionResult.DENIED, "Too many uploads: wait a few seconds")
 #: The maximum number of simultaneous uploads: one for each peer of a link.
 _MOST_UPLOADS = MAX_PEERS
-#: A host with more of them than this is the first to lose one.
-_MOST_OF_HOST = 2
-#: After this long with lists arriving, an upload does not wait for its turn: a slow or silent ground station would lock
-#: out the others. A pause ends that.
-_ALONE_S = 4.0
-_PAUSE_S = 3.0
-#: Nor does it if more than this many are running or waiting.
-_MOST_IN_TURN = 4
-#: The flight controller is not asked more often if it can take a list; one reply serves all uploads that wait for it.
+#: The flight controller is not asked more often whether it can take a list; one reply serves all uploads that wait.
 _ASK_INTERVAL_S = 0.2
 
 
@@ -71,30 +64,24 @@ class MissionUploads:
         self._log_event = log_event
         self._incidents = incidents
         self._flash = ground.flash
-        self._uploads: list[Upload] = []  # in the order of their MISSION_COUNT
-        self._states: Counter[type[UploadState]] = Counter()  # of the uploads
-        #: No state ends and no request is repeated before this time.
-        self._states_due = inf
+        self._uploads = UploadList()
         self.answers = UploadAnswers(ground)
         #: False while nothing is due: no upload runs, and no reminder waits.
         self.is_active = False
         self._is_asking = False
         self._may_ask_at = 0.0
-        #: Since when lists have been arriving without a pause, and when the last upload ended.
-        self._arriving_since = self._last_end = -inf
 
     @property
     def receiving(self) -> MissionTransfer | None:
         """The upload that receives items."""
-        for upload in self._uploads:
-            if isinstance(upload.state, Receiving):
-                source, received = str(upload.station), len(upload.state.items)
-                return MissionTransfer(source, TransferStep.RECEIVING, received, upload.count)
+        for upload in self._uploads.within(Receiving):
+            source, received = str(upload.station), len(upload.state.received)
+            return MissionTransfer(source, TransferStep.RECEIVING, received, upload.count)
         return None
 
     def is_writing(self, station: Station) -> bool:
         """True if an upload of this ground station runs or waits."""
-        return self._of(station) is not None
+        return self._uploads.of(station) is not None
 
     # From ground stations.
 
@@ -151,35 +138,35 @@ class MissionUploads:
             self._end([upload], _cancelled(f"cancelled (result {result})"), now)
         else:
             upload.state.close(now)
-            self._states_due = now  # the deadline may be sooner
+            self._uploads.schedule(upload)
 
     # From the rest of the bridge.
 
     def end(self, refusal: Refusal, now: float) -> None:
         """End the uploads that have not reached the flight controller: the craft was armed, or the bridge stops."""
-        self._end(self._undelivered(), refusal, now)
+        self._end(self._uploads.undelivered(), refusal, now)
 
     def peer_gone(self, peer: Peer, now: float) -> None:
         """A ground station's connection is closed: its uploads end without waiting for the timeout."""
-        gone = [upload for upload in self._undelivered() if upload.station.peer == peer]
+        gone = [upload for upload in self._uploads.undelivered() if upload.station.peer == peer]
         self._end(gone, _cancelled("ended: disconnected"), now)
 
     def link_lost(self, now: float) -> None:
         """The flight controller is gone: uploads that still receive items end."""
-        receiving = [upload for upload in self._uploads if isinstance(upload.state, Receiving | Complete)]
+        receiving = self._uploads.within(Receiving, Complete)
         self._end(receiving, Refusal(MissionResult.DENIED, "Flight controller lost during the upload"), now)
 
     def tick(self, now: float) -> None:
         """Repeat a request, end a state at its deadline, begin the next upload."""
-        if now >= self._states_due:
-            for upload in self._uploads[:]:
+        if now >= self._uploads.due:
+            for upload in [*self._uploads]:
                 state = upload.state
                 if now >= state.deadline:
                     self._end([upload], state.timeout, now)
                 elif isinstance(state, Receiving) and now >= state.request.due:
                     state.request.lost()
                     self._request(upload, now)
-            self._states_due = min((upload.state.next_tick() for upload in self._uploads), default=inf)
+            self._uploads.reschedule()
         if now >= self.answers.due:
             self.answers.tick(now)
         self._begin_next(now)
@@ -188,21 +175,19 @@ class MissionUploads:
 
     def next_deadline(self) -> float:
         # Asked after each datagram of a flood.
-        states = self._states
-        arriving, waiting = states[Asking] or states[Receiving], states[Waiting]
+        uploads = self._uploads
+        arriving, waiting = uploads.has(Asking, Receiving), uploads.has(Waiting)
         is_free = self._missions.occupied() is not OCCUPIED
-        if is_free and (states[Complete] or (waiting and not arriving)):
+        if is_free and (uploads.has(Complete) or (waiting and not arriving)):
             return 0.0
-        times = [self._states_due, self.answers.due]
-        times += [self._may_ask_at] if states[Asking] and not self._is_asking else []
-        times += [self._arriving_since + _ALONE_S] if is_free and waiting and arriving else []
+        times = [uploads.due, self.answers.due]
+        times += [self._may_ask_at] if uploads.has(Asking) and not self._is_asking else []
+        times += [uploads.waits_until] if is_free and waiting and arriving else []
         return min(times)
 
     # State changes of an upload.
 
-    def _begin(
-        self, station: Station, count: int, now: float, mission_type: int = messages.MAV_MISSION_TYPE_MISSION
-    ) -> None:
+    def _begin(self, station: Station, count: int, now: float, mission_type: int = _MISSION) -> None:
         self.is_active = True
         self.answers.forget(station)
         for older in self._uploads:
@@ -214,29 +199,19 @@ class MissionUploads:
             return
         incident = f"upload-{next(self._incidents)}"
         upload = Upload(station, count, incident, Waiting(Announced(), now), mission_type)
-        self._uploads.append(upload)
-        self._entered(upload)
+        self._uploads.add(upload)
         armed = self._missions.armed_refusal()
         if armed is not None:
             self._end([upload], armed, now)
         elif len(self._uploads) > _MOST_UPLOADS:
-            self._end([self._least_worth()], _cancelled("ended: too many at once"), now)
+            ended = self._uploads.least_worth(self._ground.has_standing)
+            self._end([ended], _cancelled("ended: too many at once"), now)
         self._begin_next(now)
-
-    def _least_worth(self) -> Upload:
-        """The upload to end if too many run: a crowded host's, else a stranger's, one without items, the oldest."""
-        hosts = Counter(upload.station.peer.host for upload in self._uploads)
-
-        def worth(upload: Upload) -> tuple[int, bool, bool, float]:
-            peer, state = upload.station.peer, upload.state
-            crowd = max(hosts[peer.host], _MOST_OF_HOST)
-            return -crowd, self._ground.has_standing(peer), bool(state.received), state.since
-
-        return min(self._undelivered(), key=worth)
 
     def _begin_next(self, now: float) -> None:
         """Continue the uploads whose turn has come: first that of the host that has written least."""
-        for upload in sorted(self._in(Waiting, Complete), key=lambda upload: self._flash.used(upload.station.peer)):
+        due = self._uploads.within(Waiting, Complete)
+        for upload in sorted(due, key=lambda upload: self._flash.used(upload.station.peer)):
             event = self._turn(upload, now)
             if event is not None:
                 self._handle(upload, event, now)
@@ -250,17 +225,11 @@ class MissionUploads:
             if refusal is None and is_write and not self._flash.allows(upload.station.peer, now):
                 refusal = Refusal(MissionResult.DENIED, TOO_MANY_WRITES)
         else:
-            refusal = OCCUPIED if self._must_wait(now) else self._missions.occupied()
+            refusal = OCCUPIED if self._uploads.must_wait(now) else self._missions.occupied()
         if refusal is not None:
             return None if refusal is OCCUPIED else Ended(refusal)
         is_clear = isinstance(state, Waiting) and not upload.count
         return Judged((), CLEARED_LIST) if is_clear else Turn()
-
-    def _must_wait(self, now: float) -> bool:
-        """True if the list of another upload is arriving as it should."""
-        if not self._in(Asking, Receiving, Complete):
-            return False
-        return now < self._arriving_since + _ALONE_S and len(self._uploads) <= _MOST_IN_TURN
 
     def _handle(self, upload: Upload, event: Event, now: float) -> None:
         before = upload.state
@@ -268,16 +237,13 @@ class MissionUploads:
         if after is None:
             self._forget(upload, now)
         else:
-            self._states[type(before)] -= 1
-            upload.state = after(event, now)
-            self._entered(upload)
+            self._uploads.change(upload, after(event, now))
         match event:
             case Turn() if isinstance(before, Complete):
                 delivered = partial(self._delivered, upload, before.verdict)
                 self._deliver(upload, before.received, before.verdict, delivered, now)
             case Turn():
-                if self._in(Asking, Receiving) == [upload] and now >= self._last_end + _PAUSE_S:
-                    self._arriving_since = now
+                self._uploads.begins_to_arrive(upload, now)
             case Ready():
                 self._note("mission.upload_started", upload, count=upload.count)
                 self._request(upload, now)
@@ -289,14 +255,8 @@ class MissionUploads:
             if upload in self._uploads:
                 self._handle(upload, Ended(refusal), now)
 
-    def _entered(self, upload: Upload) -> None:
-        self._states[type(upload.state)] += 1
-        self._states_due = min(self._states_due, upload.state.next_tick())
-
     def _forget(self, upload: Upload, now: float) -> None:
-        self._last_end = now
-        self._uploads.remove(upload)
-        self._states[type(upload.state)] -= 1
+        self._uploads.remove(upload, now)
         self._missions.release(upload)
 
     def _supersede(self, upload: Upload, now: float) -> None:
@@ -318,7 +278,7 @@ class MissionUploads:
             # The previous list is being written, the new one waits for its turn.
             return False
         if isinstance(state, Waiting):
-            upload.count = count
+            upload.count, upload.mission_type = count, _MISSION
             return True
         if count != upload.count or isinstance(state, Complete):
             self._supersede(upload, now)
@@ -329,32 +289,30 @@ class MissionUploads:
         return True
 
     def _ask(self, now: float) -> None:
-        """Ask the flight controller if it can take a list, for all uploads that wait for the reply."""
-        if self._in(Asking) and not self._is_asking and now >= self._may_ask_at:
+        """Ask the flight controller whether it can take a list, for all uploads that wait for the reply."""
+        if self._uploads.has(Asking) and not self._is_asking and now >= self._may_ask_at:
             self._is_asking = True
             self._may_ask_at = now + _ASK_INTERVAL_S
             self._missions.run(self._missions.preflight(), self._asked, now)
 
     def _asked(self, answer: StoreReport | Refusal, now: float) -> None:
         self._is_asking = False
-        for upload in self._in(Asking):
-            self._answered(upload, answer, now)
-
-    def _answered(self, upload: Upload, answer: StoreReport | Refusal, now: float) -> None:
-        if isinstance(answer, StoreReport) and (rejection := check_count(upload.count, answer.rules)):
-            answer = Refusal(rejection.ack, rejection.finding.text())
-        if isinstance(answer, Refusal):
-            self._handle(upload, Ended(answer), now)
-        else:
-            check = begin_check(upload.count, answer.rules, self._missions.vehicle.place())
-            self._handle(upload, Ready(upload.count, check), now)
+        for upload in self._uploads.within(Asking):
+            event: Event
+            if isinstance(answer, Refusal):
+                event = Ended(answer)
+            elif rejection := check_count(upload.count, answer.rules):
+                event = Ended(Refusal(rejection.ack, rejection.finding.text()))
+            else:
+                event = Ready(upload.count, begin_check(upload.count, answer.rules, self._missions.vehicle.place()))
+            self._handle(upload, event, now)
 
     def _request(self, upload: Upload, now: float) -> None:
         """Request the lowest missing item, by id 40: the only one that Mission Planner understands in both modes."""
         state = upload.state
         assert isinstance(state, Receiving)
         state.request.asked(state.wanted, now)
-        self._states_due = min(self._states_due, state.request.due)
+        self._uploads.schedule(upload)
         station = upload.station
         request = messages.MAVLink_mission_request_message(station.sysid, station.compid, state.wanted)
         self._ground.to(station, request)
@@ -405,29 +363,17 @@ class MissionUploads:
 
     # Ground stations.
 
-    def _of(self, station: Station) -> Upload | None:
-        """The newest upload of a ground station: one may wait behind another that is being written."""
-        return next((upload for upload in reversed(self._uploads) if upload.station == station), None)
-
-    def _in(self, *states: type[UploadState]) -> list[Upload]:
-        if not any(self._states[state] for state in states):
-            return []
-        return [upload for upload in self._uploads if type(upload.state) in states]
-
-    def _undelivered(self) -> list[Upload]:
-        return [upload for upload in self._uploads if not isinstance(upload.state, Delivering)]
-
     def _find(self, station: Station, now: float) -> Upload | None:
         """The newest upload of a ground station; it continues if its address has changed (Wi-Fi roaming).
 
         Not if it was answered at this address: then it has announced another list, and lists must never be mixed.
         """
-        if self._of(station) is None and not self.answers.was_said_to(station, now):
+        if self._uploads.of(station) is None and not self.answers.was_said_to(station, now):
             for upload in self._uploads:
                 if self._ground.stations.has_moved(upload.station, station, now):
                     self._note("mission.station_moved", upload, before=str(upload.station), after=str(station))
                     upload.station = station
-        return self._of(station)
+        return self._uploads.of(station)
 
     def _elsewhere(self, upload: Upload, now: float) -> list[Station]:
         """Other addresses of the upload's station, except those that have announced their own list."""

@@ -42,7 +42,7 @@ def holding(options: SimOptions | None = None, faults: Faults | None = None) -> 
 
 def state(world: World) -> type[UploadState] | None:
     """The state of the first upload; None if there is none."""
-    uploads = world.bridge._uploads._uploads
+    uploads = list(world.bridge._uploads._uploads)
     return type(uploads[0].state) if uploads else None
 
 
@@ -472,6 +472,16 @@ def test_a_list_announced_while_another_is_written_is_requested() -> None:
     world.run(1)
     assert acks(station) == [A.ACCEPTED]
     assert world.stored == records_of(again)
+
+
+def test_a_list_takes_the_place_of_a_waiting_clear() -> None:
+    """DroneKit sends both at once. The final ack is of the list's mission type."""
+    world, station = holding()
+    other = GroundStation(world, "other", sysid=254)
+    receiving(world, other, waypoints(30, 1), 30)
+    station.send(clear_message(255))
+    assert Upload(station, waypoints(5)).run() is A.ACCEPTED
+    assert world.stored == records_of(waypoints(5))
 
 
 @pytest.mark.parametrize("announce", [count_message(0), clear_message(), count_message(12)])
