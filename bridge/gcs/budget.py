@@ -17,7 +17,7 @@ _ALL_FORGOTTEN = 50.0
 
 
 class TokenBucket:
-    """A token bucket for `rate`; the count restarts whenever the bucket is full."""
+    """A token bucket, full at the start."""
 
     def __init__(self, rate: Rate) -> None:
         self.rate = rate

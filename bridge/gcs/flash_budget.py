@@ -22,9 +22,9 @@ TOO_MANY_WRITES = "Flash wear limit: try again in 10 minutes"
 class FlashBudget:
     """Shares the writes between the hosts with precedence on an open link; all others have one account.
 
-    The last writes are kept for hosts that have not written lately, one for each. Above that, a host may write while
-    more than half as many writes are left as it has used: a single one gets 257 at once and 7 an hour. A host that
-    gains precedence takes over the account of one that has lost it: changing addresses gains nothing.
+    The last writes are kept for hosts that have not written lately, one for each. Of the rest, a host gets no more once
+    it has used twice what is left: a single one gets 257 at once and 7 an hour. A host that gains precedence takes over
+    the account of one that has lost it: changing addresses gains nothing.
 
     A peer with the key or a listed address has its own budget, but its writes also count for the others.
     """

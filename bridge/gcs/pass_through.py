@@ -29,7 +29,7 @@ _HEARTBEAT = messages.MAVLINK_MSG_ID_HEARTBEAT
 
 
 class PassThrough:
-    """The routes of one autopilot's time on the port."""
+    """The routes while one autopilot is on the port."""
 
     def __init__(self, ground: Ground) -> None:
         self._ground = ground

@@ -78,7 +78,7 @@ def _by_precedence(peers: Iterable[Peer], steady: Collection[Peer]) -> list[tupl
 
 
 class _Places:
-    """The places of a link's listeners, or of its other peers. Receiving costs no more on a full link."""
+    """The places of a link's listeners, or of its other peers. A frame costs no more time on a full link."""
 
     def __init__(self, *, is_listener: bool) -> None:
         self.is_listener = is_listener

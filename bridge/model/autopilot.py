@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The autopilot whose MAVLink arrives on the port: a setting."""
+"""A setting: the autopilot whose MAVLink arrives on the port."""
 
 from enum import Enum
 
 
 class Autopilot(Enum):
-    """Whose MAVLink is heard on the port."""
+    """AUTO: known from MSP on this port, or from its ids. HARAKIRI is translated, OTHER is passed through."""
 
     AUTO = "auto"
     HARAKIRI = "harakiri"

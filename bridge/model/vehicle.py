@@ -290,7 +290,7 @@ class Vehicle:
             self.home = replace(self.home, altitude_m=altitude_m)
 
     def hear_gps_time(self, now: float, source: Source, unix_s: float) -> None:
-        """Take its UTC, seconds since 1970. Without a GPS time an autopilot counts from its start, and INAV says 0."""
+        """Take UTC by GPS, seconds since 1970. Without it an autopilot counts from its start, and INAV reports 0."""
         if unix_s > _EARLIEST_UNIX_S:
             self.hear(GpsTime(now, source, unix_s))
 
@@ -319,7 +319,7 @@ class Vehicle:
         return Home(position.lat_e7, position.lon_e7, altitude_m)
 
     def place(self) -> tuple[int, int] | None:
-        """The same in degrees * 1e7."""
+        """Latitude and longitude of `home_or_position`, degrees * 1e7."""
         here = self.home_or_position()
         return None if here is None else (here.lat_e7, here.lon_e7)
 

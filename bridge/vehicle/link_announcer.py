@@ -16,7 +16,7 @@ _REPEAT_S = 10.0
 
 
 class LinkAnnouncer:
-    """Each method returns a text to show, or None."""
+    """`found` and `tick` return a text to show, or None."""
 
     def __init__(self) -> None:
         self._known: str | None = None

@@ -28,7 +28,7 @@ from protocols.mission_item import MissionItem, MissionResult
 _GUIDED = (2, 3)
 _AUTOPILOT = m.MAV_COMP_ID_AUTOPILOT1
 
-#: Messages of a mission transfer, which may come at any rate; others are rare.
+#: Messages of a mission transfer: hundreds a second over a fast link. All others are rare.
 _OF_A_TRANSFER = frozenset(
     {
         m.MAVLINK_MSG_ID_MISSION_COUNT,
@@ -151,7 +151,7 @@ class MessageRouter:
 
 
 class Incoming:
-    """Every frame from a ground station passes here: guarded, counted, and answered or passed on.
+    """Guards, counts, and answers or passes on every frame from a ground station.
 
     `routes` is set while an autopilot that represents itself is on the line; frames then go to it unchanged.
     """

@@ -15,10 +15,10 @@ from protocols.mission_item import Command, Frame, MissionItem, MissionResult
 
 #: Downloads that are remembered; the oldest is forgotten first.
 _MAX_READERS = 16
-#: A download without a request for this long has ended, even if its MISSION_ACK was lost: Mission Planner retries an
-#: item for 15 s.
+#: A download has ended after this long without a request, even if its MISSION_ACK was lost. Mission Planner repeats
+#: the request for an item for 15 s.
 _READING_S = 20.0
-#: Requests that wait for the list to be read; further ones are dropped, and repeated by their senders.
+#: Requests waiting for the list to be read; further ones are dropped, and their senders repeat them.
 _MAX_QUESTIONS = 32
 #: Mission Planner repeats a request after 2.5 s. A position comes within that time, unless there is no GPS.
 _POSITION_WAIT_S = 2.0
@@ -134,7 +134,7 @@ class MissionDownloads:
     def _send_home(self, question: _Question, now: float) -> None:
         """Item 0 while armed, at the altitude of HOME_POSITION: Mission Planner takes its ground level from it.
 
-        Until a position is heard the first request waits for its repetition.
+        While no position is known, requests of the first 2 s get no answer: Mission Planner repeats them.
         """
         known, home = self._missions.home_item(), self._vehicle.home_or_position()
         if known is None and home is None:

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A ground station writes a mission: the vehicle's side of MAVLink's upload (docs/mission-rules.md).
 
-Uploads run one at a time, in the order of their MISSION_COUNT, unless slow or numerous lists would lock out the
-others: then they are received in parallel, and only written one at a time. Mission Planner loses some packets, and any
-ack to MISSION_COUNT means "continue" to it; most special cases below respond to a behaviour listed in
-docs/ground-stations.md.
+Uploads run one at a time, in the order of their MISSION_COUNT. If slow or numerous lists would lock out the others,
+they are received in parallel and written one at a time. Mission Planner loses some packets, and takes any ack to
+MISSION_COUNT as "continue"; most special cases below respond to a behaviour listed in docs/ground-stations.md.
 """
 
 from collections.abc import Callable, Iterator
@@ -110,7 +109,7 @@ class MissionUploads:
             return
         state = upload.state
         if not isinstance(state, Receiving):
-            # The next request or the final ack is on its way already.
+            # The next request or the final ack will follow anyway.
             return
         if item.seq >= upload.count:
             text = f"WP {item.seq} is beyond the {upload.count} items announced"

@@ -29,9 +29,9 @@ from protocols.msp.commands import Msp
 
 #: The interval of HEARTBEAT, and the clock for messages without a reading.
 _TICK_S = 1.0
-#: The polls follow requests at this interval: that costs a step for each message and ground station.
+#: The minimum interval between updates of the polls: each costs a step for every message and ground station.
 _POLLS_INTERVAL_S = 0.25
-#: Mission Planner needs two heartbeats to connect.
+#: Mission Planner needs two heartbeats to connect: a newcomer gets one every 0.2 s for 3 s.
 _NEWCOMER_S, _NEWCOMER_INTERVAL_S = 3.0, 0.2
 #: Home and arming blockers are repeated for newcomers at most this often, s.
 _REPEAT_S = 5.0
@@ -64,9 +64,9 @@ class OwnVehicle:
         self._announcer = announcer
         self._unix_time_s = unix_time_s
         self._started_at = self._now = now
-        #: The time of the next `tick`: the sooner of a second's end and of the next heartbeat for newcomers.
+        #: The time of the next `tick`.
         self.due = self._second_ends = now
-        #: Messages that any ground station wants, by the reading that they follow.
+        #: The messages that any ground station wants, by the reading that triggers them.
         self._rows: dict[type[Reading] | None, list[Row]] = {}
         self._rates = MessageRates({row.msgid: row.interval_s for row in TELEMETRY})
         self._progress = MissionProgress()
@@ -86,7 +86,7 @@ class OwnVehicle:
         self._announced: tuple[bool | None, FlightMode | str | None, bool] | None = None
 
     def newcomer(self, peer: Peer) -> None:
-        """Send a new ground station faster heartbeats, so that it connects sooner, and HOME_POSITION soon."""
+        """Send a new ground station more heartbeats, so that it connects sooner, and HOME_POSITION within 5 s."""
         self._is_news_wanted = True
         if len(self._newcomers) < PRECEDENCE:  # to a crowd, one a second
             self._newcomers[peer] = self._ground.now + _NEWCOMER_S
@@ -132,7 +132,7 @@ class OwnVehicle:
                 self._ground.greet(peer, heartbeat)
 
     def heard(self, news: Collection[type[Reading]], now: float) -> None:
-        """Send the messages that follow from new readings, where due."""
+        """Send the messages that new readings trigger, where due."""
         self._now = now
         for reading in news:
             self._send_due(self._rows.get(reading, ()))
@@ -154,7 +154,7 @@ class OwnVehicle:
                     self._ground.multicast(pack(message), peers)
 
     def also_want(self, readings: Mapping[type[Reading], float]) -> None:
-        """Poll for consumers other than ground stations, too: seconds by reading."""
+        """Set the poll intervals for consumers other than ground stations: seconds by reading."""
         self._also_wanted = readings
         self._set_polls(self._ground.everyone())
 
@@ -294,7 +294,7 @@ class OwnVehicle:
 
 
 def _stale_ages_s(line_interval_s: Callable[[Msp], float]) -> dict[type[Reading], float]:
-    """The maximum ages of readings, where the line is too slow to ask for them every second."""
+    """The maximum ages of readings that the line is too slow to poll every second."""
     intervals = {reading: line_interval_s(poll) for reading, poll in POLL_FOR.items()}
     return {reading: STALE_S * interval_s for reading, interval_s in intervals.items() if interval_s > 1.0}
 

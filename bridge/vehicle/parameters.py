@@ -43,7 +43,7 @@ class Parameters:
     def set(self, station: Station, name: str, value: float, now: float) -> None:
         """PARAM_SET: answered with the value then in force, as the protocol requires."""
         fc_store, radius_cm = self._missions.fc_store, self._values().get(WP_RADIUS)
-        # Mission Planner keeps metres as text: 2.10 m comes as 209.99998 cm.
+        # Mission Planner keeps metres as text: 2.10 m arrives as 209.99998 cm.
         wanted_cm = round(value) if math.isfinite(value) else -1
         if name != WP_RADIUS or wanted_cm == radius_cm:
             # An equal value is not written: that would erase and rewrite the board's whole configuration.

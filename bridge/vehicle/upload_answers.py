@@ -28,7 +28,7 @@ _UNKNOWN_UPLOAD = Refusal(MissionResult.OPERATION_CANCELLED, "Unknown upload: wr
 
 @dataclass(frozen=True, slots=True)
 class _Answer:
-    """A MISSION_ACK that ended an upload of `count` items; a repeated cancel is answered until `cancelled_until`."""
+    """The MISSION_ACK that ended an upload of `count` items. It answers a repeated Cancel until `cancelled_until`."""
 
     ack: MissionResult
     count: int
@@ -53,7 +53,7 @@ class UploadAnswers:
         #: The time of the next `tick`; infinity without reminders.
         self.due = inf
 
-    # Sent at the end of an upload.
+    # At the end of an upload.
 
     def end(
         self,
@@ -103,10 +103,10 @@ class UploadAnswers:
         self._reminders = reminders
         self.due = min((due for due, _, _ in reminders), default=inf)
 
-    # Repeated, for messages that arrive after the end.
+    # After the end.
 
     def repeat_cancelled(self, station: Station, now: float) -> bool:
-        """Answer a repeated Cancel, whose answer was lost: it must not clear the mission on the craft."""
+        """Answer a Cancel again if the first answer was lost: it must not clear the mission on the craft."""
         answer = self._to(station, now)
         if answer is None or now >= answer.cancelled_until:
             return False
@@ -114,7 +114,7 @@ class UploadAnswers:
         return True
 
     def late_item(self, station: Station, seq: int, now: float, *, is_lost: bool) -> None:
-        """Answer an item of an upload that has ended, or, if `is_lost`, of one before the daemon was killed.
+        """Answer an item of an upload that has ended; if `is_lost`, perhaps because the daemon was restarted.
 
         A ground station whose address has just changed gets no answer.
         """
@@ -140,7 +140,7 @@ class UploadAnswers:
         self._remind([reminder for reminder in self._reminders if reminder[1] != station])
 
     def was_said_to(self, station: Station, now: float) -> bool:
-        """True if it was answered at this very address."""
+        """True if the station was answered at this address."""
         self._forget_old(now)
         return station in self._answers
 
@@ -158,7 +158,7 @@ class UploadAnswers:
         return any((known.sysid, known.compid) == (station.sysid, station.compid) for known in self._answers)
 
     def _forget_strangers(self) -> None:
-        """Keep those to peers with standing, to hosts with few answers, to accepted lists, and the latest."""
+        """Keep answers to peers with standing, to hosts with few answers, to accepted lists, and the latest."""
         hosts = Counter(station.peer.host for station in self._answers)
 
         def worth(station: Station) -> tuple[bool, int, bool]:

@@ -13,9 +13,9 @@ from bridge.model.refusal import Refusal
 from bridge.model.verdict import Verdict
 from protocols.mission_item import MissionItem, MissionResult
 
-#: After the end of Mission Planner's "Write Fast", delayed items may arrive for this long.
+#: After Mission Planner's "Write Fast" has ended, delayed items may still arrive for this long.
 _LAST_ITEMS_S = 0.3
-#: Of an item request.
+#: The timeout of an item request.
 _FIRST_TIMEOUT_S = 0.25
 _MAX_TIMEOUT_S = 1.5
 #: Of one item's timeouts, this many are equal; then each is twice the previous one.
@@ -34,7 +34,7 @@ class Announced(Event):
 
 
 class Turn(Event):
-    """The other transfers have ended, or do not count."""
+    """No other transfer delays this one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ class Ready(Event):
 
 @dataclass(frozen=True, slots=True)
 class Judged(Event):
-    """The list is complete, or enough of it has arrived to reject it."""
+    """The whole list has arrived, or enough of it to reject it."""
 
     items: tuple[MissionItem, ...]
     verdict: Verdict[Any]
@@ -65,7 +65,7 @@ class Ended(Event):
 
 
 class UploadState(ABC):
-    """A state times out at `deadline`, `seconds` after its start or last progress, with `timeout` as the answer."""
+    """A state ends at `deadline`, `seconds` after its start or last progress; `timeout` is then the answer."""
 
     seconds: ClassVar[float]
 
@@ -114,10 +114,10 @@ class Asking(UploadState):
 
 @dataclass(slots=True)
 class ItemRequest:
-    """The pending request. Its timeout follows the round trip time of this ground station."""
+    """The pending item request. Its timeout follows the ground station's round trip time."""
 
     due: float = 0.0
-    #: The item was requested more than once: its answer gives no round trip time.
+    #: The item was requested more than once.
     is_repeated: bool = False
     _seq: int | None = None
     _first_at: float = 0.0
@@ -143,7 +143,7 @@ class ItemRequest:
             self._timeout_s = min(self._timeout_s * 2, _MAX_TIMEOUT_S)
 
     def is_copy(self, now: float) -> bool:
-        """True if a repeated message was duplicated on its way, and needs no separate answer."""
+        """True if a repeated message is a copy made by the network, which needs no answer."""
         return now < self._asked_at + _REPEAT_AFTER_S
 
     def answered(self, now: float) -> None:
@@ -163,7 +163,7 @@ class ItemRequest:
 
 
 class Receiving(UploadState):
-    """Receives items; each is checked once all before it have arrived."""
+    """Items arrive; each is checked once all items before it are here."""
 
     seconds = 5.0
 
@@ -174,7 +174,7 @@ class Receiving(UploadState):
         self.items: dict[int, MissionItem] = {}
         self._judged = 0  # items 0.._judged-1 have arrived and are checked
         self.request = ItemRequest()
-        #: MISSION_COUNT came again: the client restarted, or the network duplicated it. The next item shows which.
+        #: MISSION_COUNT arrived again: the client restarted, or the network duplicated it. The next item shows which.
         self.announced_again = False
 
     @property

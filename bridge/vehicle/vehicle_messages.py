@@ -124,7 +124,7 @@ class Moment:
         return self.vehicle.fresh(kind, self.now, self.stale_s.get(kind, STALE_S))
 
     def need(self, kind: type[ReadingT]) -> ReadingT:
-        """The same for a reading without which the message cannot be made."""
+        """The latest reading of a kind; Unknown if there is none or it is stale."""
         reading = self.fresh(kind)
         if reading is None:
             raise Unknown
