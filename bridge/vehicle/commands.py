@@ -139,13 +139,10 @@ class CommandService:
         return CommandResult.UNSUPPORTED
 
     def _send_once(self, station: Station, msgid: int, index: int = 0) -> CommandResult:
-        match self._vehicle.send_once(station, msgid, index):
-            case None:
-                return CommandResult.UNSUPPORTED
-            case False:
-                return CommandResult.TEMPORARILY_REJECTED
-            case True:
-                return CommandResult.ACCEPTED
+        is_known = self._vehicle.send_once(station, msgid, index)
+        if is_known is None:
+            return CommandResult.UNSUPPORTED
+        return CommandResult.ACCEPTED if is_known else CommandResult.TEMPORARILY_REJECTED
 
     def _set_interval(self, station: Station, msgid: int, interval_us: float) -> CommandResult:
         """SET_MESSAGE_INTERVAL: -1 never, 0 the default."""

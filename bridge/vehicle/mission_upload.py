@@ -165,7 +165,7 @@ class MissionUploads:
                 elif isinstance(state, Receiving) and now >= state.request.due:
                     state.request.lost()
                     self._request(upload, now)
-            self._uploads.reschedule()
+            self._uploads.due = min((upload.state.next_tick() for upload in self._uploads), default=inf)
         if now >= self.answers.due:
             self.answers.tick(now)
         self._begin_next(now)

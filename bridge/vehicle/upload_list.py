@@ -57,9 +57,6 @@ class UploadList:
         """Note that an upload may be due sooner."""
         self.due = min(self.due, upload.state.next_tick())
 
-    def reschedule(self) -> None:
-        self.due = min((upload.state.next_tick() for upload in self._uploads), default=inf)
-
     def of(self, station: Station) -> Upload | None:
         """The newest upload of a ground station: one may wait behind another that is being written."""
         return next((upload for upload in reversed(self._uploads) if upload.station == station), None)

@@ -356,7 +356,7 @@ def test_a_smaller_battery_is_recognised_after_a_pause(pause_s: float, armed: bo
 
 
 def test_no_charge_is_estimated_on_usb_power() -> None:
-    state = told(Vehicle(), HARAKIRI, STATUS=status(), ANALOG=struct.pack("<BHH", 3, 0, 0))
+    state = with_replies(Vehicle(), HARAKIRI, STATUS=status(), ANALOG=struct.pack("<BHH", 3, 0, 0))
     assert (make.battery_status(at(state)).voltages[0], make.sys_status(at(state)).battery_remaining) == (300, -1)
 
 
