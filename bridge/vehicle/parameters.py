@@ -70,7 +70,7 @@ class Parameters:
         def done(failure: PushFailure | LinkLost | None, _at: float) -> None:
             self._is_setting = False
             if failure is PushFailure.NO_ANSWER or isinstance(failure, LinkLost):
-                self._ground.say(Severity.ERROR, f"{WP_RADIUS} was not set: no answer", station)
+                self._ground.say(Severity.ERROR, f"No answer: {WP_RADIUS} may be set, read it again", station)
             elif failure is not None:
                 text = f"{WP_RADIUS} stays {fc_store.wp_radius_cm}: {failure.value}"
                 self._ground.say(Severity.ERROR, text, station)

@@ -10,7 +10,7 @@ from bridge.controllers.harakiri.mission_store import HarakiriMissions
 from bridge.missions.fc_mission_store import PushFailure
 from bridge.vehicle.telemetry_table import TELEMETRY
 from protocols.mavlink.dialect import Message, messages
-from simulator.options import Faults
+from simulator.options import Faults, SimOptions, TelemetryProtocol
 from tests.support.world import GroundStation, World, ready_world
 
 m = messages
@@ -373,7 +373,23 @@ def test_setting_the_radius_of_a_silent_board_fails_with_a_text() -> None:
     world.faults.hang = True
     station.send(param_set(b"WPNAV_RADIUS", 400.0))
     world.wait_until(lambda _: bool(station.texts()), 5)
-    assert "WPNAV_RADIUS was not set: no answer" in station.texts()[0]
+    assert station.texts()[0] == "No answer: WPNAV_RADIUS may be set, read it again"
+
+
+def test_a_radius_set_just_before_arming_is_not_reported_as_unchanged() -> None:
+    """The board changes it, then speaks MAVLink before it is read back."""
+    world = World(SimOptions(tele_prot=TelemetryProtocol.MAVLINK), speeds=(115200,))
+    world.wait_ready()
+    station = GroundStation(world)
+    station.send(param_set(b"WPNAV_RADIUS", 400.0))
+    world.run(0.02)
+    world.faults.armed = True
+    world.wait_until(lambda _: bool(station.texts()), 10)
+    assert station.texts() == ["No answer: WPNAV_RADIUS may be set, read it again"]
+    world.faults.armed = False
+    world.run(8)
+    received = answers((world, station), m.MAVLink_param_request_read_message(1, 1, b"WPNAV_RADIUS", -1))
+    assert ("WPNAV_RADIUS", 400.0, 1, 2) in values(received)
 
 
 def test_without_the_extension_there_is_no_radius() -> None:
