@@ -34,7 +34,7 @@ from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame
 from protocols.msp.telemetry import Sensor
 
 _HEARTBEAT = m.MAVLINK_MSG_ID_HEARTBEAT
-#: Five lost heartbeats. Only then is another autopilot followed: it may be the same one with a new system id.
+#: Five lost heartbeats. Only then is a new system id followed, if its component id is the same.
 _GONE_S = 5.0
 #: The autopilot field of a heartbeat's payload, and its value from cameras and gimbals. MAVLink 2 may omit it.
 _AUTOPILOT_AT, _NO_AUTOPILOT = 5, bytes((m.MAV_AUTOPILOT_INVALID,))
@@ -80,6 +80,7 @@ class MavlinkTelemetry:
         }
         #: Message id by the bytes of a frame's header that hold sender and message id.
         self._known: dict[bytes, int] = {}
+        self._compid: int | None = None
         #: When the autopilot counts as gone if no heartbeat of it is heard; a Harakiri never does.
         self._gone_at = -math.inf
 
@@ -106,7 +107,7 @@ class MavlinkTelemetry:
 
     def _recognise(self, frames: Sequence[MavlinkFrame], now: float) -> None:
         for frame in frames:
-            is_heartbeat = frame.msgid == _HEARTBEAT
+            is_heartbeat = frame.msgid == _HEARTBEAT and self._compid in (None, frame.compid)
             if self._is_harakiri or (is_heartbeat and frame.payload[_AUTOPILOT_AT:][:1] != _NO_AUTOPILOT):
                 sender = bytes(frame.sender)
                 keys = {sender + msgid.to_bytes(size, "little"): msgid for msgid in self._readers for size in (1, 3)}
@@ -114,7 +115,7 @@ class MavlinkTelemetry:
                     # The values of two autopilots must not mix.
                     self._unread.clear()
                     self._vehicle.forget()
-                self._known = keys
+                self._known, self._compid = keys, frame.compid
                 self._gone_at = math.inf if self._is_harakiri else now + _GONE_S
                 return
 

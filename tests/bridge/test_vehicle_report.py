@@ -158,6 +158,18 @@ def test_two_autopilots_on_one_line_are_not_mixed() -> None:
         assert world.bridge.report.group(Group.ATTITUDE).roll_deg is None
 
 
+def test_a_companion_on_board_does_not_replace_an_autopilot_that_restarts() -> None:
+    world, autopilot, _ = passing()
+    companion = m.MAVLink(None, srcSystem=1, srcComponent=191)
+    own, autopilot.mavlink = autopilot.mavlink, companion
+    autopilot.heartbeat = m.MAVLink_heartbeat_message(18, 0, 0, 0, 4, 3)
+    world.run(20)
+    for _ in range(3):
+        autopilot.outgoing += m.MAVLink_heartbeat_message(2, 3, 81 | 128, 4, 4, 3).pack(own)
+        world.run(1)
+    assert world.bridge.session.vehicle.armed
+
+
 def test_an_unused_channel_does_not_move_the_others() -> None:
     world, autopilot, _ = passing()
     world.bridge.report.watch(Group)
