@@ -111,7 +111,7 @@ def _config(folder: Path, endpoint: str) -> Path:
 
 def _listed_s(endpoint: str, count: int) -> float:
     began_at = time.monotonic()
-    command = [sys.executable, "-c", "from service.cli.main import main; main()", "fleet", "list", "--json"]
+    command = [sys.executable, "-c", "from service.cli.program import start; start()", "fleet", "list", "--json"]
     listed = subprocess.run([*command, "--connect", endpoint], cwd=ROOT, capture_output=True, check=True)
     took_s = time.monotonic() - began_at
     found = len(json.loads(listed.stdout)["vehicles"])

@@ -22,7 +22,7 @@ ENVIRONMENT = {key: value for key, value in os.environ.items() if key != "PYTHON
     "PYTHONPYCACHEPREFIX": str(RESULTS / "bytecode")
 }
 #: The console script, without depending on where it is installed.
-NAZE_BRIDGE = [sys.executable, "-c", "from service.cli.main import main; main()"]
+NAZE_BRIDGE = [sys.executable, "-c", "from service.cli.program import start; start()"]
 _TIMEOUT_S = 30.0
 _POLL_S = 0.002
 

@@ -84,9 +84,9 @@ class PtyLink:
 
     def _is_anothers(self) -> bool:
         """True if a running simulator owns the link. Terminal numbers are reused: an older link led to another one."""
-        if self._leads_to().parent != _TERMINALS:
-            return False
         try:
+            if self._leads_to().parent != _TERMINALS:
+                return False
             terminal = os.open(self._path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         except OSError:
             return False

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads user-supplied files, up to a maximum size."""
 
-import errno
 from pathlib import Path
 
 
@@ -10,5 +9,5 @@ def read_bounded(path: Path, most: int) -> bytes:
     with path.open("rb") as file:
         data = file.read(most + 1)
     if len(data) > most:
-        raise OSError(errno.EFBIG, f"it is larger than {most >> 20} MB", str(path))
+        raise OSError(f"it is larger than {most >> 20} MB")
     return data

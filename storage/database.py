@@ -15,6 +15,7 @@ from datetime import UTC, datetime
 from importlib import resources
 from pathlib import Path
 
+from storage.os_error import reason
 from storage.store_error import FAILURES, StoreError, explained, primary_code
 
 #: The columns of `missions` that its crc32 covers.
@@ -50,7 +51,7 @@ def open_database(path: Path, now: float) -> tuple[sqlite3.Connection, Path | No
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise StoreError(f"{failure}: its directory cannot be created ({error.strerror})") from error
+        raise StoreError(f"{failure}: its directory cannot be created ({reason(error)})") from error
     with explained(failure), ExitStack() as undo:
         connection = _connect(path)
         undo.callback(connection.close)
@@ -178,7 +179,7 @@ def _keep_aside(path: Path, now: float) -> Path:
         _forget_oldest(path, aside)
     except OSError as error:
         raise StoreError(
-            f"the mission store {path} is damaged and cannot be renamed ({error.strerror}); move it away"
+            f"the mission store {path} is damaged and cannot be renamed ({reason(error)}); move it away"
         ) from error
     return aside
 

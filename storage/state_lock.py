@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from storage.os_error import reason
 from storage.store_error import StoreError
 
 _NAME = "lock"
@@ -30,7 +31,7 @@ def state_lock(directory: Path) -> Iterator[None]:
         descriptor = os.open(directory / _NAME, os.O_RDWR | os.O_CREAT, 0o644)
     except OSError as error:
         raise StateUnusableError(
-            f"cannot use the state directory {directory}: {error.strerror}; use another with --state-dir"
+            f"cannot use the state directory {directory}: {reason(error)}; use another with --state-dir"
         ) from error
     try:
         try:

@@ -101,7 +101,7 @@ def _latest_mission(state_dir: Path) -> Json:
 def _daemon(port: int, state_dir: Path, console: Console) -> Iterator[tuple[int, subprocess.Popen[bytes]]]:
     arguments = ["run", "--fc", "sim:", "--gcs", f"udpin:0.0.0.0:{port}", "--state-dir", str(state_dir)]
     console.print(f"$ naze-bridge {' '.join(arguments)}", style="bold", markup=False)
-    program = [sys.executable, "-c", "from service.cli.main import main; main()"]
+    program = [sys.executable, "-c", "from service.cli.program import start; start()"]
     log = state_dir / "daemon.log"
     with log.open("wb") as stderr, subprocess.Popen([*program, *arguments], stderr=stderr) as process:  # noqa: S603
         try:

@@ -11,6 +11,7 @@ import click
 
 from service.cli.command_group import LazyCommand, LazyGroup
 from service.cli.sentences import INTERRUPTED, complain
+from storage.os_error import reason
 
 _COMMANDS = {
     "setup": LazyCommand("service.cli.setup.command:setup", "Set this Raspberry Pi up: UART, Wi-Fi, page, service."),
@@ -53,7 +54,7 @@ class _Main(LazyGroup):
         except OSError as error:
             if error.errno not in _UNWRITABLE:
                 raise
-            complain(f"the output cannot be written: {error.strerror}")
+            complain(f"the output cannot be written: {reason(error)}")
             # The unwritten buffer would fail again at the interpreter's exit.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             sys.exit(os.EX_IOERR)

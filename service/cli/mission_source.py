@@ -10,6 +10,7 @@ from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
 from service.cli.sentences import complain
 from storage.bounded_file import read_bounded
+from storage.os_error import reason
 
 MAX_BYTES = 8 * 2**20  # 65,535 items, the most that MAVLink can count, are about 5 MB of text
 
@@ -30,7 +31,7 @@ def mission_bytes(path: Path) -> bytes:
         return read_bounded(path, MAX_BYTES)
     except (OSError, ValueError) as error:
         name = click.format_filename(path)
-        raise MissionFileError(name, "", _reason(error), "check the path and its permissions") from None
+        raise MissionFileError(name, "", reason(error).lower(), "check the path and its permissions") from None
 
 
 def save_mission(path: Path, text: str) -> None:
@@ -53,8 +54,4 @@ def save_mission(path: Path, text: str) -> None:
                 draft.unlink(missing_ok=True)
                 raise
     except (OSError, ValueError) as error:
-        raise MissionFileError(name, "", _reason(error), "check the path and its permissions") from None
-
-
-def _reason(error: Exception) -> str:
-    return (getattr(error, "strerror", None) or str(error)).lower()
+        raise MissionFileError(name, "", reason(error).lower(), "check the path and its permissions") from None

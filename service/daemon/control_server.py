@@ -17,7 +17,7 @@ from service.daemon.api import DaemonApi
 from service.daemon.client import ControlError
 from service.daemon.daemon import Daemon
 from service.daemon.mission_data import Json, to_json
-from service.machine.os_error import reason
+from storage.os_error import reason
 from storage.store_error import StoreError
 
 #: asyncio buffers twice as much for each client; a list of 146 items has 40 kB.

@@ -12,6 +12,7 @@ import structlog
 from service.daemon.daemon import Daemon
 from service.machine.log_setup import set_log_level
 from service.machine.notify import Notifier
+from service.machine.threads import BackgroundThread
 from service.settings import Settings, SettingsError
 
 #: The interval of status updates, and the minimum number of watchdog messages per watchdog timeout.
@@ -105,12 +106,12 @@ async def _reload_when_told(
     # Ready when ground stations can connect: the flight controller may appear at any time.
     await daemon.started.wait()
     notifier.ready()
+    reader = BackgroundThread("settings")  # a hanging disk must delay neither the links nor the stop
     while await told.wait():
         told.clear()
         notifier.reloading()
         try:
-            # In a thread: a slow disk must not delay the links.
-            _take_over(daemon, await asyncio.to_thread(load))
+            _take_over(daemon, await reader.ask(load))
         except SettingsError as error:
             _log.error("config.rejected", why=[str(problem) for problem in error.problems], what="nothing is changed")
         notifier.ready()

@@ -13,9 +13,9 @@ from typing import Protocol
 import serial
 
 from service.links.port_holder import explain_port_error, find_console
-from service.machine.os_error import reason
 from service.machine.threads import BackgroundThread
 from service.settings.addresses import UNKNOWN_HOST_HINT, AutoFc, FcAddress, SerialFc, TcpFc, family_of
+from storage.os_error import reason
 
 #: Errors of an open port: pyserial raises the last two if it is unplugged, or its driver refuses the speed.
 DEVICE_ERRORS = (OSError, termios.error, ValueError)
@@ -99,8 +99,8 @@ async def _open_tcp(address: TcpFc, resolver: BackgroundThread) -> socket.socket
                 await asyncio.get_running_loop().sock_connect(connection, found[0][4])
         except (OSError, TimeoutError) as error:
             why = reason(error) or "no answer"
-            hint = f"; {UNKNOWN_HOST_HINT}" if isinstance(error, socket.gaierror) else ""
-            raise PortError(f"{address} cannot be reached: {why}{hint}") from error
+            hint = UNKNOWN_HOST_HINT if isinstance(error, socket.gaierror) else "is it switched on, and the port right?"
+            raise PortError(f"{address} cannot be reached: {why}; {hint}") from error
         unless_connected.pop_all()
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _TCP_STALL_MS)

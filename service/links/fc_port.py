@@ -12,7 +12,7 @@ import structlog
 
 from service.links.fc_device import DEVICE_ERRORS, Device, PortError
 from service.links.traffic import Traffic
-from service.machine.os_error import reason
+from storage.os_error import reason
 
 #: The reason given to `on_close` at the end of the daemon.
 STOPPED = "the daemon stops"

@@ -8,8 +8,8 @@ from bridge.gcs.station import Peer
 from service.links.gcs_events import GcsEvents
 from service.links.tcp_link import TcpLink
 from service.links.udp_link import UdpLink
-from service.machine.os_error import reason
 from service.settings.addresses import UNKNOWN_HOST_HINT, GcsAddress
+from storage.os_error import reason
 
 _HINTS = {
     errno.EADDRINUSE: "stop the program that uses it, or choose another port",

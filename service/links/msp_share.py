@@ -9,8 +9,8 @@ from bridge.gcs.budget import TokenBucket
 from bridge.gcs.cost import Rate
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from service.links.gcs_links import LinkError
-from service.machine.os_error import reason
 from service.settings.addresses import GcsAddress, family_of
+from storage.os_error import reason
 
 #: A flood would delay telemetry and missions: requests beyond the limit are dropped, the oldest first.
 _LIMIT = Rate(200, 200)

@@ -21,6 +21,7 @@ from service.links.port_holder import find_user
 from service.links.port_memory import PortMemory
 from service.links.serial_ports import SerialPort, serial_ports
 from service.machine.host import Host
+from storage.os_error import reason
 
 #: The search visits all speeds within this time.
 _SEARCH_S = 9.0
@@ -130,7 +131,7 @@ class PortFinder:
             try:
                 what = "" if port.key == self._memory.flight_controller else await self._listen(device)
             except DEVICE_ERRORS as error:
-                raise PortError(getattr(error, "strerror", None) or str(error)) from error
+                raise PortError(reason(error)) from error
             if what:
                 self._memory.found_other(port.key, what)
                 raise PortError(f"{what} was heard there")

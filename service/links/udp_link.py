@@ -10,9 +10,9 @@ import structlog
 from bridge.gcs.station import Peer
 from service.links.gcs_events import GcsEvents
 from service.machine.log_setup import warn_once
-from service.machine.os_error import reason
 from service.machine.threads import BackgroundThread
 from service.settings.addresses import UNKNOWN_HOST_HINT, GcsAddress, family_of
+from storage.os_error import reason
 
 _DATAGRAM_SIZE = 2048
 #: Datagrams taken in one wake-up, so that a flood cannot starve the flight controller's port.

@@ -12,6 +12,7 @@ import structlog
 from service.machine.threads import BackgroundThread
 from storage.atomic_file import replace_file
 from storage.bounded_file import read_bounded
+from storage.os_error import reason
 
 _MAX_BYTES = 1 << 20
 _CLOSE_TIMEOUT_S = 1.0
@@ -54,4 +55,4 @@ class StateFile:
         try:
             replace_file(self._path, data)
         except OSError as error:
-            _log.warning("state.not_stored", file=str(self._path), why=error.strerror)
+            _log.warning("state.not_stored", file=str(self._path), why=reason(error))

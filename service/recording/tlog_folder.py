@@ -16,6 +16,7 @@ import structlog
 
 from protocols.tlog import first_stamp_us
 from service.settings import TlogLimits
+from storage.os_error import reason
 
 #: Mission Planner's format, but in UTC; the names of flights (the craft was armed) end in " flight".
 _NAME_FORMAT = "%Y-%m-%d %H-%M-%S.tlog"
@@ -143,7 +144,7 @@ class TlogFolder:
         self.close()
         self._retry_at = now + _RETRY_S
         level = _log.debug if self._trouble else _log.warning
-        self._trouble = error.strerror or str(error)
+        self._trouble = reason(error)
         level("tlog.stopped", folder=str(self._folder), why=self._trouble, tried_again_every_s=_RETRY_S)
 
 

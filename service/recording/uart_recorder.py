@@ -11,6 +11,7 @@ import structlog
 from protocols.uart_capture import UartAction, UartEvent, capture_header, capture_line, is_capture
 from service.recording.disk_writer import DiskWriter
 from service.settings import SettingsError
+from storage.os_error import reason
 
 #: Bytes per file: hours of telemetry, or 45 minutes of a full line at 115200 baud.
 _MAX_SIZE = 64 << 20
@@ -61,7 +62,7 @@ class UartRecorder:
                 view = view[os.write(self._descriptor, view) :]
             os.fdatasync(self._descriptor)
         except OSError as error:
-            self._end(error.strerror or str(error))
+            self._end(reason(error))
 
     def _end(self, why: str) -> None:
         if self._over_because:
@@ -78,7 +79,7 @@ def _open(path: Path) -> tuple[int, int]:
             raise SettingsError(f"{path} is not a file: name a new file for --record-uart")
         descriptor = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o644)
     except OSError as error:
-        raise SettingsError(f"cannot record into {path}: {error.strerror}") from error
+        raise SettingsError(f"cannot record into {path}: {reason(error)}; name another file") from error
     size = os.fstat(descriptor).st_size
     if size and not is_capture(os.pread(descriptor, 64, 0)):
         os.close(descriptor)

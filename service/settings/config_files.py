@@ -11,6 +11,7 @@ from typing import Any
 from service.settings.key import Problem, short
 from service.settings.table import KEYS, TABLES
 from storage.bounded_file import read_bounded
+from storage.os_error import reason
 
 DROP_INS = "conf.d"
 _MAX_BYTES = 1 << 20
@@ -49,7 +50,7 @@ def _drop_ins(folder: Path, problems: list[Problem]) -> list[Path]:
         return []
     except OSError as error:
         # Without the unreadable file the settings would differ from the written ones.
-        problems.append(Problem(str(folder), f"this cannot be read: {error.strerror}"))
+        problems.append(Problem(str(folder), f"this cannot be read: {reason(error)}"))
         return []
 
 
@@ -60,15 +61,15 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
 
 def _read_file(path: Path, problems: list[Problem]) -> dict[str, Given]:
-    if path.is_fifo():
-        # It may never have a writer, and at a reload it would be empty.
-        problems.append(Problem(str(path), "this is a pipe: name a file, so that it can be read again at a reload"))
-        return {}
     try:
+        if path.is_fifo():
+            # It may never have a writer, and at a reload it would be empty.
+            problems.append(Problem(str(path), "this is a pipe: name a file, so that it can be read again at a reload"))
+            return {}
         text = read_bounded(path, _MAX_BYTES).decode("utf-8-sig")
         tables = tomllib.loads(text)
     except OSError as error:
-        problems.append(Problem(str(path), f"this cannot be read: {error.strerror}"))
+        problems.append(Problem(str(path), f"this cannot be read: {reason(error)}"))
         return {}
     except (ValueError, RecursionError) as error:
         problems.append(Problem(str(path), f"this is not valid TOML (text needs quotes, a list brackets): {error}"))

@@ -16,6 +16,7 @@ from pathlib import Path
 from bridge.gcs.station import Peer
 from protocols.mavlink.signing import key_from_passphrase
 from service.settings.addresses import AddressError, GcsAddress, parse_gcs
+from storage.os_error import reason
 
 Network = IPv4Network | IPv6Network
 
@@ -81,7 +82,7 @@ def read_key(path: Path) -> bytes:
                 raise WriteAccessError(f"key_file {path} is readable by other users: run chmod 600 {path}")
             passphrase = file.read(_MAX_PASSPHRASE + 1).decode()
     except OSError as error:
-        raise WriteAccessError(f"key_file {path} cannot be read: {error.strerror}") from error
+        raise WriteAccessError(f"key_file {path} cannot be read: {reason(error)}") from error
     except UnicodeDecodeError:
         # Not "from" the error, which quotes the passphrase.
         raise WriteAccessError(f"key_file {path} holds no text: write the passphrase into it, on one line") from None

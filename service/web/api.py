@@ -37,6 +37,7 @@ from service.daemon.daemon import Daemon
 from service.daemon.mission_data import MOST, Json, mission_items, to_json
 from service.machine.host import Host
 from service.machine.package import version
+from service.machine.threads import BackgroundThread
 from service.recording.tlog_recorder import TLOG_FOLDER
 from service.settings.web import WebSettings
 from service.web.access import MAX_FILE, check_token, guarded
@@ -48,6 +49,7 @@ from service.web.mission_files import MissionFiles, MissionWriter
 from service.web.response_cache import ResponseCache
 from service.web.telemetry_logs import TelemetryLogs
 from service.web.token import Token, TokenError
+from storage.os_error import reason
 from storage.store_error import StoreError
 
 _LISTED = 50
@@ -69,6 +71,8 @@ class Api:
         self._history = LinkHistory(daemon)
         state_dir = daemon.settings.state_dir
         self._logs = TelemetryLogs(None if state_dir is None else state_dir / TLOG_FOLDER)
+        #: For the logs: a hanging disk must not hold up the stop, as asyncio's own threads would.
+        self._disk = BackgroundThread("logs")
         self._host = Host()
 
     def start(self) -> None:
@@ -77,6 +81,7 @@ class Api:
     async def close(self) -> None:
         self._history.close()
         await self._writer.close()
+        self._disk.close(0)
 
     def routes(self) -> list[Route]:
         """The table above."""
@@ -191,17 +196,15 @@ class Api:
     async def _list_logs(self, request: Request) -> Response:
         check_token(request, self._token)
         try:
-            return _json(await asyncio.to_thread(self._logs.list))
+            return _json(await self._disk.ask(self._logs.list))
         except OSError as error:
-            raise HTTPException(
-                HTTPStatus.SERVICE_UNAVAILABLE, f"The logs cannot be read: {error.strerror}."
-            ) from error
+            raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, f"The logs cannot be read: {reason(error)}.") from error
 
     async def _read_log(self, request: Request) -> Response:
         check_token(request, self._token)
         start = request.query_params.get("start", "0")
         try:
-            piece = await asyncio.to_thread(self._logs.read, request.path_params["name"], _whole(start))
+            piece = await self._disk.ask(partial(self._logs.read, request.path_params["name"], _whole(start)))
         except OSError as error:
             raise HTTPException(HTTPStatus.NOT_FOUND, "There is no such log: it may have been removed.") from error
         return Response(piece, media_type="application/octet-stream")

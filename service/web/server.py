@@ -13,13 +13,13 @@ from uvicorn.config import Config
 from uvicorn.server import ServerState
 
 from service.daemon.daemon import Daemon
-from service.machine.os_error import reason
 from service.settings.web import WebSettings
 from service.web.access import SafeHeaders, failed, guarded, refused
 from service.web.api import Api
 from service.web.connection_limit import BoundedConnection, ConnectionLimit
 from service.web.static_files import static_files
 from service.web.token import DEFAULT_NAME, Token, TokenError
+from storage.os_error import reason
 
 #: An access point's address may appear after the daemon's start: binding is retried.
 _RETRY_S = 2.0

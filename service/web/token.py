@@ -8,6 +8,7 @@ from pathlib import Path
 
 from storage.atomic_file import replace_file
 from storage.bounded_file import read_bounded
+from storage.os_error import reason
 
 DEFAULT_NAME = "web-token"
 #: Letters and digits that are easy to type on a phone and to tell apart: 16 of them are 78 bits.
@@ -46,7 +47,7 @@ def _read(path: Path) -> bytes | None:
     except FileNotFoundError:
         return None
     except OSError as error:
-        raise TokenError(f"the token in {path} cannot be read: {error.strerror}") from error
+        raise TokenError(f"the token in {path} cannot be read: {reason(error)}") from error
     if len(secret) < _LEAST_LENGTH:
         raise TokenError(
             f"the token in {path} is shorter than {_LEAST_LENGTH} characters: delete the file for a new one"
@@ -59,5 +60,5 @@ def _make(path: Path) -> bytes:
     try:
         replace_file(path, secret + b"\n")
     except OSError as error:
-        raise TokenError(f"a token cannot be written to {path}: {error.strerror}") from error
+        raise TokenError(f"a token cannot be written to {path}: {reason(error)}") from error
     return secret

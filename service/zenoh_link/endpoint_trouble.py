@@ -10,8 +10,8 @@ import socket
 import ssl
 from collections.abc import Sequence
 
-from service.machine.os_error import reason
 from service.settings.zenoh_config import TlsFiles
+from storage.os_error import reason
 
 _ENDPOINT = re.compile(r"(?P<protocol>[a-z_]+)/(?P<host>\[[^\]]*\]|[^:/?#]+):(?P<port>\d+)(?:[?#].*)?")
 _CONNECT_TIMEOUT_S = 2.0

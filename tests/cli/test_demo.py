@@ -62,7 +62,7 @@ def test_an_installation_has_the_example(tmp_path: Path) -> None:
         [
             sys.executable,
             "-c",
-            "from service.cli.main import main; main()",
+            "from service.cli.program import start; start()",
             "demo",
             "--once",
             "--port",

@@ -74,7 +74,9 @@ def test_a_port_used_by_another_program_is_one_sentence(board: Board) -> None:
 
 def test_a_tcp_port_without_a_listener_is_one_sentence() -> None:
     assert_one_sentence(
-        run_naze_bridge("pull", "--fc", "tcp:127.0.0.1:9"), 1, "9 cannot be reached: Connection refused"
+        run_naze_bridge("pull", "--fc", "tcp:127.0.0.1:9"),
+        1,
+        "9 cannot be reached: Connection refused; is it switched on, and the port right?",
     )
 
 

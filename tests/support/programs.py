@@ -21,7 +21,7 @@ from tests.support.plan import PlanRow, as_items
 #: The general timeout, s, for anything that a test waits for.
 TIMEOUT_S = 50.0
 REPOSITORY = Path(__file__).resolve().parents[2]
-NAZE_BRIDGE = [sys.executable, "-c", "from service.cli.main import main; main(prog_name='naze-bridge')"]
+NAZE_BRIDGE = [sys.executable, "-c", "from service.cli.program import start; start()"]
 T = TypeVar("T")
 
 

@@ -29,7 +29,7 @@ from service.cli.fleet.watch_screen import print_changes, show_screen
 from service.cli.mission_source import save_mission
 from service.cli.printing import print_json, print_table
 from service.cli.sentences import INTERRUPTED, fail
-from service.machine.os_error import reason
+from storage.os_error import reason
 
 _STANDARD_OUTPUT = Path("-")
 _READ_ONLY = "accepts no MAVLink: zenoh.mavlink_in is off there, the router denies access, or it is not connected"

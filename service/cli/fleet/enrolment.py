@@ -13,8 +13,8 @@ from enum import Enum
 from pathlib import Path
 
 from service.daemon.mission_data import Json
-from service.machine.os_error import reason
 from service.settings.zenoh import check_name
+from storage.os_error import reason
 
 #: zenoh's own is 1,000. Each session costs the router some 100 kB.
 _MAX_SESSIONS = 12_000

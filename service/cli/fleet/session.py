@@ -15,10 +15,10 @@ from typing import Any
 
 import zenoh
 
-from service.machine.os_error import reason
 from service.settings.zenoh_config import connect_endpoints, in_short, tls_files
 from service.zenoh_link.endpoint_trouble import endpoint_trouble
 from service.zenoh_link.keys import full
+from storage.os_error import reason
 
 DEFAULT_ENDPOINT = "tcp/localhost:7447"
 #: How many vehicles get a query at the same time: each such query may carry a mission file.

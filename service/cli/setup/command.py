@@ -15,10 +15,10 @@ from service.cli.setup.change import Machine, SetupError, Step, is_root
 from service.cli.setup.steps import GCS_PORT, PAGE_PORT, STATE_FOLDER, SetupChoices, missing_steps
 from service.daemon.client import STATUS, ControlError, ask_daemon
 from service.machine.host import Host
-from service.machine.os_error import reason
 from service.machine.raspberry_pi import pi_model
 from service.settings.addresses import AddressError, parse_fc
 from service.web.token import DEFAULT_NAME
+from storage.os_error import reason
 
 _LEAST_PASSWORD, _MOST_PASSWORD, _MOST_SSID = 8, 63, 32
 #: Both speeds and protocols of every port are tried by then.
@@ -31,13 +31,11 @@ _ADDRESS_OF_HOTSPOT = "10.42.0.1"
 @click.command()
 @click.option("--fc", default="auto", show_default=True, metavar="FC", help="The flight controller, as for `run`.")
 @click.option("--hotspot", metavar="SSID", help="Open a Wi-Fi network of this name. Default: keep the current one.")
-@click.option("--password-file", type=click.Path(path_type=Path, exists=True), help="File with the hotspot's password.")
+@click.option("--password-file", type=click.Path(path_type=Path), help="File with the hotspot's password.")
 @click.option("--country", metavar="CC", help="Wi-Fi country, such as DE: the radio stays off without one.")
 @click.option("--name", metavar="HOST", help="Name of this machine on the network: HOST.local.")
 @click.option("--no-page", is_flag=True, help="Do not serve the status page.")
-@click.option(
-    "--key-file", type=click.Path(path_type=Path, exists=True), help="File with a MAVLink signing passphrase."
-)
+@click.option("--key-file", type=click.Path(path_type=Path), help="File with a MAVLink signing passphrase.")
 @click.option("--yes", is_flag=True, help="Ask no questions: use the options and their defaults.")
 @click.option("--dry-run", is_flag=True, help="Show the changes without making them.")
 @click.option("--root", type=click.Path(path_type=Path), default="/", hidden=True)
