@@ -13,6 +13,7 @@ from service.cli.fleet.conditions import parse_condition
 from service.cli.main import main
 from service.settings import Settings, load_settings
 from service.settings.addresses import parse_gcs
+from service.settings.load import CONFIG_VARIABLE
 from service.settings.table import KEYS
 from tests.support.doc_pages import PAGES, Block, blocks, place_of, spans
 from tests.support.programs import REPOSITORY
@@ -56,6 +57,12 @@ def test_a_setting_in_the_text_is_valid(setting: str, tmp_path: Path) -> None:
     # Commands need authentication, which is in other settings.
     waived = 'commands_without_authentication = "I know"\n' if name in {"commands", "mavlink_in"} else ""
     load(tmp_path, f"[{table}]\n{waived}{setting}" if table else setting)
+
+
+def test_environment_variables_exist() -> None:
+    named = {span for page in PAGES for span in spans(page) if re.fullmatch(r"NAZE_BRIDGE_\w*[A-Z]", span)}
+    assert named
+    assert named <= {key.variable for key in KEYS} | {CONFIG_VARIABLE}
 
 
 def options(command: click.Command) -> Iterator[str]:
