@@ -19,7 +19,7 @@ _UNWATCHED_S = 0.1
 
 
 class _Follower:
-    """A peer's requests and schedule, by message id.
+    """A peer's requests and schedule, by message id. No interval is below `shortest_s`.
 
     Each message uses `cost_s` of its time; messages are sent while `used_until` is not more than a burst ahead.
     """
@@ -27,6 +27,7 @@ class _Follower:
     def __init__(self, cost_s: float) -> None:
         self.requested: dict[int, float] = {}
         self.due: dict[int, float] = {}
+        self.shortest_s = 0.0
         self.cost_s = cost_s
         self.used_until = -inf
 
@@ -38,8 +39,6 @@ class MessageRates:
         self._defaults = defaults
         self._followers: dict[Peer, _Follower] = {}
         self._newcomers_cost_s = 1 / _MOST_PER_S
-        #: Peers at whose end there may be no station. They get no message more than ten times a second.
-        self.unwatched: Collection[Peer] = ()
 
     def request(self, peer: Peer, msgid: int, interval_s: float | None) -> None:
         """Set the interval that a ground station requests; None: the default."""
@@ -52,15 +51,13 @@ class MessageRates:
 
     def interval_s(self, peer: Peer, msgid: int) -> float:
         """The interval requested by a ground station, or the default."""
-        follower = self._followers.get(peer)
-        interval_s = None if follower is None else follower.requested.get(msgid)
-        interval_s = self._defaults[msgid] if interval_s is None else interval_s
-        return max(interval_s, _UNWATCHED_S) if peer in self.unwatched else interval_s
+        follower, default_s = self._followers.get(peer), self._defaults[msgid]
+        return default_s if follower is None else max(follower.requested.get(msgid, default_s), follower.shortest_s)
 
     def fastest_s(self, peers: Iterable[Peer]) -> dict[int, float]:
         """The shortest interval of `peers` for each message."""
-        # Peers without requests all have the defaults.
-        alike = {peer if peer in self.unwatched or self._has_requests(peer) else None: peer for peer in peers}.values()
+        # The others all have the defaults.
+        alike = {peer if self._is_special(peer) else None: peer for peer in peers}.values()
         return {msgid: min((self.interval_s(peer, msgid) for peer in alike), default=inf) for msgid in self._defaults}
 
     def withhold(self, peer: Peer, msgid: int, until: float) -> None:
@@ -70,11 +67,12 @@ class MessageRates:
     def take_due(self, msgid: int, peers: Sequence[Peer], now: float) -> list[Peer]:
         """The peers for which the message is due now; schedules the next one for each."""
         taken = []
+        default_s = self._defaults[msgid]
         for peer in peers:
             follower = self._followers.get(peer) or self._follower(peer)
             if follower.used_until > now + _BURST_S:
                 continue
-            interval_s = self.interval_s(peer, msgid)
+            interval_s = max(follower.requested.get(msgid, default_s), follower.shortest_s)
             due = follower.due.get(msgid, -inf)
             if interval_s == inf or now < due - interval_s * _EARLY:
                 continue
@@ -84,14 +82,18 @@ class MessageRates:
             taken.append(peer)
         return taken
 
-    def keep(self, peers: Iterable[Peer], with_standing: Collection[Peer]) -> None:
-        """Forget all other peers. `with_standing`: those whose share does not depend on the number of the others."""
+    def keep(self, peers: Iterable[Peer], with_standing: Collection[Peer], unwatched: Collection[Peer] = ()) -> None:
+        """Forget all other peers. `with_standing`: those whose share does not depend on the number of the others.
+
+        `unwatched`: those at whose end there may be no station; they get no message more than ten times a second.
+        """
         self._followers = {peer: self._follower(peer) for peer in peers}
         newcomers = len(self._followers) - len(with_standing)
         cost_s = len(with_standing) / _MOST_PER_S
         self._newcomers_cost_s = max(newcomers, 1) / _MOST_TO_OTHERS_PER_S
         for peer, follower in self._followers.items():
             follower.cost_s = cost_s if peer in with_standing else self._newcomers_cost_s
+            follower.shortest_s = _UNWATCHED_S if peer in unwatched else 0.0
 
     def _follower(self, peer: Peer) -> _Follower:
         follower = self._followers.get(peer)
@@ -99,5 +101,6 @@ class MessageRates:
             follower = self._followers[peer] = _Follower(self._newcomers_cost_s)
         return follower
 
-    def _has_requests(self, peer: Peer) -> bool:
-        return peer in self._followers and bool(self._followers[peer].requested)
+    def _is_special(self, peer: Peer) -> bool:
+        follower = self._followers.get(peer)
+        return follower is not None and bool(follower.requested or follower.shortest_s)

@@ -310,9 +310,9 @@ class MspLink:
         """Match the replies; requests are our own, from a looped-back line."""
         replies = [frame for frame in frames if frame.direction is not Direction.REQUEST]
         for reply in replies:
-            self.last_heard_at = now
             self._settle(reply, now)
         if replies:
+            self.last_heard_at = now
             self._flush(now)
         return replies
 

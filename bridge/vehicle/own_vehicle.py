@@ -108,8 +108,8 @@ class OwnVehicle:
     def _end_second(self, now: float) -> None:
         self._second_ends = max(self._second_ends + _TICK_S, now)
         everyone = self._ground.everyone()
-        self._rates.keep(everyone, set(filter(self._ground.has_standing, everyone)))
-        self._rates.unwatched = () if self._session.vehicle.armed else self._ground.unheard()
+        unwatched = () if self._session.vehicle.armed else self._ground.unheard()
+        self._rates.keep(everyone, set(filter(self._ground.has_standing, everyone)), unwatched)
         self._set_polls(everyone)
         heartbeat = self._heartbeat()
         self._ground.broadcast(heartbeat)

@@ -36,6 +36,7 @@ from bridge.model.vehicle import (
     Vehicle,
 )
 from protocols.mavlink import mode_messages
+from protocols.mavlink.codec import packed
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.telemetry import Sensor
 
@@ -85,6 +86,8 @@ _UNKNOWN_U16 = 0xFFFF
 _UNKNOWN_U8 = 0xFF
 _RAW_CHANNELS, _CHANNELS = 8, 18
 _MAX_RSSI = 254
+#: ATTITUDE is sent most often, and pymavlink's object would cost as much as the frame itself.
+_ATTITUDE = messages.MAVLink_attitude_message.unpacker
 _UNKNOWN_RATES = (math.nan, math.nan, math.nan)
 #: An armed craft above this height or speed is in the air.
 _FLYING_M, _FLYING_M_S = 1.0, 0.5
@@ -231,13 +234,14 @@ def mission_item_reached(seq: int) -> Message:
 def attitude(at: Moment) -> Message:
     """ATTITUDE: radians, radians a second."""
     now = at.need(Orientation)
-    return messages.MAVLink_attitude_message(
+    payload = _ATTITUDE.pack(
         at.boot_ms,
         math.radians(known(now.roll_deg)),
         math.radians(known(now.pitch_deg)),
         math.radians((now.heading_deg + 180) % 360 - 180),
         *_rates(now),
     )
+    return packed(messages.MAVLINK_MSG_ID_ATTITUDE, payload)
 
 
 def gps_raw_int(at: Moment) -> Message:

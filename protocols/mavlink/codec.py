@@ -46,6 +46,11 @@ class Packed(NamedTuple):
         return self.msgid > _LAST_V1_ID
 
 
+def packed(msgid: int, payload: bytes) -> Packed:
+    """A message without extension fields from its payload, quicker than by `pack`."""
+    return Packed(msgid, payload, payload.rstrip(b"\0") or b"\0")
+
+
 def _payload_alone(_packer: None, _crc_extra: int, payload: bytes, *, force_mavlink1: bool) -> bytes:
     return payload
 

@@ -88,9 +88,8 @@ class MspParser:
         buffer = self._buffer
         buffer += data
         frames: list[MspFrame] = []
-        start = 0
+        framed = start = 0
         while (found := buffer.find(_START, start)) >= 0:
-            self.skipped_bytes += found - start
             start = found
             end = _frame_end(buffer, start, takes_low_v2=self._takes_low_v2)
             if end is None or len(buffer) < end:
@@ -98,14 +97,14 @@ class MspParser:
             frame = _decode(buffer[start:end]) if end > start else None
             if frame is None:
                 self.bad_checksums += end > start
-                self.skipped_bytes += 1
                 start += 1
             else:
                 frames.append(frame)
+                framed += end - start
                 start = end
         else:
-            self.skipped_bytes += len(buffer) - start
             start = len(buffer)
+        self.skipped_bytes += start - framed
         del buffer[:start]
         return frames
 

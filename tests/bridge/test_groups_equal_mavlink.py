@@ -34,6 +34,7 @@ from bridge.model.vehicle_groups import Group
 from bridge.vehicle import vehicle_messages as make
 from bridge.vehicle.vehicle_messages import Maker
 from bridge.vehicle.vehicle_report import VehicleReporter
+from protocols.mavlink.codec import FrameWriter, pack
 from protocols.msp.telemetry import Sensor
 from service.settings.zenoh import PayloadEncoding
 from service.zenoh_link.keys import TELEMETRY
@@ -121,8 +122,7 @@ class Receivers:
     def message(self, maker: Maker) -> Any:
         """The message as received; None if it is not sent."""
         for made in make.Moment(self.vehicle, NOW, boot_ms=1).made((maker,)):
-            codec = m.MAVLink(None, srcSystem=1, srcComponent=1)
-            return m.MAVLink(None).decode(bytearray(made.pack(codec)))
+            return m.MAVLink(None).decode(bytearray(FrameWriter(1, 1).frame(pack(made), 2)))
         return None
 
     def is_fresh(self, group: Any) -> bool:
