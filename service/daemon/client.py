@@ -38,7 +38,7 @@ class NoDaemonError(ControlError):
 def ask_daemon(state_dir: Path | None, request: Json, progress: Callable[[int], None] = lambda _: None) -> Json:
     """Ask the daemon that runs on `state_dir` (None: see find_socket); ControlError if there is none or it refuses."""
     path = find_socket(state_dir)
-    line = to_json(request).encode() + b"\n"  # now: the daemon waits only 5 s for it
+    line = to_json(request).encode() + b"\n"  # before connecting: the daemon waits only 5 s for the request
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
         try:
             connection.connect(str(path))

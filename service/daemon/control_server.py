@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The daemon's local control socket: `push`, `pull`, `status` and their like talk to a running daemon through it.
+"""The daemon's local control socket, through which commands such as `push` and `status` reach a running daemon.
 
 A Unix socket in the state directory; one JSON object a line. A request has the key "do"; the daemon answers with
 any number of {"progress": ...} lines and one last line with "result" or "error".

@@ -43,7 +43,7 @@ _FINISH_S = 1.0
 _ABORT_S = 0.6
 _STORE_TIMEOUT_S = 0.2
 _REST_INTERVAL_S = 0.02
-#: A timer that fires earlier than the deadline by more than this is replaced; it would wake the process for nothing.
+#: A timer that fires earlier than this before the deadline is replaced: it would wake the process for nothing.
 _TOO_EARLY_S = 0.01
 #: Frames are accepted over zenoh only if its transport is authenticated, or the owner waived that.
 _ZENOH = {"zenoh": LinkAccess(may_write=lambda _peer: True)}
@@ -121,7 +121,7 @@ class Daemon:
 
     @property
     def is_ticking(self) -> bool:
-        """False after a bug in the bridge that a new search did not cure: then only input wakes it."""
+        """False after a bug in the bridge that a new search did not cure: only received data wakes it then."""
         return self._timer is not None
 
     async def run(self) -> None:
@@ -165,7 +165,7 @@ class Daemon:
     def flush(self) -> None:
         """Carry out the outputs that the bridge has after an input."""
         bridge = self.bridge
-        self._forward()  # first, because a reply is shown at once
+        self._forward()  # first: telemetry is shown without delay
         self.fc.carry_out()
         while bridge.runner.store_effects:
             self._carry_out(bridge.runner.store_effects.popleft())

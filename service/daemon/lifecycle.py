@@ -64,7 +64,7 @@ async def run_until_signal(daemon: Daemon, notifier: Notifier, load: Callable[[]
 
 
 class _Reporting:
-    """Feeds the watchdog and reports the status, by timers of the links' own loop: a thread would hide a hung loop."""
+    """Feeds the watchdog and reports the status from the links' own event loop: a thread would hide a hung loop."""
 
     def __init__(self, daemon: Daemon, notifier: Notifier) -> None:
         self._daemon = daemon
@@ -126,7 +126,7 @@ def _take_over(daemon: Daemon, new: Settings) -> None:
         daemon.settings = replace(daemon.settings, log_level=new.log_level)
         live.add("log_level")
     if "access" in changed:
-        # Keys are held by the parts that guard and sign: write access is not changed during a transfer.
+        # It needs a restart, and is written under `gcs`: the parts that guard and sign keep their keys.
         changed = changed - {"access"} | {"gcs"}
     elif "gcs" in changed:
         daemon.change_links(new.gcs)

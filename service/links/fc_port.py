@@ -22,7 +22,8 @@ _READ_SIZE = 4096
 _RETRY_S = 0.25
 #: Unsent bytes above this are dropped: ground stations can send faster than a UART.
 _MAX_UNSENT = 8192
-#: From this many reads within this time on, each costs more than the delay of gathering. Timers round up to whole ms.
+#: At this rate, reads are gathered: a delay of 2 ms costs the pilot less than so many wake-ups cost the CPU. Timers
+#: round up to whole ms.
 _MANY_READS = 100
 _RATE_WINDOW_S = 0.1
 _GATHER_S = 0.0019
@@ -58,7 +59,7 @@ class FcPort:
         self._speed: int | None = None
         self._unsent = bytearray()
         self._closed = asyncio.Event()
-        #: Why the port cannot be opened; empty if it could be.
+        #: Why the port cannot be opened; empty once it is open.
         self.trouble = ""
         #: Bytes dropped because the line was too slow.
         self.dropped_bytes = 0
@@ -142,7 +143,7 @@ class FcPort:
         if data:
             self._on_data(data)
         if self._traffic.pieces_received >= self._next_look:
-            # Time is looked at only now: at each read it would cost too much.
+            # The clock is read only now: at each read it would cost too much.
             now = self._loop.time()
             if self.may_gather and self._device is not None and now < self._window_began + _RATE_WINDOW_S:
                 self._loop.remove_reader(self._descriptor)
@@ -151,7 +152,7 @@ class FcPort:
             self._begin_window(now)
 
     def _gather(self) -> None:
-        """Read the bytes of one delay, until the rate drops."""
+        """Read what arrived during the delay, and repeat until the rate drops."""
         data = self._read()
         if self._device is None:
             return
@@ -211,8 +212,8 @@ class FcPort:
         self._descriptor = -1
         self._unsent.clear()
         self._speed = None
-        device.close()
         self._closed.set()
+        device.close()
         self._on_close(why)
 
     def _complain(self, why: str) -> None:

@@ -2,7 +2,7 @@
 """The keys of a daemon's links, and their signing timestamps, which survive a restart.
 
 A Pi has no battery-backed clock: after a reboot its time may be a day behind. New signatures would then reuse old
-timestamps, and recorded ones would be accepted. So the last timestamp is kept in a file. To write it seldom, the file
+timestamps, and recorded ones would be accepted. So the last timestamp is kept in a file. To spare the SD card, the file
 runs 10 s ahead; a clean stop writes the true value. After a power cut the timestamps heard since the last write are
 unknown, but all are below the file's: until that time is reached, nothing is accepted.
 """
@@ -22,7 +22,7 @@ from service.settings.write_access import WriteAccess
 FILE_NAME = "signing.json"
 #: The timestamp in the file, the streams' by link, and True after a clean stop.
 _Kept = tuple[int, Mapping[str, list[list[int]]], bool]
-#: The file's lead, and so how long after a power cut signatures are refused. A shorter one wears out the SD card.
+#: The file's lead, and so how long signatures are refused after a power cut.
 _AHEAD = 10 * TICKS_PER_S
 _LOOK_S = 1.0
 

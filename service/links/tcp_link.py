@@ -14,10 +14,10 @@ from service.settings.addresses import GcsAddress, family_of
 
 #: Small, so that the requests of a client that floods do not delay those of others.
 _READ_SIZE = 512
-#: The unread bytes of a stalled client, above which telemetry for it is dropped, oldest first.
+#: Unsent bytes for a stalled client. Above this its telemetry is dropped, oldest first.
 _MAX_UNSENT = 65536
 _KERNEL_BUFFER = 32768
-#: A client that reads nothing for this long is gone, though its Wi-Fi could not report it.
+#: A client that acknowledges nothing for this long is gone: out of Wi-Fi range it cannot close the connection.
 _STALL_MS = 60000
 #: Each costs a copy of the telemetry.
 _MAX_CLIENTS = 32
@@ -101,7 +101,7 @@ class TcpLink:
 
 
 class _TcpClient:
-    """One connection with a bounded amount of unsent bytes. `gone` is called if it ends otherwise than by `close`."""
+    """One connection with a bounded amount of unsent bytes. `gone` is called when it ends, but not after `close`."""
 
     def __init__(
         self,

@@ -106,9 +106,6 @@ class UdpLink:
         for _ in range(_DATAGRAMS_AT_ONCE):
             try:
                 data, sender = self._socket.recvfrom(_DATAGRAM_SIZE)
-            except BlockingIOError:
-                return
             except OSError:
-                # An ICMP "port unreachable" for a sent datagram: the ground station is not running yet.
-                continue
+                return  # none is left
             self._events.gcs_data(Peer(self.name, sender), data, datagram=True)
