@@ -13,6 +13,7 @@ from bridge.line.conversation import Conversation, LinkLost, receive, send
 from bridge.line.runner import Runner
 from protocols.msp.command_line import is_clean
 from protocols.msp.frame import MAX_REPLY, Direction, MspFrame, request
+from protocols.msp.nav import Nav, UnsafeRecord, decode_wp, encode_set_wp
 
 #: Never forwarded: commands that move the craft or stand in for its transmitter and sensors, that cut off its receiver,
 #: or that disconnect everyone. V2_FRAME is a v2 frame inside a v1 frame, which would hide one of them.
@@ -91,6 +92,11 @@ class MspSharing:
             return "it changes something: set write = true in its [[share]] to allow that"
         if not (link.any_byte or is_clean(request(frame.command, frame.payload))):
             return "its bytes could open this flight controller's command line, or reset it"
+        if frame.command == Nav.SET_WP and (record := decode_wp(frame.payload)):
+            try:
+                encode_set_wp(*record)
+            except UnsafeRecord as unsafe:
+                return f"{unsafe}, which is never forwarded"
         return ""
 
     def _occupied(self) -> str:

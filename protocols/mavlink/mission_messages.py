@@ -16,18 +16,8 @@ def item_from_int_message(message: Message) -> MissionItem:
 
 
 def _item(message: Message, lat_e7: int | None, lon_e7: int | None) -> MissionItem:
-    return MissionItem(
-        seq=message.seq,
-        command=message.command,
-        frame=message.frame,
-        p1=message.param1,
-        p2=message.param2,
-        p3=message.param3,
-        p4=message.param4,
-        lat_e7=lat_e7,
-        lon_e7=lon_e7,
-        alt_m=message.z,
-    )
+    params = (message.param1, message.param2, message.param3, message.param4)
+    return MissionItem(message.seq, message.command, message.frame, *params, lat_e7, lon_e7, message.z)
 
 
 def item_message(item: MissionItem, sysid: int, compid: int, *, as_int: bool) -> Message:

@@ -4,11 +4,13 @@
 import pytest
 
 from protocols.msp.frame import MAX_REPLY, Direction, MspFrame
+from protocols.msp.nav import LAST, NavAction, NavRecord
+from simulator.fc_kinds import make_board
 from tests.support.fake_inav import FakeInav
 from tests.support.world import World
 
 BOXNAMES, DATAFLASH_READ, SERVO_MIXER, SAFEHOME, SET_SAFEHOME = 116, 71, 0x2020, 0x2038, 0x2039
-SETTING_INFO, SET_PID = 0x1007, 202
+SETTING_INFO, SET_PID, SET_WP = 0x1007, 202, 209
 
 
 @pytest.mark.parametrize(("command", "size"), [(BOXNAMES, 700), (SERVO_MIXER, 700), (DATAFLASH_READ, MAX_REPLY)])
@@ -82,3 +84,15 @@ def test_a_waiting_request_is_refused_once_the_craft_is_armed() -> None:
     world.run(10)
     assert SET_PID not in board.commands
     assert found[-1] == MspFrame(Direction.ERROR, SET_PID)
+
+
+def test_a_record_that_crashes_an_inav_is_refused() -> None:
+    world = World(speeds=(115200,), peer=make_board("inav"))
+    world.wait_ready(20)
+    refusals = []
+    for number, record in enumerate((NavRecord(NavAction.WAYPOINT, 1, 1), NavRecord(NavAction.JUMP, flag=LAST)), 1):
+        frame = MspFrame(Direction.REQUEST, SET_WP, bytes((number,)) + record.pack())
+        refusals.append(world.bridge.sharing.request(frame, lambda _: None, world.now, may_write=True))
+        world.run(1)
+    assert refusals == ["", "record 2 jumps to 0, which is never forwarded"]
+    assert world.naze.counters.crashes == 0
