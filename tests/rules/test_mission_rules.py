@@ -395,6 +395,9 @@ def test_a_home_alone_is_invalid(home: MissionItem) -> None:
 def test_a_single_item_of_zeros_clears_for_mavsdk() -> None:
     blank = MissionItem(0, WAYPOINT, 3, 0.0, 0.0, 0.0, NAN, 0, None, 0.0)
     assert check_list([blank], PROFILE).result is Result.CLEARED
+    for name in ("p1", "p2", "p3", "p4", "alt_m"):
+        home = replace(blank, **{name: 1.0})  # type: ignore[arg-type]
+        assert_rejected(check_list([home], PROFILE), MissionResult.INVALID, None, "count")
 
 
 @pytest.mark.parametrize("capacity", [2, 120, 146])
