@@ -94,9 +94,6 @@ def test_every_conversation_ends_with_any_replies(seed: int) -> None:
     assert not world.bridge._uploads._uploads
 
 
-PROOF = Stored(ReplyStatus.OK, identify(records_of(waypoints(30)))).encode()
-
-
 @pytest.mark.parametrize(
     "answers",
     [
@@ -105,6 +102,7 @@ PROOF = Stored(ReplyStatus.OK, identify(records_of(waypoints(30)))).encode()
         {MissionCommand.COMMIT: Stored(ReplyStatus.INCOMPLETE, ListIdentity(0, 0)).encode()},
         {MissionCommand.COMMIT: Stored(ReplyStatus.OK, ListIdentity(0, 0)).encode()},
         {MissionCommand.COMMIT: Stored(ReplyStatus.ARMED, ListIdentity(0, 0)).encode()},
+        {MissionCommand.COMMIT: Stored(ReplyStatus.FLASH, identify(records_of(waypoints(30)))).encode()},
         {MissionCommand.BEGIN: Staged(ReplyStatus.SAME, 0, 0).encode()},
         {MissionCommand.BEGIN: Staged(ReplyStatus.BUSY, 0, 0).encode()},
         {MissionCommand.BEGIN: Staged(ReplyStatus.OK, 30, 0).encode()},
