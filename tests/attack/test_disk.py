@@ -72,11 +72,11 @@ def test_without_a_state_directory_the_daemon_keeps_working(start: Starter, tmp_
     config.write_text(f'[web]\nlisten = "127.0.0.1:{port}"\n')
     daemon = start.daemon(str(board.link), state_dir=blocked / "state", options=("--config", str(config)))
     daemon.wait()
-    with Watch(daemon) as witness, udp_station(daemon.address) as pilot:
+    with Watch(daemon) as monitor, udp_station(daemon.address) as pilot:
         pilot.send(HELLO)
         assert "memory" in pilot.wait_for("STATUSTEXT").text
         assert_uploads(pilot, board, plain_plan(20))
-        until(lambda: len(witness.gaps_s) >= 3, "heartbeats")
+        until(lambda: len(monitor.gaps_s) >= 3, "heartbeats")
     assert [kept["outcome"] for kept in daemon.missions()] == ["VERIFIED"]
     status = daemon.status()
     assert status is not None
@@ -146,7 +146,7 @@ def test_connections_and_unread_replies_are_limited(start: Starter) -> None:
     ]
     process = daemon.process.pid
     before, memory = _open_files(process), _memory_kb(process)
-    with Watch(daemon) as witness, ExitStack() as clients:
+    with Watch(daemon) as monitor, ExitStack() as clients:
         for family, address, request in targets:
             for _ in range(CONNECTIONS):
                 client = clients.enter_context(socket.socket(family))
@@ -154,8 +154,8 @@ def test_connections_and_unread_replies_are_limited(start: Starter) -> None:
                 with suppress(OSError):  # the daemon has disconnected, or its backlog is full
                     client.connect(address)
                     client.sendall(request)
-            received = len(witness.gaps_s)
-            until(lambda received=received: len(witness.gaps_s) > received, "a heartbeat")  # type: ignore[misc]
+            received = len(monitor.gaps_s)
+            until(lambda received=received: len(monitor.gaps_s) > received, "a heartbeat")  # type: ignore[misc]
             assert _open_files(process) < MOST_OPEN_FILES
         assert _memory_kb(process) - memory < 15_000
         with udp_station(daemon.address) as pilot:
@@ -168,12 +168,12 @@ def test_connections_and_unread_replies_are_limited(start: Starter) -> None:
 
 def test_a_long_source_is_truncated(start: Starter) -> None:
     bench = start.bench()
-    with Watch(bench.daemon) as witness:
-        until(lambda: len(witness.gaps_s) >= 1, "a heartbeat")
+    with Watch(bench.daemon) as monitor:
+        until(lambda: len(monitor.gaps_s) >= 1, "a heartbeat")
         for _ in range(5):
             bench.daemon.ask({"do": "push", "source": "y" * 250_000, "items": []})
-        until(lambda: len(witness.gaps_s) >= 4, "heartbeats")
-    assert witness.frames[m.MAVLINK_MSG_ID_STATUSTEXT] < 60
+        until(lambda: len(monitor.gaps_s) >= 4, "heartbeats")
+    assert monitor.frames[m.MAVLINK_MSG_ID_STATUSTEXT] < 60
 
 
 def test_requests_of_a_megabyte_do_not_fill_the_memory(start: Starter) -> None:
@@ -181,13 +181,13 @@ def test_requests_of_a_megabyte_do_not_fill_the_memory(start: Starter) -> None:
     bench = start.bench()
     before = _memory_kb(bench.daemon.process.pid)
     request = b'{"do": "push", "items": [' + b"{}," * 300_000 + b"{}]}\n"
-    with Watch(bench.daemon) as witness, ExitStack() as clients:
+    with Watch(bench.daemon) as monitor, ExitStack() as clients:
         for _ in range(16):
             client = clients.enter_context(socket.socket(socket.AF_UNIX))
             client.connect(str(bench.daemon.state_dir / "control.sock"))
             with suppress(OSError):  # the daemon has disconnected
                 client.sendall(request)
-        until(lambda: len(witness.gaps_s) >= 2, "heartbeats")
+        until(lambda: len(monitor.gaps_s) >= 2, "heartbeats")
     assert _memory_kb(bench.daemon.process.pid, "VmHWM") - before < 15_000
     assert happens(lambda: bench.daemon.status() is not None)
 

@@ -30,7 +30,7 @@ def test_the_text_of_a_refusal_goes_only_to_the_refused_station(bench: Bench, st
     with udp_station(bench.daemon.address) as pilot:
         pilot.send(HELLO)
         pilot.wait_for("HEARTBEAT")
-        with Watch(bench.daemon) as witness, Attack(lambda: stranger.send(*loud), per_s=125) as attack:
+        with Watch(bench.daemon) as monitor, Attack(lambda: stranger.send(*loud), per_s=125) as attack:
             assert happens(lambda: attack.count > 600)
             assert_uploads(pilot, bench.board, plain_plan(20))
-        assert witness.frames[m.MAVLINK_MSG_ID_STATUSTEXT] <= 4
+        assert monitor.frames[m.MAVLINK_MSG_ID_STATUSTEXT] <= 4

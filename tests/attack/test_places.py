@@ -166,9 +166,9 @@ def test_slow_uploads_and_forged_addresses_do_not_delay_the_pilot(start: Starter
         turns = itertools.cycle(many)
         for stranger in slow:
             stranger.send(m.MAVLink_mission_count_message(1, 1, 100))
-        with Watch(bench.daemon) as witness, Attack(lambda: next(turns).send(HELLO), per_s=100) as attack:
+        with Watch(bench.daemon) as monitor, Attack(lambda: next(turns).send(HELLO), per_s=100) as attack:
             assert happens(lambda: attack.count > 100)
             for stranger in slow:
                 stranger.send(m.MAVLink_mission_item_int_message(1, 1, 0, 3, 16, 0, 1, 0, 0, 0, 0, 1, 1, 9.0))
             assert_uploads(pilot, bench.board, plain_plan(30))
-            until(lambda: len(witness.gaps_s) >= 4, "heartbeats")
+            until(lambda: len(monitor.gaps_s) >= 4, "heartbeats")

@@ -54,7 +54,7 @@ def test_other_members_cannot_publish_for_a_vehicle(start: Starter, fleet: Fleet
             pulled = run_naze_bridge("fleet", "pull", "--vehicle", "naze-1", *pilots)
             assert pulled.returncode == 0, pulled
         assert len(bench.board.records()) == len((EXAMPLES / "naze-field.waypoints").read_text().splitlines()) - 2
-    bench.board.assert_was_treated_well()
+    bench.board.assert_unharmed()
 
 
 def _send_forgeries(session: zenoh.Session) -> None:

@@ -32,7 +32,7 @@ def verdict(world: World) -> bool:
     return not isinstance(world.bridge.session.state, Closed | Searching)
 
 
-def thinks_armed(world: World) -> bool | None:
+def reports_armed(world: World) -> bool | None:
     return world.bridge.session.vehicle.armed
 
 
@@ -188,13 +188,13 @@ def test_the_bridge_follows_to_mavlink_on_arming_and_back(protocol: TelemetryPro
         world.faults.armed = True
         assert world.wait_until(lambda w: w.kind is harakiri.MAVLINK, 20) <= 8
         world.run(1.2)
-        assert thinks_armed(world) is True
+        assert reports_armed(world) is True
         world.run(6)
         assert world.kind is harakiri.MAVLINK
         world.faults.armed = False
         assert world.wait_until(lambda w: w.kind is harakiri.PATCHED, 20) <= 8
         world.run(0.5)
-        assert thinks_armed(world) is False
+        assert reports_armed(world) is False
         world.run(3)
     names = [event.name for event in world.log_event if event.name.startswith("vehicle.")]
     assert names == ["vehicle.armed", "vehicle.disarmed"] * 2
@@ -313,7 +313,7 @@ def test_an_empty_heartbeat_is_ignored() -> None:
         for version in (1, 2):
             message = messages.MAVLink_heartbeat_message(*fields)
             world.receive_from_fc(bytes(message.pack(mavlink, force_mavlink1=version == 1)))
-    assert thinks_armed(world) is True
+    assert reports_armed(world) is True
 
 
 @pytest.mark.parametrize("peer", [QuietLine, Loopback])

@@ -25,7 +25,7 @@ from tests.support.conversations import (
     waypoints,
 )
 from tests.support.fake_controllers import HARAKIRI_CAPABILITY, MspFake, ident
-from tests.support.world import Air, GroundStation, World, flash_holding, ready_world
+from tests.support.world import GroundStation, Radio, World, flash_holding, ready_world
 
 OLD = waypoints(20, seed=77)
 OLD_RECORDS = records_of(OLD)
@@ -241,7 +241,7 @@ def test_two_stations_read_at_once() -> None:
 def test_a_download_over_a_bad_radio_link_is_exact(seed: int) -> None:
     world = World(speeds=(115200,), flash=OLD_FLASH, seed=seed)
     world.wait_ready()
-    station = GroundStation(world, air=Air(loss=0.1, repeat=0.1, delay_s=0.05, spread_s=0.1))
+    station = GroundStation(world, radio=Radio(loss=0.1, repeat=0.1, delay_s=0.05, spread_s=0.1))
     items = Download(station, repeat_s=0.6, tries=20).run()
     assert [(item.lat_e7, item.lon_e7, item.alt_m) for item in items] == [
         (item.lat_e7, item.lon_e7, item.alt_m) for item in OLD
@@ -347,7 +347,7 @@ def test_item_0_is_not_denied_while_the_craft_may_be_armed(board: TelemetryProto
 
 def test_a_download_continues_during_another_stations_upload() -> None:
     world, reader = holding()
-    writer = GroundStation(world, "writer", sysid=250, air=Air(delay_s=0.01))
+    writer = GroundStation(world, "writer", sysid=250, radio=Radio(delay_s=0.01))
     upload = Upload(writer, waypoints(60, 4))
     world.run(0.3)
     assert [item.lat_e7 for item in Download(reader).run()] == [item.lat_e7 for item in OLD]

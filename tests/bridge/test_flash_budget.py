@@ -14,7 +14,7 @@ from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import MissionResult
 from simulator.options import SimOptions
 from tests.support.conversations import Upload, records_of, waypoints
-from tests.support.world import Air, GroundStation, World, ready_world
+from tests.support.world import GroundStation, Radio, World, ready_world
 
 HOUR_S = 3600.0
 PILOT = Peer("udp", ("10.0.0.1", 14550))
@@ -131,7 +131,7 @@ def test_an_unchanged_list_is_not_counted() -> None:
 def test_the_pilots_list_precedes_those_of_frequent_writers(hosts: int, lists: int) -> None:
     world = World(SimOptions(flash_erase_ms=400.0), speeds=(115200,))
     world.wait_ready()
-    pilot = GroundStation(world, "pilot", air=Air(delay_s=0.01))
+    pilot = GroundStation(world, "pilot", radio=Radio(delay_s=0.01))
     strangers = [GroundStation(world, f"stranger {number}", sysid=number) for number in range(1, hosts + 1)]
     for station in strangers:
         station.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))

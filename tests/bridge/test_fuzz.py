@@ -31,8 +31,8 @@ from simulator.options import Faults, SimOptions, TelemetryProtocol
 from simulator.simulated_board import SimulatedBoard
 from storage.mission_store import open_store
 from storage.store_error import StoreError
+from tests.support.corrupting_board import CorruptingBoard, RandomAutopilot
 from tests.support.fuzz_inputs import FuzzInputs
-from tests.support.lying_board import LyingBoard, RandomAutopilot
 from tests.support.sample_missions import mission
 from tests.support.world import GroundStation, World, ready_world
 
@@ -86,7 +86,7 @@ def test_no_reply_raises(seed: int) -> None:
     """Frames in place of a board's own: a right checksum around wrong contents."""
     inputs = FuzzInputs(seed)
     faults = Faults()
-    world = World(peer=_lying_board(inputs, faults), faults=faults, speeds=(115200, 9600, 57600))
+    world = World(peer=_corrupting_board(inputs, faults), faults=faults, speeds=(115200, 9600, 57600))
     world.bridge.report.watch(Group)
     station = GroundStation(world)
     for _ in range(AT_ONCE // 20):
@@ -117,14 +117,14 @@ def test_no_log_or_capture_raises(seed: int) -> None:
         read_capture(inputs.like(captures()))
 
 
-def _lying_board(inputs: FuzzInputs, faults: Faults) -> LyingBoard | RandomAutopilot:
+def _corrupting_board(inputs: FuzzInputs, faults: Faults) -> CorruptingBoard | RandomAutopilot:
     kind = inputs.random.choice(("harakiri", "harakiri", "autopilot", *KINDS))
     if kind == "autopilot":
         return RandomAutopilot(inputs)
     board: SimulatedBoard = SimulatedNaze(SimOptions(tele_prot=inputs.random.choice(tuple(TelemetryProtocol))), faults)
     if kind != "harakiri":
         board = make_board(kind, faults=faults)
-    return LyingBoard(board, inputs, inputs.random.choice((0.02, 0.3)))
+    return CorruptingBoard(board, inputs, inputs.random.choice((0.02, 0.3)))
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ from protocols.mission_item import MissionResult
 from protocols.tlog import tlog_record
 from tests.bridge.test_pass_through import Autopilot
 from tests.support.conversations import Download, Upload, clear_message, count_message, item_message, waypoints
-from tests.support.world import Air, GroundStation, World
+from tests.support.world import GroundStation, Radio, World
 
 KEY = key_from_passphrase("a passphrase")
 OTHER_KEY = key_from_passphrase("another passphrase")
@@ -335,7 +335,7 @@ def test_an_unsigned_frame_cannot_end_the_pilots_upload() -> None:
 def test_a_signed_upload_over_a_network_that_loses_and_duplicates(seed: int) -> None:
     world = World(seed=seed, speeds=(115200,), links={"udp": LinkAccess(signing(), LINK_ID)})
     world.wait_ready()
-    station = GroundStation(world, air=Air(loss=0.05, repeat=0.3, delay_s=0.02))
+    station = GroundStation(world, radio=Radio(loss=0.05, repeat=0.3, delay_s=0.02))
     station.sign(KEY, ticks(NOON))
     assert Upload(station, waypoints(30)).run() is MissionResult.ACCEPTED
     assert len(world.stored) == 30

@@ -20,7 +20,7 @@ from protocols.msp.frame import Direction, MspFrame, MspParser
 from protocols.msp.nav import LAST, Nav, NavAction
 from tests.support.conversations import Download, Upload, clear_message, count_message, waypoints
 from tests.support.fake_inav import FakeInav, FakeMultiwii, lossy, nav_config
-from tests.support.world import Air, GroundStation, World
+from tests.support.world import GroundStation, Radio, World
 
 RULES = NavRules(inav_profile())
 ACCEPTED, DENIED = MissionResult.ACCEPTED, MissionResult.DENIED
@@ -153,7 +153,7 @@ def test_nothing_is_sent_while_armed() -> None:
 def test_the_arming_state_is_read_before_a_transfer() -> None:
     inav = FakeInav()
     world, _ = found(inav)
-    upload = Upload(GroundStation(world, "far", air=Air(delay_s=0.02)), plan(10))
+    upload = Upload(GroundStation(world, "far", radio=Radio(delay_s=0.02)), plan(10))
     world.run_until(lambda _: len(upload.requested) == 10, 5)
     inav.armed = True
     assert world.bridge.session.vehicle.armed is False

@@ -18,7 +18,7 @@ from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import MissionResult
 from tests.support.conversations import Upload, count_message, item_message, records_of, waypoints
-from tests.support.world import Air, GroundStation, World, ready_world
+from tests.support.world import GroundStation, Radio, World, ready_world
 
 HELLO = m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
 SECONDS, PER_S = 4, 2000
@@ -65,7 +65,7 @@ def longest_gap_s(pilot: GroundStation, since: float) -> float:
 
 def test_a_flood_does_not_affect_a_pilot_who_connected_before_it() -> None:
     world = ready_world()
-    pilot = GroundStation(world, "pilot", air=Air(delay_s=0.01))
+    pilot = GroundStation(world, "pilot", radio=Radio(delay_s=0.01))
     pilot.send(HELLO)
     world.run(1)
     pilot.take()
@@ -103,7 +103,7 @@ def test_listed_addresses_that_send_no_frame_are_not_remembered() -> None:
 def test_a_pilot_who_arrives_later_can_write(addresses: Callable[[random.Random], Callable[[], Address]]) -> None:
     """The flood announces 500 lists a second, sixty times the limit for all newcomers together."""
     world = ready_world()
-    pilot = GroundStation(world, "pilot", air=Air(delay_s=0.01))
+    pilot = GroundStation(world, "pilot", radio=Radio(delay_s=0.01))
     attack(world, [count_message(9)], addresses(random.Random(7)), 500, 6.0)
     world.run(0.5)
     for beat in range(4):
@@ -123,7 +123,7 @@ def test_a_lost_final_ack_is_repeated_in_a_flood(
     addresses: Callable[[random.Random], Callable[[], Address]], *, late: bool
 ) -> None:
     world = ready_world()
-    pilot = GroundStation(world, "pilot", air=Air(delay_s=0.01))
+    pilot = GroundStation(world, "pilot", radio=Radio(delay_s=0.01))
     for beat in range(4):
         world.after(beat + 0.5 * late, lambda: pilot.send(HELLO))
     world.run(0.0 if late else 3.5)
@@ -161,7 +161,7 @@ def test_an_answer_to_a_peer_with_standing_is_kept(*, ids_of_one: bool) -> None:
 def test_a_pilot_on_a_slow_radio_can_write_during_a_flood() -> None:
     """Between two of the pilot's items a hundred lists are announced."""
     world = ready_world()
-    pilot = GroundStation(world, "pilot", air=Air(delay_s=0.7))
+    pilot = GroundStation(world, "pilot", radio=Radio(delay_s=0.7))
     for beat in range(4):
         world.after(beat, lambda: pilot.send(HELLO))
     world.run(4)
@@ -178,7 +178,7 @@ def test_a_pilot_on_a_slow_radio_who_arrives_later_can_write() -> None:
         stranger = GroundStation(world, f"10.0.0.{number}", sysid=99)
         world.after(number / 50, partial(stranger.send, count_message(9)))
         world.after(number / 50 + 0.5, partial(stranger.send, item_message(0, waypoints(9)[0])))
-    pilot = GroundStation(world, "pilot", air=Air(delay_s=0.8))
+    pilot = GroundStation(world, "pilot", radio=Radio(delay_s=0.8))
     world.run(0.2)
     pilot.send(HELLO)
     assert Upload(pilot, waypoints(3), repeat_s=1.7).run() is MissionResult.ACCEPTED
@@ -204,7 +204,7 @@ def test_made_up_ids_do_not_cancel_a_pilot_on_a_slow_radio() -> None:
         for stranger in strangers:
             world.after(beat, lambda stranger=stranger: stranger.send(HELLO))  # type: ignore[misc]
     world.run(3.5)
-    pilot = GroundStation(world, "pilot", air=Air(delay_s=0.7))
+    pilot = GroundStation(world, "pilot", radio=Radio(delay_s=0.7))
     ids = itertools.count()
 
     def send_count() -> None:

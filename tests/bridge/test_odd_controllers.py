@@ -22,7 +22,7 @@ INFO = Info(1, InfoFlag(0), 15, 2, 6, 146, ListIdentity(0, 0), 200, 50, 0, 0)
 TELEMETRY = {101: 11, 106: 18, 108: 8, 109: 10, 110: 7, 118: 21}
 
 
-class Odd(QuietLine):
+class FakeExtension(QuietLine):
     """Identifies as a Harakiri with the extension; `answer` decides the other replies."""
 
     def __init__(self, seed: int = 0, info: Info = INFO) -> None:
@@ -67,7 +67,7 @@ class Odd(QuietLine):
         return Staged(status, count, checksum).encode()
 
 
-class Stubborn(Odd):
+class FixedReplies(FakeExtension):
     """Always gives the same reply to CHUNK, COMMIT or READ."""
 
     def __init__(self, answers: dict[int, bytes], info: Info = INFO) -> None:
@@ -86,7 +86,9 @@ def found(peer: QuietLine) -> tuple[World, GroundStation]:
 
 @pytest.mark.parametrize("seed", range(40))
 def test_every_conversation_ends_with_any_replies(seed: int) -> None:
-    world, station = found(Odd(seed, Info(1, InfoFlag(0), 15, 2, 6, 146, ListIdentity(20, 99), 200, 50, 0, 0)))
+    world, station = found(
+        FakeExtension(seed, Info(1, InfoFlag(0), 15, 2, 6, 146, ListIdentity(20, 99), 200, 50, 0, 0))
+    )
     assert Upload(station, waypoints(30, seed)).run(120) not in (None, MissionResult.ACCEPTED)
     Download(station).run(60)
     station.send(messages.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", 300.0, 9))
@@ -110,7 +112,7 @@ def test_every_conversation_ends_with_any_replies(seed: int) -> None:
     ],
 )
 def test_a_board_that_always_gives_the_same_reply_is_given_up(answers: dict[int, bytes]) -> None:
-    _, station = found(Stubborn(answers))
+    _, station = found(FixedReplies(answers))
     assert Upload(station, waypoints(30)).run(60) is MissionResult.DENIED
 
 
@@ -126,7 +128,7 @@ def test_a_board_that_always_gives_the_same_reply_is_given_up(answers: dict[int,
 )
 def test_a_download_without_progress_ends(answer: Records) -> None:
     info = Info(1, InfoFlag(0), 15, 2, 6, 146, ListIdentity(20, 99), 200, 50, 0, 0)
-    _, station = found(Stubborn({MissionCommand.READ: answer.encode()}, info))
+    _, station = found(FixedReplies({MissionCommand.READ: answer.encode()}, info))
     download = Download(station, repeat_s=30)
     download.run(30)
     assert download.result is MissionResult.DENIED
@@ -135,7 +137,7 @@ def test_a_download_without_progress_ends(answer: Records) -> None:
 @pytest.mark.parametrize("records", [15, 16, 40, 255])
 def test_a_chunk_size_beyond_a_frame_is_limited(records: int) -> None:
     info = Info(1, InfoFlag(0), records, 255, records, 146, ListIdentity(0, 0), 200, 50, 0, 0)
-    _, station = found(Stubborn({}, info))
+    _, station = found(FixedReplies({}, info))
     assert Upload(station, waypoints(60)).run(60) is MissionResult.DENIED
 
 
@@ -148,7 +150,7 @@ def test_a_chunk_size_beyond_a_frame_is_limited(records: int) -> None:
 )
 @settings(max_examples=60, deadline=None)
 def test_any_telemetry_is_shown_or_dropped(payloads: list[bytes]) -> None:
-    board = Odd()
+    board = FakeExtension()
     board.telemetry = dict(zip(TELEMETRY, payloads, strict=True))
     world, station = found(board)
     station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))

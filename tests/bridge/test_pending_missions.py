@@ -37,7 +37,7 @@ def test_a_board_that_resets_during_commit_is_asked_later(boot_ms: int, cut_afte
     world.wait_until(is_committing, 5)
     world.run(cut_after_s)
     upload.stop()
-    station.air.loss = 0.0
+    station.radio.loss = 0.0
     if outcome is Outcome.VERIFIED:
         # Stored, but the reply is lost.
         world.unplug()

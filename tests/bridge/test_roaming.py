@@ -9,12 +9,12 @@ from bridge.gcs.stations import EXPIRY_S, MOVED_S
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import MissionResult
 from tests.support.conversations import Download, Upload, count_message, item_message, records_of, waypoints
-from tests.support.world import Air, GroundStation, World, ready_world
+from tests.support.world import GroundStation, Radio, World, ready_world
 
 m = messages
 PLAN = waypoints(40)
 #: Enough items for a long upload.
-WIFI = Air(delay_s=0.02)
+WIFI = Radio(delay_s=0.02)
 
 
 def send_heartbeats(station: GroundStation, is_there: list[GroundStation]) -> None:
@@ -49,7 +49,7 @@ class Roamer:
         """Move to a new address; an upload continues there."""
         left = self.present[:]
         self._number += 1
-        station = GroundStation(self.world, f"roams {self._number}", air=WIFI)
+        station = GroundStation(self.world, f"roams {self._number}", radio=WIFI)
         self.present[:] = [station]
         for former in left:
             former.on_message.clear()
@@ -203,7 +203,7 @@ def test_the_result_of_an_upload_goes_to_the_new_address() -> None:
 def test_a_second_station_with_the_same_ids_cannot_join_an_upload() -> None:
     """It was known before, or the first one is still active: its list waits, and its items are ignored."""
     world = ready_world()
-    first, second = GroundStation(world, "first", air=WIFI), GroundStation(world, "second")
+    first, second = GroundStation(world, "first", radio=WIFI), GroundStation(world, "second")
     second.send(heartbeat())
     world.run(0.5)
     upload = Upload(first, PLAN)
@@ -223,7 +223,7 @@ def test_a_second_station_with_the_same_ids_cannot_join_an_upload() -> None:
 def test_a_refused_station_is_not_mistaken_for_one_that_moved() -> None:
     """Mission Planner sends its items even after its COUNT was refused, when the first station is silent."""
     world = ready_world()
-    first = GroundStation(world, "first", air=WIFI)
+    first = GroundStation(world, "first", radio=WIFI)
     upload = Upload(first, PLAN, repeat_s=100)
     world.wait_until(lambda _: len(upload.requested) > 10, 5)
     newcomer = GroundStation(world, "newcomer")

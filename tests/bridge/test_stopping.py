@@ -13,7 +13,7 @@ from protocols.msp.frame import MspParser
 from protocols.msp.mission import MissionCommand
 from simulator.options import Faults, SimOptions
 from tests.support.conversations import Upload, count_message, records_of, waypoints
-from tests.support.world import Air, GroundStation, World, flash_holding
+from tests.support.world import GroundStation, Radio, World, flash_holding
 
 OLD, NEW = waypoints(20, seed=77), waypoints(146, seed=5)
 
@@ -95,7 +95,7 @@ def test_a_board_that_does_not_answer_keeps_its_old_list() -> None:
 
 
 def test_an_unfinished_upload_is_cancelled_and_stored(world: World) -> None:
-    station = GroundStation(world, air=Air(delay_s=0.005))
+    station = GroundStation(world, radio=Radio(delay_s=0.005))
     upload = Upload(station, NEW)
     world.wait_until(lambda _: len(upload.requested) > 20, 5)
     stop(world)

@@ -24,7 +24,7 @@ from tests.support.conversations import (
     waypoints,
 )
 from tests.support.fake_controllers import HARAKIRI_CAPABILITY, MspFake, ident
-from tests.support.world import Air, GroundStation, World, flash_holding
+from tests.support.world import GroundStation, Radio, World, flash_holding
 
 OLD = waypoints(20, seed=77)
 OLD_RECORDS = records_of(OLD)
@@ -128,7 +128,7 @@ def test_another_mission_type_is_unsupported(mission_type: int) -> None:
 
 def test_another_mission_type_does_not_disturb_a_transfer() -> None:
     world, station = holding()
-    station.air = Air(delay_s=0.002)
+    station.radio = Radio(delay_s=0.002)
     upload = Upload(station, waypoints(30))
     for number in range(10):
         world.after(number * 0.003, lambda: station.send(count_message(3, 1)))
@@ -243,8 +243,8 @@ def test_more_than_the_flight_controller_holds_is_no_space(capacity: int) -> Non
 def test_two_simultaneous_uploads_both_succeed() -> None:
     """The second station repeats its MISSION_COUNT for 2.8 s and is answered when the first is done."""
     world, station = holding()
-    second = GroundStation(world, "second", sysid=254, air=Air(delay_s=0.002))
-    station.air = Air(delay_s=0.002)
+    second = GroundStation(world, "second", sysid=254, radio=Radio(delay_s=0.002))
+    station.radio = Radio(delay_s=0.002)
     uploads = [Upload(station, waypoints(100)), Upload(second, waypoints(30, 1), repeat_s=0.7, tries=4)]
     assert [upload.run() for upload in uploads] == [A.ACCEPTED, A.ACCEPTED]
     assert world.stored == records_of(waypoints(30, 1))
@@ -281,7 +281,7 @@ def test_an_upload_started_again_and_again_does_not_delay_others() -> None:
 def test_unfinished_uploads_do_not_delay_others() -> None:
     """The ones with the slowest progress end."""
     world, station = holding()
-    station.air = Air(delay_s=0.03)
+    station.radio = Radio(delay_s=0.03)
     station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
     for number in range(90):
         stranger = GroundStation(world, f"crowd {number}", sysid=1 + number)
@@ -704,7 +704,7 @@ def test_a_repeated_item_gets_one_request_and_is_ignored() -> None:
 def test_duplicates_from_the_network_do_not_multiply_requests() -> None:
     world, station = holding()
     items = waypoints(40)
-    station.air = Air(repeat=0.1, delay_s=0.03, spread_s=0.02)
+    station.radio = Radio(repeat=0.1, delay_s=0.03, spread_s=0.02)
 
     def answer(message: Message) -> None:
         if message.get_type() == "MISSION_REQUEST":
@@ -762,7 +762,7 @@ def test_the_timeout_adapts_to_the_round_trip(round_trip_s: float, copies: int) 
     request, so every later request is repeated as often, but not more.
     """
     _, station = holding()
-    station.air = Air(delay_s=round_trip_s / 2)
+    station.radio = Radio(delay_s=round_trip_s / 2)
     upload = Upload(station, waypoints(30), repeat_s=10)
     assert upload.run(120) is A.ACCEPTED
     assert max(requested(station).count(seq) for seq in range(30)) == copies
@@ -771,7 +771,7 @@ def test_the_timeout_adapts_to_the_round_trip(round_trip_s: float, copies: int) 
 def test_four_copies_of_a_lost_request_arrive_before_mavsdk_gives_up() -> None:
     """It waits 2.5 s for the next request."""
     world, station = holding()
-    station.air = Air(delay_s=0.2)
+    station.radio = Radio(delay_s=0.2)
     items = waypoints(8)
     asked: dict[int, list[float]] = {seq: [] for seq in range(8)}
 
@@ -792,7 +792,7 @@ def test_four_copies_of_a_lost_request_arrive_before_mavsdk_gives_up() -> None:
 def test_needless_repeats_lengthen_the_timeout(round_trip_s: float) -> None:
     """A ground station that answers each request once: only the first request is repeated."""
     world, station = holding()
-    station.air = Air(delay_s=round_trip_s / 2)
+    station.radio = Radio(delay_s=round_trip_s / 2)
     items = waypoints(30)
     answered: set[int] = set()
 
@@ -916,10 +916,10 @@ def test_a_lost_final_ack_is_sent_again() -> None:
     world, station = holding()
     items = waypoints(20)
     receiving(world, station, items, 19)
-    station.air.loss = 1.0
+    station.radio.loss = 1.0
     world.receive_from(station, station.pack(item_message(19, items[19])))
     world.run(1)
-    station.air.loss = 0.0
+    station.radio.loss = 0.0
     assert acks(station) == []
     station.send(item_message(19, items[19]))
     world.run(0.1)
@@ -1046,7 +1046,7 @@ def test_uploads_over_a_bad_radio_link_are_exact_or_refused() -> None:
     for seed in range(25):
         world = World(speeds=(115200,), seed=seed, flash=OLD_FLASH)
         world.wait_ready()
-        station = GroundStation(world, air=Air(loss=0.1, repeat=0.1, delay_s=0.1 * (seed % 3), spread_s=0.05))
+        station = GroundStation(world, radio=Radio(loss=0.1, repeat=0.1, delay_s=0.1 * (seed % 3), spread_s=0.05))
         items = waypoints(25, seed)
         result = Upload(station, items).run(120)
         world.run(6)
@@ -1062,7 +1062,7 @@ def test_late_wake_ups_lose_nothing(late_s: float) -> None:
     for seed in range(4):
         world = World(speeds=(115200,), seed=seed, flash=OLD_FLASH, late_s=late_s)
         world.wait_ready()
-        station = GroundStation(world, air=Air(loss=0.05, repeat=0.05, delay_s=0.02, spread_s=0.02))
+        station = GroundStation(world, radio=Radio(loss=0.05, repeat=0.05, delay_s=0.02, spread_s=0.02))
         items = waypoints(40, seed)
         assert Upload(station, items).run(60) is A.ACCEPTED
         assert world.stored == records_of(items)

@@ -44,7 +44,7 @@ def test_a_pushed_mission_is_pulled_unchanged(board: Board, tmp_path: Path) -> N
     assert board.records() == records_of(judge(plan))
     assert run_naze_bridge("pull", tmp_path / "held", "--fc", board.link).returncode == 0
     assert (tmp_path / "held").read_text() == write_qgc_wpl(judge(plan).items)
-    board.assert_was_treated_well()
+    board.assert_unharmed()
 
 
 def test_status_waits_for_telemetry(tmp_path: Path) -> None:

@@ -83,7 +83,7 @@ def test_without_a_daemon_the_old_mission_is_kept(start: Starter) -> None:
     assert terminal.end() == 130
     assert "interrupted: naze-bridge was stopped during the write; the old mission is kept" in terminal.printed
     assert board.records() == before
-    board.assert_was_treated_well()
+    board.assert_unharmed()
 
 
 def interrupted_push(start: Starter) -> tuple[Board, Terminal]:

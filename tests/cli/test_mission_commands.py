@@ -75,9 +75,9 @@ def test_a_pushed_mission_is_pulled_unchanged(daemon: Daemon, tmp_path: Path) ->
     pushed = ask(daemon, "push", write_plan(tmp_path / "plan", plan))
     assert pushed.returncode == 0
     assert pushed.stdout.endswith("ACCEPTED: Mission verified: 7 records\n")
-    assert daemon.held()["records"] == records_of(judge(plan))
+    assert daemon.pull()["records"] == records_of(judge(plan))
     pulled = ask(daemon, "pull")
-    assert pulled.stdout.endswith(f"7 records, checksum {daemon.held()['checksum']}\n")
+    assert pulled.stdout.endswith(f"7 records, checksum {daemon.pull()['checksum']}\n")
     assert "45.3847523" in pulled.stdout
     assert ask(daemon, "clear").stdout == "ACCEPTED: Mission on the flight controller cleared\n"
     assert ask(daemon, "pull").stdout == "0 records, checksum 00000000\n"
@@ -92,14 +92,14 @@ def test_a_refusal_is_reported_with_exit_status_1(daemon: Daemon, tmp_path: Path
 
 def test_a_list_that_would_erase_the_mission_needs_confirmation(daemon: Daemon, tmp_path: Path) -> None:
     ask(daemon, "push", write_plan(tmp_path / "plan", plain_plan(7, start=20)))
-    held = daemon.held()["records"]
+    held = daemon.pull()["records"]
     nothing = write_plan(tmp_path / "nothing", [HOME, PlanRow(Command.DO_CHANGE_SPEED)])
     refused = ask(daemon, "push", nothing)
     assert refused.returncode == 3
     assert "would erase the current mission" in refused.stdout
-    assert daemon.held()["records"] == held
+    assert daemon.pull()["records"] == held
     assert ask(daemon, "push", "--erase", nothing).returncode == 0
-    assert daemon.held()["records"] == []
+    assert daemon.pull()["records"] == []
 
 
 @pytest.mark.parametrize(("typed", "code", "left"), [(b"n\n", 3, 7), (b"\n", 3, 7), (b"y\n", 0, 0)])
@@ -117,7 +117,7 @@ def test_a_person_at_a_terminal_is_asked_before_the_mission_is_erased(
         os.close(far_end)
     assert "Erase it? [y/N]" in ended.stderr
     assert ended.returncode == code, ended
-    assert len(daemon.held()["records"]) == left
+    assert len(daemon.pull()["records"]) == left
 
 
 def test_a_list_that_is_too_long_is_refused_without_a_table(daemon: Daemon, tmp_path: Path) -> None:
@@ -156,7 +156,7 @@ def test_a_checksum_looks_the_same_everywhere(daemon: Daemon, tmp_path: Path) ->
         strict(ask(daemon, "status", "--json").stdout)["mission_checksum"],
         strict(ask(daemon, "missions", "list", "--limit", "1", "--json").stdout)[0]["checksum"],
         strict(ask(daemon, "missions", "show", str(number), "--json").stdout)["received"]["checksum"],
-    } == {daemon.held()["checksum"]}
+    } == {daemon.pull()["checksum"]}
 
 
 def test_tables_fit_and_have_no_trailing_spaces(daemon: Daemon, tmp_path: Path) -> None:
@@ -234,7 +234,7 @@ def test_pull_into_standard_output_is_a_mission_file(daemon: Daemon) -> None:
     daemon.push(plain_plan(6))
     pulled = ask(daemon, "pull", "-")
     assert len(read_mission_file(pulled.stdout.encode(), "-")) == 6
-    assert pulled.stderr == f"6 records, checksum {daemon.held()['checksum']}\n"
+    assert pulled.stderr == f"6 records, checksum {daemon.pull()['checksum']}\n"
     assert ask(daemon, "pull", "-", "--json").returncode == 2
 
 

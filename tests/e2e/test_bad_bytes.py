@@ -144,7 +144,7 @@ def test_a_megabyte_of_noise_on_the_uart_does_no_harm(start: Starter) -> None:
     wire.unplug()
     board = start.board()
     daemon.wait()
-    board.assert_was_treated_well()
+    board.assert_unharmed()
 
 
 # -- strangers -----------------------------------------------------------------------------------------------

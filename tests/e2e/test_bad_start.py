@@ -104,7 +104,7 @@ def test_the_plain_simulator_takes_a_mission(start: Starter) -> None:
     with udp_station(daemon.address) as station:
         station.send_heartbeat()
         assert station.upload(plain_plan(20)) == 0
-    assert daemon.held()["records"] == records_of(judge(plain_plan(20)))
+    assert daemon.pull()["records"] == records_of(judge(plain_plan(20)))
 
 
 # -- the serial port -----------------------------------------------------------------------------------------

@@ -35,7 +35,7 @@ def assert_denied(act: Callable[[], None]) -> None:
 
 def assert_old_list(bench: Bench) -> None:
     assert bench.board.records() == records_of(judge(OLD))
-    assert bench.daemon.held()["records"] == records_of(judge(OLD))
+    assert bench.daemon.pull()["records"] == records_of(judge(OLD))
 
 
 def assert_retry_works(bench: Bench, planner: MissionPlanner) -> None:
@@ -168,7 +168,7 @@ def test_a_harakiri_without_the_extension_refuses_missions(start: Starter) -> No
     found = bench.daemon.has_logged("fc.found")
     assert found is not None
     assert "Harakiri" in found["name"]
-    bench.board.assert_was_treated_well()
+    bench.board.assert_unharmed()
 
 
 def test_a_harakiri_that_speaks_mavlink_while_armed_is_one_vehicle(start: Starter) -> None:
@@ -184,7 +184,7 @@ def test_a_harakiri_that_speaks_mavlink_while_armed_is_one_vehicle(start: Starte
         planner.wait_for_armed(False)
         planner.write(plain_plan(12))
     assert board.records() == records_of(judge(plain_plan(12)))
-    board.assert_was_treated_well()
+    board.assert_unharmed()
 
 
 def test_a_board_at_an_unexpected_speed_is_found(start: Starter) -> None:
@@ -194,7 +194,7 @@ def test_a_board_at_an_unexpected_speed_is_found(start: Starter) -> None:
     assert status["speed_baud"] == 38400
     bench.mission_planner().write(plain_plan(12))
     assert bench.board.records() == records_of(judge(plain_plan(12)))
-    bench.board.assert_was_treated_well()
+    bench.board.assert_unharmed()
 
 
 # -- the daemon ----------------------------------------------------------------------------------------------

@@ -59,14 +59,14 @@ def test_bad_requests_are_answered_and_change_nothing(start: Starter) -> None:
     daemon = start.daemon("sim:")
     daemon.wait()
     daemon.push(plain_plan(5))
-    held = daemon.held()
+    held = daemon.pull()
     for name, line in BAD_REQUESTS.items():
         answer = send(daemon, line)
         assert list(answer) == ["error"], name
         assert len(str(answer["error"])) < 200, name
     with pytest.raises(ControlError, match="limited to 256 kB: no flight controller stores"):
         daemon.ask({"do": " " * (64 << 20)})
-    assert daemon.held() == held
+    assert daemon.pull() == held
     daemon.push(plain_plan(6))
     assert daemon.end() == 0
     assert "Traceback" not in daemon.printed
@@ -130,5 +130,5 @@ def test_actions_of_the_command_line_are_logged(start: Starter) -> None:
     event = until(lambda: daemon.has_logged("mission.push_ended"), "a log entry about the push")
     assert (event["source"], event["ack"], event["mission"]) == ("test", "ACCEPTED", 1)
     assert event["detail"] == "Mission verified: 5 records"
-    daemon.clears()
+    daemon.try_clear()
     until(lambda: len([one for one in daemon.events() if one["event"] == "mission.push_ended"]) == 2, "and the clear")

@@ -108,7 +108,7 @@ def test_after_a_restart_of_the_board_the_reported_mission_is_true(start: Starte
     daemon = start.daemon(board.fc)
     daemon.wait()
     daemon.push(nav_plan(20))
-    assert daemon.held()["count"] == 20
+    assert daemon.pull()["count"] == 20
     board.end()
     until(lambda: (status := daemon.status()) is not None and status["flight_controller"] is None, "the loss")
     assert daemon.is_alive

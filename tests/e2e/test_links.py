@@ -65,7 +65,7 @@ def test_a_port_returns_under_another_name_behind_the_same_link(start: Starter, 
             assert board.records() == records_of(judge(plan))
             for end in taken:
                 os.close(end)
-    board.assert_was_treated_well()
+    board.assert_unharmed()
 
 
 def test_a_ground_station_keeps_the_vehicle_through_a_reset(bench: Bench) -> None:

@@ -10,7 +10,7 @@ from bridge.model.verdict import Result
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import Command, MissionResult
 from tests.support.benches import Bench
-from tests.support.lossy_udp import Way
+from tests.support.lossy_udp import Direction
 from tests.support.mission_planner import MissionPlanner, UploadFailed
 from tests.support.plan import (
     HOME,
@@ -132,7 +132,7 @@ def test_a_read_of_float_items_shows_the_same_list(shared: Bench) -> None:
 
 @pytest.mark.parametrize(("count", "use_int"), [(12, False), (146, True)])
 def test_a_write_succeeds_although_its_loops_take_packets(shared: Bench, count: int, use_int: bool) -> None:
-    planner = shared.mission_planner(appetite=0.2, seed=count + use_int)
+    planner = shared.mission_planner(own_loss=0.2, seed=count + use_int)
     plan = plain_plan(count, start=count)
     planner.write(plan, use_int=use_int)
     assert shared.board.records() == records_of(judge(plan, use_int=use_int))
@@ -258,7 +258,7 @@ def test_a_list_that_breaks_a_rule_is_refused(shared: Bench, kept: list[str], na
 
 
 def test_a_refusal_reaches_the_user_although_loops_take_packets(shared: Bench, kept: list[str]) -> None:
-    planner = shared.mission_planner(appetite=0.3, seed=5)
+    planner = shared.mission_planner(own_loss=0.3, seed=5)
     assert refusal_of(planner, plain_plan(147)) is MissionResult.NO_SPACE
     assert refusal_of(planner, BAD_LISTS["land in the middle"][0]) is MissionResult.INVALID
     assert shared.board.records() == kept
@@ -322,8 +322,8 @@ def test_a_lost_final_ack_is_sent_again(shared: Bench) -> None:
     planner = shared.mission_planner(link.address)
     swallowed: list[bytes] = []
 
-    def first_two_acks(way: Way, data: bytes) -> bool:
-        if way is Way.TO_CLIENT and data[0] == 0xFD and data[7] == messages.MAVLINK_MSG_ID_MISSION_ACK:
+    def first_two_acks(way: Direction, data: bytes) -> bool:
+        if way is Direction.TO_CLIENT and data[0] == 0xFD and data[7] == messages.MAVLINK_MSG_ID_MISSION_ACK:
             swallowed.append(data)
             return len(swallowed) <= 2
         return False

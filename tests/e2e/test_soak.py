@@ -14,7 +14,7 @@ import pytest
 
 from tests.support.benches import Starter
 from tests.support.programs import free_port, until
-from tests.support.soak import BoardEvents, Crowd, Meter, Stalls, Witness
+from tests.support.soak import BoardEvents, Crowd, HeartbeatMonitor, Meter, Stalls
 
 MINUTES = float(os.environ.get("SOAK_MINUTES", "0.5"))
 SEED = int(os.environ.get("SOAK_SEED", "1"))
@@ -38,13 +38,13 @@ def test_a_daemon_survives_events_and_attacks_at_full_rate(
     meter = Meter(daemon.process.pid)
     crowd = Crowd(daemon, udp_port, tcp_port, random.Random(SEED))
     stalls = Stalls()
-    witness = Witness(("127.0.0.1", udp_port), stalls, daemon.process.pid)
+    monitor = HeartbeatMonitor(("127.0.0.1", udp_port), stalls, daemon.process.pid)
     board_events: list[BoardEvents] = []
     boards: list[dict[str, Any]] = []
     memory_kb: list[int] = []
     descriptors: list[int] = []
     with ExitStack() as stack:
-        for watch in (stalls, witness):
+        for watch in (stalls, monitor):
             watch.start()
             stack.callback(watch.end)
         for number, tele_prot in enumerate(TELE_PROTS):
@@ -62,8 +62,8 @@ def test_a_daemon_survives_events_and_attacks_at_full_rate(
             # After the events end, everything works.
             crowd.leave()
             daemon.wait()
-            until(partial(crowd.writes, board), "a mission without disturbances")
-            assert daemon.held()["records"] == board.records()
+            until(partial(crowd.try_upload, board), "a mission without disturbances")
+            assert daemon.pull()["records"] == board.records()
             boards.append({name: value for name, value in board.stats().items() if name in TRAPS})
             memory_kb.append(meter.memory_kb())
             descriptors.append(_settled(meter))
@@ -72,14 +72,14 @@ def test_a_daemon_survives_events_and_attacks_at_full_rate(
     happened = sum((each.happened for each in board_events), crowd.happened)
     report = (
         f"seed {SEED}, {MINUTES} min: {dict(happened)}; uploads {dict(crowd.uploads)};"
-        f" {witness.frames.total()} frames, {witness.frames[30]} attitudes; longest gap {max(witness.gaps_s):.2f} s;"
+        f" {monitor.frames.total()} frames, {monitor.frames[30]} attitudes; longest gap {max(monitor.gaps_s):.2f} s;"
         f" memory {memory_kb} kB, descriptors {descriptors}; boards {boards}"
     )
     with capsys.disabled():
         print(f"\n{report}")  # noqa: T201 (what a long soak is made for)
     assert all(set(traps.values()) == {0} for traps in boards), report
-    assert witness.damaged == []
-    assert max(witness.gaps_s) <= 1.5
+    assert monitor.damaged == []
+    assert max(monitor.gaps_s) <= 1.5
     assert len(set(descriptors)) == 1, report
     assert memory_kb[-1] - memory_kb[0] <= MEMORY_KB, report
     assert "Traceback" not in daemon.printed

@@ -35,7 +35,7 @@ def commanded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Bench,
         opened = stack.enter_context(session(connect=where))
         ask_surely(opened, STATUS)
         yield bench, opened
-        bench.board.assert_was_treated_well()
+        bench.board.assert_unharmed()
 
 
 def error(answers: list[Any]) -> str:
@@ -90,7 +90,7 @@ def test_the_state_and_the_list_of_missions_are_reported(commanded: tuple[Bench,
     bench, opened = commanded
     ask(opened, UPLOAD, mission_file(9))
     (state,) = ask(opened, "state")
-    assert state["mission"] == {"count": 9, "checksum": bench.daemon.held()["checksum"]}
+    assert state["mission"] == {"count": 9, "checksum": bench.daemon.pull()["checksum"]}
     assert (state["link"]["state"], state["status"]["armed"]) == ("MSP", False)
     (listed,) = ask(opened, "mission/list?limit=1")
     assert [each["number"] for each in listed["missions"]] == [bench.daemon.missions()[0]["number"]]
@@ -155,7 +155,7 @@ def test_only_one_transfer_runs_at_a_time(commanded: tuple[Bench, zenoh.Session]
     assert len(results) + len(errors) == 6
     assert set(errors) <= {"Another mission transfer is running"}
     verified = [each for each in bench.daemon.missions() if each["outcome"] == "VERIFIED"]
-    assert f"{verified[0]['checksum']}" == bench.daemon.held()["checksum"]
+    assert f"{verified[0]['checksum']}" == bench.daemon.pull()["checksum"]
 
 
 def test_nothing_is_written_while_armed(start: Starter) -> None:
@@ -171,7 +171,7 @@ def test_nothing_is_written_while_armed(start: Starter) -> None:
             assert "rmed" in reason or "No link" in reason, suffix
         until(lambda: bench.daemon.has_logged("zenoh.refused"), "a log entry")
         assert bench.board.records() == before
-    bench.board.assert_was_treated_well()
+    bench.board.assert_unharmed()
 
 
 def test_commands_are_off_by_default(start: Starter) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 from tests.e2e.test_zenoh_recovery import recovering
 from tests.support.benches import Starter
-from tests.support.lossy_udp import LossyUdp, Way
+from tests.support.lossy_udp import Direction, LossyUdp
 from tests.support.plan import plain_plan
 from tests.support.programs import free_port, until
 from tests.support.zenoh_bench import Reader, endpoint, session, zenoh_bench
@@ -32,10 +32,10 @@ def test_reports_are_recovered_on_a_link_that_loses_datagrams(start: Starter, tm
         bench.daemon.push(plain_plan(4))
         until(lambda: len(reports) == 1, "a report")
         numbers = count()
-        air.swallow = lambda way, _: way is Way.TO_DAEMON and next(numbers) % 4 == 0
+        air.swallow = lambda way, _: way is Direction.TO_DAEMON and next(numbers) % 4 == 0
         until(lambda: has_gap([each["seq"] for each in reader.of("telemetry/attitude")]), "a lost sample")
         # A report is requested again only once; if that reply is lost too, the report is lost.
-        air.swallow = lambda way, _: way is Way.TO_DAEMON
+        air.swallow = lambda way, _: way is Direction.TO_DAEMON
         bench.daemon.push(plain_plan(5))
         air.swallow = lambda way, _: False
         bench.daemon.push(plain_plan(6))

@@ -66,7 +66,7 @@ def test_the_pilot_commands_and_a_guest_only_reads(start: Starter, fleet: Fleet)
         assert len(bench.board.records()) == 12
         guest.put(key("@mavlink/v1/in"), b"anything")
         bench.daemon.push(plain_plan(9))
-    bench.board.assert_was_treated_well()
+    bench.board.assert_unharmed()
 
 
 def test_a_vehicle_that_may_not_publish_keeps_working(start: Starter, fleet: Fleet) -> None:
@@ -80,7 +80,7 @@ def test_a_vehicle_that_may_not_publish_keeps_working(start: Starter, fleet: Fle
         assert bench.board.records() == records_of(judge(plain_plan(60)))
         assert reader.samples == []
         assert ask(pilot, "state") == []
-    bench.board.assert_was_treated_well()
+    bench.board.assert_unharmed()
 
 
 def test_vehicles_with_invalid_certificates_report_it(tls: Fleet, stack: ExitStack, tmp_path: Path) -> None:

@@ -103,7 +103,7 @@ def upload_while(bench: Bench, router: Router, blow: signal.Signals) -> None:
     router.process.send_signal(blow)
     planner.write_rest(plan, 0)
     assert bench.board.records() == records_of(judge(plan))
-    bench.board.assert_was_treated_well()
+    bench.board.assert_unharmed()
 
 
 def test_an_upload_succeeds_although_the_router_dies(start: Starter, tmp_path: Path) -> None:
@@ -134,7 +134,7 @@ def test_a_stalled_subscriber_delays_nothing(start: Starter) -> None:
         received = len(reader.samples)
         until(lambda: len(reader.samples) > received + 20, "telemetry for the other subscriber")
         until(lambda: len(ask(opened, "state")) == 1, "a reply to the other subscriber")
-        bench.board.assert_was_treated_well()
+        bench.board.assert_unharmed()
         assert bench.daemon.end() == 0
     assert "Traceback" not in bench.daemon.printed
 

@@ -60,8 +60,8 @@ def test_a_list_pushed_to_all_is_pulled_from_each(fleet: Fleet, tmp_path: Path) 
     assert (pushed.returncode, pushed.stderr) == (0, ""), pushed
     assert pushed.stdout.endswith("3 of 3 vehicles hold the mission, verified\n")
     records = records_of(judge(plan))
-    assert [fleet.daemons[name].held()["records"] for name in NAMES] == [records] * 3
-    wanted = {(9, fleet.daemons["kite"].held()["checksum"])}
+    assert [fleet.daemons[name].pull()["records"] for name in NAMES] == [records] * 3
+    wanted = {(9, fleet.daemons["kite"].pull()["checksum"])}
     found = ("mission_count", "mission_checksum")
     until(lambda: {tuple(map(each.get, found)) for each in fleet.listed().values()} == wanted, "the news")
     folder = tmp_path / "pulled"
@@ -73,13 +73,13 @@ def test_a_list_pushed_to_all_is_pulled_from_each(fleet: Fleet, tmp_path: Path) 
 
 
 def test_push_and_pull_act_only_on_the_named_vehicle(fleet: Fleet, tmp_path: Path) -> None:
-    before = fleet.daemons["kite"].held()["records"]
+    before = fleet.daemons["kite"].pull()["records"]
     pushed = fleet.pushed(plan_file(tmp_path, plain_plan(4, start=60)), "--vehicle", "owl", code=0)
     assert (list(pushed), pushed["owl"]["ok"]) == (["owl"], True)
-    assert fleet.daemons["kite"].held()["records"] == before
+    assert fleet.daemons["kite"].pull()["records"] == before
     until(lambda: fleet.listed()["owl"]["mission_count"] == 4, "the news")
     shown = fleet.ask("pull", "--vehicle", "owl").stdout
-    assert shown.startswith(f"owl: 4 records, checksum {fleet.daemons['owl'].held()['checksum']}\n")
+    assert shown.startswith(f"owl: 4 records, checksum {fleet.daemons['owl'].pull()['checksum']}\n")
     file = tmp_path / "owls"
     assert fleet.ask("pull", file, "--vehicle", "owl").returncode == 0
     assert len(read_mission_file(file.read_bytes(), "owls")) == 4
@@ -198,10 +198,10 @@ def test_two_bridges_with_one_name_get_no_mission(fleet: Fleet, tmp_path: Path) 
     try:
         until(lambda: fleet.listed()["owl"]["bridges"] == 2, "the second owl")
         assert "owl: 2 bridges use this name" in " ".join(fleet.ask("list").stdout.split())
-        before = fleet.daemons["owl"].held()["records"]
+        before = fleet.daemons["owl"].pull()["records"]
         pushed = fleet.pushed(plan_file(tmp_path, plain_plan(4, start=7)), "--vehicle", "owl", code=1)
         assert "several bridges use this name" in pushed["owl"]["error"]
-        assert fleet.daemons["owl"].held()["records"] == before
+        assert fleet.daemons["owl"].pull()["records"] == before
         assert "several bridges use this name" in fleet.ask("pull", "--vehicle", "owl").stderr
     finally:
         other.end()

@@ -49,7 +49,7 @@ def fleet(lasting_fleet: Fleet) -> Fleet:
         if not daemon.is_alive:
             daemon.kill_and_restart()
     lasting_fleet.wait("kite", "snail")
-    until(lasting_fleet.daemons["snail"].clears, "the end of a previous push")
+    until(lasting_fleet.daemons["snail"].try_clear, "the end of a previous push")
     return lasting_fleet
 
 
@@ -115,7 +115,7 @@ def test_a_push_continues_on_the_vehicle_when_the_router_stops(fleet: Fleet) -> 
         lambda: {each["mission_count"] for each in fleet.listed().values()} == {_COUNT},
         "both with the mission",
     )
-    fleet.boards["snail"].assert_was_treated_well()
+    fleet.boards["snail"].assert_unharmed()
 
 
 def test_a_vehicle_that_disappears_during_a_push_has_failed(fleet: Fleet) -> None:

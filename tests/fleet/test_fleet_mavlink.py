@@ -50,7 +50,7 @@ def test_mission_planner_writes_and_reads_a_mission(fleet: Fleet, tmp_path: Path
         planner.skip_connecting()
         plan = plain_plan(20, start=3)
         planner.write(plan)
-        assert fleet.daemons["kite"].held()["records"] == records_of(judge(plan))
+        assert fleet.daemons["kite"].pull()["records"] == records_of(judge(plan))
         assert len(planner.read()) == 20
 
 

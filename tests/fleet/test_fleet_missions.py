@@ -27,13 +27,13 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fleet]:
 
 
 def test_a_dry_run_reports_the_corrections_and_writes_nothing(fleet: Fleet, tmp_path: Path) -> None:
-    before = [fleet.daemons[name].held() for name in NAMES]
+    before = [fleet.daemons[name].pull() for name in NAMES]
     file = plan_file(tmp_path, [*plain_plan(4, start=90), PlanRow(178, p2=5.0)])
     tried = fleet.ask("push", file, "--all", "--dry-run")
     assert tried.returncode == 0, tried
     assert tried.stdout.endswith("3 of 3 vehicles would accept the mission; nothing was written\n")
     assert tried.stdout.count("WP 4: DO_CHANGE_SPEED dropped") == 1
-    assert [fleet.daemons[name].held() for name in NAMES] == before
+    assert [fleet.daemons[name].pull() for name in NAMES] == before
     bad = fleet.ask("push", plan_file(tmp_path, [HOME, PlanRow(Command.NAV_LAND), waypoint(1)]), "--all", "--dry-run")
     assert bad.returncode == 1
     assert bad.stdout.count("Rejected, WP 1: LAND must be last") == 3
@@ -46,7 +46,7 @@ def test_a_file_without_a_storable_item_erases_nothing(fleet: Fleet, tmp_path: P
     assert (tried.returncode, "no item of it can be stored" in tried.stdout) == (1, True), tried
     pushed = fleet.pushed(nothing, "--vehicle", "kite", code=1)
     assert "would erase the current mission" in pushed["kite"]["error"]
-    assert fleet.daemons["kite"].held()["count"] == 4
+    assert fleet.daemons["kite"].pull()["count"] == 4
 
 
 def test_a_mission_is_verified_by_checksum(fleet: Fleet, tmp_path: Path) -> None:
@@ -57,19 +57,19 @@ def test_a_mission_is_verified_by_checksum(fleet: Fleet, tmp_path: Path) -> None
     vehicles = {each["vehicle"]: each for each in json.loads(verified.stdout)["vehicles"]}
     assert {name: each["is_held"] for name, each in vehicles.items()} == {"kite": True, "owl": True, "swift": False}
     checked = json.loads(run_naze_bridge("check", file, "--json").stdout)
-    assert checked["checksum"] == vehicles["swift"]["checksum"] == fleet.daemons["kite"].held()["checksum"]
+    assert checked["checksum"] == vehicles["swift"]["checksum"] == fleet.daemons["kite"].pull()["checksum"]
     assert "holds no mission" in fleet.ask("verify", file, "--vehicle", "swift").stdout
     result = fleet.ask("verify", file, "--vehicle", "kite", "--vehicle", "owl")
     assert (result.returncode, result.stdout.splitlines()[-1]) == (0, "2 of 2 vehicles hold the mission")
 
 
 def test_a_staged_push_stops_at_the_first_failure(fleet: Fleet, tmp_path: Path) -> None:
-    before = [fleet.daemons[name].held()["records"] for name in NAMES]
+    before = [fleet.daemons[name].pull()["records"] for name in NAMES]
     bad = plan_file(tmp_path, [HOME, PlanRow(Command.NAV_LAND), waypoint(1)])
     pushed = fleet.pushed(bad, "--all", "--staged", code=1)
     assert "LAND must be last" in pushed["kite"]["error"]
     assert [pushed[name]["error"] for name in NAMES[1:]] == ["not started: kite had failed"] * 2
-    assert [fleet.daemons[name].held()["records"] for name in NAMES] == before
+    assert [fleet.daemons[name].pull()["records"] for name in NAMES] == before
     pushed = fleet.pushed(plan_file(tmp_path, plain_plan(5)), "--all", "--staged", code=0)
     assert [pushed[name]["ok"] for name in NAMES] == [True] * 3
 

@@ -13,7 +13,7 @@ import serial
 
 from protocols.msp.frame import request
 from simulator.nav_waypoint import FLAG_LAST, Action
-from tests.support.msp_bench import Frame, take_apart, waypoint
+from tests.support.msp_bench import Frame, split_frames, waypoint
 from tests.support.programs import NAZE_BRIDGE, REPOSITORY, TIMEOUT_S, control, free_port, run_naze_bridge, until
 
 
@@ -57,7 +57,7 @@ class Client:
         self.socket.sendall(request(command, payload))
         self.socket.settimeout(timeout)
         received = b""
-        while not (frames := take_apart(received)):
+        while not (frames := split_frames(received)):
             try:
                 data = self.socket.recv(4096)
             except TimeoutError:

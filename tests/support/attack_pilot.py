@@ -15,7 +15,7 @@ from protocols.mission_item import MissionResult
 from tests.support.plain_station import PlainStation
 from tests.support.plan import PlanRow, judge, records_of
 from tests.support.programs import Board, Daemon
-from tests.support.soak import Stalls, Witness
+from tests.support.soak import HeartbeatMonitor, Stalls
 
 m = messages
 #: The heartbeat of a ground station.
@@ -94,22 +94,22 @@ class Watch:
 
     def __init__(self, daemon: Daemon) -> None:
         self._stalls = Stalls()
-        self._witness = Witness(daemon.address, self._stalls, daemon.process.pid)
+        self._monitor = HeartbeatMonitor(daemon.address, self._stalls, daemon.process.pid)
 
-    def __enter__(self) -> Witness:
+    def __enter__(self) -> HeartbeatMonitor:
         self._stalls.start()
-        self._witness.start()
-        return self._witness
+        self._monitor.start()
+        return self._monitor
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._witness.end()
+        self._monitor.end()
         self._stalls.end()
         if kind is None:
-            assert len(self._witness.gaps_s) >= 2
-            assert max(self._witness.gaps_s) <= LONGEST_GAP_S, self._witness.gaps_s
-            assert self._witness.damaged == []
+            assert len(self._monitor.gaps_s) >= 2
+            assert max(self._monitor.gaps_s) <= LONGEST_GAP_S, self._monitor.gaps_s
+            assert self._monitor.damaged == []
 
 
 def assert_uploads(pilot: PlainStation, board: Board, plan: Sequence[PlanRow]) -> None:

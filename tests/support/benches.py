@@ -23,9 +23,9 @@ class Bench:
     daemon: Daemon
     stack: ExitStack
 
-    def mission_planner(self, address: tuple[str, int] | None = None, **habits: Any) -> MissionPlanner:
-        """A connected Mission Planner; `habits` are the arguments of MissionPlanner."""
-        planner = self.stack.enter_context(MissionPlanner(address or self.daemon.address, **habits))
+    def mission_planner(self, address: tuple[str, int] | None = None, **options: Any) -> MissionPlanner:
+        """A connected Mission Planner; `options` are the arguments of MissionPlanner."""
+        planner = self.stack.enter_context(MissionPlanner(address or self.daemon.address, **options))
         planner.skip_connecting()
         return planner
 

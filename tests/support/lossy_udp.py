@@ -17,7 +17,7 @@ _DATAGRAM_SIZE = 65535
 _LONGEST_SLEEP_S = 0.2
 
 
-class Way(Enum):
+class Direction(Enum):
     """The direction of a datagram."""
 
     TO_DAEMON = auto()
@@ -46,7 +46,7 @@ class LossyUdp:
         self._loss, self._repeats = loss, repeats
         self._delay_s, self._jitter_s = delay_s, jitter_s
         self._random = random.Random(seed)
-        self.swallow: Callable[[Way, bytes], bool] = lambda way, data: False
+        self.swallow: Callable[[Direction, bytes], bool] = lambda way, data: False
         self.passed = 0
         self.lost = 0
         self._numbers = count()
@@ -91,7 +91,7 @@ class LossyUdp:
     def _from_client(self) -> None:
         data, client = self._near.recvfrom(_DATAGRAM_SIZE)
         far = self._far_side(client)
-        self._carry(Way.TO_DAEMON, data, lambda: far.sendto(data, self._daemon))
+        self._carry(Direction.TO_DAEMON, data, lambda: far.sendto(data, self._daemon))
 
     def _far_side(self, client: tuple[str, int]) -> socket.socket:
         known = self._far.get(client)
@@ -103,9 +103,9 @@ class LossyUdp:
 
     def _from_daemon(self, far: socket.socket, client: tuple[str, int]) -> None:
         data = far.recv(_DATAGRAM_SIZE)
-        self._carry(Way.TO_CLIENT, data, lambda: self._near.sendto(data, client))
+        self._carry(Direction.TO_CLIENT, data, lambda: self._near.sendto(data, client))
 
-    def _carry(self, way: Way, data: bytes, deliver: Callable[[], object]) -> None:
+    def _carry(self, way: Direction, data: bytes, deliver: Callable[[], object]) -> None:
         chance = self._random
         if self.swallow(way, data) or chance.random() < self._loss:
             self.lost += 1

@@ -3,7 +3,7 @@
 
 Only its behaviour on the link. Its timers may be scaled down (`pace`); everything else is as in the original,
 quirks included: any ack to MISSION_COUNT means "continue" to it, it understands only MISSION_REQUEST (40) while
-sending MISSION_ITEM_INT, and its loops take each other's packets (`appetite`).
+sending MISSION_ITEM_INT, and its loops take each other's packets (`own_loss`).
 """
 
 import random
@@ -43,7 +43,7 @@ class TimedOut(UploadFailed):
 class MissionPlanner:
     """A ground station with a UDP client link to `address`; with `listen` it waits for the vehicle there instead.
 
-    pace: factor on all of its timers. appetite: probability that a packet is taken by a loop other than the one
+    pace: factor on all of its timers. own_loss: probability that a packet is taken by a loop other than the one
     waiting for it. mavlink_1_only: an old version, which never switches to MAVLink 2.
     """
 
@@ -53,7 +53,7 @@ class MissionPlanner:
         *,
         listen: bool = False,
         pace: float = 1.0,
-        appetite: float = 0.0,
+        own_loss: float = 0.0,
         seed: float = 0,
         mavlink_1_only: bool = False,
     ) -> None:
@@ -62,7 +62,7 @@ class MissionPlanner:
             self._socket.bind(address)
         self._peer = None if listen else address
         self._pace = pace
-        self._appetite = appetite
+        self._own_loss = own_loss
         self._random = random.Random(seed)
         self._mavlink_1_only = mavlink_1_only
         self._sees_mavlink_2 = False
@@ -155,7 +155,7 @@ class MissionPlanner:
                 self._requested = message.seq
             case "MISSION_ACK" if self._is_for_me(message):
                 self._answer = MissionResult(message.type)
-        if self._random.random() >= self._appetite:
+        if self._random.random() >= self._own_loss:
             self._router.append(message)
 
     def _is_for_me(self, message: Message) -> bool:

@@ -55,7 +55,7 @@ class MspBench:
         self.send(request(command, payload))
         while self.now < end:
             self._step(end)
-            frames = take_apart(bytes(self.received[before:]))
+            frames = split_frames(bytes(self.received[before:]))
             if frames:
                 return frames[0]
         return None
@@ -102,7 +102,7 @@ class MspBench:
         self.received += self.board.advance(self.now)
 
 
-def take_apart(data: bytes) -> list[Frame]:
+def split_frames(data: bytes) -> list[Frame]:
     """The complete frames, jumbo frames included; all must be intact."""
     frames = []
     while len(data) >= 6:

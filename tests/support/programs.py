@@ -153,7 +153,7 @@ class Board(Program):
         records: list[str] = self.stats()["records"]
         return records
 
-    def assert_was_treated_well(self) -> None:
+    def assert_unharmed(self) -> None:
         """Assert that nothing sent to the board would have harmed a real one."""
         stats = self.stats()
         assert stats["hazard_runs"] == stats["rx_overflows"] == stats["tx_overflows"] == 0, stats
@@ -217,23 +217,23 @@ class Daemon(Program):
         missions: list[dict[str, Any]] = self.ask({"do": "missions", "limit": 100})["missions"]
         return missions
 
-    def held(self) -> dict[str, Any]:
+    def pull(self) -> dict[str, Any]:
         """The flight controller's mission, read by the daemon."""
         return self.ask({"do": "pull"})
 
     def push(self, plan: Sequence[PlanRow]) -> None:
         """Write a list to the board like `naze-bridge push`."""
-        answer = self._pushes(plan)
+        answer = self._push(plan)
         assert answer["ack"] == "MAV_MISSION_ACCEPTED", answer
 
-    def clears(self) -> bool:
+    def try_clear(self) -> bool:
         """Clear the board; False if the daemon refused because a transfer is running."""
-        if self._pushes([])["ack"] == "MAV_MISSION_ACCEPTED":
+        if self._push([])["ack"] == "MAV_MISSION_ACCEPTED":
             return True
         time.sleep(1.0)  # the log leaves out events that repeat more than 20 times in 10 s, for which tests wait
         return False
 
-    def _pushes(self, plan: Sequence[PlanRow]) -> dict[str, Any]:
+    def _push(self, plan: Sequence[PlanRow]) -> dict[str, Any]:
         items = [asdict(item) for item in as_items(plan)]
         return self.ask({"do": "push", "source": "test", "items": items})
 

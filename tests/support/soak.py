@@ -55,7 +55,7 @@ class Stalls(threading.Thread):
         self.join()
 
 
-class Witness(threading.Thread):
+class HeartbeatMonitor(threading.Thread):
     """A ground station that requests all telemetry and checks it."""
 
     def __init__(self, address: tuple[str, int], stalls: Stalls, pid: int) -> None:
@@ -224,7 +224,7 @@ class Crowd:
         self._stalled.clear()
         self._abandoned.clear()
 
-    def writes(self, board: Board) -> bool:
+    def try_upload(self, board: Board) -> bool:
         """Write a mission; True if accepted, after checking that the board holds it."""
         plan = plain_plan(self._chance.randrange(2, 80), start=self._chance.randrange(100))
         by_tcp = self._chance.random() < 0.5
@@ -240,7 +240,7 @@ class Crowd:
         return result is MissionResult.ACCEPTED
 
     def _upload(self, board: Board) -> None:
-        self.writes(board)
+        self.try_upload(board)
 
     def _download(self, board: Board) -> None:
         """Request the list and some of its items, without a final ack."""

@@ -98,4 +98,4 @@ def web_bench(directory: Path) -> Iterator[WebBench]:
         board = start.board()
         bench = web_daemon(start, str(board.link))
         yield WebBench(bench.daemon, board, bench.port)
-        board.assert_was_treated_well()
+        board.assert_unharmed()

@@ -98,7 +98,7 @@ class MemoryStore:
 
 
 @dataclass(slots=True)
-class Air:
+class Radio:
     """Properties of the link, each way: probability of loss and of duplication, delay and its spread in seconds."""
 
     loss: float = 0.0
@@ -353,12 +353,12 @@ class GroundStation:
         sysid: int = 255,
         compid: int = 190,
         version: int = 2,
-        air: Air | None = None,
+        radio: Radio | None = None,
     ) -> None:
         self.world = world
         self.peer = Peer("udp", name)
         self.version = version
-        self.air = air or Air()
+        self.radio = radio or Radio()
         self.received: list[tuple[float, Message]] = []
         self.frames: list[bytes] = []
         self.on_message: list[Callable[[Message], None]] = []
@@ -370,7 +370,7 @@ class GroundStation:
 
     def send(self, message: Message) -> None:
         data = self.pack(message)
-        self._through_the_air(lambda: self.world.receive_from(self, data))
+        self._transmit(lambda: self.world.receive_from(self, data))
 
     def sign(self, key: bytes, timestamp: int, link_id: int = 0) -> None:
         signing = self._mavlink.signing
@@ -383,7 +383,7 @@ class GroundStation:
 
     def carry(self, frame: bytes) -> None:
         """Deliver a frame from the bridge over the link."""
-        self._through_the_air(lambda: self._arrived(frame))
+        self._transmit(lambda: self._arrived(frame))
 
     def take(self, *types: str) -> list[Message]:
         """Return the received messages of these types and clear all received ones."""
@@ -414,12 +414,12 @@ class GroundStation:
             for react in self.on_message:
                 react(message)
 
-    def _through_the_air(self, arrive: Callable[[], None]) -> None:
-        chance, air = self.world.random, self.air
-        for _ in range(1 + (chance.random() < air.repeat)):
-            if chance.random() < air.loss:
+    def _transmit(self, arrive: Callable[[], None]) -> None:
+        chance, radio = self.world.random, self.radio
+        for _ in range(1 + (chance.random() < radio.repeat)):
+            if chance.random() < radio.loss:
                 continue
-            delay = air.delay_s + chance.random() * air.spread_s
+            delay = radio.delay_s + chance.random() * radio.spread_s
             if delay:
                 self.world.after(delay, arrive)
             else:

@@ -13,7 +13,7 @@ pytest_plugins = ("tests.support.web_fixtures",)
 def test_the_list_on_the_flight_controller_is_shown(lasting_web: WebBench) -> None:
     held = lasting_web.ask("/api/held").data
     assert held["count"] == len(held["items"]) == 13
-    assert held["checksum"] == lasting_web.state()["mission"]["checksum"] == lasting_web.daemon.held()["checksum"]
+    assert held["checksum"] == lasting_web.state()["mission"]["checksum"] == lasting_web.daemon.pull()["checksum"]
     assert [item["name"] for item in held["items"][:4]] == ["WAYPOINT", "TAKEOFF", "WAYPOINT", "DO_SET_ROI"]
 
 

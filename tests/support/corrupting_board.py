@@ -26,7 +26,7 @@ READ_MESSAGES = (
 )
 
 
-class LyingBoard:
+class CorruptingBoard:
     """Changes a share, `rate`, of a board's frames; FrSky has no frames, so there it changes bytes."""
 
     def __init__(self, board: Any, inputs: FuzzInputs, rate: float) -> None:
@@ -43,13 +43,13 @@ class LyingBoard:
         """The bytes that the board sends until `now`."""
         sent = self._board.advance(now)
         if self._board.baud == _FRSKY_BAUD:
-            return bytes(self._inputs.random.randrange(256) if self._lies else byte for byte in sent)
-        replies = [(self._reply(frame) if self._lies else frame).encode() for frame in self._msp.feed(sent)]
-        messages = [self._message(frame) if self._lies else frame.raw for frame in self._mavlink.feed(sent)]
+            return bytes(self._inputs.random.randrange(256) if self._corrupts else byte for byte in sent)
+        replies = [(self._reply(frame) if self._corrupts else frame).encode() for frame in self._msp.feed(sent)]
+        messages = [self._message(frame) if self._corrupts else frame.raw for frame in self._mavlink.feed(sent)]
         return b"".join(replies + messages)
 
     @property
-    def _lies(self) -> bool:
+    def _corrupts(self) -> bool:
         return self._inputs.random.random() < self._rate
 
     def _reply(self, frame: MspFrame) -> MspFrame:
