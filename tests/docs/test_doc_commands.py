@@ -24,7 +24,6 @@ from tests.support.programs import REPOSITORY, TIMEOUT_S, Daemon, free_port, unt
 #: Commands that are not run here, by their beginning, with the reason.
 NOT_RUN = {
     "naze-bridge demo": "tests/cli/test_demo.py runs it",
-    "naze-bridge setup": "changes the machine: tests/setup and `make image-check` run it",
     "naze-bridge fleet list": "needs a router: tests/fleet/test_fleet_commands.py runs it",
     "naze-bridge fleet watch": "needs a router: tests/fleet/test_watch_screen.py runs it",
     "naze-bridge fleet push": "needs a router: tests/fleet/test_fleet_push.py runs it",
@@ -82,6 +81,10 @@ def parse(words: list[str]) -> bool:
     return True
 
 
+#: The FILE of each command; the others take a mission.
+_FILES = {"run": "config.toml", "setup": "gcs.key"}
+
+
 class Sandbox:
     """A folder in which commands run, next to a daemon with a simulated Naze and two stored missions."""
 
@@ -90,6 +93,8 @@ class Sandbox:
         (folder / "examples").symlink_to(REPOSITORY / "examples")
         shutil.copy(next((REPOSITORY / "tests" / "captures").glob("*.uart")), folder / "naze.uart")
         shutil.copy(REPOSITORY / "systemd" / "config.toml", folder)
+        (folder / "gcs.key").write_text("a passphrase of the pilot\n")
+        (folder / "gcs.key").chmod(0o600)
         # Only parsed.
         (folder / "firmware" / "build").mkdir(parents=True)
         for name in ("X.elf", "pilot.json5", "firmware/build/libnaze_mission.so"):
@@ -101,12 +106,16 @@ class Sandbox:
             **dict.fromkeys(("/dev/ttyAMA0", "/dev/ttyUSB0", "/dev/serial0", "/tmp/naze"), str(self.folder / "naze")),  # noqa: S108
             "udpin:14550": f"udpin:127.0.0.1:{free_port()}",
             "tcpin:5760": f"tcpin:127.0.0.1:{free_port()}",
-            "FILE": "config.toml" if "--config" in command.words else "examples/naze-field.waypoints",
+            "FILE": _FILES.get(command.words[1], "examples/naze-field.waypoints"),
             "N": "1",
             "M": "2",
         }
         words = [instead.get(word, word) for word in command.words[1:]]
-        return [*words, "--link", str(self.folder / "naze")] if words[0] == "sim" and "--link" not in words else words
+        if words[0] == "setup":
+            words.append("--dry-run")
+        if words[0] == "sim" and "--link" not in words:
+            words += ["--link", str(self.folder / "naze")]
+        return words
 
     def start(self, words: list[str]) -> Forked:
         return Forked(words, self.folder, self.folder / "output", self.folder / "output")
