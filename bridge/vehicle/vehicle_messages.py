@@ -36,7 +36,7 @@ from bridge.model.vehicle import (
     Vehicle,
 )
 from protocols.mavlink import mode_messages
-from protocols.mavlink.codec import packed
+from protocols.mavlink.codec import pack_payload
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.telemetry import Sensor
 
@@ -241,7 +241,7 @@ def attitude(at: Moment) -> Message:
         math.radians((now.heading_deg + 180) % 360 - 180),
         *_rates(now),
     )
-    return packed(messages.MAVLINK_MSG_ID_ATTITUDE, payload)
+    return pack_payload(messages.MAVLINK_MSG_ID_ATTITUDE, payload)
 
 
 def gps_raw_int(at: Moment) -> Message:

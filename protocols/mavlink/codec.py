@@ -46,7 +46,7 @@ class Packed(NamedTuple):
         return self.msgid > _LAST_V1_ID
 
 
-def packed(msgid: int, payload: bytes) -> Packed:
+def pack_payload(msgid: int, payload: bytes) -> Packed:
     """A message without extension fields from its payload, quicker than by `pack`."""
     return Packed(msgid, payload, payload.rstrip(b"\0") or b"\0")
 
