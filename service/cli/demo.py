@@ -12,7 +12,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import click
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from protocols.mission_file import MissionFileError
@@ -21,7 +20,7 @@ from service.cli.mission_client import ClientError, connect
 from service.cli.mission_source import load_mission
 from service.cli.mission_table import mission_table
 from service.cli.printing import print_table
-from service.cli.sentences import fail
+from service.cli.sentences import fail, say
 from service.daemon.client import ControlError, ask_daemon
 from service.daemon.mission_data import Json, mission_findings, mission_items
 from service.machine.host import Host
@@ -37,7 +36,6 @@ _CONNECT_TIMEOUT_S = 15.0
 @click.option("--port", type=click.IntRange(1, 65535), default=14550, show_default=True, help="UDP port.")
 def demo(file: Path, once: bool, port: int) -> None:
     """Start the daemon on a simulated Naze, write a mission FILE to it over UDP, and show the result."""
-    console = Console(highlight=False)
     # The daemon is a child of this program, so that both end together, also when the terminal is closed.
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda number, _frame: sys.exit(128 + number))
@@ -45,10 +43,10 @@ def demo(file: Path, once: bool, port: int) -> None:
         items = load_mission(file)
         state_dir = Path(tempfile.mkdtemp(prefix="naze-bridge-demo-"))
         try:
-            with _daemon(_free_port(port, console), state_dir, console) as (address, process):
-                _show(items, file, address, state_dir, console)
+            with _daemon(_free_port(port), state_dir) as (address, process):
+                _show(items, file, address, state_dir)
                 if not once:
-                    _stay(address, process, state_dir, console)
+                    _stay(address, process, state_dir)
         finally:
             shutil.rmtree(state_dir, ignore_errors=True)
     except MissionFileError as error:
@@ -57,14 +55,14 @@ def demo(file: Path, once: bool, port: int) -> None:
         fail(str(error))
 
 
-def _show(items: list[MissionItem], file: Path, port: int, state_dir: Path, console: Console) -> None:
+def _show(items: list[MissionItem], file: Path, port: int, state_dir: Path) -> None:
     with connect("127.0.0.1", port, _CONNECT_TIMEOUT_S) as client:
-        console.print(f"Writing {file.name}, {len(items)} items, over UDP port {port} ...", markup=False)
+        say(f"Writing {file.name}, {len(items)} items, over UDP port {port} ...")
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
-        with Progress(*columns, console=console) as bar:
+        with Progress(*columns) as bar:
             task = bar.add_task("Upload", total=len(items))
             result = client.write(items, lambda done: bar.update(task, completed=done))
-        console.print(f"The vehicle answers MAV_MISSION_{result.name}.\n", markup=False)
+        say(f"The vehicle answers MAV_MISSION_{result.name}.\n")
         received = _latest_mission(state_dir)
         held = client.read()
     findings = mission_findings(received["findings"])
@@ -73,14 +71,12 @@ def _show(items: list[MissionItem], file: Path, port: int, state_dir: Path, cons
         raise ClientError(f"the mission was not accepted: {'; '.join(client.texts)}")
     if held != mission_items(received["stored_items"]):
         raise ClientError("the mission read back differs from the stored one")
-    console.print(
-        f"\nSent {len(items)} items; the flight controller holds {len(held)}, read back from it and compared."
-    )
+    say(f"\nSent {len(items)} items; the flight controller holds {len(held)}, read back from it and compared.")
 
 
-def _stay(port: int, process: subprocess.Popen[bytes], state_dir: Path, console: Console) -> None:
+def _stay(port: int, process: subprocess.Popen[bytes], state_dir: Path) -> None:
     addresses = ", ".join(Host().ipv4_addresses()) or "this machine's address"
-    console.print(
+    say(
         f"\nThe bridge keeps running. In Mission Planner choose UDPCl, host {addresses}, port {port}, and press Connect"
         "\n(QGroundControl, MAVProxy and MAVSDK: udpout / udp client to the same address). Ctrl-C ends.\n"
         f"The daemon's log: {state_dir / 'daemon.log'}"
@@ -88,7 +84,7 @@ def _stay(port: int, process: subprocess.Popen[bytes], state_dir: Path, console:
     try:
         process.wait()
     except KeyboardInterrupt:
-        console.print()  # the shell's prompt starts on a new line
+        say("")  # the shell's prompt starts on a new line
 
 
 def _latest_mission(state_dir: Path) -> Json:
@@ -98,9 +94,9 @@ def _latest_mission(state_dir: Path) -> Json:
 
 
 @contextmanager
-def _daemon(port: int, state_dir: Path, console: Console) -> Iterator[tuple[int, subprocess.Popen[bytes]]]:
+def _daemon(port: int, state_dir: Path) -> Iterator[tuple[int, subprocess.Popen[bytes]]]:
     arguments = ["run", "--fc", "sim:", "--gcs", f"udpin:0.0.0.0:{port}", "--state-dir", str(state_dir)]
-    console.print(f"$ naze-bridge {' '.join(arguments)}", style="bold", markup=False)
+    click.secho(f"$ naze-bridge {' '.join(arguments)}", bold=True)
     program = [sys.executable, "-c", "from service.cli.program import start; start()"]
     log = state_dir / "daemon.log"
     with log.open("wb") as stderr, subprocess.Popen([*program, *arguments], stderr=stderr) as process:  # noqa: S603
@@ -110,13 +106,13 @@ def _daemon(port: int, state_dir: Path, console: Console) -> Iterator[tuple[int,
             process.terminate()
 
 
-def _free_port(wanted: int, console: Console) -> int:
+def _free_port(wanted: int) -> int:
     """`wanted`, or another port if a ground station on this machine uses it."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.bind(("0.0.0.0", wanted))  # noqa: S104  # reachable over Wi-Fi
         except OSError:
             probe.bind(("0.0.0.0", 0))  # noqa: S104
-            console.print(f"UDP port {wanted} is in use; using another one.")
+            say(f"UDP port {wanted} is in use; using another one.")
         port: int = probe.getsockname()[1]
         return port

@@ -40,15 +40,19 @@ class _Main(LazyGroup):
         The status is 74 (EX_IOERR) if standard output cannot be written, as on a full disk. Click itself ignores a
         closed pipe (`| head`).
         """
+        color = False if os.environ.get("NO_COLOR") else None  # None: on a terminal
         try:
-            code = super().main(*args, **kwargs | {"standalone_mode": False})
+            code = super().main(*args, **kwargs | {"standalone_mode": False, "color": color})
         except click.exceptions.NoArgsIsHelpError as error:
             error.show()
             sys.exit(error.exit_code)
         except click.ClickException as error:
             complain(error.format_message())
             sys.exit(error.exit_code)
-        except click.Abort:
+        except click.Abort as error:
+            if isinstance(error.__context__, EOFError):
+                complain("standard input ended before the question was answered: run this in a terminal, or see --help")
+                sys.exit(1)
             complain("interrupted")
             sys.exit(INTERRUPTED)
         except OSError as error:

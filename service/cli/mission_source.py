@@ -26,7 +26,7 @@ def load_mission(path: Path) -> list[MissionItem]:
 
 
 def mission_bytes(path: Path) -> bytes:
-    """The bytes of the mission file at `path`; MissionFileError if it cannot be read."""
+    """MissionFileError if the file cannot be read."""
     try:
         return read_bounded(path, MAX_BYTES)
     except (OSError, ValueError) as error:

@@ -86,10 +86,11 @@ def load_settings(
 
 def takeoff_limit_m() -> int:
     """The takeoff_max_m of a daemon on this machine, for commands without one; SettingsError if unusable."""
-    config = Path(os.environ.get(CONFIG_VARIABLE) or SERVICE_CONFIG)
+    named = os.environ.get(CONFIG_VARIABLE)
+    config = Path(named or SERVICE_CONFIG)
     problems: list[Problem] = []
-    is_there = CONFIG_VARIABLE in os.environ or config.exists()
-    given = (read_files(config, problems) if is_there else {}) | _read_environment(os.environ, problems)
+    given = read_files(config, problems) if named or config.exists() else {}
+    given |= _read_environment(os.environ, problems)
     limit: int = _read_values(given, problems).get("takeoff_max_m", TAKEOFF_MAX_M)
     if problems:
         raise SettingsError(problems)

@@ -204,6 +204,8 @@ def test_the_take_off_limit_is_the_daemons(tmp_path: Path, monkeypatch: pytest.M
     config.write_text("takeoff_max_m = 999")
     assert run(path).exit_code == 2
     assert "takeoff_max_m" in run(path).stderr
+    monkeypatch.setenv("NAZE_BRIDGE_CONFIG", "")  # as if it were not set
+    assert objects(run("--json", path))[0]["items"][1]["alt_m"] == 15
 
 
 def test_a_list_that_is_too_long_is_refused_without_a_table(tmp_path: Path) -> None:

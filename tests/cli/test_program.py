@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The program as its shell sees it: Ctrl-C while it starts, works and exits; closed standard streams."""
 
+import os
+import pty
 import signal
 import subprocess
 import sys
@@ -10,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from tests.support.programs import REPOSITORY, TIMEOUT_S
+from tests.support.programs import NAZE_BRIDGE, REPOSITORY, TIMEOUT_S
 
 MISSION = REPOSITORY / "examples" / "naze-field.waypoints"
 #: Runs the program, with SIGINT at a known moment: the import of a module, or the exit of the interpreter.
@@ -44,7 +46,8 @@ start()
 def run(program: str, *arguments: str | Path, before: Callable[[], object] | None = None) -> Any:
     return subprocess.run(
         [sys.executable, "-c", program, *map(str, arguments)],
-        cwd=REPOSITORY, capture_output=True, text=True, check=False, timeout=TIMEOUT_S, preexec_fn=before,
+        cwd=REPOSITORY, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False, timeout=TIMEOUT_S,
+        preexec_fn=before,
     )  # fmt: skip
 
 
@@ -70,6 +73,25 @@ def test_ctrl_c_ends_it_without_a_traceback(moment: str, code: int, said: str) -
 def test_an_ignored_ctrl_c_stays_ignored() -> None:
     ended = run(WITH_CTRL_C, "click", "check", MISSION, before=with_sigint(signal.SIG_IGN))
     assert (ended.returncode, ended.stderr) == (0, "")
+
+
+def test_a_question_without_an_answer_is_one_sentence(tmp_path: Path) -> None:
+    ended = run("from service.cli.program import start; start()", "setup", "--root", tmp_path)
+    assert ended.returncode == 1
+    said = "standard input ended before the question" if os.geteuid() == 0 else "setup needs root"
+    assert ended.stderr.splitlines()[-1].startswith(f"naze-bridge: {said}")
+
+
+@pytest.mark.parametrize(("no_color", "has_colours"), [("", True), ("1", False)])
+def test_no_color_is_respected_on_a_terminal(no_color: str, has_colours: bool) -> None:
+    """no-color.org: set and not empty."""
+    master, terminal = pty.openpty()
+    command = [*NAZE_BRIDGE, "check", str(MISSION)]
+    subprocess.run(command, cwd=REPOSITORY, stdout=terminal, env=os.environ | {"NO_COLOR": no_color}, check=True)
+    os.close(terminal)
+    printed = os.read(master, 80)
+    os.close(master)
+    assert (b"\x1b[" in printed) == has_colours
 
 
 @pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])

@@ -24,15 +24,12 @@ class Checked:
 
 
 def ok(check: str, found: str) -> Checked:
-    """A result without a problem."""
     return Checked(check, Grade.OK, found)
 
 
 def note(check: str, found: str, remedy: str) -> Checked:
-    """A result that may become a problem."""
     return Checked(check, Grade.NOTE, found, remedy)
 
 
 def problem(check: str, found: str, remedy: str) -> Checked:
-    """A problem for the bridge."""
     return Checked(check, Grade.PROBLEM, found, remedy)

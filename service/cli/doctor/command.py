@@ -20,7 +20,6 @@ from service.settings import Settings, SettingsError, load_settings
 from service.settings.load import CONFIG_VARIABLE, SERVICE_CONFIG
 from storage.store_error import StoreError
 
-#: The service's configuration file and state directory.
 _COLOURS = {Grade.OK: "green", Grade.NOTE: "yellow", Grade.PROBLEM: "red"}
 
 

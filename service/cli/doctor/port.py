@@ -47,7 +47,6 @@ def check_candidates(host: Host) -> list[SerialFc]:
 
 
 def check_no_port(host: Host) -> Checked:
-    """The problem if there is no port."""
     remedy = "plug the flight controller into USB, or name its port: fc in the settings"
     return problem("port", "there is no serial port for a flight controller", remedy)
 
