@@ -26,6 +26,18 @@ _MAX_KINDS = 1024
 #: Carries a signing key in the clear. The guard refuses it from ground stations.
 _NEVER_FORWARDED = messages.MAVLINK_MSG_ID_SETUP_SIGNING
 _HEARTBEAT = messages.MAVLINK_MSG_ID_HEARTBEAT
+#: Not passed on for a peer that may only read. It may use the pilot's ids: then its heartbeats would hide the loss of
+#: the pilot's station (ArduPilot's GCS failsafe), and its mission requests would end the pilot's upload.
+_ONLY_FROM_WRITERS = frozenset(
+    {
+        _HEARTBEAT,
+        messages.MAVLINK_MSG_ID_MISSION_REQUEST_LIST,
+        messages.MAVLINK_MSG_ID_MISSION_REQUEST_PARTIAL_LIST,
+        messages.MAVLINK_MSG_ID_MISSION_REQUEST,
+        messages.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
+        messages.MAVLINK_MSG_ID_MISSION_ACK,
+    }
+)
 
 
 class PassThrough:
@@ -65,12 +77,12 @@ class PassThrough:
         if speaker in self._aboard:
             # The autopilot's own frame, returned by a router that floods.
             return False
+        system, component = target_of(frame)
         if not to_stations:
-            return target_of(frame)[0] == 0 or self.is_aboard(target_of(frame)[0])
+            return frame.msgid not in _ONLY_FROM_WRITERS and (system == 0 or self.is_aboard(system))
         behind = self._heard.setdefault(station.peer, set())
         if len(behind) < _MAX_SPEAKERS:
             behind.add(speaker)
-        system, component = target_of(frame)
         if system == 0:
             self._copy(frame, station, self._ground.everyone())
             return True

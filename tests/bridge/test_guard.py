@@ -17,7 +17,15 @@ from protocols.mavlink.signing import TICKS_PER_S, TOLERANCE, Check, Signing, Ti
 from protocols.mission_item import MissionResult
 from protocols.tlog import tlog_record
 from tests.bridge.test_pass_through import Autopilot
-from tests.support.conversations import Download, Upload, clear_message, count_message, item_message, waypoints
+from tests.support.conversations import (
+    Download,
+    Upload,
+    clear_message,
+    count_message,
+    item_message,
+    request_message,
+    waypoints,
+)
 from tests.support.world import GroundStation, Radio, World
 
 KEY = key_from_passphrase("a passphrase")
@@ -49,7 +57,7 @@ WRITES: Sequence[tuple[Message, str | None]] = (
     (mavlink.MAVLink_gps_inject_data_message(1, 1, 1, [0] * 110), None),
     (mavlink.MAVLink_file_transfer_protocol_message(0, 1, 1, [0] * 251), "FILE_TRANSFER_PROTOCOL"),
 )
-READS: Sequence[Message] = (
+READS: tuple[Message, ...] = (
     mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3),
     mavlink.MAVLink_statustext_message(6, b"Mission Planner 1.3"),
     mavlink.MAVLink_ping_message(1, 1, 0, 0),
@@ -425,6 +433,22 @@ def test_unsigned_frames_are_not_passed_to_a_mavlink_autopilot(message: Message,
     assert [message.get_type() for message in other.messages() if message.get_type() != "HEARTBEAT"] == []
     if answer in ("MISSION_ACK", "COMMAND_ACK"):
         assert len(station.messages(answer)) == 1
+
+
+def test_a_listener_with_the_pilots_ids_cannot_act_as_the_pilot() -> None:
+    """ArduPilot's GCS failsafe waits for the pilot's heartbeats, and it denies an upload when a list is requested."""
+    world, autopilot = passing({"udp": LinkAccess(signing(), LINK_ID)})
+    listener = GroundStation(world)
+    for message in READS[:1] + READS[7:9] + (request_message(0), request_message(0, as_int=False)):
+        listener.send(message)
+    world.run(0.01)
+    assert bytes(autopilot.received) == b""
+    pilot = signing_station(world, "pilot")
+    frames = [listener.pack(READS[5]), pilot.pack(READS[0]), pilot.pack(READS[7])]
+    world.receive_from(listener, frames[0])
+    world.receive_from(pilot, frames[1])
+    world.receive_from(pilot, frames[2])
+    assert bytes(autopilot.received) == b"".join(frames)
 
 
 def test_a_refusal_has_the_autopilots_ids() -> None:
