@@ -74,12 +74,13 @@ def hear_msp(vehicle: Vehicle, frame: MspFrame, controller: FlightController, no
 
 def _attitude(vehicle: Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
     """MSP's pitch is nose-down positive on all firmware."""
-    told = decode_attitude(payload)
-    if told is not None:
+    reply = decode_attitude(payload)
+    if reply is not None:
         health = vehicle.last(Health)
         has_compass = health is not None and Sensor.COMPASS in health.sensors
-        heading_deg = float(told.heading_deg % 360)
-        roll_deg, pitch_deg, rates = told.roll_ddeg / 10, -told.pitch_ddeg / 10, _rates_deg_s(vehicle, controller, now)
+        heading_deg = float(reply.heading_deg % 360)
+        roll_deg, pitch_deg = reply.roll_ddeg / 10, -reply.pitch_ddeg / 10
+        rates = _rates_deg_s(vehicle, controller, now)
         vehicle.hear(Orientation(now, Source.MSP, roll_deg, pitch_deg, heading_deg, has_compass, rates))
 
 
@@ -122,11 +123,11 @@ def velocity(speed_m_s: float, course_deg: float | None) -> tuple[float | None, 
 
 def _altitude(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
     """A board without a barometer answers zeros, which are no height."""
-    told, health = decode_altitude(payload), vehicle.last(Health)
-    if told is None or health is None:
+    reply, health = decode_altitude(payload), vehicle.last(Health)
+    if reply is None or health is None:
         return
-    if Sensor.BAROMETER in health.sensors or told.height_cm or told.climb_cms:
-        vehicle.hear(Height(now, Source.MSP, told.height_cm / 100, told.climb_cms / 100))
+    if Sensor.BAROMETER in health.sensors or reply.height_cm or reply.climb_cms:
+        vehicle.hear(Height(now, Source.MSP, reply.height_cm / 100, reply.climb_cms / 100))
 
 
 def _status(vehicle: Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
@@ -145,16 +146,16 @@ def _status(vehicle: Vehicle, payload: bytes, controller: FlightController, now:
 
 def _analog(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
     """A voltage of 0 is not measured, nor is a current while none was drawn, nor a strength before the first signal."""
-    told = decode_analog(payload)
-    if told is None:
+    reply = decode_analog(payload)
+    if reply is None:
         return
-    voltage = told.battery_dv / 10 or None
-    if told.current_ca is None or not (told.current_ca or told.drawn_mah):
+    voltage = reply.battery_dv / 10 or None
+    if reply.current_ca is None or not (reply.current_ca or reply.drawn_mah):
         vehicle.hear(Power(now, Source.MSP, voltage))
     else:
-        vehicle.hear(Power(now, Source.MSP, voltage, told.current_ca / 100, told.drawn_mah))
-    if told.rssi or vehicle.last(Signal) is not None:
-        vehicle.hear(Signal(now, Source.MSP, min(told.rssi / _MAX_RSSI, 1.0)))
+        vehicle.hear(Power(now, Source.MSP, voltage, reply.current_ca / 100, reply.drawn_mah))
+    if reply.rssi or vehicle.last(Signal) is not None:
+        vehicle.hear(Signal(now, Source.MSP, min(reply.rssi / _MAX_RSSI, 1.0)))
 
 
 def _rc(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:

@@ -146,7 +146,7 @@ class MspLink:
         #: A byte's time on the line.
         self.byte_s = byte_time_s(baud)
         self._ring_size = _OUTSTANDING_BESIDE_FRSKY if baud == FRSKY_SPEED else MAX_OUTSTANDING_BYTES
-        #: It counts damaged frames, and bytes outside frames.
+        #: Counts damaged frames, and bytes outside frames.
         self.parser = MspParser()
         self._waiting: deque[Send] = deque()
         self._sent: list[_Request] = []  # in sending order

@@ -33,31 +33,31 @@ _MAX_RSSI = 1023
 
 
 def _inav_status(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
-    told = decode_inav_status(payload)
-    if told is not None:
-        load = told.load_percent / 100
-        vehicle.hear(Health(now, Source.MSP, told.sensors, told.cycle_time_us, told.i2c_errors, load))
-        vehicle.hear(Readiness(now, Source.MSP, told.blockers))
+    reply = decode_inav_status(payload)
+    if reply is not None:
+        load = reply.load_percent / 100
+        vehicle.hear(Health(now, Source.MSP, reply.sensors, reply.cycle_time_us, reply.i2c_errors, load))
+        vehicle.hear(Readiness(now, Source.MSP, reply.blockers))
 
 
 def _inav_analog(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
     """INAV_ANALOG. Without a battery the cell count is 0 and the percentage meaningless."""
-    told = decode_inav_analog(payload)
-    if told is None:
+    reply = decode_inav_analog(payload)
+    if reply is None:
         return
-    if told.cells and told.battery_cv:
-        volts, amperes = told.battery_cv / 100, told.current_ca / 100
-        vehicle.hear(Power(now, Source.MSP, volts, amperes, told.drawn_mah, told.cells, told.percent))
+    if reply.cells and reply.battery_cv:
+        volts, amperes = reply.battery_cv / 100, reply.current_ca / 100
+        vehicle.hear(Power(now, Source.MSP, volts, amperes, reply.drawn_mah, reply.cells, reply.percent))
     else:
-        vehicle.hear(Power(now, Source.MSP, told.battery_cv / 100 or None))
-    _hear_signal(vehicle, told.rssi, now)
+        vehicle.hear(Power(now, Source.MSP, reply.battery_cv / 100 or None))
+    _hear_signal(vehicle, reply.rssi, now)
 
 
 def _analog(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
     """MSP_ANALOG, for the signal strength; INAV_ANALOG has the battery in a finer scale."""
-    told = decode_analog(payload)
-    if told is not None:
-        _hear_signal(vehicle, told.rssi, now)
+    reply = decode_analog(payload)
+    if reply is not None:
+        _hear_signal(vehicle, reply.rssi, now)
 
 
 def _hear_signal(vehicle: Vehicle, rssi: int, now: float) -> None:

@@ -36,7 +36,7 @@ class NavProfile:
 
     capacity: records, without home. endless_hold: action and p1 of an endless hold. sea_level: altitudes may refer to
     mean sea level. leg_speed: legs may have a speed. rth_height: an RTH may have an altitude. jumps_back_only: a JUMP
-    must go back, and its loop contain no other; else it may go to any leg not next to it. longest_hold: seconds.
+    must go back, and no other may be in its loop; if False, it may go to any leg that is not adjacent. longest_hold: s.
     ends_on_any_record: the end of a list is noticed on a SET_POI or SET_HEAD, too. own_rth_landing: an RTH's own p1
     decides if it lands; else the last record's p1 does. limits: of its legs; None: unlimited.
     """
