@@ -7,7 +7,7 @@ Imports no part of the daemon, so that a command starts quickly.
 import json
 import os
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from tempfile import gettempdir
@@ -39,7 +39,7 @@ def ask_daemon(state_dir: Path | None, request: Json, progress: Callable[[int], 
     """Ask the daemon that runs on `state_dir` (None: see find_socket); ControlError if there is none or it refuses."""
     path = find_socket(state_dir)
     line = to_json(request).encode() + b"\n"  # before connecting: the daemon waits only 5 s for the request
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection, connection.makefile() as answers:
         try:
             connection.connect(str(path))
         except PermissionError as error:
@@ -52,7 +52,7 @@ def ask_daemon(state_dir: Path | None, request: Json, progress: Callable[[int], 
             # A refusal may arrive in the middle of a long request: read it.
             connection.sendall(line)
         with suppress(ConnectionError):
-            for answer in _lines(connection):
+            for answer in map(json.loads, answers):
                 if "progress" in answer:
                     progress(answer["progress"])
                 elif "error" in answer:
@@ -61,12 +61,6 @@ def ask_daemon(state_dir: Path | None, request: Json, progress: Callable[[int], 
                     result: Json = answer["result"]
                     return result
     raise ControlError("the daemon ended before it answered")
-
-
-def _lines(connection: socket.socket) -> Iterator[Json]:
-    with connection.makefile() as stream:
-        for line in stream:
-            yield json.loads(line)
 
 
 def socket_of_daemon(state_dir: Path) -> Path:

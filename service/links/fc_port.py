@@ -78,7 +78,9 @@ class FcPort:
                 try:
                     self._device = await self._open()
                 except (PortError, OSError) as error:
-                    self._complain(str(error))
+                    level = _log.debug if str(error) == self.trouble else _log.warning
+                    level("fc.port_unavailable", why=str(error))
+                    self.trouble = str(error)
                 else:
                     self._descriptor = self._device.fileno()
                     self._is_tcp = isinstance(self._device, socket.socket) and self._device.family != socket.AF_UNIX
@@ -215,8 +217,3 @@ class FcPort:
         self._closed.set()
         device.close()
         self._on_close(why)
-
-    def _complain(self, why: str) -> None:
-        level = _log.debug if why == self.trouble else _log.warning
-        level("fc.port_unavailable", why=why)
-        self.trouble = why

@@ -171,7 +171,6 @@ class PortFinder:
         self._timer = self._loop.call_later(seconds, self._waited)
 
     def _waited(self) -> None:
-        self._timer = None
         if self._present is None:
             return
         others = [port for port in serial_ports(self._host) if port.key not in self._memory.others]
@@ -184,7 +183,6 @@ class PortFinder:
     def _stop_waiting(self) -> None:
         if self._timer is not None:
             self._timer.cancel()
-            self._timer = None
 
     def _leave(self) -> None:
         self._stop_waiting()

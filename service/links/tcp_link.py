@@ -5,6 +5,7 @@ import asyncio
 import errno
 import socket
 from collections.abc import Callable
+from functools import partial
 
 from bridge.gcs.station import Peer
 from service.links.gcs_events import GcsEvents
@@ -85,14 +86,8 @@ class TcpLink:
             self._events.gcs_gone(peer)
         # A TCP client hears the vehicle from the start: it may wait for a heartbeat before it speaks.
         self._events.add_default_peer(peer)
-
-        def received(data: bytes) -> None:
-            self._events.gcs_data(peer, data, datagram=False)
-
-        def gone() -> None:
-            self._forget(peer)
-
-        self._clients[peer] = _TcpClient(connection, self._loop, received, gone)
+        received = partial(self._events.gcs_data, peer, datagram=False)
+        self._clients[peer] = _TcpClient(connection, self._loop, received, partial(self._forget, peer))
 
     def _forget(self, peer: Peer) -> None:
         del self._clients[peer]
