@@ -124,15 +124,15 @@ class TlogFolder:
     def _make_room(self, now: datetime) -> None:
         """Remove the oldest files until another one fits, flights last. Files with other names are left alone.
 
-        Files of this run go after earlier ones, in the order of writing and regardless of their age: the clock may have
-        been weeks behind at the start.
+        Age does not count for flights, nor for files of this run, which go after earlier ones in the order of writing:
+        until a Pi finds a network, its clock may be months behind, and dates a file too early.
         """
         too_old = (now - timedelta(days=self._limits.days)).strftime(_NAME_FORMAT)
         sizes = {path: path.stat().st_size for path in self._folder.iterdir() if _NAME_PATTERN.fullmatch(path.name)}
         total = sum(sizes.values())
         earlier = sorted(sizes.keys() - set(self._own))
         self._own = [path for path in self._own if path in sizes]
-        outdated = {path for path in earlier if path.name < too_old}
+        outdated = {path for path in earlier if path.name < too_old and not _is_flight(path)}
         for path in sorted((*earlier, *self._own), key=lambda path: (path not in outdated, _is_flight(path))):
             if path not in outdated and total + self._limits.file_size <= self._limits.total_size:
                 return

@@ -97,7 +97,12 @@ KEYS = (
         "Size of all telemetry logs together, megabytes, at least twice tlog_file_mb; the oldest are deleted.",
         str(_LIMITS.total_size >> 20),
     ),
-    Key("tlog_days", whole(1, 3650), "How long a telemetry log is kept, days, 1..3650.", str(_LIMITS.days)),
+    Key(
+        "tlog_days",
+        whole(1, 3650),
+        "How long a telemetry log without a flight is kept, days, 1..3650.",
+        str(_LIMITS.days),
+    ),
     Key(
         "record_uart",
         file_name(),

@@ -53,6 +53,8 @@ from storage.os_error import reason
 from storage.store_error import StoreError
 
 _LISTED = 50
+#: For the mission store, whose SD card may hang: the page itself waits for 8 s.
+_STORE_TIMEOUT_S = 5.0
 
 
 class Api:
@@ -110,7 +112,7 @@ class Api:
         now = asyncio.get_running_loop().time()
         transfer = daemon.bridge.transfer
         try:
-            listed = (await self._api.list_missions(1))["missions"]
+            listed = (await _stored(self._api.list_missions(1)))["missions"]
             newest = {key: listed[0][key] for key in ("number", "outcome")} if listed else None
             store = daemon.store_trouble
         except StoreError as error:
@@ -234,10 +236,19 @@ def _sent(mission: Json) -> list[MissionItem]:
     return mission_items(mission["received"]["items"])
 
 
+async def _stored(asked: Awaitable[Json]) -> Json:
+    """Wait for the store; StoreError also if it does not answer in time."""
+    try:
+        async with asyncio.timeout(_STORE_TIMEOUT_S):
+            return await asked
+    except TimeoutError as error:
+        raise StoreError("the mission store does not answer: the disk is slow or failing; check dmesg") from error
+
+
 async def _told(asked: Awaitable[Json]) -> Json:
     """Wait for the store; its errors become refusals."""
     try:
-        return await asked
+        return await _stored(asked)
     except ControlError as error:
         raise HTTPException(HTTPStatus.NOT_FOUND, str(error)) from error
     except StoreError as error:

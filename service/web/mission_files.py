@@ -11,6 +11,7 @@ from collections.abc import Awaitable, Callable
 from functools import partial
 from http import HTTPStatus
 
+import structlog
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
 
@@ -26,7 +27,7 @@ _PAUSE_S = 0.25
 _MAX_NAME = 80
 #: A page of another site cannot send this type without a preflight request, which is refused.
 _CONTENT_TYPE = "application/octet-stream"
-
+_log = structlog.get_logger()
 
 Progress = Callable[[Json], None]
 
@@ -62,6 +63,9 @@ class MissionWriter:
             state |= {"ok": answer["ack"] == "MAV_MISSION_ACCEPTED", "text": answer["text"]}
         except (ControlError, StoreError, ValueError) as error:
             state["text"] = str(error)
+        except Exception:
+            state["text"] = "The daemon failed during the write; see its log."
+            _log.exception("web.failed", path="/api/write")
         finally:
             state["done"] = True
 

@@ -5,6 +5,7 @@ Repeats the first steps with the standard library, which distinguishes an expire
 Blocks for up to a few seconds: not for an event loop.
 """
 
+import os
 import re
 import socket
 import ssl
@@ -40,7 +41,7 @@ def _trouble(endpoint: str, files: TlsFiles) -> str:
         return f"the router's certificate is not accepted: {error.verify_message}"
     except ssl.SSLError as error:
         return f"no secure connection: {_words(error)}"
-    except socket.gaierror:
+    except (socket.gaierror, UnicodeError):  # UnicodeError: an empty or too long part of the name
         return f"the host name {host!r} is unknown"
     except TimeoutError:
         return "no answer"
@@ -57,8 +58,8 @@ def _tls_trouble(connection: socket.socket, host: str, files: TlsFiles) -> str:
     """Continue with TLS as zenoh does; SSLError or OSError describe the problem, too."""
     context = ssl.create_default_context()
     for path in (files.root_ca_certificate, files.connect_certificate, files.connect_private_key):
-        if path is not None and not path.is_file():
-            return f"there is no file {path}"
+        if path is not None and not os.access(path, os.R_OK):
+            return f"{path} cannot be read: check its owner and mode" if path.exists() else f"there is no file {path}"
     try:
         if files.root_ca_certificate is not None:
             context = ssl.create_default_context(cafile=files.root_ca_certificate)

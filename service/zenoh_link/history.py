@@ -3,14 +3,13 @@
 
 from collections import deque
 from collections.abc import Callable
-from functools import partial
 from math import inf
 from pathlib import Path
 
 from service.daemon.api import DaemonApi
 from service.daemon.mission_data import Json
 from service.machine.threads import BackgroundThread
-from service.zenoh_link.logged_past import LoggedPast, read_logged_past
+from service.zenoh_link.logged_past import LoggedPast, log_stamps, read_logged_past
 from service.zenoh_link.time_range import parse_time_range
 
 #: About 150 bytes each; a busy day has some hundred.
@@ -26,6 +25,7 @@ class History:
         self._api = api
         self._logs = logs
         self._clock = clock
+        self._earlier = frozenset[str]() if logs is None else log_stamps(logs)
         self._disk = BackgroundThread("history")
         self._events: deque[Json] = deque(maxlen=_MAX_EVENTS)
 
@@ -38,11 +38,16 @@ class History:
         wanted = parse_time_range(time_range or _DEFAULT_RANGE, self._clock())
         found = await self._api.missions_between(wanted.start_s, wanted.end_s, _MAX_MISSIONS)
         kept_from_s = self._events[0]["time_s"] if self._events else inf
-        logged = LoggedPast()
-        if self._logs is not None and (max_positions or wanted.start_s < kept_from_s):
-            logged = await self._disk.ask(partial(read_logged_past, self._logs, wanted, max_positions))
-        events = [event for event in logged.events if event["time_s"] < kept_from_s]
-        events += [event for event in self._events if event["time_s"] in wanted]
+        logs, logged = self._logs, LoggedPast()
+        if logs is not None:
+            logged = await self._disk.ask(
+                lambda: read_logged_past(logs, wanted, max_positions, self._earlier, kept_from_s)
+            )
+        # Without a network a Pi's clock resumes at the last shutdown, so runs may overlap.
+        events = sorted(
+            (*logged.events, *(event for event in self._events if event["time_s"] in wanted)),
+            key=lambda event: event["time_s"],
+        )
         return found | {
             "events": events[-_MAX_EVENTS:],
             "positions": logged.positions,

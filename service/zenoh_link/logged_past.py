@@ -7,7 +7,7 @@ Blocks for seconds: not for an event loop.
 import os
 import time
 from bisect import bisect_left
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
@@ -52,18 +52,32 @@ class LoggedPast:
     from_s: float | None = None
 
 
-def read_logged_past(folder: Path, wanted: TimeRange, max_positions: int) -> LoggedPast:
-    """Search the logs of a time range. OSError if they cannot be read."""
+def log_stamps(folder: Path) -> frozenset[str]:
+    """The times in the names of the present logs. A log keeps its time when it is renamed as a flight's."""
+    return frozenset(log.path.name[:_NAME_LENGTH] for log in _logs(folder))
+
+
+def read_logged_past(
+    folder: Path, wanted: TimeRange, max_positions: int, earlier: Container[str] = (), kept_from_s: float = inf
+) -> LoggedPast:
+    """Search the logs of a time range. OSError if they cannot be read.
+
+    `earlier`: the logs of previous runs (log_stamps). The others yield only events before `kept_from_s`: the caller
+    has the later ones.
+    """
     past = LoggedPast()
     deadline = time.monotonic() + _MAX_READING_S
     for log in reversed(_logs(folder)):
         if log.begun_s > wanted.end_s or log.ended_s < wanted.start_s:
             continue
+        is_own = log.path.name[:_NAME_LENGTH] not in earlier
+        if is_own and not max_positions and wanted.start_s >= kept_from_s:
+            continue
         if time.monotonic() > deadline:
             break
         with suppress(FileNotFoundError):  # already removed, or renamed because a flight began
             found = _read(log, wanted, max_positions)
-            past.events[:0] = found.events
+            past.events[:0] = [event for event in found.events if not is_own or event["time_s"] < kept_from_s]
             past.positions[:0] = found.positions
             past.from_s = log.begun_s
     past.positions = _thinned(past.positions, max_positions)

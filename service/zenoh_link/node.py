@@ -161,10 +161,10 @@ class Node(Follower):
             self._pending_publish = self._loop.call_soon(self._publish_whole)
 
     def _every_second(self) -> None:
+        self._tick = self._loop.call_later(_STATE_INTERVAL_S, self._every_second)
         self._publish_whole()
         if self._outage is not None:
             self._outage.look(self._presence.is_alone, self._loop.time())
-        self._tick = self._loop.call_later(_STATE_INTERVAL_S, self._every_second)
 
     def _publish_whole(self) -> None:
         self._pending_publish = None

@@ -26,7 +26,7 @@ class OutageLog:
         self._diagnose = diagnose
         self._loop = asyncio.get_running_loop()
         self._next_at = self._loop.time() + _INTERVAL_S
-        self._is_alone = False
+        self._is_alone = self._is_running = False
         self._found = ""
         self._logged = ""
 
@@ -36,14 +36,16 @@ class OutageLog:
         if not is_alone:
             self._found = ""
             self._next_at = now + _INTERVAL_S
-        elif now >= self._next_at:
+        elif now >= self._next_at and not self._is_running:
             self._next_at = now + _INTERVAL_S
+            self._is_running = True
             threading.Thread(target=self._run, name="zenoh why", daemon=True).start()
 
     def _run(self) -> None:
         post(self._loop, self._diagnosed, self._diagnose())
 
     def _diagnosed(self, why: str) -> None:
+        self._is_running = False
         before, self._found = self._found, why
         if self._is_alone and why == before and why != self._logged:
             self._logged = why

@@ -134,6 +134,9 @@ class Queries:
             self._refuse(question, QueryRefused(str(error)))
         except asyncio.CancelledError:
             self._refuse(question, QueryRefused(_STOPPED))
+        except Exception as error:
+            _log.exception("daemon.fault", what=f"the query {question.name}")
+            self._refuse(question, QueryRefused(f"the daemon failed ({error!r}); see its log"))
         question.end()
 
     def _refuse(self, question: Question, error: QueryRefused) -> None:

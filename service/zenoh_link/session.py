@@ -101,7 +101,8 @@ class SessionThread:
             try:
                 session = zenoh.open(self._config)
                 self._declare(session)
-            except zenoh.ZError as error:
+            except Exception as error:
+                # Also an error in a declaration: a thread that ends here would end zenoh without a word.
                 self._complain("zenoh.not_open", error)
             else:
                 self._complaint = ""

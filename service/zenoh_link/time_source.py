@@ -24,11 +24,12 @@ class SampleClock:
     def __init__(self, now: Callable[[], float], synchronized: Path = _SYNCHRONIZED) -> None:
         self._now = now
         self._synchronized = synchronized
-        self._offset_s = 0.0
+        #: By GPS: when the monotonic clock was 0, seconds since 1970. None while the Pi's clock is right.
+        self._epoch_s: float | None = None
 
     def unix_s(self) -> float:
         """Seconds since 1970 (UTC), in milliseconds: a Pi's clock is no better, and each digit costs data."""
-        return round(time.time() + self._offset_s, 3)
+        return round(time.time() if self._epoch_s is None else self._epoch_s + self._now(), 3)
 
     def source(self, vehicle: Vehicle) -> str:
         """Either gps (the flight controller has a 3D fix and the time), ntp (the clock was set) or pi. Follows it."""
@@ -36,15 +37,15 @@ class SampleClock:
         if gps_time is not None and fix is not None and fix.fix is Fix.THREE_D:
             age_s = now - min(gps_time.heard_at, fix.heard_at)
             if age_s < _FRESH_S:
-                self._follow(gps_time.unix_s + now - gps_time.heard_at - time.time())
+                self._follow(gps_time.unix_s - gps_time.heard_at, time.time() - now)
                 return "gps"
         if self._synchronized.exists():
-            self._offset_s = 0.0
+            self._epoch_s = None
             return "ntp"
         return "pi"
 
-    def _follow(self, offset_s: float) -> None:
-        if abs(offset_s) < _TOLERANCE_S:
-            self._offset_s = 0.0
-        elif abs(offset_s - self._offset_s) > _TOLERANCE_S:
-            self._offset_s = offset_s
+    def _follow(self, epoch_s: float, own_epoch_s: float) -> None:
+        if abs(epoch_s - own_epoch_s) < _TOLERANCE_S:
+            self._epoch_s = None
+        elif self._epoch_s is None or abs(epoch_s - self._epoch_s) > _TOLERANCE_S:
+            self._epoch_s = epoch_s

@@ -10,7 +10,7 @@ import pytest
 
 from protocols.mavlink.dialect import Message, messages
 from protocols.tlog import tlog_record
-from service.zenoh_link.logged_past import read_logged_past
+from service.zenoh_link.logged_past import log_stamps, read_logged_past
 from service.zenoh_link.time_range import TimeRange
 
 NOON_S = datetime(2026, 5, 1, 12, tzinfo=UTC).timestamp()
@@ -64,6 +64,18 @@ def test_only_the_requested_range_is_returned(tmp_path: Path) -> None:
     past = read_logged_past(tmp_path, TimeRange(NOON_S + 3601, NOON_S + 7200), 0)
     assert [each["facts"]["text"] for each in past.events] == ["1.1", "1.2", "2.0"]
     assert past.from_s == NOON_S + 3600
+
+
+def test_runs_may_overlap_because_the_clock_resumes_at_the_last_shutdown(tmp_path: Path) -> None:
+    """Only of the present run's logs the later part is left out: its events are in memory."""
+    write(tmp_path, NOON_S, (NOON_S, heartbeat(armed=False)), (NOON_S + 900, text("flown")))
+    earlier = log_stamps(tmp_path)
+    write(tmp_path, NOON_S + 60, (NOON_S + 60, heartbeat(armed=False)), (NOON_S + 70, text("in memory")))
+    write(tmp_path, NOON_S, (NOON_S, heartbeat(armed=False)), (NOON_S + 900, text("flown")), flight=True)
+    (tmp_path / "2026-05-01 12-00-00.tlog").unlink()
+    for start_s in (NOON_S, NOON_S + 600):
+        past = read_logged_past(tmp_path, TimeRange(start_s), 0, earlier, kept_from_s=NOON_S + 62)
+        assert [each["facts"]["text"] for each in past.events] == ["flown"]
 
 
 def test_part_of_a_long_log_is_read(tmp_path: Path) -> None:

@@ -38,6 +38,17 @@ def test_a_3d_fix_corrects_a_wrong_clock(tmp_path: Path, wrong_by_s: float) -> N
     assert clock.unix_s() <= time.time() + 0.001
 
 
+def test_a_clock_that_is_set_later_is_not_corrected_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By chrony or by hand, which leave no file as timesyncd does."""
+    clock, true_s, pi_s = SampleClock(lambda: NOW, tmp_path / "synchronized"), 1_790_000_000.0, 1_700_000_000.0
+    monkeypatch.setattr(time, "time", lambda: pi_s)
+    assert clock.source(vehicle_with(Fix.THREE_D, true_s - pi_s)) == "gps"
+    monkeypatch.setattr(time, "time", lambda: true_s)
+    assert clock.unix_s() == pytest.approx(true_s, abs=1.0)
+    assert clock.source(Vehicle()) == "pi"
+    assert clock.unix_s() == pytest.approx(true_s, abs=1.0)
+
+
 @pytest.mark.parametrize(("fix", "age_s"), [(Fix.TWO_D, 1.0), (Fix.NO_FIX, 1.0), (Fix.THREE_D, 9.0)])
 def test_without_a_recent_fix_there_is_no_gps_time(tmp_path: Path, fix: Fix, age_s: float) -> None:
     clock = SampleClock(lambda: NOW, tmp_path / "synchronized")
