@@ -4,10 +4,9 @@
 import os
 import signal
 import sys
-from typing import NoReturn
 
 
-def start() -> NoReturn:
+def start() -> None:
     """Import and run the command. Ctrl-C during the import or the exit ends the process silently, as by default."""
     _open_standard_streams()
     is_usual = signal.getsignal(signal.SIGINT) is signal.default_int_handler  # else ignored: a background job

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from service.cli.setup.change import Machine, Run, Step, WriteFile
-from service.cli.setup.steps import SETTINGS_FILE, SetupChoices, missing_steps
+from service.cli.setup.steps import SETTINGS_FILE, SetupChoices, missing_steps, settings_text
 from tests.support.faulty_machine import FaultyMachine
 from tests.support.programs import run_naze_bridge
 
@@ -118,6 +118,12 @@ def test_a_second_run_keeps_the_key_and_the_hotspot(tmp_path: Path, model: str) 
     assert "web" not in settings
     assert "key_file" in settings["gcs"][0]
     assert "systemctl restart naze-bridge.service" in pi.ran
+
+
+@pytest.mark.parametrize("fc", ["/dev/ttyUSB0,57600", '/dev/the "naze"', "/dev/a\\b", "/dev/näze"])
+def test_any_port_gives_a_valid_settings_file(fc: str, tmp_path: Path) -> None:
+    text = settings_text(FreshPi(tmp_path, "4"), SetupChoices(fc=fc))
+    assert tomllib.loads(text)["fc"] == fc
 
 
 def test_an_enabled_getty_is_disabled(tmp_path: Path) -> None:

@@ -124,7 +124,8 @@ def _key(host: Host, answers: SetupChoices) -> Iterator[Step]:
 
 def settings_text(host: Host, answers: SetupChoices) -> str:
     """The drop-in file with the choices."""
-    lines = ["# Written by `naze-bridge setup`, which can be run again.", f'fc = "{answers.fc}"']
+    fc = json.dumps(answers.fc, ensure_ascii=False)  # also valid TOML
+    lines = ["# Written by `naze-bridge setup`, which can be run again.", f"fc = {fc}"]
     if answers.key is not None or host.path(KEY_FILE).exists():
         lines.append(f'gcs = [{{address = "udpin:0.0.0.0:{GCS_PORT}", key_file = "{KEY_FILE}"}}]')
     if answers.page:
