@@ -120,6 +120,9 @@ class MissionUploads:
             self._supersede(upload, now)
             self._begin(station, upload.count, now)
             return
+        if state.is_doubtful(item):
+            self._request(upload, now)
+            return
         state.announced_again = False
         taken = state.take(item, now)
         if isinstance(taken, Judged):

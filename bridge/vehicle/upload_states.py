@@ -174,8 +174,9 @@ class Receiving(UploadState):
         self.items: dict[int, MissionItem] = {}
         self._judged = 0  # items 0.._judged-1 have arrived and are checked
         self.request = ItemRequest()
-        #: MISSION_COUNT arrived again: the client restarted, or the network duplicated it. The next item shows which.
+        #: MISSION_COUNT arrived again: the client restarted, or the network duplicated it. The next items show which.
         self.announced_again = False
+        self._doubtful: MissionItem | None = None
 
     @property
     def timeout(self) -> Refusal:
@@ -201,11 +202,23 @@ class Receiving(UploadState):
     def is_of_another_list(self, item: MissionItem) -> bool:
         """True if the ground station has started again, perhaps with another list.
 
-        "Write Fast" does not wait for the request: its first items may be lost.
+        Its MISSION_COUNT may be lost: a request for the former list's item also seems to answer it. "Write Fast" does
+        not wait for the request, so its first items may be lost.
         """
         held = self.items.get(item.seq, item)
         # As text, because NaN, "not given", differs from itself.
-        return self.announced_again and (item.seq == 0 or repr(held) != repr(item))
+        signs = self.announced_again, item.seq == 0, repr(held) != repr(item)
+        return sum(signs) >= 2
+
+    def is_doubtful(self, item: MissionItem) -> bool:
+        """True for a new item after a second MISSION_COUNT, until it is repeated.
+
+        MAVProxy and QGroundControl answer a request that was on its way for the former list with their new list's item.
+        """
+        if not self.announced_again or item.seq in self.items or repr(item) == repr(self._doubtful):
+            return False
+        self._doubtful = item
+        return True
 
     def take(self, item: MissionItem, now: float) -> Judged | bool:
         """Keep an item; returns Judged at the end of the list, else True if the next item is to be requested."""

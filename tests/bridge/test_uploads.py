@@ -433,6 +433,35 @@ def test_two_lists_are_never_mixed_if_a_burst_loses_its_first_item() -> None:
     assert world.stored == records_of(after)
 
 
+def test_two_lists_are_never_mixed_if_a_request_is_on_its_way() -> None:
+    """MAVProxy answers the request for an item of the former list with one of the new list, which has the same home."""
+    world, station = holding()
+    station.air = Air(delay_s=0.05)
+    former = Upload(station, waypoints(20, 1))
+    world.wait_until(lambda _: len(former.requested) > 8, 10)
+    former.stop()
+    items = [*waypoints(1, 1), *waypoints(20, 2)[1:]]
+    assert Upload(station, items).run() is A.ACCEPTED
+    assert world.stored == records_of(items)
+
+
+def test_two_lists_are_never_mixed_if_the_second_count_is_lost() -> None:
+    """To Mission Planner the repeated request for item 1 answers its new MISSION_COUNT: it sends item 0."""
+    world, station = holding()
+    receiving(world, station, waypoints(5, seed=1), 1)
+    items = waypoints(5, seed=2)
+    for seq, item in enumerate(items):
+        station.send(item_message(seq, item))
+    world.run(0.001)
+    assert acks(station) == []
+    for seq in range(5):
+        world.wait_until(lambda _, seq=seq: seq in requested(station), 2)  # type: ignore[misc]
+        station.send(item_message(seq, items[seq]))
+    world.wait_until(lambda _: bool(acks(station)), 5)
+    assert acks(station) == [A.ACCEPTED]
+    assert world.stored == records_of(items)
+
+
 def test_the_same_station_restarts_while_the_flight_controller_is_asked() -> None:
     world, station = holding()
     station.send(count_message(9))
@@ -688,10 +717,10 @@ def test_a_repeated_item_gets_one_request_and_is_ignored() -> None:
     world, station = holding()
     items = waypoints(8)
     receiving(world, station, items, 5)
-    for seq in (0, 4, 4, 2):
+    for seq in (1, 4, 4, 2):
         world.run(0.12)
         station.take()
-        # Even with other contents: the first one counts.
+        # Even with other contents: the first one counts. Only item 0 shows another list.
         station.send(item_message(seq, replace(items[seq], alt_m=99.0)))
         world.run(0.001)
         assert requested(station) == [5]
