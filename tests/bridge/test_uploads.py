@@ -436,7 +436,7 @@ def test_two_lists_are_never_mixed_if_a_burst_loses_its_first_item() -> None:
 def test_two_lists_are_never_mixed_if_a_request_is_on_its_way() -> None:
     """MAVProxy answers the request for an item of the former list with one of the new list, which has the same home."""
     world, station = holding()
-    station.air = Air(delay_s=0.05)
+    station.radio = Radio(delay_s=0.05)
     former = Upload(station, waypoints(20, 1))
     world.wait_until(lambda _: len(former.requested) > 8, 10)
     former.stop()
