@@ -11,7 +11,7 @@ from bridge.model.refusal import Refusal
 from protocols.mavlink.dialect import Message
 from protocols.mission_item import Command, MissionResult
 from protocols.msp.frame import MspParser
-from protocols.msp.mission import MissionCommand
+from protocols.msp.mission import MissionCommand, pack_records
 from simulator.fc_kinds import make_board
 from simulator.options import Faults, SimOptions, TelemetryProtocol
 from tests.support.conversations import (
@@ -85,6 +85,16 @@ def test_a_list_changed_on_the_board_is_read_again() -> None:
     world.naze._flash._memory[:] = flash_holding(records_of(other))
     world.power_on()
     world.run(8)
+    items = Download(station).run()
+    assert [item.lat_e7 for item in items] == [item.lat_e7 for item in other]
+
+
+def test_a_list_that_the_firmware_saved_itself_is_read_again() -> None:
+    """No line is lost, so only INFO's checksum shows that the copy is old."""
+    world, station = holding()
+    assert Download(station).run() != []
+    other = waypoints(9, seed=3)
+    world.naze._firmware._missions.store(pack_records(records_of(other)))
     items = Download(station).run()
     assert [item.lat_e7 for item in items] == [item.lat_e7 for item in other]
 

@@ -307,6 +307,24 @@ def test_only_some_cancelled_lists_are_stored() -> None:
     assert 10 < len(world.store.missions) <= 25
 
 
+def test_the_upload_of_a_station_that_disconnects_ends_at_once() -> None:
+    world, station = holding()
+    receiving(world, station, waypoints(60), 20)
+    world.bridge.gcs_gone(station.peer, world.now)
+    assert state(world) is None
+    assert world.stored == OLD_RECORDS
+
+
+def test_a_late_error_ack_does_not_end_a_write() -> None:
+    world, station = holding()
+    receiving(world, station, waypoints(60), 60)
+    assert state(world) is Delivering
+    station.send(ack_message(A.ERROR))
+    world.run(3)
+    assert acks(station) == [A.ACCEPTED]
+    assert world.stored == records_of(waypoints(60))
+
+
 def test_a_station_that_disconnects_before_the_ack_is_forgotten() -> None:
     world, station = holding()
     receiving(world, station, waypoints(60), 60)
