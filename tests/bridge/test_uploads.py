@@ -315,6 +315,20 @@ def test_the_upload_of_a_station_that_disconnects_ends_at_once() -> None:
     assert world.stored == OLD_RECORDS
 
 
+def test_a_list_announced_again_before_its_write_is_received_again() -> None:
+    """The new one may differ: the ack of the previous list would seem to be its own."""
+    world, station = holding()
+    receiving(world, station, waypoints(8), 7)
+    world.store.delay_s = 1.0
+    world.push(waypoints(3))
+    station.send(item_message(7, waypoints(8)[7]))
+    world.run(0.1)
+    station.send(count_message(8))
+    world.run(8)
+    assert A.ACCEPTED not in acks(station)
+    assert world.stored != records_of(waypoints(8))
+
+
 def test_a_late_error_ack_does_not_end_a_write() -> None:
     world, station = holding()
     receiving(world, station, waypoints(60), 60)
