@@ -10,8 +10,9 @@ from bridge.missions.mission_service import HeldMission
 from bridge.model.refusal import Refusal
 from protocols.mavlink.dialect import Message
 from protocols.mission_item import Command, MissionResult
+from protocols.mission_record import pack_records
 from protocols.msp.frame import MspParser
-from protocols.msp.mission import MissionCommand, pack_records
+from protocols.msp.mission import MissionCommand
 from simulator.fc_kinds import make_board
 from simulator.options import Faults, SimOptions, TelemetryProtocol
 from tests.support.conversations import (

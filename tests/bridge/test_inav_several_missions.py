@@ -12,6 +12,7 @@ from bridge.missions.mission_service import HeldMission
 from bridge.model.mission_log import Outcome
 from bridge.model.refusal import Refusal
 from protocols.mavlink.dialect import messages
+from protocols.mission_item import MissionResult
 from protocols.msp.commands import Msp
 from protocols.msp.frame import MspParser
 from protocols.msp.nav import LAST, Nav
@@ -118,6 +119,14 @@ def test_missions_that_no_longer_fit_are_reported_and_copied_to_the_pi() -> None
     copies = [mission for mission, _ in bench.world.store.missions if mission.source.startswith("copy")]
     assert [[record.pack() for record in copy.verdict.records] for copy in copies] == [sets(4, 30, 60)[2]]
     assert "Mission of 60 records does not fit" in bench.text()
+
+
+def test_without_a_copy_of_what_it_erases_nothing_is_written() -> None:
+    bench = Bench(4, 30, 60)
+    bench.world.store.failing = True
+    assert Upload(bench.station, plan(81, 7)).run() is MissionResult.DENIED
+    assert "could not be copied to the Pi" in bench.text()
+    assert bench.stored() == sets(4, 30, 60)
 
 
 def test_record_fields_without_an_item_field_survive_a_read_and_a_write() -> None:
