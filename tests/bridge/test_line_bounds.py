@@ -214,6 +214,21 @@ def test_nothing_is_sent_alongside_an_exclusive_request() -> None:
     assert sent(link) == [101]
 
 
+def test_a_resync_waits_for_the_reply_to_an_exclusive_request() -> None:
+    link = MspLink(115200, 0.0)
+    link.send(question(101, 11), 0.0)
+    now = link.next_deadline()
+    link.tick(now)
+    link.send(question(106, 18), now)
+    link.send(question(191, 7, exclusive=True), now)
+    now = link.next_deadline()
+    link.tick(now)
+    assert link.requests_lost == 2
+    assert RESYNC not in link.take_output()
+    link.receive(reply(191), now + 0.1)
+    assert RESYNC in link.take_output()
+
+
 def test_our_own_echo_is_not_a_reply() -> None:
     link = MspLink(115200, 0.0)
     link.send(question(101, 11), 0.0)
@@ -248,3 +263,15 @@ def test_a_frame_with_a_hazard_byte_is_never_sent() -> None:
     with pytest.raises(AssertionError, match="hazard"):
         link.send(Send(request(100, b"\x0d"), 100, 13), 0.0)
     assert link.take_output() == []
+
+
+def test_a_harmless_request_follows_a_frame_with_a_hazard_byte_if_the_board_accepts_them() -> None:
+    """INAV opens its command line after a '#' and 100 ms of silence."""
+    link = MspLink(115200, 0.0)
+    link.any_byte = True
+    link.send(Send(request(100, b"#"), 100, 13), 0.0)
+    assert sent(link) == [100]
+    now = link.next_deadline()
+    assert now < 0.1
+    link.tick(now)
+    assert sent(link) == [Msp.API_VERSION]

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridge.controllers.harakiri import profile as harakiri
+from bridge.missions.fc_mission_store import PushFailure
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
 from protocols.mission_record import ListIdentity, identify
@@ -114,6 +115,49 @@ def test_every_conversation_ends_with_any_replies(seed: int) -> None:
 def test_a_board_that_always_gives_the_same_reply_is_given_up(answers: dict[int, bytes]) -> None:
     _, station = found(FixedReplies(answers))
     assert Upload(station, waypoints(30)).run(60) is MissionResult.DENIED
+
+
+LIST = identify(records_of(waypoints(60)))
+TOO_FAR, WHOLE = (Staged(ReplyStatus.OK, count, LIST.checksum).encode() for count in (61, 60))
+COMMITTED = Stored(ReplyStatus.OK, LIST).encode()
+
+
+class BeginsInTurn(FixedReplies):
+    """Answers each BEGIN with the next of `begins`; silent after the last one if `then_silent`."""
+
+    def __init__(self, begins: list[bytes], answers: dict[int, bytes], *, then_silent: bool = False) -> None:
+        super().__init__(answers)
+        self.begins = begins
+        self.then_silent = then_silent
+
+    def receive(self, data: bytes, now: float) -> None:
+        if self.begins or not self.then_silent:
+            super().receive(data, now)
+
+    def answer(self, frame: MspFrame) -> bytes | None:
+        return self.begins.pop(0) if frame.command == MissionCommand.BEGIN else super().answer(frame)
+
+
+def test_a_board_that_claims_more_records_than_the_list_has_starts_again() -> None:
+    _, station = found(BeginsInTurn([TOO_FAR, WHOLE], {MissionCommand.COMMIT: COMMITTED}))
+    assert Upload(station, waypoints(60)).run(60) is MissionResult.ACCEPTED
+
+
+def test_a_failed_commit_does_not_leave_the_next_attempt_uncertain() -> None:
+    """The board reports a flash error, takes a new BEGIN and falls silent before any chunk arrives."""
+    refused: dict[int, bytes] = {MissionCommand.COMMIT: Stored(ReplyStatus.FLASH, ListIdentity(0, 0)).encode()}
+    begins = [WHOLE, Staged(ReplyStatus.OK, 0, 0).encode()]
+    world, _ = found(BeginsInTurn(begins, refused, then_silent=True))
+    outcome = world.push(waypoints(60))
+    world.wait_until(lambda _: bool(outcome), 30)
+    assert outcome[0][0].text == PushFailure.NO_ANSWER.value
+
+
+def test_a_board_that_reports_itself_armed_in_info_gets_no_list() -> None:
+    """Its telemetry still says disarmed: polls are slower than INFO."""
+    answers: dict[int, bytes] = {MissionCommand.BEGIN: WHOLE, MissionCommand.COMMIT: COMMITTED}
+    _, station = found(FixedReplies(answers, INFO._replace(flags=InfoFlag.ARMED)))
+    assert Upload(station, waypoints(60)).run(60) is MissionResult.DENIED
 
 
 @pytest.mark.parametrize(
