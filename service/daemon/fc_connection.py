@@ -81,12 +81,14 @@ class FcConnection:
 
     async def run(self) -> None:
         """Keep the port open, also after a bug; cancel to end."""
-        while True:
+        task = asyncio.current_task()
+        assert task is not None
+        while not task.cancelling():  # a bug while the port closes replaces the CancelledError
             try:
                 await self._port.run()
             except Exception:
                 _log.exception("daemon.fault", what="the flight controller's port")
-            await asyncio.sleep(_RESTART_S)
+                await asyncio.sleep(_RESTART_S)
 
     def close(self) -> None:
         """Stop the timers, and write the rest of the recording. The port closes with `run`."""

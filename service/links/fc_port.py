@@ -215,5 +215,6 @@ class FcPort:
         self._unsent.clear()
         self._speed = None
         self._closed.set()
-        device.close()
+        with suppress(*DEVICE_ERRORS):  # it is opened again in any case
+            device.close()
         self._on_close(why)

@@ -2,14 +2,17 @@
 """An error of the bridge itself while the flight controller's port opens or closes."""
 
 import asyncio
+import os
 
 import pytest
 
 from bridge.fc.session import FcSession
 from service.daemon.daemon import Daemon
+from service.links.fc_port import STOPPED, FcPort
+from service.links.traffic import Traffic
 from service.settings import Settings
 from service.settings.addresses import SimulatedFc
-from tests.support.programs import until_async
+from tests.support.programs import TIMEOUT_S, until_async
 
 
 def is_found(daemon: Daemon) -> bool:
@@ -39,3 +42,45 @@ async def test_the_flight_controller_is_found_again(event: str, monkeypatch: pyt
     assert not running.done()
     running.cancel()
     await asyncio.wait([running])
+
+
+async def test_a_bug_does_not_prevent_a_stop(monkeypatch: pytest.MonkeyPatch) -> None:
+    def wrong(_session: FcSession, _now: float, _why: str | None) -> None:
+        raise AssertionError("a bug")
+
+    monkeypatch.setattr(FcSession, "closed", wrong)
+    daemon = Daemon(Settings(SimulatedFc()))
+    running = asyncio.create_task(daemon.run())
+    await until_async(lambda: is_found(daemon), "the flight controller")
+    running.cancel()
+    await asyncio.wait([running], timeout=TIMEOUT_S)
+    assert running.done()
+
+
+class Unclosable:
+    """A device whose close fails."""
+
+    def __init__(self) -> None:
+        self._ends = os.pipe()
+
+    def fileno(self) -> int:
+        return self._ends[0]
+
+    def close(self) -> None:
+        for end in self._ends:
+            os.close(end)
+        raise OSError("failed")
+
+
+async def test_a_port_that_fails_to_close_is_reported_as_closed() -> None:
+    async def open_device() -> Unclosable:
+        return Unclosable()
+
+    opened = asyncio.Event()
+    closed: list[str] = []
+    running = asyncio.create_task(FcPort(open_device, opened.set, lambda _: None, closed.append, Traffic()).run())
+    await opened.wait()
+    running.cancel()
+    await asyncio.wait([running])
+    assert running.cancelled()
+    assert closed == [STOPPED]
