@@ -3,6 +3,7 @@
 
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from math import inf
 from pathlib import Path
 
@@ -25,7 +26,10 @@ class History:
         self._api = api
         self._logs = logs
         self._clock = clock
-        self._earlier = frozenset[str]() if logs is None else log_stamps(logs)
+        self._earlier = frozenset[str]()
+        if logs is not None:
+            with suppress(OSError):  # a query reports it
+                self._earlier = log_stamps(logs)
         self._disk = BackgroundThread("history")
         self._events: deque[Json] = deque(maxlen=_MAX_EVENTS)
 

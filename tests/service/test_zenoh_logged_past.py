@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`history?_time=[..]` from telemetry logs."""
 
+import errno
 import os
 from datetime import UTC, datetime
 from itertools import pairwise
@@ -10,6 +11,12 @@ import pytest
 
 from protocols.mavlink.dialect import Message, messages
 from protocols.tlog import tlog_record
+from service.daemon.api import DaemonApi
+from service.daemon.daemon import Daemon
+from service.daemon.mission_data import Json
+from service.settings import Settings
+from service.settings.addresses import SimulatedFc
+from service.zenoh_link.history import History
 from service.zenoh_link.logged_past import log_stamps, read_logged_past
 from service.zenoh_link.time_range import TimeRange
 
@@ -121,3 +128,19 @@ def test_other_senders_other_files_and_damage_are_skipped(tmp_path: Path) -> Non
     (tmp_path / "2026-99-99 99-99-99.tlog").write_bytes(b"no date")
     (tmp_path / "notes.txt").write_bytes(b"no log")
     assert [each["facts"]["text"] for each in read_logged_past(tmp_path, EVER, 9).events] == ["whole"]
+
+
+async def test_a_failing_disk_is_reported_by_the_query_and_does_not_prevent_the_start(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(path: Path) -> None:
+        raise OSError(errno.EIO, os.strerror(errno.EIO), path)
+
+    async def none_stored(*_range: float) -> Json:
+        return {"missions": []}
+
+    monkeypatch.setattr("service.zenoh_link.logged_past.os.scandir", fail)
+    monkeypatch.setattr(DaemonApi, "missions_between", none_stored)
+    history = History(DaemonApi(Daemon(Settings(SimulatedFc()))), tmp_path, lambda: NOON_S)
+    with pytest.raises(OSError, match="Input/output error"):
+        await history.answer(None, 0)
