@@ -12,8 +12,9 @@ import pytest
 from bridge.gcs.guard import LinkAccess
 from bridge.gcs.station import Peer, Station
 from bridge.gcs.stations import MAX_PEERS
-from bridge.vehicle import mission_upload
+from bridge.vehicle import mission_upload, upload_states
 from bridge.vehicle.upload_answers import UploadAnswers
+from bridge.vehicle.upload_list import UploadList
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import MissionResult
@@ -215,6 +216,14 @@ def test_made_up_ids_do_not_cancel_a_pilot_on_a_slow_radio() -> None:
         world.after(number / 20, send_count)
     assert Upload(pilot, waypoints(3), repeat_s=1.5).run(9) is MissionResult.ACCEPTED
     assert world.stored == records_of(waypoints(3))
+
+
+def test_of_too_many_uploads_the_oldest_without_standing_ends() -> None:
+    pilot, *strangers = (Station(Peer("udp", (f"10.0.0.{number}", 14550)), 255, 190) for number in range(4))
+    uploads = UploadList()
+    for at, station in enumerate((pilot, *strangers)):
+        uploads.add(upload_states.Upload(station, 9, "", upload_states.Waiting(upload_states.Announced(), at), 0))
+    assert uploads.least_worth(lambda peer: peer == pilot.peer).station == strangers[0]
 
 
 def test_of_too_many_uploads_the_oldest_without_items_ends(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,7 +13,7 @@ from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
 from protocols.mission_record import ListIdentity, identify
 from protocols.msp.frame import Direction, MspFrame, MspParser
-from protocols.msp.mission import Info, InfoFlag, MissionCommand, Records, ReplyStatus, Staged, Stored
+from protocols.msp.mission import Info, InfoFlag, MissionCommand, Records, ReplyStatus, Staged, Stored, decode_info
 from tests.support.conversations import Download, Upload, records_of, waypoints
 from tests.support.fake_controllers import HARAKIRI_CAPABILITY, QuietLine, ident
 from tests.support.world import GroundStation, World
@@ -176,6 +176,12 @@ def test_a_download_without_progress_ends(answer: Records) -> None:
     download = Download(station, repeat_s=30)
     download.run(30)
     assert download.result is MissionResult.DENIED
+
+
+@pytest.mark.parametrize("field", ["version", "chunk_records", "chunk_window", "read_records"])
+def test_info_without_a_number_that_a_transfer_needs_is_not_accepted(field: str) -> None:
+    assert decode_info(INFO.encode()) == INFO
+    assert decode_info(INFO._replace(**{field: 0}).encode()) is None  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("records", [15, 16, 40, 255])

@@ -4,7 +4,9 @@
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.fc.states.msp import Identifying
 from bridge.line.conversation import save
+from bridge.missions.mission_service import HeldMission
 from bridge.model.mission_log import ArrivedMission, Outcome
+from bridge.model.refusal import Refusal
 from bridge.model.verdict import CLEARED_LIST
 from protocols.mission_item import MissionResult
 from tests.support.conversations import Download, Upload, records_of, waypoints
@@ -61,6 +63,20 @@ def test_identification_delayed_by_many_missions_is_repeated() -> None:
     world.wait_until(lambda w: not isinstance(w.bridge.session.state, Identifying), 15.1)
     assert world.kind is None
     world.wait_until(lambda w: w.kind is harakiri.PATCHED, 30)
+
+
+def test_a_list_whose_board_is_gone_when_the_store_answers_is_not_kept() -> None:
+    world, _ = holding()
+    world.bridge.missions.held = None
+    world.store.delay_s = 2.0
+    answers: list[HeldMission | Refusal] = []
+    world.bridge.local.pull(answers.append, world.now)
+    world.run(1)
+    assert not answers
+    world.unplug()
+    world.wait_until(lambda _: bool(answers), 3)
+    assert isinstance(answers[0], HeldMission)
+    assert world.bridge.missions.held is None
 
 
 def test_a_late_reply_of_the_store_is_dropped() -> None:

@@ -2,7 +2,9 @@
 """MSP frames are found in any stream: byte by byte, after false or truncated headers, in bounded time."""
 
 import random
+from functools import reduce
 from itertools import pairwise
+from operator import xor
 
 from hypothesis import example, given
 from hypothesis import strategies as st
@@ -126,3 +128,10 @@ def test_a_megabyte_of_any_bytes_takes_bounded_work() -> None:
             assert len(parser._buffer) < 9 + MAX_REPLY
         parser.reset()
         assert parser._buffer == b""
+
+
+def test_a_jumbo_frame_has_at_least_255_bytes() -> None:
+    """A shorter one is noise, although its checksum is right."""
+    body = b"\xff\x64\x03\x00abc"
+    parser = MspParser()
+    assert parser.feed(b"$M>" + body + bytes((reduce(xor, body),))) + parser.reset() == []

@@ -131,6 +131,7 @@ def test_a_missing_number_is_reported(store: MissionStore) -> None:
     assert store.get(5) is None
     with pytest.raises(StoreError, match=r"there is no mission 5 in .*missions\.db"):
         store.conclude(5, "VERIFIED", "", 1.0)
+    assert store.add(mission(1)) == 1, "the failed transaction is rolled back"
 
 
 def test_a_closed_store_reports_it(tmp_path: Path) -> None:

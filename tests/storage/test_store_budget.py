@@ -29,6 +29,16 @@ def test_a_full_store_loses_rejected_lists_first(tmp_path: Path) -> None:
     assert (tmp_path / "missions.db").stat().st_size < 2 << 20
 
 
+def test_a_full_store_keeps_a_failed_list_longer_than_newer_rejected_ones(tmp_path: Path) -> None:
+    with open_store(tmp_path / "missions.db", 0.0, budget=1 << 20).store as store:
+        failed = store.add(mission(1))
+        store.conclude(failed, "FAILED", "", 1.0)
+        for number in range(2, 400):
+            outcome = "REJECTED" if number % 2 else "CANCELLED"
+            store.conclude(store.add(mission(number, items=40)), outcome, "", 1.0)
+        assert [line.number for line in store.list(1000)][-1] == failed
+
+
 def test_intact_missions_in_a_damaged_store_are_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Sectors and bytes are changed at random; no mission and no row of the list reads back changed."""
     path = tmp_path / "missions.db"
