@@ -13,7 +13,17 @@ from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
 from protocols.mission_record import ListIdentity, identify
 from protocols.msp.frame import Direction, MspFrame, MspParser
-from protocols.msp.mission import Info, InfoFlag, MissionCommand, Records, ReplyStatus, Staged, Stored, decode_info
+from protocols.msp.mission import (
+    Info,
+    InfoFlag,
+    MissionCommand,
+    Records,
+    ReplyStatus,
+    Staged,
+    Stored,
+    decode_info,
+    unmask,
+)
 from tests.support.conversations import Download, Upload, records_of, waypoints
 from tests.support.fake_controllers import HARAKIRI_CAPABILITY, QuietLine, ident
 from tests.support.world import GroundStation, World
@@ -176,6 +186,41 @@ def test_a_download_without_progress_ends(answer: Records) -> None:
     download = Download(station, repeat_s=30)
     download.run(30)
     assert download.result is MissionResult.DENIED
+
+
+class Reader(FakeExtension):
+    """Holds 20 records; `first_reply` is its reply to the first READ, or to all of them if `is_stubborn`."""
+
+    def __init__(self, first_reply: Records, *, is_stubborn: bool = False) -> None:
+        self.records = records_of(waypoints(20))
+        super().__init__(info=INFO._replace(stored=identify(self.records)))
+        self.first_reply = first_reply
+        self.is_stubborn = is_stubborn
+        self.reads = 0
+
+    def answer(self, frame: MspFrame) -> bytes | None:
+        body = unmask(frame.payload)
+        if frame.command != MissionCommand.READ or body is None:
+            return None
+        self.reads += 1
+        if self.reads == 1 or self.is_stubborn:
+            return self.first_reply.encode()
+        first = int.from_bytes(body[:2], "little")
+        return Records(ReplyStatus.OK, first, self.records[first : first + body[2]]).encode()
+
+
+def test_records_at_a_place_that_was_not_asked_for_are_read_again() -> None:
+    board = Reader(Records(ReplyStatus.OK, 7, records_of(waypoints(20))[7:13]))
+    _, station = found(board)
+    assert len(Download(station, repeat_s=30).run(30)) == 20
+
+
+def test_a_refused_read_is_tried_only_once_more() -> None:
+    """Two READs are in flight at a time."""
+    board = Reader(Records(ReplyStatus.ARMED, 0, []), is_stubborn=True)
+    world, _ = found(board)
+    world.wait_until(lambda w: board.reads > 0 and not w.bridge.runner.is_busy, 30)
+    assert board.reads <= 4
 
 
 @pytest.mark.parametrize("field", ["version", "chunk_records", "chunk_window", "read_records"])
