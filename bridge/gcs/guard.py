@@ -156,7 +156,7 @@ class Guard:
         self._log_event = log_event
         self._passes_everything = passes_everything
         self._signed: set[Peer] = set()
-        self._told: dict[Peer, set[str]] = {}
+        self._logged: dict[Peer, set[str]] = {}
         #: Refusals by (link, reason).
         self.refused: Counter[tuple[str, str]] = Counter()
 
@@ -208,14 +208,14 @@ class Guard:
 
     def forget(self, peer: Peer) -> None:
         self._signed.discard(peer)
-        self._told.pop(peer, None)
+        self._logged.pop(peer, None)
 
     def _refuse(self, peer: Peer, frame: MavlinkFrame, why: str, *, is_forged: bool = False) -> GuardRefusal:
         self.refused[peer.link, why] += 1
-        told = self._told.setdefault(peer, set())
-        is_first = why not in told and not _asks_for_rates(frame)
+        logged = self._logged.setdefault(peer, set())
+        is_first = why not in logged and not _asks_for_rates(frame)
         if is_first:
-            told.add(why)
+            logged.add(why)
             station = Station(peer, frame.sysid, frame.compid)
             self._log_event("warning", "gcs.refused", station=str(station), message=_name(frame), why=why)
         return GuardRefusal(why, is_first, is_forged)

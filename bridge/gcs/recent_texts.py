@@ -15,18 +15,18 @@ class RecentTexts:
     """Remembers each text until 1 s has passed without a repetition."""
 
     def __init__(self) -> None:
-        self._told: dict[tuple[Peer, str], float] = {}  # oldest first
+        self._sent: dict[tuple[Peer, str], float] = {}  # oldest first
 
     def new_to(self, peers: Iterable[Peer], text: str, now: float) -> list[Peer]:
         """Those of `peers` for whom `text` is new in this attempt."""
-        while self._told:
-            oldest = next(iter(self._told))
-            if now < self._told[oldest] + _QUIET_S and len(self._told) <= _MAX_TEXTS:
+        while self._sent:
+            oldest = next(iter(self._sent))
+            if now < self._sent[oldest] + _QUIET_S and len(self._sent) <= _MAX_TEXTS:
                 break
-            del self._told[oldest]
+            del self._sent[oldest]
         new = []
         for peer in peers:
-            if self._told.pop((peer, text), None) is None:
+            if self._sent.pop((peer, text), None) is None:
                 new.append(peer)
-            self._told[peer, text] = now
+            self._sent[peer, text] = now
         return new

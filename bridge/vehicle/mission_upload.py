@@ -344,7 +344,7 @@ class MissionUploads:
         accepted = delivery.ack is MissionResult.ACCEPTED
         if verdict.result is not Result.REJECTED and accepted and not delivery.change:
             self._flash.not_written(upload.station.peer)
-        self.answers.tell(upload.station, verdict, delivery)
+        self.answers.report(upload.station, verdict, delivery)
         if upload in self._uploads:
             self._answer(upload, delivery.ack, now)
             self._handle(upload, Delivered(), now)

@@ -73,7 +73,7 @@ class UploadAnswers:
             self._forget_strangers()
         self._ground.mission_ack(station, ack, mission_type)
 
-    def tell(self, station: Station, verdict: Verdict[Any], delivery: DeliveryResult) -> None:
+    def report(self, station: Station, verdict: Verdict[Any], delivery: DeliveryResult) -> None:
         """Report everything to the sender, and the change on the aircraft to other ground stations."""
         if delivery.ack is not MissionResult.ACCEPTED:
             self._ground.say(Severity.ERROR, delivery.text, station)

@@ -32,13 +32,13 @@ class DaemonApi:
         self._daemon = daemon
         self._loop = asyncio.get_running_loop()
 
-    async def do(self, request: Json, tell: Callable[[Json], None]) -> Json:
-        """Handle a request; `tell` takes the progress. ControlError, StoreError or ValueError on failure."""
+    async def do(self, request: Json, progress: Callable[[Json], None]) -> Json:
+        """Handle a request; `progress` is called with each step. ControlError, StoreError or ValueError on failure."""
         match request.get("do"):
             case "push":
                 source = str(request.get("source"))[:_MAX_SOURCE]
                 may_erase = request.get("may_erase") is not False
-                return await self.push(mission_items(request.get("items")), source, tell, may_erase=may_erase)
+                return await self.push(mission_items(request.get("items")), source, progress, may_erase=may_erase)
             case "pull":
                 return await self.pull()
             case "status":
@@ -48,7 +48,7 @@ class DaemonApi:
             case "mission":
                 return await self.show_mission(whole_number(request, "number", 0, MOST))
             case "restore":
-                return await self.restore(whole_number(request, "number", 0, MOST), tell)
+                return await self.restore(whole_number(request, "number", 0, MOST), progress)
             case other:
                 raise ControlError(f"{other!r} is not a request")
 
@@ -61,10 +61,10 @@ class DaemonApi:
         def done(outcome: DeliveryResult | Refusal, arrived: ArrivedMission | None) -> None:
             _resolve(future, delivery_data(outcome, arrived))
 
-        def tell(records: int) -> None:
+        def written(records: int) -> None:
             progress({"progress": records})
 
-        self._daemon.bridge.local.push(items, source, tell, done, self._loop.time(), may_erase=may_erase)
+        self._daemon.bridge.local.push(items, source, written, done, self._loop.time(), may_erase=may_erase)
         self._daemon.flush()
         return await future
 

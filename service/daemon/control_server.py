@@ -92,23 +92,23 @@ class ControlServer:
             writer.close()
 
     async def _answer(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        def tell(answer: Json) -> None:
+        def send(answer: Json) -> None:
             writer.write(to_json(answer).encode() + b"\n")
 
         try:
             line = await asyncio.wait_for(_read_line(reader), _REQUEST_TIMEOUT_S)
-            tell({"result": await self._api.do(_request(line), tell)})
+            send({"result": await self._api.do(_request(line), send)})
             await _send_all(writer)
         except TimeoutError:
-            tell({"error": f"no complete request within {_REQUEST_TIMEOUT_S:.0f} s"})
+            send({"error": f"no complete request within {_REQUEST_TIMEOUT_S:.0f} s"})
         except (ControlError, StoreError) as error:
-            tell({"error": str(error)})
+            send({"error": str(error)})
         except ValueError as error:
-            tell({"error": f"request not understood: {error}"})
+            send({"error": f"request not understood: {error}"})
         except ConnectionError:
             pass
         except asyncio.CancelledError:  # by close(); asyncio's streams would log it as an error
-            tell({"error": "the daemon stopped before it could reply; `pull` shows what the flight controller holds"})
+            send({"error": "the daemon stopped before it could reply; `pull` shows what the flight controller holds"})
 
 
 async def _send_all(writer: asyncio.StreamWriter) -> None:

@@ -50,7 +50,7 @@ async def run_until_signal(daemon: Daemon, notifier: Notifier, load: Callable[[]
         loop.add_signal_handler(number, signalled, number)
     told_to_reload = asyncio.Event()
     loop.add_signal_handler(signal.SIGHUP, told_to_reload.set)
-    reloading = loop.create_task(_reload_when_told(told_to_reload, daemon, notifier, load))
+    reloading = loop.create_task(_reload_on_request(told_to_reload, daemon, notifier, load))
     reporting = _Reporting(daemon, notifier)
     try:
         with suppress(asyncio.CancelledError):
@@ -99,16 +99,16 @@ def link_line(daemon: Daemon) -> str:
     return f"{where}; {count} ground station{'' if count == 1 else 's'}"
 
 
-async def _reload_when_told(
-    told: asyncio.Event, daemon: Daemon, notifier: Notifier, load: Callable[[], Settings]
+async def _reload_on_request(
+    requested: asyncio.Event, daemon: Daemon, notifier: Notifier, load: Callable[[], Settings]
 ) -> None:
-    """Apply the result of `load` each time `told` is set; invalid settings change nothing."""
+    """Apply the result of `load` each time `requested` is set; invalid settings change nothing."""
     # Ready when ground stations can connect: the flight controller may appear at any time.
     await daemon.started.wait()
     notifier.ready()
     reader = BackgroundThread("settings")  # a hanging disk must delay neither the links nor the stop
-    while await told.wait():
-        told.clear()
+    while await requested.wait():
+        requested.clear()
         notifier.reloading()
         try:
             _take_over(daemon, await reader.ask(load))

@@ -22,7 +22,7 @@ _log = structlog.get_logger()
 
 
 class StateFile:
-    """Written in order by its own thread: an SD card may take a second. `without`: the effect of losing it."""
+    """Written by its own thread, because an SD card may take a second. `without`: the effect of losing it."""
 
     def __init__(self, path: Path, without: str) -> None:
         self._path = path

@@ -8,7 +8,7 @@ from pathlib import Path
 from reprlib import Repr
 from typing import NamedTuple
 
-_ENVIRONMENT = "NAZE_BRIDGE_"
+ENVIRONMENT_PREFIX = "NAZE_BRIDGE_"
 _repr = Repr()
 _repr.maxstring = _repr.maxother = _repr.maxlong = 80
 
@@ -64,7 +64,7 @@ class Key:
     @property
     def variable(self) -> str:
         """The name of its environment variable."""
-        return _ENVIRONMENT + self.name.upper().replace(".", "_")
+        return ENVIRONMENT_PREFIX + self.name.upper().replace(".", "_")
 
 
 def short(value: object) -> str:

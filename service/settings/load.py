@@ -10,7 +10,7 @@ from typing import Any
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
 from service.settings.addresses import GcsAddress, SerialFc, parse_gcs, split_gcs
 from service.settings.config_files import Given, nearest, read_files
-from service.settings.key import Problem, SettingsError, Unfit
+from service.settings.key import ENVIRONMENT_PREFIX, Problem, SettingsError, Unfit
 from service.settings.ports import port_conflicts
 from service.settings.settings import DEFAULT_GCS, Settings, TlogLimits
 from service.settings.table import KEYS
@@ -22,7 +22,6 @@ from service.settings.zenoh import ZenohSettings, ZenohSettingsError
 CONFIG_VARIABLE = "NAZE_BRIDGE_CONFIG"
 #: The service's configuration file, as in its unit.
 SERVICE_CONFIG = Path("/etc/naze-bridge/config.toml")
-_PREFIX = "NAZE_BRIDGE_"
 
 
 def default_state_dir() -> Path:
@@ -107,7 +106,7 @@ def _read_environment(environment: Mapping[str, str], problems: list[Problem]) -
             table, dot, _ = key.name.partition(".")
             if dot:
                 given[table] = Given(True, variable)
-        elif variable.startswith(_PREFIX) and variable != CONFIG_VARIABLE:
+        elif variable.startswith(ENVIRONMENT_PREFIX) and variable != CONFIG_VARIABLE:
             problems.append(Problem(variable, f"this is not a setting; {nearest(variable, keys)}"))
     return given
 

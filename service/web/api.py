@@ -157,7 +157,7 @@ class Api:
         return Response(qr_code(urls[0]), media_type="image/svg+xml")
 
     async def _missions(self, _request: Request) -> Response:
-        return _json(await _told(self._api.list_missions(_LISTED)))
+        return _json(await _answered(self._api.list_missions(_LISTED)))
 
     async def _mission(self, request: Request) -> Response:
         number = _number(request, "number")
@@ -215,7 +215,7 @@ class Api:
         return Response(self._metrics.render(), media_type=CONTENT_TYPE)
 
     async def _find(self, number: int) -> Json:
-        return await _told(self._api.show_mission(number))
+        return await _answered(self._api.show_mission(number))
 
 
 def _number(request: Request, name: str) -> int:
@@ -245,7 +245,7 @@ async def _stored(asked: Awaitable[Json]) -> Json:
         raise StoreError("the mission store does not answer: the disk is slow or failing; check dmesg") from error
 
 
-async def _told(asked: Awaitable[Json]) -> Json:
+async def _answered(asked: Awaitable[Json]) -> Json:
     """Wait for the store; its errors become refusals."""
     try:
         return await _stored(asked)

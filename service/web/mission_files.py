@@ -55,8 +55,8 @@ class MissionWriter:
             await asyncio.gather(self._task, return_exceptions=True)
 
     async def _run(self, write: Callable[[Progress], Awaitable[Json]], state: Json) -> None:
-        def progress(told: Json) -> None:
-            state["records"] = told["progress"]
+        def progress(message: Json) -> None:
+            state["records"] = message["progress"]
 
         try:
             answer = await write(progress)

@@ -43,7 +43,7 @@ class CommandQueries:
     async def _upload(self, question: Question) -> Json:
         items = await self._items(question)
         # A file without a storable item must not erase the missions of a fleet.
-        return _end(await self._api.push(items, "zenoh upload", _teller(question, len(items)), may_erase=False))
+        return _end(await self._api.push(items, "zenoh upload", _progress_of(question, len(items)), may_erase=False))
 
     async def _check(self, question: Question) -> Json:
         return {"result": await self._api.check(await self._items(question))}
@@ -56,7 +56,7 @@ class CommandQueries:
         if number is None or not number.isascii() or not number.isdigit() or not 0 < int(number) <= MOST:
             raise QueryRefused("add the mission's number: restore?number=3; mission/list has the numbers")
         data = await self._api.show_mission(int(number))
-        return _end(await self._api.restore(int(number), _teller(question, len(data["received"]["items"]))))
+        return _end(await self._api.restore(int(number), _progress_of(question, len(data["received"]["items"]))))
 
     async def _status(self, _: Question) -> Json:
         return {"result": self._api.status()}
@@ -101,9 +101,9 @@ def _number(question: Question, name: str, most: float) -> float | None:
     return number
 
 
-def _teller(question: Question, count: int) -> Callable[[Json], None]:
+def _progress_of(question: Question, count: int) -> Callable[[Json], None]:
     """A function that reports the progress towards `count` records."""
-    return lambda progress: question.tell(progress | {"of": count})
+    return lambda progress: question.send(progress | {"of": count})
 
 
 def _end(answer: Json) -> Json:

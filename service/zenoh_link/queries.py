@@ -64,7 +64,7 @@ class Question:
             raise QueryRefused(f"{name} must be a whole number from 1 to {most}")
         return int(text)
 
-    def tell(self, body: Json) -> None:
+    def send(self, body: Json) -> None:
         """Send one reply; more may follow."""
         data, encoding = self._payloads.reply(self._key, body), self._payloads.encoding(self._key)
 
@@ -127,7 +127,7 @@ class Queries:
 
     async def _answer(self, question: Question, answerer: Answerer) -> None:
         try:
-            question.tell(await answerer(question))
+            question.send(await answerer(question))
         except QueryRefused as error:
             self._refuse(question, error)
         except (ControlError, StoreError, OSError, ValueError) as error:

@@ -89,7 +89,7 @@ def test_refused_addresses_are_not_remembered() -> None:
         peer = Peer("udp", (f"10.0.{number // 250}.{number % 250}", 14550))
         world.bridge.gcs_received(peer, stranger.pack(count_message(9)), number / PER_S, datagram=True)
         world.bridge.tick(number / PER_S)
-    assert len(world.bridge.guard._told) <= MAX_PEERS
+    assert len(world.bridge.guard._logged) <= MAX_PEERS
 
 
 def test_listed_addresses_that_send_no_frame_are_not_remembered() -> None:

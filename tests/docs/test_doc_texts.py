@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from protocols.uart_capture import capture_header, capture_line, read_capture
-from service.cli.doctor.command import _tell as tell
+from service.cli.doctor.command import _print as print_check
 from service.cli.doctor.machine import check_clock
 from service.cli.doctor.port import check_console, check_port
 from tests.support.doc_pages import PAGES, blocks, place_of, prose_of, spans
@@ -45,7 +45,7 @@ def test_the_report_of_doctor(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     now = datetime.fromisoformat(time[1]).replace(tzinfo=UTC)
     for checked in (check_port(pi, PORT), check_console(pi, PORT), check_clock(pi, now)):
         assert checked is not None
-        tell(checked, as_json=False)
+        print_check(checked, as_json=False)
     assert capsys.readouterr().out == block.text
 
 

@@ -53,7 +53,7 @@ def diagnose(
         state_dir = state_dir or (SERVICE_STATE if SERVICE_STATE.is_symlink() else None)
     is_well = True
     for checked in _examine(config, fc, state_dir, asked):
-        _tell(checked, as_json=as_json)
+        _print(checked, as_json=as_json)
         if checked.grade is Grade.PROBLEM:
             is_well = False
     return is_well
@@ -84,7 +84,7 @@ def _listen(settings: Settings) -> Json:
         raise ControlError(str(error)) from error
 
 
-def _tell(checked: Checked, *, as_json: bool) -> None:
+def _print(checked: Checked, *, as_json: bool) -> None:
     if as_json:
         print_json(asdict(checked) | {"grade": checked.grade.value})
         return

@@ -40,14 +40,14 @@ def examine(
     if isinstance(fc, AutoFc) and running is not None and "port" not in running:
         fc = parse_fc(running["where"])  # the daemon was started with --fc
     ports: Sequence[FcAddress] = check_candidates(host) if isinstance(fc, AutoFc) else [fc]
-    told = [found for port in ports for check in _ON_PORT if (found := check(host, port)) is not None]
+    results = [found for port in ports for check in _ON_PORT if (found := check(host, port)) is not None]
     if len(ports) > 1:
         # One port with a flight controller is enough.
-        told = [replace(found, grade=Grade.NOTE) if found.grade is Grade.PROBLEM else found for found in told]
-    told.append(check_modem_manager(host, ports[0]) if ports else check_no_port(host))
+        results = [replace(found, grade=Grade.NOTE) if found.grade is Grade.PROBLEM else found for found in results]
+    results.append(check_modem_manager(host, ports[0]) if ports else check_no_port(host))
     yield check_versions(host)
-    yield from told
-    is_free = not any(found.grade is Grade.PROBLEM for found in told)
+    yield from results
+    is_free = not any(found.grade is Grade.PROBLEM for found in results)
     is_free = is_free and all(holder_of_port(host, port) is None for port in ports)
     yield from check_flight_controller(fc, running, ask_port if is_free else None)
     yield from check_wifi(host, settings.gcs)

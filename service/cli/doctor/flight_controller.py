@@ -12,7 +12,7 @@ from service.settings.addresses import FcAddress
 
 _WIRING = "is it powered? TX goes to RX, RX to TX, GND to GND; a Naze's USB socket is empty; MSP is on at this UART"
 
-_AGAIN = "then run `sudo naze-bridge doctor` again"
+_AGAIN = "after that, run `sudo naze-bridge doctor` again"
 
 
 def check_flight_controller(fc: FcAddress, running: Json | None, ask_port: Callable[[], Json] | None) -> list[Checked]:

@@ -38,20 +38,20 @@ def check_versions(host: Host) -> Checked:
 
 def check_clock(host: Host, now: datetime) -> Checked:
     """Check the clock, which logs and signatures depend on."""
-    told = f"{now:%Y-%m-%d %H:%M} UTC"
+    time_text = f"{now:%Y-%m-%d %H:%M} UTC"
     if now < _EPOCH:
         return problem(
-            "clock", f"it is {told}, years in the past", f"set it: sudo date --set '{_EPOCH:%Y-%m-%d} 12:00'"
+            "clock", f"it is {time_text}, years in the past", f"set it: sudo date --set '{_EPOCH:%Y-%m-%d} 12:00'"
         )
     if host.path(_SYNCED).exists():
-        return ok("clock", f"{told}, set by the network")
+        return ok("clock", f"{time_text}, set by the network")
     keeper = next((process.name for process in host.processes() if process.name in _TIME_PROGRAMS), None)
     if keeper is not None:
-        return ok("clock", f"{told}, kept by {keeper}")
+        return ok("clock", f"{time_text}, kept by {keeper}")
     remedy = (
         "without a network nothing sets it: connect to the Internet once, or sudo date --set '...' before the flight"
     )
-    return note("clock", f"{told}, not set by the network since the start", remedy)
+    return note("clock", f"{time_text}, not set by the network since the start", remedy)
 
 
 def check_disk(state_dir: Path, free_of: Callable[[Path], int] = lambda path: shutil.disk_usage(path).free) -> Checked:
@@ -72,10 +72,10 @@ def check_disk(state_dir: Path, free_of: Callable[[Path], int] = lambda path: sh
             remedy = "the card may be worn out: look at `sudo dmesg`, then sudo mount -o remount,rw /"
             return problem("disk", f"{folder} is on a disk that is read-only", remedy)
         return note("disk", f"no permission to write to {folder}", "run doctor with sudo")
-    told = f"{free >> 20} MB free for {state_dir}"
+    space = f"{free >> 20} MB free for {state_dir}"
     if free < _LEAST_FREE:
-        return problem("disk", told, f"remove unneeded files, such as old logs: ls -l {state_dir}/logs")
-    return ok("disk", told)
+        return problem("disk", space, f"remove unneeded files, such as old logs: ls -l {state_dir}/logs")
+    return ok("disk", space)
 
 
 def check_database(state_dir: Path) -> list[Checked]:

@@ -145,11 +145,11 @@ def mavlink(name: str, gcs: tuple[str, ...], **where: Any) -> None:
     with fleet_session(where) as (session, prefix):
         chosen(alive(session, prefix), (name,), prefix)
 
-        def told(accepts: bool) -> None:
+        def input_changed(accepts: bool) -> None:
             click.echo(f"{name} {'accepts MAVLink again' if accepts else _READ_ONLY}", err=True)
 
         async def relay() -> None:
-            relay = GcsRelay(session, prefix, name, addresses, told)
+            relay = GcsRelay(session, prefix, name, addresses, input_changed)
             click.echo(f"{name} is at {', '.join(gcs)}. Ctrl-C ends.")
             try:
                 await asyncio.Event().wait()

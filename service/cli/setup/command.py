@@ -21,7 +21,7 @@ from service.web.token import DEFAULT_NAME
 from storage.os_error import reason
 
 _LEAST_PASSWORD, _MOST_PASSWORD, _MOST_SSID = 8, 63, 32
-#: Both speeds and protocols of every port are tried by then.
+#: The search spends 9 s on a port: three are tried by then.
 _SEARCH_S = 30
 _NEEDS_ROOT = "setup needs root: run `sudo naze-bridge setup`, or see the changes with --dry-run"
 _HOST_NAME = re.compile("[A-Za-z0-9](?:[A-Za-z0-9-]{0,61}[A-Za-z0-9])?")
@@ -97,7 +97,7 @@ def setup(
         if not yes and not click.confirm("Make these changes?", default=True):
             raise click.Abort
         _carry_out(steps, Machine(host))
-    _tell_where(host, answers)
+    _print_addresses(host, answers)
     if any(step.needs_reboot for step in steps):
         click.echo("\nReboot once for the UART: sudo reboot. After that: naze-bridge doctor")
     elif host.path("/run/systemd/system").exists():
@@ -140,7 +140,7 @@ def _await_flight_controller() -> None:
         time.sleep(1)
 
 
-def _tell_where(host: Host, answers: SetupChoices) -> None:
+def _print_addresses(host: Host, answers: SetupChoices) -> None:
     addresses = [_ADDRESS_OF_HOTSPOT] if answers.hotspot else host.ipv4_addresses()
     name = answers.name or host.read("/etc/hostname").strip()
     local = [f"{name}.local"] if name and host.path("/etc/avahi").exists() else []
