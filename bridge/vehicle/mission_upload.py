@@ -6,7 +6,7 @@ they are received in parallel and written one at a time. Mission Planner loses s
 MISSION_COUNT as "continue"; most special cases below respond to a behaviour listed in docs/ground-stations.md.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from math import inf
 from typing import Any
@@ -16,6 +16,7 @@ from bridge.gcs.flash_budget import TOO_MANY_WRITES
 from bridge.gcs.ground import Ground
 from bridge.gcs.station import Peer, Severity, Station
 from bridge.gcs.stations import MAX_PEERS
+from bridge.line.conversation import Conversation
 from bridge.missions.fc_mission_store import StoreReport
 from bridge.missions.list_check import begin_check, check_count
 from bridge.missions.mission_service import OCCUPIED, DeliveryResult, MissionService, MissionTransfer, TransferStep
@@ -50,7 +51,7 @@ _MISSION = int(messages.MAV_MISSION_TYPE_MISSION)
 _TOO_MANY_UPLOADS = Refusal(MissionResult.DENIED, "Too many uploads: wait a few seconds")
 #: The maximum number of simultaneous uploads: one for each peer of a link.
 _MOST_UPLOADS = MAX_PEERS
-#: The flight controller is not asked more often whether it can take a list; one reply serves all uploads that wait.
+#: The minimum interval between asking the flight controller if it can take a list; one reply serves all that wait.
 _ASK_INTERVAL_S = 0.2
 
 
@@ -223,7 +224,7 @@ class MissionUploads:
         state = upload.state
         if isinstance(state, Complete):
             refusal = self._missions.acquire(upload)
-            is_write = state.verdict.result is not Result.REJECTED
+            is_write = state.judged.verdict.result is not Result.REJECTED
             if refusal is None and is_write and not self._flash.allows(upload.station.peer, now):
                 refusal = Refusal(MissionResult.DENIED, TOO_MANY_WRITES)
         else:
@@ -242,8 +243,8 @@ class MissionUploads:
             self._uploads.change(upload, after(event, now))
         match event:
             case Turn() if isinstance(before, Complete):
-                delivered = partial(self._delivered, upload, before.verdict)
-                self._deliver(upload, before.received, before.verdict, delivered, now)
+                delivered = partial(self._delivered, upload, before.judged.verdict)
+                self._missions.run(self._delivery(upload, before.judged), delivered, now)
             case Turn():
                 self._uploads.begins_to_arrive(upload, now)
             case Ready():
@@ -324,18 +325,11 @@ class MissionUploads:
             for elsewhere in self._elsewhere(upload, now):
                 self._ground.to(elsewhere, request)
 
-    def _deliver(
-        self,
-        upload: Upload,
-        items: tuple[MissionItem, ...],
-        verdict: Verdict[Any],
-        on_done: Callable[[DeliveryResult | Refusal, float], None],
-        now: float,
-    ) -> None:
+    def _delivery(self, upload: Upload, judged: Judged) -> Conversation[DeliveryResult]:
         """Store the list and write it; a rejected one is only stored, unless its sender sent too many of them."""
-        is_kept = verdict.result is not Result.REJECTED or self._ground.allows(upload.station, Cost.STORED)
-        arrived = ArrivedMission(str(upload.station), items, verdict)
-        self._missions.run(self._missions.deliver(arrived, is_kept=is_kept), on_done, now)
+        is_kept = judged.verdict.result is not Result.REJECTED or self._ground.allows(upload.station, Cost.STORED)
+        arrived = ArrivedMission(str(upload.station), judged.items, judged.verdict)
+        return self._missions.deliver(arrived, is_kept=is_kept)
 
     def _delivered(self, upload: Upload, verdict: Verdict[Any], delivery: DeliveryResult | Refusal, now: float) -> None:
         if isinstance(delivery, Refusal):
@@ -355,8 +349,8 @@ class MissionUploads:
         """Report the reason for the end of an upload; the received items are still stored."""
         if items := state.received:
             finding = Finding(None, "list", len(items), None, refusal.text)
-            verdict: Verdict[Any] = Verdict(Result.REJECTED, refusal.ack, findings=(finding,))
-            self._deliver(upload, items, verdict, lambda _result, _at: None, now)
+            judged = Judged(items, Verdict(Result.REJECTED, refusal.ack, findings=(finding,)))
+            self._missions.run(self._delivery(upload, judged), lambda _result, _at: None, now)
             if state.is_closed:
                 self.answers.remind(upload.station, refusal.text, now)
         self._ground.say(Severity.ERROR, refusal.text, upload.station)

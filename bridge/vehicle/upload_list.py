@@ -26,7 +26,7 @@ class UploadList:
         self._states: Counter[type[UploadState]] = Counter()
         #: No state ends and no request is repeated before this time.
         self.due = inf
-        #: Since when lists have been arriving without a pause, and when the last upload ended.
+        #: When lists began to arrive without a pause, and when the last upload ended.
         self._arriving_since = self._last_end = -inf
 
     def __iter__(self) -> Iterator[Upload]:

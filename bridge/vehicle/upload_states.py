@@ -252,12 +252,11 @@ class Complete(UploadState):
 
     def __init__(self, event: Judged, now: float) -> None:
         super().__init__(event, now)
-        self._items = event.items
-        self.verdict = event.verdict
+        self.judged = event
 
     @property
     def received(self) -> tuple[MissionItem, ...]:
-        return self._items
+        return self.judged.items
 
 
 class Delivering(UploadState):
