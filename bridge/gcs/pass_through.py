@@ -60,10 +60,6 @@ class PassThrough:
         for frame in frames:
             self._send_alone(frame)
 
-    def is_aboard(self, system: int) -> bool:
-        """True if a system was heard on the autopilot's side."""
-        return any(system == sysid for sysid, _ in self._aboard)
-
     def addressed(self, system: int) -> int | None:
         """The system on the autopilot's side that a frame for `system` is meant for (0: any); None: none."""
         return next((sysid for sysid, _ in self._aboard if system in (0, sysid)), None)
@@ -79,7 +75,7 @@ class PassThrough:
             return False
         system, component = target_of(frame)
         if not to_stations:
-            return frame.msgid not in _ONLY_FROM_WRITERS and (system == 0 or self.is_aboard(system))
+            return frame.msgid not in _ONLY_FROM_WRITERS and (system == 0 or self.addressed(system) is not None)
         behind = self._heard.setdefault(station.peer, set())
         if len(behind) < _MAX_SPEAKERS:
             behind.add(speaker)
@@ -88,7 +84,7 @@ class PassThrough:
             return True
         others = [other for other in self._peers_of(system, component) if other != station.peer]
         self._copy(frame, station, others)
-        return self.is_aboard(system) or not others
+        return self.addressed(system) is not None or not others
 
     def forget(self, peer: Peer) -> None:
         self._heard.pop(peer, None)

@@ -141,9 +141,8 @@ class MessageRouter:
     def _ping(self, station: Station, message: Message, _now: float) -> None:
         # A PING with targets is itself an answer.
         if message.target_system == 0:
-            self._ground.to(
-                station, m.MAVLink_ping_message(message.time_usec, message.seq, station.sysid, station.compid)
-            )
+            answer = m.MAVLink_ping_message(message.time_usec, message.seq, station.sysid, station.compid)
+            self._ground.to(station, answer)
 
     def _timesync(self, station: Station, message: Message, now: float) -> None:
         if message.tc1 == 0:
@@ -194,9 +193,9 @@ class Incoming:
                 self._pass_on(self.routes, station, frame, now)
             else:
                 self._ground.record(peer, frame, now)
-                if self._router.understands(frame.msgid):
+                if self._router.understands(frame.msgid) and self._is_ours(*target_of(frame)):
                     message = self._decoder.decode(frame)
-                    if message is not None and self._is_for_us(message):
+                    if message is not None:
                         self._router.take(station, message, now)
         return True
 
@@ -241,11 +240,6 @@ class Incoming:
             self._parameters.send_one(station, message.param_id, -1)
         if refused.is_first:
             answers(m.MAVLink_statustext_message(Severity.WARNING, f"Refused: {refused.why}".encode()))
-
-    def _is_for_us(self, message: Message) -> bool:
-        system = getattr(message, "target_system", 0)
-        component = getattr(message, "target_component", 0)
-        return self._is_ours(system, component)
 
     def _is_ours(self, system: int, component: int) -> bool:
         sysid, compid = self._ids
