@@ -75,7 +75,6 @@ class OwnVehicle:
         self._is_news_wanted = False
         self._repeated_at = -inf
         self._told_blockers: tuple[str, ...] = ()
-        self._has_told_failsafe = False
         self._also_wanted: Mapping[type[Reading], float] = {}
         self._stale_s: Mapping[type[Reading], float] = {}
         #: New ground stations, and the end of their faster heartbeats.
@@ -251,13 +250,12 @@ class OwnVehicle:
         state = self._session.vehicle.last(FlightState)
         if state is None or (state.armed, state.mode, state.is_failsafe) == self._announced:
             return
+        was_failsafe = self._announced is not None and self._announced[2]
         self._announced = state.armed, state.mode, state.is_failsafe
-        if state.is_failsafe != self._has_told_failsafe:
-            self._has_told_failsafe = state.is_failsafe
-            if state.is_failsafe:
-                self._ground.say(Severity.CRITICAL, "Failsafe: the flight controller has taken over")
-            elif state.armed:
-                self._ground.say(Severity.NOTICE, "Failsafe ended: the pilot has control")
+        if state.is_failsafe and not was_failsafe:
+            self._ground.say(Severity.CRITICAL, "Failsafe: the flight controller has taken over")
+        elif was_failsafe and not state.is_failsafe and state.armed:
+            self._ground.say(Severity.NOTICE, "Failsafe ended: the pilot has control")
         self._ground.broadcast(self._heartbeat())
 
     def _heartbeat(self) -> Message:
