@@ -16,7 +16,7 @@ class Rate:
     burst: float
 
 
-class Cost(IntEnum):  # its hash is an int's, in C: it is made for each datagram
+class Cost(IntEnum):  # hashed for each datagram: as an int, in C
     """The limited kinds of work.
 
     RECEIVED: a datagram or a read from a connection.

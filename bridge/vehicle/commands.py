@@ -104,16 +104,13 @@ class CommandService:
         self._ground.say(Severity.ERROR, _REFUSED[command], station)
 
     def _acknowledge(self, station: Station, command: int, result: CommandResult) -> None:
-        self._ground.to(
-            station,
-            messages.MAVLink_command_ack_message(command, result, 0, 0, station.sysid, station.compid),
-        )
+        ack = messages.MAVLink_command_ack_message(command, result, 0, 0, station.sysid, station.compid)
+        self._ground.to(station, ack)
 
     def _acted(self, station: Station, command: int, outcome: ActionResult) -> None:
         result = _OUTCOMES[outcome]
-        self._ground.say(
-            Severity.NOTICE if result is CommandResult.ACCEPTED else Severity.ERROR, outcome.value, station
-        )
+        severity = Severity.NOTICE if result is CommandResult.ACCEPTED else Severity.ERROR
+        self._ground.say(severity, outcome.value, station)
         self._acknowledge(station, command, result)
 
     def _do(self, station: Station, command: int, params: Sequence[float]) -> CommandResult:

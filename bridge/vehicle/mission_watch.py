@@ -26,7 +26,7 @@ _NOT_LOADED = MissionChange("No mission is loaded: disarm to load the saved one"
 
 
 class MissionWatch:
-    """Checks as often as the store needs it, while no transfer runs: at once after a check that took longer."""
+    """Checks at the store's interval while no transfer runs; after a check that took longer, at once."""
 
     def __init__(self, missions: MissionService, ground: Ground, log_event: EventLog) -> None:
         self._missions = missions
