@@ -27,7 +27,8 @@ from service.machine.host import Host
 
 #: A link to examples/ in the repository, a file in the installed package.
 _EXAMPLE = Path(__file__).parent / "naze-field.waypoints"
-_CONNECT_TIMEOUT_S = 15.0
+#: Python's start included: about 3 s on a Pi Zero, far longer if it is busy.
+_CONNECT_TIMEOUT_S = 30.0
 
 
 @click.command()

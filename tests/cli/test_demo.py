@@ -38,6 +38,7 @@ def demo(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Itera
             lambda: "keeps running" in program.printed or not program.is_alive,
             "the end of the demonstration",
         )
+        assert program.is_alive, program.printed
         yield program
 
 
