@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 from socket import SOCK_STREAM
 
-from benchmarks.processes import ROOT, running, wait_for
+from benchmarks.processes import NAZE_BRIDGE, ROOT, running, wait_for
 from benchmarks.zenoh_programs import cpu_s
 from tests.support.programs import free_port
 from tests.support.zenoh_router import client, running_router
@@ -111,8 +111,8 @@ def _config(folder: Path, endpoint: str) -> Path:
 
 def _listed_s(endpoint: str, count: int) -> float:
     began_at = time.monotonic()
-    command = [sys.executable, "-c", "from service.cli.program import start; start()", "fleet", "list", "--json"]
-    listed = subprocess.run([*command, "--connect", endpoint], cwd=ROOT, capture_output=True, check=True)
+    command = [*NAZE_BRIDGE, "fleet", "list", "--json", "--connect", endpoint]
+    listed = subprocess.run(command, cwd=ROOT, capture_output=True, check=True)
     took_s = time.monotonic() - began_at
     found = len(json.loads(listed.stdout)["vehicles"])
     if found != count:

@@ -31,6 +31,9 @@ class _Follower:
         self.cost_s = cost_s
         self.used_until = -inf
 
+    def interval_s(self, msgid: int, default_s: float) -> float:
+        return max(self.requested.get(msgid, default_s), self.shortest_s)
+
 
 class MessageRates:
     """Intervals in seconds; infinity: never. `defaults` holds every known message id."""
@@ -52,7 +55,7 @@ class MessageRates:
     def interval_s(self, peer: Peer, msgid: int) -> float:
         """The interval requested by a ground station, or the default."""
         follower, default_s = self._followers.get(peer), self._defaults[msgid]
-        return default_s if follower is None else max(follower.requested.get(msgid, default_s), follower.shortest_s)
+        return default_s if follower is None else follower.interval_s(msgid, default_s)
 
     def fastest_s(self, peers: Iterable[Peer]) -> dict[int, float]:
         """The shortest interval of `peers` for each message."""
@@ -72,7 +75,7 @@ class MessageRates:
             follower = self._followers.get(peer) or self._follower(peer)
             if follower.used_until > now + _BURST_S:
                 continue
-            interval_s = max(follower.requested.get(msgid, default_s), follower.shortest_s)
+            interval_s = follower.interval_s(msgid, default_s)
             due = follower.due.get(msgid, -inf)
             if interval_s == inf or now < due - interval_s * _EARLY:
                 continue

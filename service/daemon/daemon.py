@@ -37,6 +37,7 @@ from service.machine.package import version
 from service.recording.tlog_recorder import TLOG_FOLDER, TlogRecorder
 from service.settings import PassThroughRule, Settings
 from service.settings.addresses import AutoFc, FcAddress, GcsAddress, SerialFc
+from storage.os_error import reason
 
 #: Timeouts of a stop: for a push to finish, for its abort, for the store. Together they stay within 2 s.
 _FINISH_S = 1.0
@@ -240,7 +241,7 @@ class Daemon:
         error = context.get("exception")
         if isinstance(error, OSError) and "accept" in context["message"]:
             # No file descriptor is left for a new client; asyncio retries every second.
-            warn_once(self._warned, "daemon.cannot_accept", why=error.strerror)
+            warn_once(self._warned, "daemon.cannot_accept", why=reason(error))
             return
         _log.error("daemon.fault", what=context["message"], exc_info=error)
         if error is not None and "handle" in context:

@@ -48,9 +48,9 @@ async def run_until_signal(daemon: Daemon, notifier: Notifier, load: Callable[[]
 
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, signalled, number)
-    told_to_reload = asyncio.Event()
-    loop.add_signal_handler(signal.SIGHUP, told_to_reload.set)
-    reloading = loop.create_task(_reload_on_request(told_to_reload, daemon, notifier, load))
+    reload_requested = asyncio.Event()
+    loop.add_signal_handler(signal.SIGHUP, reload_requested.set)
+    reloading = loop.create_task(_reload_on_request(reload_requested, daemon, notifier, load))
     reporting = _Reporting(daemon, notifier)
     try:
         with suppress(asyncio.CancelledError):

@@ -35,6 +35,18 @@ def flying() -> tuple[World, GroundStation]:
     return world, station
 
 
+def two_stations() -> tuple[World, GroundStation, GroundStation]:
+    """Two connected ground stations without unread messages."""
+    world = ready_world()
+    stations = GroundStation(world, "asking"), GroundStation(world, "other", sysid=254)
+    for station in stations:
+        station.send(m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3))
+    world.run(3)
+    for station in stations:
+        station.take()
+    return world, *stations
+
+
 def long(command: int, param1: float = 0.0, *, system: int = 1, component: int = 1) -> Message:
     return m.MAVLink_command_long_message(system, component, command, 0, param1, 0, 0, 0, 0, 0, 0)
 
@@ -156,13 +168,7 @@ def test_a_mode_change_is_refused_with_a_text(flying: tuple[World, GroundStation
     ids=lambda message: message.get_type(),
 )
 def test_only_the_sender_gets_the_refusal(refused: Message) -> None:
-    world = ready_world()
-    asking, other = GroundStation(world, "asking"), GroundStation(world, "other", sysid=254)
-    for station in (asking, other):
-        station.send(m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3))
-    world.run(1)
-    asking.take()
-    other.take()
+    world, asking, other = two_stations()
     asking.send(refused)
     world.run(3)
     assert asking.texts()
@@ -171,13 +177,7 @@ def test_only_the_sender_gets_the_refusal(refused: Message) -> None:
 
 def test_the_current_waypoint_cannot_be_set() -> None:
     """A MISSION_CURRENT would be success to Mission Planner, and another request to MAVSDK."""
-    world = ready_world()
-    asking, other = GroundStation(world, "asking"), GroundStation(world, "other", sysid=254)
-    for station in (asking, other):
-        station.send(m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3))
-    world.run(3)
-    asking.take()
-    other.take()
+    world, asking, other = two_stations()
     asking.send(m.MAVLink_mission_set_current_message(1, 1, 3))
     world.run(3)
     assert any("cannot be set" in text for text in asking.texts())

@@ -4,7 +4,6 @@ import os
 import shutil
 import signal
 import subprocess
-import sys
 import tempfile
 import tomllib
 from collections.abc import Iterator
@@ -13,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.programs import Program, free_port, run_naze_bridge, until
+from tests.support.programs import NAZE_BRIDGE, Program, free_port, run_naze_bridge, until
 
 REPOSITORY = Path(__file__).parents[2]
 TEMPORARY = "naze-bridge-demo-"
@@ -60,15 +59,7 @@ def test_an_installation_has_the_example(tmp_path: Path) -> None:
     for package in project["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]:
         shutil.copytree(REPOSITORY / package, tmp_path / package)
     ended = subprocess.run(
-        [
-            sys.executable,
-            "-c",
-            "from service.cli.program import start; start()",
-            "demo",
-            "--once",
-            "--port",
-            str(free_port()),
-        ],
+        [*NAZE_BRIDGE, "demo", "--once", "--port", str(free_port())],
         cwd=tmp_path,
         capture_output=True,
         text=True,
