@@ -15,7 +15,7 @@ enum { INFO_SIZE = 24, LIST_SIZE = 7, ABORT_SIZE = 1, READ_SIZE = 3, RADIUS_SIZE
 
 static uint16_t get16(const uint8_t *from)
 {
-    return (uint16_t)(from[0] | (uint16_t)(from[1] << 8));
+    return (uint16_t)(from[0] | (unsigned)from[1] << 8);
 }
 
 static uint32_t get32(const uint8_t *from)
@@ -199,14 +199,14 @@ static nm_status_t begin(nm_t *m, const uint8_t *body)
 {
     const nm_list_t list = get_list(body);
     nm_status_t status = may_write(m);
+    if (list.count == 0 && list.checksum != 0)
+        return NM_BAD_REQUEST;
     if (status != NM_OK)
         return status;
     if (!m->open || !same(list, m->wanted)) {
         m->open = false;
         if (list.count > NM_CAPACITY)
             return NM_NO_SPACE;
-        if (list.count == 0 && list.checksum != 0)
-            return NM_BAD_REQUEST;
         if (is_stored(m, list))
             return NM_SAME;
         status = clear_slot(m);
@@ -276,15 +276,16 @@ static nm_status_t commit(nm_t *m, const uint8_t *body)
 static nm_status_t set_radius(nm_t *m, const uint8_t *body)
 {
     const uint16_t radius = get16(body);
+    const nm_status_t allowed = may_write(m);
     if ((radius ^ get16(body + 2)) != 0xFFFF)
         return NM_BAD_REQUEST;
+    if (allowed != NM_ARMED && radius == m->board->radius(m->self))
+        return NM_OK;
+    if (allowed != NM_OK)
+        return allowed;
     if (radius > NM_MAX_RADIUS_CM)
         return NM_RANGE;
-    if (m->board->armed(m->self))
-        return NM_ARMED;
-    if (radius == m->board->radius(m->self))
-        return NM_OK;
-    if (m->board->write_pending(m->self) || !spend_write(m))
+    if (!spend_write(m))
         return NM_BUSY;
     m->board->set_radius(m->self, radius);
     return NM_OK;
@@ -424,7 +425,7 @@ void nm_start(nm_t *m, const nm_board_t *board, void *self)
     m->credited_ms = board->millis(self);
     for (uint8_t slot = 0; slot < NM_SLOTS; slot++) {
         const uint32_t sequence = get32(slot_flash(m, slot) + SEQUENCE_AT);
-        if (slot_valid(m, slot) && (m->slot == NM_SLOTS || (int32_t)(sequence - m->sequence) > 0))
+        if (slot_valid(m, slot) && (m->slot == NM_SLOTS || sequence - m->sequence < 0x80000000u))
             use_slot(m, slot);
     }
 }

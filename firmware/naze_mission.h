@@ -4,7 +4,7 @@
  *
  * The core takes an MSP command with its payload and returns the reply's payload. It does not depend on serial ports or on
  * the firmware around it, and its only time is a millisecond counter. No heap, no float, no globals: the caller owns all
- * state, one nm_t (under 56 bytes on a 32 bit target). It calls the board through an nm_board_t.
+ * state, one nm_t (48 bytes on a 32 bit target). It calls the board through an nm_board_t.
  *
  * THE FLASH
  *   NM_PAGES pages of NM_PAGE_SIZE bytes, two slots of NM_SLOT_PAGES each, written in turn. A slot is a header and, from
@@ -22,9 +22,12 @@
  *   directly, COMMIT its header and then the seal. So a power cut at any moment leaves the complete old or new list, and
  *   staging needs no RAM. Every program and erase operation is verified by reading back.
  *
- *   Wear: a list costs at most one erase of one slot, so 10,000 erase cycles last for 20,000 different lists. Blank
- *   pages are not erased again, and a list that is already stored is not written again. nm_t.sequence (INFO's last field)
+ *   Wear: a list costs at most one erase of one slot, so 10,000 erase cycles last for 20,000 different lists. Pages that
+ *   read blank are not erased, and a list that is already stored is not written again. nm_t.sequence (INFO's last field)
  *   counts the lists written.
+ *
+ *   Weak bits: a page whose erase was cut short can read blank, and a bit of it can change later. nm_start() then finds the
+ *   wrong CRC and takes the older list.
  *
  *   A companion in a loop must not wear out the flash: BEGINs that need an erase and RADIUS requests that change the
  *   configuration share a budget of NM_WRITE_BURST writes after a reset and one more every NM_WRITE_INTERVAL_MS, up to
@@ -37,9 +40,9 @@
  *   context, never from an interrupt. The core is not reentrant for one nm_t.
  *
  * TIME
- *   BEGIN takes as long as the board's page erases, up to three (STM32F103: 20..40 ms each). A full CHUNK programs 120 half-words
- *   (52..70 us each: under 9 ms). COMMIT and nm_start() compute CRCs over up to 2,336 bytes, COMMIT only while disarmed. Nothing
- *   else touches the flash.
+ *   On an STM32F103: BEGIN erases up to three pages of 20..40 ms each. A full CHUNK programs 120 half-words of 52..70 us each,
+ *   under 9 ms. Meanwhile a CPU that runs from the same flash stands still, with its interrupts: ticks of the clock are lost.
+ *   A CRC over a full list takes 2 ms. While armed, the core neither writes to the flash nor computes a CRC.
  *
  * STACK
  *   Under 200 bytes below nm_handle() on Cortex-M3, without the board's functions (`make test-arm` measures it).
@@ -158,8 +161,9 @@ void nm_poll(nm_t *m);
 int nm_handle(nm_t *m, uint8_t command, uint8_t *buffer, uint8_t size);
 
 /*
- * Make `count` records the stored list, as COMMIT does; an open transfer is dropped. For lists that the firmware received
- * without this extension. Returns NM_OK, NM_SAME (nothing written), NM_ARMED, NM_NO_SPACE or NM_FLASH (the old list is whole).
+ * Make `count` records the stored list, as COMMIT does, for lists that the firmware received without this extension.
+ * Returns NM_OK or NM_FLASH (the old list is whole), which drop an open transfer; NM_SAME, NM_ARMED or NM_NO_SPACE, which
+ * change nothing.
  */
 nm_status_t nm_store(nm_t *m, const uint8_t *records, uint16_t count);
 

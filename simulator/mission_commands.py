@@ -142,17 +142,17 @@ class MissionCommands:
     def _begin(self, body: bytes | None, now: float) -> ReplyStatus:
         if body is None or len(body) != _LIST.size:
             return ReplyStatus.BAD_REQUEST
+        identity = ListIdentity(*_LIST.unpack(body))
+        if identity.count == 0 and identity.checksum:
+            return ReplyStatus.BAD_REQUEST
         if refusal := self._refusal():
             return refusal
-        identity = ListIdentity(*_LIST.unpack(body))
         if self._transfer and self._transfer.identity == identity:
             self._transfer.touched = now
             return ReplyStatus.OK
         self._transfer = None
         if identity.count > self._options.capacity:
             return ReplyStatus.NO_SPACE
-        if identity.count == 0 and identity.checksum:
-            return ReplyStatus.BAD_REQUEST
         if identity == self._slots.stored:
             return ReplyStatus.SAME
         if not self._slots.is_prepared:
@@ -239,13 +239,14 @@ class MissionCommands:
         value, inverse = _RADIUS.unpack(body)
         if value ^ inverse != 0xFFFF:
             return ReplyStatus.BAD_REQUEST
+        refusal = self._refusal()
+        if refusal is not ReplyStatus.ARMED and value == self._board.wp_radius_cm:
+            return ReplyStatus.OK
+        if refusal:
+            return refusal
         if value > MAX_RADIUS_CM:
             return ReplyStatus.RANGE
-        if self._board.armed:
-            return ReplyStatus.ARMED
-        if value == self._board.wp_radius_cm:
-            return ReplyStatus.OK
-        if self._board.write_pending or not self._spend_write():
+        if not self._spend_write():
             return ReplyStatus.BUSY
         self._board.set_wp_radius(value, now)
         return ReplyStatus.OK

@@ -39,7 +39,7 @@ typedef struct {
     bool armed;
     bool write_pending; /* some other write of the configuration is scheduled */
 
-    uint32_t operations; /* flash operations since sim_create() or sim_count() */
+    uint32_t operations; /* flash operations since power-up, sim_cut_at() or sim_fail_at() */
     uint32_t violations; /* of the flash's rules */
     uint32_t erases[NM_PAGES];
     uint32_t cut_at; /* cut the power at this operation; 0: never */

@@ -15,6 +15,7 @@
  * Always: the flash's rules are kept, the configuration is untouched, the list changes only by a COMMIT or by the firmware,
  * and the stored list has the reported checksum.
  */
+#include "reference.h"
 #include "sim_board.h"
 
 #include <stdlib.h>
@@ -38,17 +39,6 @@ static void expect(bool condition)
 static uint8_t next(input_t *in)
 {
     return in->at < in->end ? *in->at++ : 0;
-}
-
-static uint32_t slow_checksum(const uint8_t *data, uint32_t length)
-{
-    uint32_t crc = 0xFFFFFFFFu;
-    while (length--) {
-        crc ^= *data++;
-        for (int bit = 0; bit < 8; bit++)
-            crc = crc & 1 ? crc >> 1 ^ 0xEDB88320u : crc >> 1;
-    }
-    return ~crc;
 }
 
 static void receive(uint8_t byte)
@@ -117,7 +107,7 @@ static void check_stored(void)
     const uint32_t bytes = board.core.stored.count * NM_RECORD_SIZE;
     expect(sim_config_intact(&board));
     if (records) {
-        expect(slow_checksum(records, bytes) == board.core.stored.checksum);
+        expect(bitwise_crc32(records, bytes) == board.core.stored.checksum);
         expect(memcmp(board.list, records, bytes) == 0);
     }
 }

@@ -4,6 +4,7 @@
  * stands in for Harakiri: it makes the calls that the patches make.
  */
 #include "harakiri_mission.c"
+#include "reference.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,7 +19,7 @@ int16_t rcData[8];
 uint32_t ScheduleEEPROMwriteMS;
 
 static uint32_t now;
-static bool pass, upload_open;
+static bool pass, upload_open, unlocked;
 static unsigned config_writes;
 
 #define CHECK(condition) check((condition), #condition, __LINE__)
@@ -41,10 +42,12 @@ static uint8_t *at(uint32_t address)
 
 void FLASH_Unlock(void)
 {
+    unlocked = true;
 }
 
 void FLASH_Lock(void)
 {
+    unlocked = false;
 }
 
 void FLASH_ClearFlag(uint32_t flags)
@@ -54,12 +57,16 @@ void FLASH_ClearFlag(uint32_t flags)
 
 FLASH_Status FLASH_ErasePage(uint32_t address)
 {
+    CHECK(unlocked && address % FLASH_PAGE_SIZE == 0);
     memset(at(address), 0xFF, FLASH_PAGE_SIZE);
     return FLASH_COMPLETE;
 }
 
 FLASH_Status FLASH_ProgramHalfWord(uint32_t address, uint16_t data)
 {
+    uint16_t before;
+    memcpy(&before, at(address), sizeof before);
+    CHECK(unlocked && address % 2 == 0 && (before == 0xFFFF || data == 0));
     memcpy(at(address), &data, sizeof data);
     return FLASH_COMPLETE;
 }
@@ -138,17 +145,6 @@ static void serve_scheduled_write(void)
     }
 }
 
-static uint32_t bitwise_crc32(const uint8_t *data, uint32_t length)
-{
-    uint32_t crc = 0xFFFFFFFFu;
-    while (length--) {
-        crc ^= *data++;
-        for (int bit = 0; bit < 8; bit++)
-            crc = crc & 1 ? crc >> 1 ^ 0xEDB88320u : crc >> 1;
-    }
-    return ~crc;
-}
-
 /* Push one record, all bytes 1 but for its command. Returns COMMIT's status. */
 static int push_one(uint8_t command)
 {
@@ -162,7 +158,7 @@ static int push_one(uint8_t command)
     if (MissionRequest(NM_BEGIN, begin, 7) != 7 || begin[0] != NM_OK)
         return begin[0];
     CHECK(MissionRequest(NM_CHUNK, chunk, 19) == 7 && chunk[0] == NM_OK);
-    CHECK(MissionRequest(NM_COMMIT, commit, 7) == 7);
+    CHECK(MissionRequest(NM_COMMIT, commit, 7) == 7 && !unlocked);
     return commit[0];
 }
 
@@ -220,6 +216,15 @@ static void test_a_write_of_the_configuration_ends_an_upload(void)
     CHECK(has(2, 7));
 }
 
+static void test_the_slots_take_turns(void)
+{
+    new_chip(0, 0);
+    for (uint8_t command = 0; command < 4; command++)
+        CHECK(push_one(command) == NM_OK);
+    power_up();
+    CHECK(has(1, 1) && mission.sequence == 4);
+}
+
 static void test_the_configurations_copy_follows_with_the_next_write(void)
 {
     const config_t *copy = (const config_t *)at(FLASH_WRITE_ADDR);
@@ -271,6 +276,7 @@ int main(void)
         test_an_invalid_configuration_has_no_list,
         test_an_interrupted_upload_keeps_the_stored_list,
         test_a_write_of_the_configuration_ends_an_upload,
+        test_the_slots_take_turns,
         test_the_configurations_copy_follows_with_the_next_write,
         test_writing_waits_for_a_scheduled_write,
         test_with_feature_pass_writes_wait_for_the_throttle,

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Tests of the mission core on a board in memory. Runs on the host and on an emulated Cortex-M3. */
+#include "reference.h"
 #include "sim_board.h"
 
 #include <stdio.h>
@@ -37,17 +38,6 @@ typedef struct {
     uint32_t checksum;
     uint8_t records[NM_CAPACITY * NM_RECORD_SIZE];
 } list_t;
-
-static uint32_t bitwise_crc32(const uint8_t *data, uint32_t length)
-{
-    uint32_t crc = 0xFFFFFFFFu;
-    while (length--) {
-        crc ^= *data++;
-        for (int bit = 0; bit < 8; bit++)
-            crc = crc & 1 ? crc >> 1 ^ 0xEDB88320u : crc >> 1;
-    }
-    return ~crc;
-}
 
 static list_t list_of(uint16_t count, uint8_t seed)
 {

@@ -242,7 +242,8 @@ def test_arming_drops_the_transfer_and_refuses_changes(fc: Companion) -> None:
     assert fc.begin(identify(NEW)) == Staged(ReplyStatus.ARMED, 0, 0)
     assert fc.chunk(NEW, 0) == Staged(ReplyStatus.ARMED, 0, 0)
     assert fc.commit(identify(NEW)) == Stored(ReplyStatus.ARMED, identify(OLD))
-    assert fc.radius(500) == (ReplyStatus.ARMED, 200)
+    assert fc.radius(500) == fc.radius(2001) == (ReplyStatus.ARMED, 200)
+    assert fc.begin(ListIdentity(0, 1)).status is ReplyStatus.BAD_REQUEST
     assert fc.read(0, READ).records == list(OLD)
     fc.device.arm(False)
     assert fc.commit(identify(NEW)).status is ReplyStatus.NO_TRANSFER
@@ -307,6 +308,7 @@ def test_malformed_requests_change_nothing(fc: Companion) -> None:
                 assert reply is not None
                 assert reply[0] == ReplyStatus.BAD_REQUEST
                 assert len(reply) == lengths.get(command, 7)
+    assert fc.begin(ListIdentity(0, 1)).status is ReplyStatus.BAD_REQUEST
     assert fc.info() == before
 
 
