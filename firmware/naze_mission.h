@@ -41,7 +41,7 @@
  *
  * TIME
  *   On an STM32F103: BEGIN erases up to three pages of 20..40 ms each. A full CHUNK programs 120 half-words of 52..70 us each,
- *   under 9 ms. Meanwhile a CPU that runs from the same flash stands still, with its interrupts: ticks of the clock are lost.
+ *   under 9 ms. Meanwhile a CPU that runs from the same flash is stalled, interrupts included: ticks of the clock are lost.
  *   A CRC over a full list takes 2 ms. While armed, the core neither writes to the flash nor computes a CRC.
  *
  * STACK
