@@ -155,8 +155,10 @@ config-sample: $(VENV)/.test-ready
 	echo '<!-- begin: make config-sample -->' >> docs/configuration.md
 	$(BIN)/python -m generators.config_sample --page >> docs/configuration.md
 
+# The published schemas, and their page.
 zenoh-schemas: $(VENV)/.test-ready
 	$(BIN)/python -m generators.zenoh_schemas
+	$(BIN)/python -m generators.zenoh_page
 
 clean:
 	rm -rf $(VENV) build dist .demo .hypothesis .mypy_cache .pytest_cache .ruff_cache benchmarks/results

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Prints every vehicle's position: `python zenoh_positions.py [ENDPOINT]`. Needs `pip install eclipse-zenoh`.
 
-The same for the shell, with the zenoh project's own tools: docs/fleet.md. Fields and units: docs/zenoh.md.
+Fields and units: docs/zenoh-payloads.md.
 """
 
 import json

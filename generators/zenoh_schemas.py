@@ -4,6 +4,7 @@
 Run by `make zenoh-schemas`; a test checks that the files are up to date.
 """
 
+import inspect
 import json
 import types
 from dataclasses import is_dataclass
@@ -23,64 +24,137 @@ from storage.mission_store import MissionSummary
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _TYPES = {float: "number", int: "integer", str: "string", bool: "boolean", types.NoneType: "null"}
 _ENVELOPE: Json = {
-    "v": {"const": VERSION, "description": "version of keys and payloads"},
-    "seq": {"type": "integer", "minimum": 0, "description": "number of this key's sample: a gap is a loss"},
-    "time_s": {"type": "number", "description": "by the bridge's clock, seconds since 1970 (UTC)"},
+    "v": {"const": VERSION, "description": "the version of keys and payloads"},
+    "seq": {
+        "type": "integer",
+        "minimum": 0,
+        "description": "counts the key's samples from 0 since the daemon's start: a gap is a loss, a step back a "
+        "restart; a reply has the number of the last sample",
+    },
+    "time_s": {
+        "type": "number",
+        "description": "when the bridge made the sample, seconds since 1970 (UTC); see time_source in the state",
+    },
 }
 _LOGGED_PLACE = ("lat_deg", "lon_deg", "altitude_m", "height_m")
 _NUMBER: Json = {"type": ["number", "null", "string"], "description": "null: not given; inf or -inf as text"}
 _PLACE: Json = {"type": ["integer", "null"], "description": "degrees * 1e7; null: not given"}
-_ITEM_FIELDS: Json = {**dict.fromkeys(("p1", "p2", "p3", "p4", "alt_m"), _NUMBER), "lat_e7": _PLACE, "lon_e7": _PLACE}
+_MAV_NUMBER: Json = {"type": "integer", "description": "MAVLink's number"}
+_ITEM_FIELDS: Json = {
+    **dict.fromkeys(("command", "frame"), _MAV_NUMBER),
+    **dict.fromkeys(("p1", "p2", "p3", "p4"), _NUMBER),
+    **dict.fromkeys(("lat_e7", "lon_e7"), _PLACE),
+    "alt_m": _NUMBER,
+}
 _COUNT: Json = {"type": ["integer", "null"], "minimum": 0, "description": "records, home included; null: not known"}
 _CHECKSUM: Json = {"type": "string", "pattern": "^[0-9a-f]{8}$", "description": "CRC-32 over the records"}
+_FINDING_FIELDS = {
+    "seq": "the item as sent; null: the whole list",
+    "field": "of the item, or count",
+    "was": "as sent; null: not given",
+    "becomes": "as stored; or dropped (the item), rejected or cleared (the list)",
+    "why": "the reason",
+    "command": "the item's MAV_CMD",
+    "news": "its importance to the pilot",
+}
+_SUMMARY_FIELDS = {
+    "source": "the sender",
+    "verdict": "of the rules",
+    "item_count": "as received",
+    "finding_count": "without filled-in defaults",
+    "record_count": "for the flight controller, home included",
+    "detail": "the reason for the outcome",
+}
+_WHAT = {
+    "state": "The whole vehicle: the newest values of every group.",
+    "overview": "The state in 60 bytes, for programs that watch thousands of vehicles: always CBOR, all numbers whole. "
+    "null: not known, or not heard for 10 s.",
+    "event": "An event, as in the daemon's log.",
+    "history": "The reply to a query about a time range.",
+    "mission_current": "The flight controller's mission. All fields are null while it is unknown.",
+    "mission_list": "The stored missions, newest first.",
+    "mission_report": "The result of an upload.",
+}
 
 
 def schemas() -> dict[str, Json]:
     """The schema of each payload, by file name."""
     items = {"type": "array", "items": _of(MissionItem) | {"properties": _fields(MissionItem) | _ITEM_FIELDS}}
-    findings = {"type": "array", "items": _of(Finding)}
+    findings = {
+        "type": "array",
+        "items": _object(_described(_fields(Finding), _FINDING_FIELDS)),
+        "description": "every changed value, dropped item or reason for a refusal",
+    }
     upload = {
-        "ack": {"type": "string", "pattern": "^MAV_MISSION_"},
-        "text": {"type": "string"},
-        "verdict": {"enum": ["ACCEPTED", "CLEARED", "REJECTED"]},
+        "ack": {"type": "string", "pattern": "^MAV_MISSION_", "description": "MAVLink's result"},
+        "text": {"type": "string", "description": "the result in a sentence, with the reason for a refusal"},
+        "verdict": {"enum": ["ACCEPTED", "CLEARED", "REJECTED"], "description": "of the rules"},
         "findings": findings,
-        "sent": items,
-        "stored": items,
+        "sent": items | {"description": "as received"},
+        "stored": items | {"description": "as the flight controller holds them"},
         "mission": {"type": ["integer", "null"], "description": "its number in the store; null: it is not stored"},
     }
-    made = {group.value: _fields(getattr(groups, group.value.capitalize())) for group in Group}
+    made = {group.value: _fields(_group(group.value)) for group in Group}
     made["state"] = {
         "vehicle": {"type": "string", "description": "its name, as in the key"},
-        "others_of_this_name": {"type": "integer", "minimum": 0, "description": "more bridges that use the name"},
+        "others_of_this_name": {
+            "type": "integer",
+            "minimum": 0,
+            "description": "other bridges that use it: normally 0",
+        },
         "time_source": {
             "type": "string",
-            "description": "gps: the flight controller's; ntp: the clock was set over the network; pi: neither",
+            "description": "gps: from the flight controller's 3D fix (an autopilot's SYSTEM_TIME, INAV's MSP_RTC), "
+            "which corrects time_s if the Pi's clock is off by more than 0.5 s; ntp: the clock was set over the "
+            "network since the start; pi: neither, it may be hours off",
         },
         **_fields(VehicleReport),
     }
     made["overview"] = _fields(Overview)
     made["event"] = {
         "level": {"enum": ["debug", "info", "warning", "error"]},
-        "event": {"type": "string", "pattern": r"^[a-z0-9_]+(\.[a-z0-9_]+)+$"},
-        "facts": {"type": "object", "additionalProperties": {"type": ["string", "number", "boolean", "null"]}},
+        "event": {
+            "type": "string",
+            "pattern": r"^[a-z0-9_]+(\.[a-z0-9_]+)+$",
+            "description": "its name in the log; gcs.text: a text shown on ground stations",
+        },
+        "facts": {
+            "type": "object",
+            "additionalProperties": {"type": ["string", "number", "boolean", "null"]},
+            "description": "as in the log",
+        },
     }
     made["mission_current"] = {
         "count": _COUNT,
         "checksum": _CHECKSUM | {"type": ["string", "null"]},
         "items": items | {"type": ["array", "null"]},
     }
-    summary = _fields(MissionSummary) | {"checksum": _CHECKSUM}
+    summary = _described(_fields(MissionSummary), _SUMMARY_FIELDS) | {"checksum": _CHECKSUM}
     for name in ("received_at", "concluded_at"):
         summary[f"{name}_s"] = summary.pop(name) | {"description": "seconds since 1970 (UTC)"}
-    missions = {"missions": {"type": "array", "items": _object(summary)}}
+    missions = {"missions": {"type": "array", "items": _object(summary), "description": "newest first"}}
     made["mission_list"] = missions
-    number = _ENVELOPE["seq"] | {"type": ["integer", "null"], "description": "null: it is from a telemetry log"}
+    number = _ENVELOPE["seq"] | {"type": ["integer", "null"], "description": "null: from a telemetry log"}
     place = {name: field for name, field in made["position"].items() if name in _LOGGED_PLACE}
     made["history"] = {
-        "events": {"type": "array", "items": _object(_ENVELOPE | {"seq": number} | made["event"])},
+        "events": {
+            "type": "array",
+            "items": _object(_ENVELOPE | {"seq": number} | made["event"]),
+            "description": "oldest first, the newest 2,000; from before the daemon's start only vehicle.armed, "
+            "vehicle.disarmed and gcs.text, out of the telemetry logs",
+        },
         **missions,
-        "positions": {"type": "array", "items": _object({"time_s": _ENVELOPE["time_s"]} | place)},
-        "logs_from_s": {"type": ["number", "null"], "description": "start of the oldest telemetry log that was read"},
+        "positions": {
+            "type": "array",
+            "items": _object({"time_s": _ENVELOPE["time_s"]} | place),
+            "description": "if asked for: where the vehicle flew, from the telemetry logs, spread evenly over the "
+            "range, at most one a second",
+        },
+        "logs_from_s": {
+            "type": ["number", "null"],
+            "description": "the start of the oldest telemetry log that was read, newest first; null: none. Reading "
+            "stops after 5 s: if this is later than the start of the range, ask for a shorter one",
+        },
     }
     made["mission_report"] = upload | {"source": {"type": "string", "description": "the sender"}}
     files = {name: _file(name, _ENVELOPE | body) for name, body in made.items()}
@@ -142,7 +216,18 @@ def _reply(upload: Json, items: Json, findings: Json) -> Json:
 
 
 def _file(name: str, properties: Json) -> Json:
-    return {"$schema": _DIALECT, "title": name, **_object(properties)}
+    what = _WHAT.get(name) or inspect.getdoc(_group(name))
+    return {"$schema": _DIALECT, "title": name, "description": what, **_object(properties)}
+
+
+def _group(name: str) -> type:
+    found: type = getattr(groups, name.capitalize())
+    return found
+
+
+def _described(properties: Json, descriptions: dict[str, str]) -> Json:
+    more = {name: properties[name] | {"description": text} for name, text in descriptions.items()}
+    return properties | more
 
 
 def _object(properties: Json, required: tuple[str, ...] | None = None) -> Json:

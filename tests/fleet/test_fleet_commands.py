@@ -14,7 +14,7 @@ import zenoh
 from protocols.mission_file import read_mission_file
 from protocols.mission_item import Command
 from service.cli.fleet.session import open_session
-from tests.support.doc_pages import commands
+from tests.support.doc_pages import blocks
 from tests.support.fleet_bench import Fleet
 from tests.support.plan import HOME, PlanRow, judge, plain_plan, plan_file, records_of, waypoint
 from tests.support.programs import run_naze_bridge, until
@@ -180,14 +180,14 @@ def test_the_example_programs_work(fleet: Fleet, tmp_path: Path) -> None:
         positions.wait()
 
 
-def test_the_one_liner_in_the_docs_works(fleet: Fleet, tmp_path: Path) -> None:
-    (code,) = (command.words[3] for command in commands() if command.words[:3] == ("python", "-u", "-c"))
+def test_the_subscriber_in_the_docs_works(fleet: Fleet, tmp_path: Path) -> None:
+    (code,) = (block.text for block in blocks() if block.language == "python")
     output = tmp_path / "samples"
     with output.open("w") as log:
-        command = [sys.executable, "-u", "-c", code.replace("tcp/localhost:7447", fleet.router.endpoint)]
+        command = [sys.executable, "-c", code.replace("tcp/192.168.4.1:7447", fleet.router.endpoint)]
         reader = subprocess.Popen(command, stdout=log, stderr=log)
     try:
-        until(lambda: "fleet/kite/v1/telemetry/position b'{" in output.read_text(), "a position")
+        until(lambda: "fleet/kite/v1/telemetry/position {" in output.read_text(), "a position")
     finally:
         reader.kill()
         reader.wait()

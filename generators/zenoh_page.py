@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""docs/zenoh-payloads.md, from the published schemas (`make zenoh-schemas`)."""
+
+import textwrap
+from collections.abc import Iterator
+from pathlib import Path
+
+from generators.zenoh_schemas import schemas
+from service.daemon.mission_data import Json
+from service.zenoh_link.compact import object_schema
+from service.zenoh_link.keys import KEYS
+
+PAGE = Path(__file__).parents[1] / "docs" / "zenoh-payloads.md"
+_HEAD = """\
+<!-- made by: make zenoh-schemas -->
+# Payloads over zenoh
+
+The fields of each payload of [zenoh](zenoh.md), from the JSON Schemas in
+[`service/zenoh_link/schemas/`](../service/zenoh_link/schemas/). Every payload begins with the first
+three. null means "not known", which includes values that the flight controller cannot measure: a
+board without a compass has no heading. Ignore fields that you do not know: new ones do not change
+the version.
+"""
+_WIDTH = 100
+#: A command's reply is described in docs/zenoh.md: one of several objects.
+_SCHEMAS = {name: schema for name, schema in schemas().items() if "properties" in schema}
+_COMMON = ("v", "seq", "time_s")
+#: Objects within payloads, by the name of the field that holds them.
+_INNER = {
+    "items": "item",
+    "sent": "item",
+    "stored": "item",
+    "findings": "finding",
+    "missions": "stored mission",
+    "mission": "mission",
+    "positions": "logged position",
+    "events": "event",
+}
+_TYPES = {
+    "number": "number",
+    "integer": "whole number",
+    "string": "text",
+    "boolean": "true or false",
+    "object": "object",
+    "null": "null",
+}
+
+
+def page() -> str:
+    """The whole page."""
+    payloads = {_heading(key.suffix): (key.suffix, _SCHEMAS[key.schema]) for key in KEYS if key.schema in _SCHEMAS}
+    parts = [_HEAD, *_table({name: _SCHEMAS["state"]["properties"][name] for name in _COMMON})]
+    inner: dict[str, Json] = {}
+    for heading, (suffix, schema) in payloads.items():
+        fields = {name: field for name, field in schema["properties"].items() if name not in _COMMON}
+        objects = {_INNER[name]: _object_in(field) for name, field in fields.items() if name in _INNER}
+        inner |= {name: found for name, found in objects.items() if "properties" in found and name not in payloads}
+        what = textwrap.fill(f"`{suffix}`. {schema['description']}", _WIDTH)
+        parts += ["", f"## {heading}", "", what, "", *_table(fields)]
+    for name, schema in inner.items():
+        parts += ["", f"## {name}", "", *_table(schema["properties"])]
+    return "\n".join(parts) + "\n"
+
+
+def _heading(suffix: str) -> str:
+    return suffix.partition("/")[2].removeprefix("telemetry/")
+
+
+def _table(fields: Json) -> Iterator[str]:
+    yield from ("| field | type | meaning |", "|---|---|---|")
+    for name, field in fields.items():
+        yield f"| `{name}` | {_type(name, field)} | {field.get('description', '')} |"
+
+
+def _object_in(field: Json) -> Json:
+    found = object_schema(field)
+    inner: Json = found.get("items", found)
+    return inner
+
+
+def _type(name: str, field: Json) -> str:
+    if "properties" in _object_in(field):
+        link = f"[{_INNER.get(name, name)}](#{_INNER.get(name, name).replace(' ', '-')})"
+        kind = f"list of {link}" if "items" in object_schema(field) else link
+        return f"{kind} or null" if _may_be_null(field) else kind
+    if "const" in field:
+        return str(field["const"])
+    if "enum" in field:
+        *others, last = map(str, field["enum"])
+        return f"{', '.join(others)} or {last}"
+    if "items" in object_schema(field):
+        kind = f"list of {_TYPES[_object_in(field)['type']]}s"
+        return f"{kind} or null" if _may_be_null(field) else kind
+    if "anyOf" in field:
+        return " or ".join(_type(name, each) for each in field["anyOf"])
+    kinds = field["type"] if isinstance(field["type"], list) else [field["type"]]
+    return " or ".join(_TYPES[kind] for kind in kinds)
+
+
+def _may_be_null(field: Json) -> bool:
+    return {"type": "null"} in field.get("anyOf", ()) or "null" in field.get("type", ())
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page())
