@@ -9,6 +9,7 @@ import pytest
 import zenoh
 from jsonschema import Draft202012Validator
 
+from bridge.model.vehicle_groups import Group
 from generators.zenoh_schemas import schemas, text
 from service.settings.zenoh import PayloadEncoding
 from service.zenoh_link.compact import SCHEMAS as FOLDER
@@ -60,7 +61,8 @@ def test_all_payloads_match_the_published_schemas(start: Starter, encoding: str)
     bench = zenoh_bench(start, f'listen = ["{where}"]\nencoding = "{encoding}"\n{I_KNOW}')
     with session(connect=where) as opened:
         reader = Reader(opened)
-        reader.wait("telemetry/attitude", lambda attitude: attitude["roll_deg"] is not None)
+        for group in Group:
+            reader.wait(f"telemetry/{group.value}")
         bench.daemon.push(plain_plan(12))
         refused = MISSION.replace(b"\t16\t", b"\t2000\t")
         for suffix, payload in {
