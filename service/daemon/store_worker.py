@@ -21,6 +21,8 @@ from storage.store_error import StoreError
 DATABASE_NAME = "missions.db"
 #: For the last jobs: a hanging disk must not keep the daemon from ending.
 _CLOSE_TIMEOUT_S = 2.0
+#: For a query, whose sender waits for 8 s (the page) or 10 s (zenoh).
+_TIMEOUT_S = 5.0
 T = TypeVar("T")
 _log = structlog.get_logger()
 
@@ -33,7 +35,7 @@ class StoreWorker:
 
     def __init__(self, directory: Path | None, on_trouble: Callable[[str], None] = lambda _why: None) -> None:
         self._on_trouble = on_trouble
-        self._thread = BackgroundThread("store")
+        self._thread = BackgroundThread("store", _TIMEOUT_S)
         self._loop = asyncio.get_running_loop()
         self._store: MissionStore | None = None
         if directory is not None:
@@ -48,14 +50,17 @@ class StoreWorker:
         self._thread.submit(work)
 
     async def ask(self, question: Callable[[MissionStore], T]) -> T:
-        """Run a query on the store; StoreError if there is no store or it fails."""
+        """Run a query on the store; StoreError if there is no store, it fails or does not answer in time."""
 
         def work() -> T:
             if self._store is None:
                 raise StoreError("no missions are stored here: start the daemon with --state-dir DIR")
             return question(self._store)
 
-        return await self._thread.ask(work)
+        try:
+            return await self._thread.ask(work)
+        except TimeoutError as error:
+            raise StoreError(f"the mission store: {error}") from error
 
     def close(self) -> None:
         """Finish the queued jobs, then close; gives up on a hanging disk."""

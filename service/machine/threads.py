@@ -14,6 +14,9 @@ from typing import TypeVar, TypeVarTuple
 
 import structlog
 
+#: Questions to a thread that hangs; more are refused at once.
+MAX_WAITING = 32
+
 T = TypeVar("T")
 Arguments = TypeVarTuple("Arguments")
 _log = structlog.get_logger()
@@ -26,9 +29,13 @@ def post(loop: asyncio.AbstractEventLoop, callback: Callable[[*Arguments], objec
 
 
 class BackgroundThread:
-    """Runs jobs in order. A daemon thread, so that one that hangs in the kernel ends with the process."""
+    """Runs jobs in order. A daemon thread, so that one that hangs in the kernel ends with the process.
 
-    def __init__(self, name: str) -> None:
+    `ask_timeout_s`: the time that a caller of `ask` waits for the disk; None: until there is an answer.
+    """
+
+    def __init__(self, name: str, ask_timeout_s: float | None = None) -> None:
+        self._ask_timeout_s = ask_timeout_s
         self._work: SimpleQueue[Callable[[], object] | None] = SimpleQueue()
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
@@ -38,7 +45,7 @@ class BackgroundThread:
         self._work.put(work)
 
     async def ask(self, work: Callable[[], T]) -> T:
-        """Queue a job that may raise, and return its result. Called on an event loop."""
+        """Queue a job that may raise, and return its result; TimeoutError. Called on an event loop."""
         answer: Future[T] = Future()
 
         def run() -> None:
@@ -48,8 +55,14 @@ class BackgroundThread:
                 except Exception as error:
                     answer.set_exception(error)
 
-        self.submit(run)
-        return await asyncio.wrap_future(answer)
+        try:
+            if self._work.qsize() >= MAX_WAITING:
+                raise TimeoutError
+            self.submit(run)
+            async with asyncio.timeout(self._ask_timeout_s):
+                return await asyncio.wrap_future(answer)
+        except TimeoutError:
+            raise TimeoutError("the disk does not answer: it is slow or failing; check dmesg") from None
 
     def close(self, timeout_s: float) -> bool:
         """Run the remaining jobs and end; False on timeout."""

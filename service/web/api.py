@@ -22,6 +22,7 @@ from collections.abc import Awaitable
 from dataclasses import asdict
 from functools import partial
 from http import HTTPStatus
+from typing import TypeVar
 
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
@@ -37,7 +38,6 @@ from service.daemon.daemon import Daemon
 from service.daemon.mission_data import MOST, Json, mission_items, to_json
 from service.machine.host import Host
 from service.machine.package import version
-from service.machine.threads import BackgroundThread
 from service.recording.tlog_recorder import TLOG_FOLDER
 from service.settings.web import WebSettings
 from service.web.access import MAX_FILE, check_token, guarded
@@ -53,8 +53,7 @@ from storage.os_error import reason
 from storage.store_error import StoreError
 
 _LISTED = 50
-#: For the mission store, whose SD card may hang: the page itself waits for 8 s.
-_STORE_TIMEOUT_S = 5.0
+T = TypeVar("T")
 
 
 class Api:
@@ -73,8 +72,6 @@ class Api:
         self._history = LinkHistory(daemon)
         state_dir = daemon.settings.state_dir
         self._logs = TelemetryLogs(None if state_dir is None else state_dir / TLOG_FOLDER)
-        #: For the logs: a hanging disk must not hold up the stop, as asyncio's own threads would.
-        self._disk = BackgroundThread("logs")
         self._host = Host()
 
     def start(self) -> None:
@@ -83,7 +80,7 @@ class Api:
     async def close(self) -> None:
         self._history.close()
         await self._writer.close()
-        self._disk.close(0)
+        self._logs.close()
 
     def routes(self) -> list[Route]:
         """The table above."""
@@ -112,7 +109,7 @@ class Api:
         now = asyncio.get_running_loop().time()
         transfer = daemon.bridge.transfer
         try:
-            listed = (await _stored(self._api.list_missions(1)))["missions"]
+            listed = (await self._api.list_missions(1))["missions"]
             newest = {key: listed[0][key] for key in ("number", "outcome")} if listed else None
             store = daemon.store_trouble
         except StoreError as error:
@@ -197,18 +194,12 @@ class Api:
 
     async def _list_logs(self, request: Request) -> Response:
         check_token(request, self._token)
-        try:
-            return _json(await self._disk.ask(self._logs.list))
-        except OSError as error:
-            raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, f"The logs cannot be read: {reason(error)}.") from error
+        return _json(await _from_disk(self._logs.list()))
 
     async def _read_log(self, request: Request) -> Response:
         check_token(request, self._token)
         start = request.query_params.get("start", "0")
-        try:
-            piece = await self._disk.ask(partial(self._logs.read, request.path_params["name"], _whole(start)))
-        except OSError as error:
-            raise HTTPException(HTTPStatus.NOT_FOUND, "There is no such log: it may have been removed.") from error
+        piece = await _from_disk(self._logs.read(request.path_params["name"], _whole(start)))
         return Response(piece, media_type="application/octet-stream")
 
     async def _render_metrics(self, _request: Request) -> Response:
@@ -236,19 +227,20 @@ def _sent(mission: Json) -> list[MissionItem]:
     return mission_items(mission["received"]["items"])
 
 
-async def _stored(asked: Awaitable[Json]) -> Json:
-    """Wait for the store; StoreError also if it does not answer in time."""
+async def _from_disk(asked: Awaitable[T]) -> T:
+    """Wait for the logs; errors become refusals."""
     try:
-        async with asyncio.timeout(_STORE_TIMEOUT_S):
-            return await asked
-    except TimeoutError as error:
-        raise StoreError("the mission store does not answer: the disk is slow or failing; check dmesg") from error
+        return await asked
+    except FileNotFoundError as error:
+        raise HTTPException(HTTPStatus.NOT_FOUND, "There is no such log: it may have been removed.") from error
+    except OSError as error:
+        raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, f"The logs cannot be read: {reason(error)}.") from error
 
 
 async def _answered(asked: Awaitable[Json]) -> Json:
     """Wait for the store; its errors become refusals."""
     try:
-        return await _stored(asked)
+        return await asked
     except ControlError as error:
         raise HTTPException(HTTPStatus.NOT_FOUND, str(error)) from error
     except StoreError as error:

@@ -5,31 +5,46 @@ A connection lasts only seconds (service.web.connection_limit), so a browser fet
 """
 
 import os
+from functools import partial
 from pathlib import Path
 
 from service.daemon.mission_data import Json
+from service.machine.threads import BackgroundThread
 from service.recording.tlog_folder import is_log_name
 
 PIECE = 256 << 10
 _LISTED = 200
+#: The page itself waits for 8 s.
+_TIMEOUT_S = 5.0
 
 
 class TelemetryLogs:
-    """The logs in `folder`; None: no logs are written."""
+    """The logs in `folder`; None: no logs are written. Every method may raise OSError, also if the disk hangs."""
 
     def __init__(self, folder: Path | None) -> None:
         self._folder = folder
+        #: A hanging disk must not hold up the daemon's stop, as asyncio's own threads would.
+        self._disk = BackgroundThread("logs", _TIMEOUT_S)
 
-    def list(self) -> Json:
-        """Names and sizes in bytes, newest first. OSError if the folder cannot be read."""
+    def close(self) -> None:
+        self._disk.close(0)
+
+    async def list(self) -> Json:
+        """Names and sizes in bytes, newest first."""
+        return await self._disk.ask(self._list)
+
+    async def read(self, name: str, start: int) -> bytes:
+        """At most PIECE bytes from `start`. FileNotFoundError if there is no such log."""
+        return await self._disk.ask(partial(self._read, name, start))
+
+    def _list(self) -> Json:
         if self._folder is None or not self._folder.exists():
             return {"logs": []}
         found = [entry for entry in os.scandir(self._folder) if is_log_name(entry.name) and entry.is_file()]
         found.sort(key=lambda entry: entry.name, reverse=True)
         return {"logs": [{"name": entry.name, "size": entry.stat().st_size} for entry in found[:_LISTED]]}
 
-    def read(self, name: str, start: int) -> bytes:
-        """At most PIECE bytes from `start`. FileNotFoundError if there is no such log."""
+    def _read(self, name: str, start: int) -> bytes:
         if self._folder is None or not is_log_name(name):
             raise FileNotFoundError(name)
         with (self._folder / name).open("rb") as file:

@@ -16,6 +16,8 @@ from service.zenoh_link.time_range import parse_time_range
 #: About 150 bytes each; a busy day has some hundred.
 _MAX_EVENTS = 2000
 _MAX_MISSIONS = 200
+#: Reading takes up to 5 s (logged_past), and a zenoh query waits for 10 s.
+_TIMEOUT_S = 8.0
 _DEFAULT_RANGE = "[now(-1h)..]"
 
 
@@ -30,7 +32,7 @@ class History:
         if logs is not None:
             with suppress(OSError):  # a query reports it
                 self._earlier = log_stamps(logs)
-        self._disk = BackgroundThread("history")
+        self._disk = BackgroundThread("history", _TIMEOUT_S)
         self._events: deque[Json] = deque(maxlen=_MAX_EVENTS)
 
     def add(self, event: Json) -> None:

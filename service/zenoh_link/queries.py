@@ -15,6 +15,7 @@ from service.machine.threads import post
 from service.zenoh_link.keys import UPLOAD, ZenohKey
 from service.zenoh_link.payload import Payloads
 from service.zenoh_link.session import SessionThread
+from storage.os_error import reason
 from storage.store_error import StoreError
 
 #: More at once are refused: each may hold a mission file.
@@ -131,7 +132,7 @@ class Queries:
         except QueryRefused as error:
             self._refuse(question, error)
         except (ControlError, StoreError, OSError, ValueError) as error:
-            self._refuse(question, QueryRefused(str(error)))
+            self._refuse(question, QueryRefused(reason(error)))
         except asyncio.CancelledError:
             self._refuse(question, QueryRefused(_STOPPED))
         except Exception as error:

@@ -7,7 +7,7 @@ import threading
 import pytest
 from structlog.testing import capture_logs
 
-from service.machine.threads import BackgroundThread
+from service.machine.threads import MAX_WAITING, BackgroundThread
 
 
 def test_work_is_done_in_order_before_the_end() -> None:
@@ -45,6 +45,17 @@ async def test_a_cancelled_question_does_not_end_the_thread() -> None:
     hangs.set()
     assert await thread.ask(lambda: 7) == 7
     thread.close(timeout_s=10)
+
+
+async def test_questions_to_a_hung_disk_end_in_time_and_do_not_pile_up() -> None:
+    hangs = threading.Event()
+    thread = BackgroundThread("test", ask_timeout_s=0.01)
+    for _ in range(2 * MAX_WAITING):
+        with pytest.raises(TimeoutError, match="the disk does not answer"):
+            await thread.ask(hangs.wait)
+    assert thread._work.qsize() == MAX_WAITING
+    hangs.set()
+    assert thread.close(timeout_s=10)
 
 
 async def test_a_job_that_raises_does_not_end_the_thread() -> None:

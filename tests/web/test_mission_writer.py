@@ -1,15 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A write started on the page always ends with a sentence, and the page with a hanging disk answers."""
+"""A write started on the page always ends with a sentence."""
 
 import asyncio
 
-import pytest
 from structlog.testing import capture_logs
 
 from service.daemon.mission_data import Json
-from service.web import api
 from service.web.mission_files import MissionWriter, Progress
-from storage.store_error import StoreError
 
 
 async def test_an_unexpected_error_ends_the_write_with_a_sentence() -> None:
@@ -25,10 +22,3 @@ async def test_an_unexpected_error_ends_the_write_with_a_sentence() -> None:
     assert (writer.state["done"], writer.state["ok"]) == (True, False)
     assert writer.state["text"] == "The daemon failed during the write; see its log."
     assert [event["event"] for event in events] == ["web.failed"]
-
-
-async def test_a_hanging_store_is_an_error_in_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(api, "_STORE_TIMEOUT_S", 0.01)
-    hangs: asyncio.Future[Json] = asyncio.get_running_loop().create_future()
-    with pytest.raises(StoreError, match="does not answer"):
-        await api._stored(hangs)

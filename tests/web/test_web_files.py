@@ -85,8 +85,10 @@ def test_logs_need_the_token(lasting_web: WebBench) -> None:
         assert lasting_web.ask(f"/api/logs/{name}", **proof).status == 404
 
 
-def test_without_a_state_directory_there_are_no_logs() -> None:
-    assert TelemetryLogs(None).list() == {"logs": []}
+async def test_without_a_state_directory_there_are_no_logs() -> None:
+    logs = TelemetryLogs(None)
+    assert await logs.list() == {"logs": []}
+    logs.close()
 
 
 def test_the_history_of_the_serial_line_is_served(lasting_web: WebBench) -> None:
