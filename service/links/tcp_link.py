@@ -11,7 +11,7 @@ from bridge.gcs.station import Peer
 from service.links.gcs_events import GcsEvents
 from service.links.send_queue import SendQueue
 from service.machine.log_setup import warn_once
-from service.settings.addresses import GcsAddress, family_of
+from service.settings.addresses import GcsAddress, bindable, family_of
 
 #: Small, so that the requests of a client that floods do not delay those of others.
 _READ_SIZE = 512
@@ -36,7 +36,7 @@ class TcpLink:
         self._loop = asyncio.get_running_loop()
         self._clients: dict[Peer, _TcpClient] = {}
         self._warned: set[str] = set()
-        self._socket = socket.create_server((address.host, address.port), family=family_of(address.host))
+        self._socket = socket.create_server(bindable(address.host, address.port), family=family_of(address.host))
         self._socket.setblocking(False)
         self._resting: asyncio.TimerHandle | None = None
         self._listen()

@@ -11,7 +11,7 @@ from bridge.gcs.station import Peer
 from service.links.gcs_events import GcsEvents
 from service.machine.log_setup import warn_once
 from service.machine.threads import BackgroundThread
-from service.settings.addresses import UNKNOWN_HOST_HINT, GcsAddress, family_of
+from service.settings.addresses import UNKNOWN_HOST_HINT, GcsAddress, bindable, family_of
 from storage.os_error import reason
 
 _DATAGRAM_SIZE = 2048
@@ -68,7 +68,7 @@ class UdpLink:
             # Otherwise it would take the port away from udpin:0.0.0.0.
             self._socket.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
         if self._address.kind == "udpin":
-            self._socket.bind((host, port))
+            self._socket.bind(bindable(host, port))
             return
         broadcast = self._address.kind == "udpbcast"
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, broadcast)

@@ -6,6 +6,7 @@ import socket
 from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from typing import Any
 
 UNKNOWN_HOST_HINT = "check the name and the network, or give the address in numbers"
 
@@ -156,6 +157,11 @@ def _meant_gcs(word: str, rest: str) -> str:
 def family_of(host: str) -> socket.AddressFamily:
     """AF_INET6 for an IPv6 address; a name means an IPv4 address."""
     return socket.AF_INET6 if ":" in host else socket.AF_INET
+
+
+def bindable(host: str, port: int) -> tuple[Any, ...]:
+    """The address for bind(), which does not itself read the interface of a link-local one (fe80::1%eth0). OSError."""
+    return socket.getaddrinfo(host, port, family_of(host))[0][4]
 
 
 def client_hosts(listening: str, own: Sequence[str]) -> Sequence[str]:

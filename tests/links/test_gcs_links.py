@@ -15,7 +15,7 @@ from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import messages as m
 from service.links import tcp_link, udp_link
 from service.links.fc_device import device_opener
-from service.links.gcs_links import GcsLink, open_link
+from service.links.gcs_links import GcsLink, LinkError, open_link
 from service.settings.addresses import AddressError, GcsAddress, TcpFc, parse_fc, parse_gcs, split_gcs
 from tests.support.programs import TIMEOUT_S, free_port, until_async
 
@@ -338,3 +338,10 @@ async def test_a_flight_controller_may_be_behind_tcp(host: str) -> None:
         device = await device_opener(address)()
         server.accept()[0].close()
         device.close()
+
+
+@pytest.mark.parametrize("kind", ["udpin", "tcpin"])
+async def test_a_link_local_address_keeps_its_interface(links: Links, kind: str) -> None:
+    """The loopback has no such address. Without the interface the kernel would call it an invalid argument."""
+    with pytest.raises(LinkError, match="this machine has no such address"):
+        links.open(f"{kind}:[fe80::1%lo]:{free_port()}")
