@@ -40,8 +40,9 @@ static bool program(void *self, uint16_t offset, const uint8_t *data, uint16_t l
 
 static const uint8_t *flash(void *self)
 {
+    const volatile uintptr_t address = MISSION_FLASH_ADDR; /* volatile: see nm_board_t */
     (void)self;
-    return (const uint8_t *)(uintptr_t)MISSION_FLASH_ADDR;
+    return (const uint8_t *)address;
 }
 
 static uint32_t now_ms(void *self)

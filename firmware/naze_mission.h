@@ -112,7 +112,8 @@ typedef struct {
     bool (*erase)(void *self, uint8_t page);
     /* Program `length` (even) bytes at the even `offset` 0..NM_FLASH_SIZE-1, half-word by half-word, in ascending order. */
     bool (*program)(void *self, uint16_t offset, const uint8_t *data, uint16_t length);
-    /* The address at which NM_FLASH_SIZE bytes of flash can be read. */
+    /* The address at which NM_FLASH_SIZE bytes of flash can be read. Keep its value from the optimizer (volatile): it may move
+       a read of a known address across the register accesses that erase a page there. */
     const uint8_t *(*flash)(void *self);
     /* A counter of milliseconds that may wrap at 2^32. */
     uint32_t (*millis)(void *self);
