@@ -2,7 +2,7 @@
 """The commands below @cmd: those of the command line, sent as queries."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Set
 
 from bridge.model.vehicle_groups import Group
 from protocols.mission_file import MissionFileError, read_mission_file
@@ -11,6 +11,7 @@ from service.daemon.api import DaemonApi
 from service.daemon.mission_data import MOST, Json
 from service.settings.zenoh import STATE_NAME
 from service.zenoh_link import keys
+from service.zenoh_link.liveliness import RENAME
 from service.zenoh_link.queries import Answerer, QueryRefused, Question
 from service.zenoh_link.rates import MAX_REQUEST_HZ, MAX_REQUEST_S, SampleRates
 
@@ -24,21 +25,33 @@ _RATE_NAMES = (*(group.value for group in Group), STATE_NAME)
 
 
 class CommandQueries:
-    """Handles the commands through DaemonApi, like all other interfaces."""
+    """Handles the commands through DaemonApi, like all other interfaces. `others`: bridges with the same name.
 
-    def __init__(self, api: DaemonApi, rates: SampleRates) -> None:
+    They get each command, too, so none that changes a mission is obeyed.
+    """
+
+    def __init__(self, api: DaemonApi, rates: SampleRates, others: Set[str]) -> None:
         self._api = api
+        self._others = others
         self._rates = rates
         #: Parsing takes about 50 times the file's size in memory.
         self._one_at_a_time = asyncio.Lock()
         self.answerers: dict[keys.ZenohKey, Answerer] = {
-            keys.UPLOAD: self._upload,
+            keys.UPLOAD: self._alone(self._upload),
             keys.CHECK: self._check,
-            keys.CLEAR: self._clear,
-            keys.RESTORE: self._restore,
+            keys.CLEAR: self._alone(self._clear),
+            keys.RESTORE: self._alone(self._restore),
             keys.STATUS: self._status,
             keys.RATES: self._raise_rates,
         }
+
+    def _alone(self, answerer: Answerer) -> Answerer:
+        async def answer(question: Question) -> Json:
+            if self._others:
+                raise QueryRefused(f"another bridge has the same vehicle name: {RENAME}")
+            return await answerer(question)
+
+        return answer
 
     async def _upload(self, question: Question) -> Json:
         items = await self._items(question)

@@ -43,7 +43,8 @@ class History:
         """The events, missions and positions of a time range; StoreError, OSError, or ValueError about the range."""
         wanted = parse_time_range(time_range or _DEFAULT_RANGE, self._clock())
         found = await self._api.missions_between(wanted.start_s, wanted.end_s, _MAX_MISSIONS)
-        kept_from_s = self._events[0]["time_s"] if self._events else inf
+        # Not simply the first one's: the clock may have been set back since.
+        kept_from_s = min((event["time_s"] for event in self._events), default=inf)
         logs, logged = self._logs, LoggedPast()
         if logs is not None:
             logged = await self._disk.ask(

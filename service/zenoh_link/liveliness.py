@@ -9,6 +9,8 @@ from bridge.model.events import EventLog
 from service.daemon.mission_data import Json
 from service.machine.threads import post
 
+RENAME = "give one of the two another zenoh.vehicle"
+
 
 class Liveliness:
     """Shows that the bridge is alive. `others`: sessions of other bridges with the same vehicle name."""
@@ -46,8 +48,7 @@ class Liveliness:
             return
         if is_there:
             self.others.add(peer_id)
-            what = "give one of the two another zenoh.vehicle"
-            self._note("warning", "zenoh.name_taken", vehicle=self._vehicle, by=peer_id, what=what)
+            self._note("warning", "zenoh.name_taken", vehicle=self._vehicle, by=peer_id, what=RENAME)
         else:
             self.others.discard(peer_id)
             self._note("info", "zenoh.name_free", vehicle=self._vehicle, was=peer_id)

@@ -2,6 +2,7 @@
 """MAVLink over zenoh: a link to ground stations like the others. Frames go out only while a subscriber reads them."""
 
 import asyncio
+from collections.abc import Set
 
 import zenoh
 
@@ -20,13 +21,14 @@ _MAX_WAITING = 64
 
 
 class MavlinkLink:
-    """Implements GcsLink."""
+    """Implements GcsLink. `others`: bridges with the same name. They get all frames, too, so none is taken."""
 
     name = "zenoh"
 
-    def __init__(self, publisher: Publisher, events: GcsConnections) -> None:
+    def __init__(self, publisher: Publisher, events: GcsConnections, others: Set[str]) -> None:
         self._publisher = publisher
         self._events = events
+        self._others = others
         self._loop = asyncio.get_running_loop()
         self._waiting = 0
 
@@ -55,4 +57,5 @@ class MavlinkLink:
 
     def _take(self, data: bytes) -> None:
         self._waiting -= 1
-        self._events.gcs_data(_READERS, data, datagram=True)
+        if not self._others:
+            self._events.gcs_data(_READERS, data, datagram=True)

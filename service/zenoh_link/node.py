@@ -63,8 +63,8 @@ class Node(Follower):
         clock = SampleClock(self._loop.time)
         self._payloads = Payloads(settings.encoding, clock.unix_s)
         self._publisher = Publisher(self._payloads, self._readers_changed)
-        self._mavlink = MavlinkLink(self._publisher, daemon.gcs)
         self._presence = Liveliness(settings.vehicle, self._note)
+        self._mavlink = MavlinkLink(self._publisher, daemon.gcs, self._presence.others)
         self._data = VehicleData(settings.vehicle, daemon.bridge, self._presence.others, clock)
         self._queries = Queries(self._payloads, self._thread)
         api = DaemonApi(daemon)
@@ -73,7 +73,7 @@ class Node(Follower):
         self._history = History(api, None if state_dir is None else state_dir / TLOG_FOLDER, clock.unix_s)
         self._answerers = Answers(self._data, daemon.bridge, api, self._history).answerers
         if settings.commands:
-            self._answerers |= CommandQueries(api, self._rates).answerers
+            self._answerers |= CommandQueries(api, self._rates, self._presence.others).answerers
         self._held: HeldMission | None = None
         self._pending_publish: asyncio.Handle | None = None
         self._tick: asyncio.TimerHandle | None = None

@@ -14,8 +14,9 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from protocols.mavlink.codec import MavlinkDecoder
 from protocols.mavlink.frame import MavlinkSplitter
+from service.zenoh_link.keys import COMMANDS
 from tests.support.benches import Bench, Starter
-from tests.support.plan import judge, plain_plan, records_of
+from tests.support.plan import judge, plain_plan, plan_text, records_of
 from tests.support.programs import until
 from tests.support.zenoh_bench import (
     I_KNOW,
@@ -145,10 +146,12 @@ def test_two_vehicles_with_one_name_both_report_it(start: Starter, tmp_path: Pat
     with ExitStack() as stack:
         if behind_a_router:
             stack.enter_context(running_router(tmp_path, where))
-        first = zenoh_bench(start, f'{"connect" if behind_a_router else "listen"} = ["{where}"]')
+        first = zenoh_bench(start, f'{"connect" if behind_a_router else "listen"} = ["{where}"]\n{I_KNOW}')
         opened = stack.enter_context(session(connect=where))
         reader = Reader(opened)
         reader.wait("state", lambda state: state["others_of_this_name"] == 0)
+        first.daemon.push(plain_plan(5))
+        before = first.board.records()
         second_directory = tmp_path / "second"
         second_directory.mkdir()
         config = write_config(second_directory, f'connect = ["{where}"]')
@@ -161,6 +164,11 @@ def test_two_vehicles_with_one_name_both_report_it(start: Starter, tmp_path: Pat
         status = first.daemon.status()
         assert status is not None
         assert status["zenoh_others_of_this_name"] == 1
+        for command in ("mission/upload", "mission/clear", "mission/restore?number=1"):  # both would obey it
+            payload = plan_text(plain_plan(7)).encode() if command == "mission/upload" else None
+            (refused,) = ask(opened, f"{COMMANDS}/{command}", payload)
+            assert "another bridge has the same vehicle name" in refused["error"]
+        assert first.board.records() == before
         second.end(signal.SIGKILL)
         until(lambda: first.daemon.has_logged("zenoh.name_free"), "the end of that")
 

@@ -144,3 +144,18 @@ async def test_a_failing_disk_is_reported_by_the_query_and_does_not_prevent_the_
     history = History(DaemonApi(Daemon(Settings(SimulatedFc()))), tmp_path, lambda: NOON_S)
     with pytest.raises(OSError, match="Input/output error"):
         await history.answer(None, 0)
+
+
+async def test_a_clock_that_was_ahead_doubles_no_event(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The events after the correction are in a telemetry log of this run, too."""
+
+    async def none_stored(*_range: float) -> Json:
+        return {"missions": []}
+
+    monkeypatch.setattr(DaemonApi, "missions_between", none_stored)
+    history = History(DaemonApi(Daemon(Settings(SimulatedFc()))), tmp_path, lambda: NOON_S)
+    for number, at_s in enumerate((NOON_S + 86400, NOON_S)):
+        history.add({"v": 1, "seq": number, "time_s": at_s, "level": "info", "event": "vehicle.armed", "facts": {}})
+    write(tmp_path, NOON_S, (NOON_S, heartbeat(armed=True)))
+    found = await history.answer("[..]", 0)
+    assert [each["seq"] for each in found["events"]] == [1, 0]
