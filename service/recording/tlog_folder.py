@@ -87,9 +87,7 @@ class TlogFolder:
             if self._measure_free_space(self._folder) < LEFT_FREE + len(records):
                 raise _LittleSpaceError(f"less than {LEFT_FREE >> 20} MB of the disk are free")
             if is_flight and not _is_flight(self._path):
-                self._own.remove(self._path)
-                self._path = self._path.rename(_of_flight(self._path))
-                self._own.append(self._path)
+                self._path = self._own[-1] = self._path.rename(_of_flight(self._path))
             is_first = not self._file.tell()
             rest = memoryview(records)
             while rest:

@@ -72,19 +72,18 @@ class UartRecorder:
 
 
 def _open(path: Path) -> tuple[int, int]:
-    """Open a new capture, or an earlier one to append to. Answer: its descriptor and size."""
+    """Open a new capture, or an earlier one to append to; returns its descriptor and size."""
     try:
         if path.exists() and not path.is_file():
             # Never write to a device: a serial port may lead to an aircraft.
             raise SettingsError(f"{path} is not a file: name a new file for --record-uart")
         descriptor = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o644)
+        size = os.fstat(descriptor).st_size
+        if size and not is_capture(os.pread(descriptor, 64, 0)):
+            raise SettingsError(f"{path} is not a UART capture: name a new file for --record-uart")
+        if size and os.pread(descriptor, 1, size - 1) != b"\n":
+            # The daemon was killed in the middle of a line: keep the next one apart.
+            os.write(descriptor, b"\n")
     except OSError as error:
         raise SettingsError(f"cannot record into {path}: {reason(error)}; name another file") from error
-    size = os.fstat(descriptor).st_size
-    if size and not is_capture(os.pread(descriptor, 64, 0)):
-        os.close(descriptor)
-        raise SettingsError(f"{path} is not a UART capture: name a new file for --record-uart")
-    if size and os.pread(descriptor, 1, size - 1) != b"\n":
-        # The daemon was killed in the middle of a line: keep the next one apart.
-        os.write(descriptor, b"\n")
     return descriptor, size

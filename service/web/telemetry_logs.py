@@ -12,7 +12,8 @@ from service.daemon.mission_data import Json
 from service.machine.threads import BackgroundThread
 from service.recording.tlog_folder import is_log_name
 
-PIECE = 256 << 10
+#: Bytes; 8 kB/s are enough within the time that the page waits.
+PIECE = 64 << 10
 _LISTED = 200
 #: The page itself waits for 8 s.
 _TIMEOUT_S = 5.0

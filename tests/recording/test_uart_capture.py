@@ -2,6 +2,7 @@
 """Capture files read back as written; damaged ones as far as possible."""
 
 import os
+import resource
 from pathlib import Path
 
 import pytest
@@ -118,6 +119,19 @@ def test_a_truncated_capture_is_appended_to(tmp_path: Path) -> None:
         b"\1",
         b"\2",
     ]
+
+
+def test_a_truncated_capture_on_a_full_disk_is_refused_with_the_reason(tmp_path: Path) -> None:
+    """It was truncated because the disk was full: the daemon is started again before there is space."""
+    path = tmp_path / "naze.uart"
+    path.write_bytes(capture_header("2026-11-21T12:00:00Z") + b'{"t":0.5,"ba')
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (path.stat().st_size, hard))
+    try:
+        with pytest.raises(SettingsError, match=r"cannot record into .*naze\.uart: File too large; name another file"):
+            UartRecorder(path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 def test_a_captures_total_size_is_limited(tmp_path: Path) -> None:

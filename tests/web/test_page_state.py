@@ -64,6 +64,21 @@ def test_old_values_are_marked_stale(lasting_web: WebBench, page: Browser) -> No
     until(lambda: page.text("#badges") == "DISARMED", "the craft again")
 
 
+UPGRADE = """
+    const fetched = window.fetch;
+    window.fetch = async (path, ...options) => {
+        const reply = await fetched(path, ...options);
+        return path === "/api/state" ? new Response(JSON.stringify({ ...await reply.json(), version: "99" })) : reply;
+    };
+    document.body.dataset.isOld = true;"""
+
+
+def test_an_open_page_is_loaded_again_after_an_upgrade(page: Browser) -> None:
+    page.run(UPGRADE)
+    until(lambda: page.run("return document.body && !document.body.dataset.isOld"), "a new page")
+    page.wait_text("#badges", "DISARMED")
+
+
 LIVE = """
     return [...document.querySelectorAll('[role=status], [role=alert], [aria-live]')].map((e) => e.textContent);"""
 

@@ -68,7 +68,7 @@ def test_a_bad_file_gets_one_sentence(lasting_web: WebBench, body: bytes, kind: 
 def test_logs_need_the_token(lasting_web: WebBench) -> None:
     folder = lasting_web.daemon.state_dir / "logs"
     folder.mkdir(exist_ok=True)
-    contents = bytes(range(256)) * 2048
+    contents = bytes(range(256)) * (PIECE // 128)
     (folder / "2026-01-02 03-04-05.tlog").write_bytes(contents)
     (folder / "secret").write_bytes(b"other")
     path = "/api/logs/2026-01-02%2003-04-05.tlog"

@@ -25,6 +25,7 @@ async function look() {
   const askedAt = performance.now();
   try {
     const state = await ask("/api/state");
+    if (last && last.version !== state.version) return location.reload(); // upgraded: these scripts are the old ones
     last = state;
     lastAt = performance.now();
     showStateBar(state, null);
