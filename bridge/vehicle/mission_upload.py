@@ -111,6 +111,8 @@ class MissionUploads:
         state = upload.state
         if not isinstance(state, Receiving):
             # The next request or the final ack will follow anyway.
+            if isinstance(state, Complete | Delivering):
+                upload.waits_for_answer(now)
             return
         if item.seq >= upload.count:
             text = f"WP {item.seq} is beyond the {upload.count} items announced"
@@ -121,12 +123,9 @@ class MissionUploads:
             self._supersede(upload, now)
             self._begin(station, upload.count, now)
             return
-        if state.is_doubtful(item):
-            self._request(upload, now)
-            return
-        state.announced_again = False
-        taken = state.take(item, now)
+        taken = state.is_doubtful(item, now) or state.take(item, now)
         if isinstance(taken, Judged):
+            upload.waits_for_answer(now)
             self._handle(upload, taken, now)
             self._begin_next(now)
         elif taken:
@@ -169,7 +168,11 @@ class MissionUploads:
                 elif isinstance(state, Receiving) and now >= state.request.due:
                     state.request.lost()
                     self._request(upload, now)
-            self._uploads.due = min((upload.state.next_tick() for upload in self._uploads), default=inf)
+                elif now >= upload.reminder_at:
+                    upload.waits_for_answer(now)
+                    if upload.reminder_at < inf:
+                        self._send_request(upload.station, upload.count - 1)
+            self._uploads.due = min((upload.next_tick() for upload in self._uploads), default=inf)
         if now >= self.answers.due:
             self.answers.tick(now)
         self._begin_next(now)
@@ -287,7 +290,7 @@ class MissionUploads:
             self._supersede(upload, now)
             return False
         if isinstance(state, Receiving):
-            state.announced_again = bool(state.items)
+            state.count_repeated()
             self._request(upload, now)
         return True
 
@@ -311,19 +314,21 @@ class MissionUploads:
             self._handle(upload, event, now)
 
     def _request(self, upload: Upload, now: float) -> None:
-        """Request the lowest missing item, by id 40: the only one that Mission Planner understands in both modes."""
+        """Request the lowest missing item, or item 0 to learn if it is still the same list."""
         state = upload.state
         assert isinstance(state, Receiving)
         state.request.asked(state.wanted, now)
         self._uploads.schedule(upload)
-        station = upload.station
-        request = messages.MAVLink_mission_request_message(station.sysid, station.compid, state.wanted)
-        self._ground.to(station, request)
+        self._send_request(upload.station, state.wanted)
         # Without items, a station at another address may have started again: it would take this request for its own
         # list's, whose MISSION_COUNT it repeats until it has one.
         if state.request.is_repeated and state.items:
             for elsewhere in self._elsewhere(upload, now):
-                self._ground.to(elsewhere, request)
+                self._send_request(elsewhere, state.wanted)
+
+    def _send_request(self, station: Station, seq: int) -> None:
+        """Request an item by id 40: the only one that Mission Planner understands in both modes."""
+        self._ground.to(station, messages.MAVLink_mission_request_message(station.sysid, station.compid, seq))
 
     def _delivery(self, upload: Upload, judged: Judged) -> Conversation[DeliveryResult]:
         """Store the list and write it; a rejected one is only stored, unless its sender sent too many of them."""

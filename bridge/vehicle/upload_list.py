@@ -55,7 +55,7 @@ class UploadList:
 
     def schedule(self, upload: Upload) -> None:
         """Note that an upload may be due sooner."""
-        self.due = min(self.due, upload.state.next_tick())
+        self.due = min(self.due, upload.next_tick())
 
     def of(self, station: Station) -> Upload | None:
         """The newest upload of a ground station: one may wait behind another that is being written."""

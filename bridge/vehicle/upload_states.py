@@ -2,8 +2,10 @@
 """One upload: its states from MISSION_COUNT to the final MISSION_ACK, their events and transitions."""
 
 from abc import ABC, abstractmethod
+from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from math import inf
 from typing import Any, ClassVar
 
 from bridge.gcs.station import Station
@@ -23,6 +25,11 @@ _EQUAL_TIMEOUTS = 3
 #: A message repeated within this time was duplicated by the network. Answering each copy would double every message
 #: that follows, and MAVSDK gives up after five repeats; a ground station that missed our request repeats it later.
 _REPEAT_AFTER_S = 0.1
+#: After a pause of this length, and its usual time for an item, a ground station may have given up its list and begun
+#: another: QGroundControl after 1.5 s, and then its user must act; MAVSDK after 2.5 s.
+_ABANDONED_S = 2.5
+#: QGroundControl reports a failed write 1.5 s after its last item, unless that is requested again.
+_NO_ANSWER_S = 1.2
 
 
 class Event:
@@ -125,12 +132,15 @@ class ItemRequest:
     _repeats: int = 0
     _timeout_s: float = _FIRST_TIMEOUT_S
     _round_trip_s: float | None = None
+    #: The number of answers still to come, by item.
+    _unanswered: Counter[int] = field(default_factory=Counter)
 
     def asked(self, seq: int, now: float) -> None:
         self.is_repeated = seq == self._seq
         if not self.is_repeated:
             self._seq, self._first_at, self._repeats = seq, now, 0
         self._asked_at = now
+        self._unanswered[seq] += 1
         self.due = now + self._timeout_s
 
     def lost(self) -> None:
@@ -142,23 +152,26 @@ class ItemRequest:
         if self._round_trip_s is None or self._repeats >= _EQUAL_TIMEOUTS:
             self._timeout_s = min(self._timeout_s * 2, _MAX_TIMEOUT_S)
 
-    def is_copy(self, now: float) -> bool:
-        """True if a repeated message is a copy made by the network, which needs no answer."""
-        return now < self._asked_at + _REPEAT_AFTER_S
+    def needs_none(self, seq: int, now: float) -> bool:
+        """True if a repeated item needs no answer: it was requested as often, or the network made a copy."""
+        self._unanswered[seq] -= 1
+        return self._unanswered[seq] >= 0 or now < self._asked_at + _REPEAT_AFTER_S
 
-    def answered(self, now: float) -> None:
-        """Update the timeout when the requested item arrives."""
-        elapsed_s, known_s = now - self._asked_at, self._round_trip_s
-        if not self.is_repeated:
-            round_trip_s = elapsed_s if known_s is None else known_s * 7 / 8 + elapsed_s / 8
-        elif known_s is None:
+    def answered(self, seq: int, now: float) -> None:
+        """Update the timeout when an item arrives for the first time."""
+        self._unanswered[seq] -= 1
+        if seq != self._seq:
             return
+        elapsed_s, known_s = now - self._asked_at, self._round_trip_s
+        round_trip_s = known_s or 0.0
+        if not self.is_repeated:
+            self._round_trip_s = round_trip_s = elapsed_s if known_s is None else known_s * 7 / 8 + elapsed_s / 8
+        elif known_s is None:
+            # At most this long, until one request is answered alone.
+            round_trip_s = now - self._first_at
         elif elapsed_s < known_s / 2:
             # Too early for an answer to the last copy: the round trip has become longer than the timeout.
-            round_trip_s = min(now - self._first_at, _MAX_TIMEOUT_S)
-        else:
-            round_trip_s = known_s
-        self._round_trip_s = round_trip_s
+            self._round_trip_s = round_trip_s = min(now - self._first_at, _MAX_TIMEOUT_S)
         self._timeout_s = min(max(1.5 * round_trip_s, _FIRST_TIMEOUT_S), _MAX_TIMEOUT_S)
 
 
@@ -174,8 +187,10 @@ class Receiving(UploadState):
         self.items: dict[int, MissionItem] = {}
         self._judged = 0  # items 0.._judged-1 have arrived and are checked
         self.request = ItemRequest()
-        #: MISSION_COUNT arrived again: the client restarted, or the network duplicated it. The next items show which.
-        self.announced_again = False
+        self._progress_at = now
+        self._longest_pause_s = 0.0
+        #: Perhaps the ground station has begun another list of this length. The next items show it.
+        self._is_in_doubt = False
         self._doubtful: MissionItem | None = None
 
     @property
@@ -193,11 +208,15 @@ class Receiving(UploadState):
     @property
     def wanted(self) -> int:
         """The number of the lowest item that is missing."""
-        return 0 if self.announced_again else self._judged
+        return 0 if self._is_in_doubt else self._judged
 
     def next_tick(self) -> float:
         """The time to repeat the request, or to give up."""
         return min(self.deadline, self.request.due)
+
+    def count_repeated(self) -> None:
+        """MISSION_COUNT has arrived again: the client has restarted, or the network duplicated it."""
+        self._is_in_doubt = bool(self.items)
 
     def is_of_another_list(self, item: MissionItem) -> bool:
         """True if the ground station has started again, perhaps with another list.
@@ -207,26 +226,32 @@ class Receiving(UploadState):
         """
         held = self.items.get(item.seq, item)
         # As text, because NaN, "not given", differs from itself.
-        signs = self.announced_again, item.seq == 0, repr(held) != repr(item)
+        signs = self._is_in_doubt, item.seq == 0, repr(held) != repr(item)
         return sum(signs) >= 2
 
-    def is_doubtful(self, item: MissionItem) -> bool:
-        """True for a new item after a second MISSION_COUNT, until it is repeated.
+    def is_doubtful(self, item: MissionItem, now: float) -> bool:
+        """True for a new item after a second MISSION_COUNT or a long pause, until it is repeated.
 
-        MAVProxy and QGroundControl answer a request that was on its way for the former list with their new list's item.
+        MAVProxy and QGroundControl answer a request for the former list's item with that of their new list, whose
+        MISSION_COUNT is on its way, or lost. Item 0 is requested until then. Mission Planner repeats its item instead.
         """
-        if not self.announced_again or item.seq in self.items or repr(item) == repr(self._doubtful):
-            return False
-        self._doubtful = item
-        return True
+        if item.seq not in self.items:
+            pause_s = now - self._progress_at
+            self._is_in_doubt |= pause_s >= self._longest_pause_s + _ABANDONED_S and bool(self.items)
+            if self._is_in_doubt and repr(item) != repr(self._doubtful):
+                self._doubtful = item
+                return True
+        self._is_in_doubt, self._doubtful = False, None
+        return False
 
     def take(self, item: MissionItem, now: float) -> Judged | bool:
         """Keep an item; returns Judged at the end of the list, else True if the next item is to be requested."""
         if item.seq in self.items:
-            return not self.request.is_copy(now)
-        if item.seq == self._judged:
-            self.request.answered(now)
+            return not self.request.needs_none(item.seq, now)
+        self.request.answered(item.seq, now)
         self.items[item.seq] = item
+        self._longest_pause_s = max(self._longest_pause_s, now - self._progress_at)
+        self._progress_at = now
         self.deadline = max(self.deadline, now + (_LAST_ITEMS_S if self.is_closed else self.seconds))
         while self._judged in self.items:
             if self._check.take(self.items[self._judged]) is not None:
@@ -280,6 +305,15 @@ class Upload:
     is_superseded: bool = False
     #: Its ground station has sent a MISSION_COUNT of 0.
     is_cancelled: bool = False
+    #: When to request the last item again, while the whole list waits for its write and result.
+    reminder_at: float = inf
+
+    def waits_for_answer(self, now: float) -> None:
+        """Its ground station has sent its last item, or repeated it."""
+        self.reminder_at = now + _NO_ANSWER_S if self.count and not self.is_superseded else inf
+
+    def next_tick(self) -> float:
+        return min(self.state.next_tick(), self.reminder_at)
 
 
 #: State -> event -> next state, None at the end; any other event in a state is a bug. A clear asks for nothing first.

@@ -218,13 +218,33 @@ def test_the_banner_names_the_flight_controller(flying: tuple[World, GroundStati
     assert "Harakiri with the mission extension" in text
 
 
-def test_a_file_request_is_refused_at_once(flying: tuple[World, GroundStation]) -> None:
-    payload = bytes((7, 0, 3, 4, 0, 0, 0, 0, 0, 0, 0, 0)).ljust(251, b"\0")
+def test_there_are_no_logs(flying: tuple[World, GroundStation]) -> None:
+    """Mission Planner waits 25 s for an answer, without reading its link otherwise."""
+    (entry,) = answers(flying, m.MAVLink_log_request_list_message(1, 1, 0, 0xFFFF))
+    assert entry.get_type() == "LOG_ENTRY"
+    assert (entry.id, entry.num_logs, entry.last_log_num) == (0, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("opcode", "error"),
+    [
+        # List, open to read, CRC: on "File Not Found" QGroundControl requests the parameters in the usual way at once;
+        # after any other error it waits 5 s and tries again.
+        (3, [1, 10]),
+        (4, [1, 10]),
+        (14, [1, 10]),
+        # FailErrno: Mission Planner ignores "unknown command" and keeps asking for 70 s.
+        (6, [2, 2, 95]),
+        (7, [2, 2, 95]),
+    ],
+)
+def test_a_file_request_is_refused_at_once(flying: tuple[World, GroundStation], opcode: int, error: list[int]) -> None:
+    payload = bytes((7, 0, 3, opcode, 0, 0, 0, 0, 0, 0, 0, 0)).ljust(251, b"\0")
     (answer,) = answers(flying, m.MAVLink_file_transfer_protocol_message(0, 1, 1, list(payload)))
     assert (answer.target_system, answer.target_component) == (255, 190)
-    assert list(answer.payload[:6]) == [8, 0, 3, 129, 2, 4]
-    # FailErrno: Mission Planner ignores "unknown command" and keeps asking for 70 s.
-    assert list(answer.payload[12:14]) == [2, 95]
+    size, *data = error
+    assert list(answer.payload[:6]) == [8, 0, 3, 129, size, opcode]
+    assert list(answer.payload[12:]) == [*data, *[0] * (239 - size)]
     # A refusal is not a request and gets no reply.
     assert answers(flying, m.MAVLink_file_transfer_protocol_message(0, 1, 1, list(answer.payload))) == []
 

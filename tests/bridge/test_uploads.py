@@ -494,6 +494,65 @@ def test_two_lists_are_never_mixed_if_the_second_count_is_lost() -> None:
     assert world.stored == records_of(items)
 
 
+def answers_requests(world: World, station: GroundStation, items: list[MissionItem]) -> None:
+    """From now on the station answers each request with an item of this list, as MAVProxy and QGroundControl do."""
+
+    def answer(message: Message) -> None:
+        if message.get_type() == "MISSION_REQUEST":
+            station.send(item_message(message.seq, items[message.seq]))
+
+    station.on_message[:] = [answer]
+
+
+@pytest.mark.parametrize("changed", [range(1, 12), range(3, 4), range(9, 10)])
+def test_two_lists_are_never_mixed_if_the_first_was_stuck_and_the_second_count_is_lost(changed: range) -> None:
+    """Both have the same home and length; the ground station sends MISSION_COUNT once."""
+    world, station = holding()
+    former = waypoints(12, 1)
+    latter = [replace(item, alt_m=item.alt_m + 5) if item.seq in changed else item for item in former]
+    receiving(world, station, former, 6)
+    world.run(3.0)
+    answers_requests(world, station, latter)
+    world.wait_until(lambda _: bool(acks(station)), 20)
+    assert acks(station) == [A.ACCEPTED]
+    assert world.stored == records_of(latter)
+
+
+def test_a_list_goes_on_after_a_long_pause() -> None:
+    """Mission Planner sends only its next item, whatever is requested."""
+    world, station = holding()
+    items = waypoints(12)
+    receiving(world, station, items, 6)
+    world.run(3.0)
+    for seq in range(6, 12):
+        station.take()
+        station.send(item_message(seq, items[seq]))
+        while seq < 11 and seq + 1 not in requested(station):
+            world.run(0.15)
+            station.send(item_message(seq, items[seq]))
+    world.wait_until(lambda _: bool(acks(station)), 5)
+    assert acks(station) == [A.ACCEPTED]
+    assert world.stored == records_of(items)
+
+
+def test_an_item_that_was_once_doubtful_is_doubted_again() -> None:
+    """The network duplicates a MISSION_COUNT; later the ground station begins a second list of the same length."""
+    world, station = holding()
+    first, second = waypoints(12, 1), waypoints(12, 2)
+    receiving(world, station, first, 6)
+    for _ in range(2):
+        station.send(count_message(12))
+        station.send(item_message(6, second[6]))
+        world.run(0.001)
+        assert requested(station)[-1] == 0
+        # An item that is known resolves the doubt.
+        station.send(item_message(3, first[3]))
+        world.run(0.2)
+    answers_requests(world, station, first)
+    world.wait_until(lambda _: bool(acks(station)), 20)
+    assert world.stored == records_of(first)
+
+
 def test_the_same_station_restarts_while_the_flight_controller_is_asked() -> None:
     world, station = holding()
     station.send(count_message(9))
@@ -815,18 +874,20 @@ def test_an_unanswered_request_is_repeated_for_five_seconds(sent: int) -> None:
     assert world.store.outcomes() == ([Outcome.CANCELLED] if sent else [])
 
 
-@pytest.mark.parametrize(("round_trip_s", "copies"), [(0.2, 1), (0.3, 2), (0.6, 2), (1.0, 3)])
+@pytest.mark.parametrize(("round_trip_s", "copies"), [(0.2, 1), (0.3, 2), (0.5, 2), (0.6, 2), (1.0, 3), (2.0, 4)])
 def test_the_timeout_adapts_to_the_round_trip(round_trip_s: float, copies: int) -> None:
     """A repeated request costs Mission Planner one of its ten tries.
 
-    The first request is repeated until it is answered. Each copy is answered by an item, which leads to the next
-    request, so every later request is repeated as often, but not more.
+    The first request is repeated until it is answered. Each copy is answered by an item; only the first leads to the
+    next request.
     """
     _, station = holding()
     station.radio = Radio(delay_s=round_trip_s / 2)
     upload = Upload(station, waypoints(30), repeat_s=10)
     assert upload.run(120) is A.ACCEPTED
-    assert max(requested(station).count(seq) for seq in range(30)) == copies
+    counts = [requested(station).count(seq) for seq in range(30)]
+    assert counts[0] == copies
+    assert max(counts[1:]) == (1 if round_trip_s <= 1.0 else 2)
 
 
 def test_four_copies_of_a_lost_request_arrive_before_mavsdk_gives_up() -> None:
@@ -971,6 +1032,25 @@ def test_a_repeated_last_item_gets_no_reply_until_the_final_ack() -> None:
     world.run(0.45)
     assert acks(station) == []
     assert world.naze.counters.flash_writes == 2
+
+
+@pytest.mark.parametrize("in_turn", [True, False])
+def test_a_station_that_waits_for_the_final_ack_hears_from_us(*, in_turn: bool) -> None:
+    """QGroundControl reports a failed write 1.5 s after its last item, unless it gets a request."""
+    world, station = holding()
+    world.store.delay_s = 1.0
+    other, items = GroundStation(world, "other"), waypoints(10)
+    heard_at = [world.now]
+    answers_requests(world, station, items)
+    station.on_message.append(lambda message: heard_at.append(world.now) if "MISSION" in message.get_type() else None)
+    if not in_turn:
+        receiving(world, other, waypoints(5, 3), 5)
+    station.send(count_message(10))
+    world.wait_until(lambda _: bool(acks(station)), 30)
+    assert acks(station) == [A.ACCEPTED]
+    assert world.stored == records_of(items)
+    assert max(later - earlier for earlier, later in pairwise(heard_at)) < 1.5
+    assert requested(station)[-1] == 9
 
 
 def test_a_lost_final_ack_is_sent_again() -> None:
