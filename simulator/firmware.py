@@ -19,7 +19,8 @@ from simulator.harakiri_mission_store import Floppy
 from simulator.mavlink_port import MavlinkSchedule, MavlinkSender
 from simulator.mission_slots import StoredConfig
 from simulator.missions import Board, BootMissions
-from simulator.msp_port import HarakiriCommand, MspAnswers, MspReceiver, reply
+from simulator.msp_port import MspAnswers, MspReceiver, reply
+from simulator.msp_sensors import MspCommand
 from simulator.options import Counters, Faults, SimOptions, TelemetryProtocol
 from simulator.traps import Trap, TrapCounters
 from simulator.uart import Uart
@@ -27,8 +28,8 @@ from simulator.uart import Uart
 _AUTOSENSE_SECONDS = 4.0
 #: Calibration command -> the option with its duration.
 _CALIBRATIONS: dict[int, str] = {
-    HarakiriCommand.ACC_CALIBRATION: "acc_calibration_ms",
-    HarakiriCommand.MAG_CALIBRATION: "mag_calibration_ms",
+    MspCommand.ACC_CALIBRATION: "acc_calibration_ms",
+    MspCommand.MAG_CALIBRATION: "mag_calibration_ms",
 }
 _FRSKY_BAUD = 9600
 _MINIMOSD_BAUD = 57600
@@ -286,7 +287,7 @@ class Firmware:
                 self._floppy.load()
             self._counters.flash_writes = self._missions.writes
         else:
-            if command == HarakiriCommand.EEPROM_WRITE:
+            if command == MspCommand.EEPROM_WRITE:
                 self._write_config()
             elif command in _CALIBRATIONS:
                 seconds = getattr(self._options, _CALIBRATIONS[command]) / 1000

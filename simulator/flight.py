@@ -7,15 +7,16 @@ from dataclasses import dataclass
 #: The field of examples/naze-field.waypoints.
 FIELD_LAT_E7 = 453838000
 FIELD_LON_E7 = 84733000
-_FIELD_ALTITUDE_M = 131
+#: Above the sea, metres.
+FIELD_ALTITUDE_M = 131.0
 _CRUISE_HEIGHT_M = 20.0
 _CIRCLE_RADIUS_M = 25.0
 _CRUISE_SPEED_MS = 2.5
 _CLIMB_SECONDS = 8.0
 METRES_PER_DEGREE = 111_320.0
 METRES_PER_DEGREE_EAST = METRES_PER_DEGREE * math.cos(math.radians(FIELD_LAT_E7 / 1e7))
-_FULL_BATTERY_V = 12.6
-_EMPTY_BATTERY_V = 10.2
+FULL_BATTERY_V = 12.6
+EMPTY_BATTERY_V = 10.2
 _IDLE_SAG_VS = 0.0002
 _FLIGHT_SAG_VS = 0.003
 
@@ -70,7 +71,7 @@ def fly(uptime: float, flown: float, armed: bool) -> FlightState:
     return FlightState(
         lat_e7=FIELD_LAT_E7 + round(north / METRES_PER_DEGREE * 1e7),
         lon_e7=FIELD_LON_E7 + round(east / METRES_PER_DEGREE_EAST * 1e7),
-        altitude_m=_FIELD_ALTITUDE_M + height,
+        altitude_m=FIELD_ALTITUDE_M + height,
         height_m=height,
         climb_ms=_CRUISE_HEIGHT_M / _CLIMB_SECONDS * (1 - climbed) if armed else 0.0,
         speed_ms=_CRUISE_SPEED_MS if armed else 0.0,
@@ -78,5 +79,5 @@ def fly(uptime: float, flown: float, armed: bool) -> FlightState:
         roll=sway * (4.0 + 2.0 * math.sin(uptime * 0.9)),
         pitch=sway * (3.0 + 1.5 * math.sin(uptime * 0.7)),
         heading=course,
-        volts=max(_FULL_BATTERY_V - _IDLE_SAG_VS * uptime - _FLIGHT_SAG_VS * flown, _EMPTY_BATTERY_V),
+        volts=max(FULL_BATTERY_V - _IDLE_SAG_VS * uptime - _FLIGHT_SAG_VS * flown, EMPTY_BATTERY_V),
     )

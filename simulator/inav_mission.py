@@ -7,13 +7,14 @@ After setWaypoint, getWaypoint, loadNonVolatileWaypointList and saveNonVolatileW
 
 from dataclasses import replace
 
+from protocols.msp.nav import NavAction
 from simulator.msp_firmware import CrashError
-from simulator.nav_waypoint import FLAG_LAST, WAYPOINT_SIZE, Action, NavWaypoint, unpack_waypoint, wrap16
+from simulator.nav_waypoint import FLAG_LAST, WAYPOINT_SIZE, NavWaypoint, unpack_waypoint, wrap16
 
 CAPACITY = 120
 EEPROM_SIZE = CAPACITY * WAYPOINT_SIZE
-_STORED_ACTIONS = frozenset(Action) - {Action.POSHOLD_UNLIM}
-_GEO_ACTIONS = frozenset((Action.WAYPOINT, Action.POSHOLD_TIME, Action.LAND))
+_STORED_ACTIONS = frozenset(NavAction) - {NavAction.POSHOLD_UNLIM}
+_GEO_ACTIONS = frozenset((NavAction.WAYPOINT, NavAction.POSHOLD_TIME, NavAction.LAND))
 #: The reply past the end of the list, and for home until it is known.
 FAKE = NavWaypoint()
 
@@ -61,7 +62,7 @@ class InavMission:
         if not 1 <= number <= min(self.known(armed), CAPACITY):
             return FAKE
         waypoint = self._list[number - 1 + (self._start if armed else 0)]
-        return replace(waypoint, p1=wrap16(waypoint.p1 + 1)) if waypoint.action == Action.JUMP else waypoint
+        return replace(waypoint, p1=wrap16(waypoint.p1 + 1)) if waypoint.action == NavAction.JUMP else waypoint
 
     def write(self, number: int, waypoint: NavWaypoint) -> None:
         """Store a waypoint if it is valid; the flight controller acknowledges it either way."""
@@ -71,7 +72,7 @@ class InavMission:
             return
         if number == 1:
             self._forget()
-        if waypoint.action == Action.JUMP:
+        if waypoint.action == NavAction.JUMP:
             waypoint = replace(waypoint, p1=wrap16(waypoint.p1 - 1))
         self._list[number - 1] = waypoint
         self.count = number
@@ -95,7 +96,7 @@ class InavMission:
             if saved.flag == FLAG_LAST:
                 self._missions += 1
                 after = self._saved(number + 1) if number < CAPACITY else None
-                if after and (after.flag, after.action) == (FLAG_LAST, Action.RTH):
+                if after and (after.flag, after.action) == (FLAG_LAST, NavAction.RTH):
                     break
         self._total = self.count
         if self.selected > self._missions:
@@ -120,7 +121,7 @@ class InavMission:
         """True if INAV allows arming with these JUMPs; checked whenever it is disarmed. CrashError."""
         for index in range(self.count):
             waypoint = self[index]
-            if waypoint.action != Action.JUMP:
+            if waypoint.action != NavAction.JUMP:
                 continue
             target = waypoint.p1
             is_near = index - 2 < target < index + 2
@@ -136,13 +137,13 @@ class InavMission:
     def start_jumps(self) -> None:
         """Set the counter of each JUMP, which INAV keeps in p3."""
         for index in range(self.count):
-            if self[index].action == Action.JUMP:
+            if self[index].action == NavAction.JUMP:
                 self.set_jump(index, self[index].p2)
 
     def end_jumps(self) -> None:
         """Clear the counters at the mission's end."""
         for index in range(self.count):
-            if self[index].action == Action.JUMP:
+            if self[index].action == NavAction.JUMP:
                 self.set_jump(index, 0)
 
     def set_jump(self, index: int, repeats: int) -> None:

@@ -7,11 +7,13 @@ pilot's sticks, safe distances, and the climb before a return home.
 
 from enum import Enum
 
+from protocols.msp.nav import NavAction
+from simulator.flight import FIELD_ALTITUDE_M
 from simulator.inav_mission import CAPACITY, InavMission
 from simulator.msp_firmware import CrashError
 from simulator.nav_status import Error, Mode, NavStatus, State
-from simulator.nav_waypoint import FLAG_HOME, FLAG_LAST, Action
-from simulator.waypoint_craft import FIELD_ALTITUDE_M, WaypointCraft
+from simulator.nav_waypoint import FLAG_HOME, FLAG_LAST
+from simulator.waypoint_craft import WaypointCraft
 
 _CRUISE_MS = 3.0
 _MAX_MS = 10.0
@@ -111,18 +113,18 @@ class InavNavigation:
         for _ in range(CAPACITY):
             waypoint = self._mission[self.index]
             match waypoint.action:
-                case Action.RTH:
+                case NavAction.RTH:
                     self._restarts = True
                     self.phase = Phase.RTH_ENROUTE
                     return
-                case Action.JUMP if waypoint.p3:
+                case NavAction.JUMP if waypoint.p3:
                     if waypoint.p1 < 0:
                         raise CrashError
                     if waypoint.p3 > 0:
                         self._mission.set_jump(self.index, waypoint.p3 - 1)
                     self.index = min(waypoint.p1, CAPACITY - 1)
-                case Action.JUMP | Action.SET_POI | Action.SET_HEAD:
-                    if waypoint.action == Action.JUMP:
+                case NavAction.JUMP | NavAction.SET_POI | NavAction.SET_HEAD:
+                    if waypoint.action == NavAction.JUMP:
                         self._mission.set_jump(self.index, waypoint.p2)
                     if self._is_last():
                         self._finish()
@@ -139,14 +141,14 @@ class InavNavigation:
             height -= FIELD_ALTITUDE_M
         flies_home = waypoint.flag == FLAG_HOME or not (waypoint.lat_e7 or waypoint.lon_e7)
         target = self._home if flies_home else (waypoint.lat_e7, waypoint.lon_e7)
-        wanted = waypoint.p2 if waypoint.action == Action.POSHOLD_TIME else waypoint.p1
+        wanted = waypoint.p2 if waypoint.action == NavAction.POSHOLD_TIME else waypoint.p1
         speed = min(wanted / 100, _MAX_MS) if wanted >= _MIN_MISSION_CMS else _CRUISE_MS
         if not self._craft.fly_to(target, height, speed, seconds):
             return
         match waypoint.action:
-            case Action.LAND:
+            case NavAction.LAND:
                 self.phase = Phase.LANDING
-            case Action.POSHOLD_TIME:
+            case NavAction.POSHOLD_TIME:
                 self.phase = Phase.HOLD
                 self._held_s = 0.0
             case _:

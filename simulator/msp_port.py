@@ -3,10 +3,11 @@
 
 import struct
 from collections.abc import Callable
-from enum import IntEnum
+from dataclasses import replace
 
 from protocols.msp.frame import Direction, MspFrame
 from simulator.flight import Craft
+from simulator.msp_sensors import RSSI, MspCommand, SensorReplies
 from simulator.options import Tree
 from simulator.transmitter import box_activation, channels_us
 
@@ -16,7 +17,6 @@ _QUADX = 3
 _MSP_VERSION = 0
 _CAPABILITY = 0x8000_0000
 _CYCLE_TIME_US = 3000
-_SENSORS = 0b1111  # accelerometer, barometer, magnetometer, GPS
 _ARM_BIT = 5
 _BOXES = (
     "ANGLE", "HORIZON", "BARO", "MAG", "CAMSTAB", "ARM", "GPS HOME", "GPS HOLD", "GPS AUTO", "PASSTHRU",
@@ -25,60 +25,25 @@ _BOXES = (
 #: Roll and pitch, whose P the firmware divides by.
 _CLAMPED_PIDS = (0, 3)
 _PIDS = ("ROLL", "PITCH", "YAW", "ALT", "Pos", "PosR", "NavR", "LEVEL", "MAG", "VEL")
-_RSSI = 230
 _HOME, _HOLD = 0, 16
 _MALFORMED_WP_SIZE = 12
-
-
-class HarakiriCommand(IntEnum):
-    """Harakiri's commands."""
-
-    IDENT = 100
-    STATUS = 101
-    RAW_IMU = 102
-    SERVO = 103
-    MOTOR = 104
-    RC = 105
-    RAW_GPS = 106
-    COMP_GPS = 107
-    ATTITUDE = 108
-    ALTITUDE = 109
-    BAT = 110
-    RC_TUNING = 111
-    PID = 112
-    BOX = 113
-    MISC = 114
-    MOTOR_PINS = 115
-    BOXNAMES = 116
-    PIDNAMES = 117
-    WP = 118
-    SET_RAW_RC = 200
-    SET_RAW_GPS = 201
-    SET_PID = 202
-    SET_BOX = 203
-    SET_RC_TUNING = 204
-    ACC_CALIBRATION = 205
-    MAG_CALIBRATION = 206
-    SET_MISC = 207
-    RESET_CONF = 208
-    EEPROM_WRITE = 250
-    DEBUG = 254
+_GPS_WITHOUT_COURSE = 14
 
 
 _SETTERS = {
-    HarakiriCommand.SET_PID: HarakiriCommand.PID,
-    HarakiriCommand.SET_BOX: HarakiriCommand.BOX,
-    HarakiriCommand.SET_RC_TUNING: HarakiriCommand.RC_TUNING,
+    MspCommand.SET_PID: MspCommand.PID,
+    MspCommand.SET_BOX: MspCommand.BOX,
+    MspCommand.SET_RC_TUNING: MspCommand.RC_TUNING,
 }
 _ACKNOWLEDGED = frozenset(
     (
-        HarakiriCommand.SET_RAW_RC,
-        HarakiriCommand.SET_RAW_GPS,
-        HarakiriCommand.ACC_CALIBRATION,
-        HarakiriCommand.MAG_CALIBRATION,
-        HarakiriCommand.SET_MISC,
-        HarakiriCommand.RESET_CONF,
-        HarakiriCommand.EEPROM_WRITE,
+        MspCommand.SET_RAW_RC,
+        MspCommand.SET_RAW_GPS,
+        MspCommand.ACC_CALIBRATION,
+        MspCommand.MAG_CALIBRATION,
+        MspCommand.SET_MISC,
+        MspCommand.RESET_CONF,
+        MspCommand.EEPROM_WRITE,
     )
 )
 
@@ -151,21 +116,22 @@ class MspAnswers:
         self._craft = craft
         #: GPSLatLonErrorVal in HarakiriWebstore1's mw.h.
         self._unknown_e7 = 0 if tree is Tree.TESTCODE3 else 1_900_000_000
-        self._boxes = [box for box in _BOXES if box != "PASSTHRU" or tree is Tree.TESTCODE3]
+        boxes = [box for box in _BOXES if box != "PASSTHRU" or tree is Tree.TESTCODE3]
+        self._sensors = SensorReplies(dict(enumerate(boxes)), _CYCLE_TIME_US)
         self._settings = {
-            HarakiriCommand.RC_TUNING: bytes((90, 65, 0, 0, 0, 50, 0)),
-            HarakiriCommand.PID: bytes((40, 30, 23)) * len(_PIDS),
-            HarakiriCommand.BOX: box_activation(len(self._boxes)),
+            MspCommand.RC_TUNING: bytes((90, 65, 0, 0, 0, 50, 0)),
+            MspCommand.PID: bytes((40, 30, 23)) * len(_PIDS),
+            MspCommand.BOX: box_activation(len(boxes)),
         }
 
     def answer(self, command: int, payload: bytes) -> bytes:
         """The whole reply frame. The caller handles WP without a payload."""
-        if command == HarakiriCommand.WP:
+        if command == MspCommand.WP:
             return self._waypoint(payload)
         if command in _SETTERS:
-            setting = _SETTERS[HarakiriCommand(command)]
+            setting = _SETTERS[MspCommand(command)]
             if len(payload) == len(self._settings[setting]):
-                if command == HarakiriCommand.SET_PID:
+                if command == MspCommand.SET_PID:
                     payload = bytes(max(byte, 1) if at in _CLAMPED_PIDS else byte for at, byte in enumerate(payload))
                 self._settings[setting] = payload
             return reply(command)
@@ -176,52 +142,34 @@ class MspAnswers:
 
     def _read(self, command: int) -> bytes | None:
         craft = self._craft()
-        flight, armed = craft.flight, craft.armed
+        flags = craft.boxes & ~(1 << _ARM_BIT) | craft.armed << _ARM_BIT
+        usual = self._sensors.payload(command, replace(craft, boxes=flags))
         match command:
-            case HarakiriCommand.IDENT:
+            case MspCommand.IDENT:
                 return struct.pack("<BBBI", _VERSION, _QUADX, _MSP_VERSION, _CAPABILITY)
-            case HarakiriCommand.STATUS:
-                flags = craft.boxes & ~(1 << _ARM_BIT) | armed << _ARM_BIT
-                return struct.pack("<HHHIB", _CYCLE_TIME_US, 0, _SENSORS, flags, 0)
-            case HarakiriCommand.RAW_IMU:
-                return struct.pack("<9h", 0, 0, 512, 0, 0, 0, 210, 0, -430)
-            case HarakiriCommand.SERVO:
+            case MspCommand.SERVO:
                 return struct.pack("<8h", *(1500,) * 8)
-            case HarakiriCommand.MOTOR:
-                return struct.pack("<8h", *(1450 if armed else 1000,) * 4, *(0,) * 4)
-            case HarakiriCommand.RC:
-                return struct.pack("<8H", *channels_us(armed, craft.boxes))
-            case HarakiriCommand.RAW_GPS:
-                position = (
-                    flight.lat_e7,
-                    flight.lon_e7,
-                    round(flight.altitude_m),
-                    round(flight.speed_ms * 100),
-                )
-                return struct.pack("<BBiiHH", 1, flight.satellites, *position)
-            case HarakiriCommand.COMP_GPS:
-                distance, direction = craft.way_home()
-                return struct.pack("<HhB", round(distance), round((direction + 180) % 360 - 180), 1)
-            case HarakiriCommand.ATTITUDE:
-                heading = round((flight.heading + 180) % 360 - 180)
-                return struct.pack("<4h", round(flight.roll * 10), round(flight.pitch * 10), heading, 0)
-            case HarakiriCommand.ALTITUDE:
-                return struct.pack("<ih", round(flight.height_m * 100), round(flight.climb_ms * 100))
-            case HarakiriCommand.BAT:
-                return struct.pack("<BHH", round(flight.volts * 10), 0, _RSSI << 2)
-            case HarakiriCommand.RC_TUNING | HarakiriCommand.PID | HarakiriCommand.BOX:
-                return self._settings[HarakiriCommand(command)]
-            case HarakiriCommand.MISC:
+            case MspCommand.RC:
+                return struct.pack("<8H", *channels_us(craft.armed, craft.boxes))
+            case MspCommand.RAW_GPS:
+                return usual and usual[:_GPS_WITHOUT_COURSE]
+            case MspCommand.ATTITUDE:
+                return usual and usual + bytes(2)
+            case MspCommand.ANALOG:
+                return struct.pack("<BHH", round(craft.flight.volts * 10), 0, RSSI)
+            case MspCommand.RC_TUNING | MspCommand.PID | MspCommand.BOX:
+                return self._settings[MspCommand(command)]
+            case MspCommand.MISC:
                 return bytes(2)
-            case HarakiriCommand.MOTOR_PINS:
+            case MspCommand.MOTOR_PINS:
                 return bytes(range(1, 9))
-            case HarakiriCommand.BOXNAMES:
-                return "".join(f"{name};" for name in self._boxes).encode()
-            case HarakiriCommand.PIDNAMES:
+            case MspCommand.PIDNAMES:
                 return "".join(f"{name};" for name in _PIDS).encode()
-            case HarakiriCommand.DEBUG:
+            case MspCommand.DEBUG:
                 return bytes(8)
-        return None
+            case MspCommand.BOXIDS:
+                return None
+        return usual
 
     def _waypoint(self, payload: bytes) -> bytes:
         craft = self._craft()
@@ -232,8 +180,8 @@ class MspAnswers:
                 number, lat, lon = _HOLD, craft.flight.lat_e7, craft.flight.lon_e7
             case _:
                 # The firmware announces 12 bytes, sends none, and closes with the checksum.
-                return b"$M>" + bytes((_MALFORMED_WP_SIZE, HarakiriCommand.WP, _MALFORMED_WP_SIZE ^ HarakiriCommand.WP))
-        return reply(HarakiriCommand.WP, struct.pack("<BiiHB", number, lat, lon, 0, 0))
+                return b"$M>" + bytes((_MALFORMED_WP_SIZE, MspCommand.WP, _MALFORMED_WP_SIZE ^ MspCommand.WP))
+        return reply(MspCommand.WP, struct.pack("<BiiHB", number, lat, lon, 0, 0))
 
 
 def reply(command: int, payload: bytes = b"") -> bytes:

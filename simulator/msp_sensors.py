@@ -14,11 +14,12 @@ DRAWN_MAH, RSSI = 120, 920
 
 
 class MspCommand(IntEnum):
-    """The simulated commands that these boards share."""
+    """MultiWii's commands; each firmware has some of them."""
 
     IDENT = 100
     STATUS = 101
     RAW_IMU = 102
+    SERVO = 103
     MOTOR = 104
     RC = 105
     RAW_GPS = 106
@@ -26,22 +27,37 @@ class MspCommand(IntEnum):
     ATTITUDE = 108
     ALTITUDE = 109
     ANALOG = 110
+    RC_TUNING = 111
+    PID = 112
+    BOX = 113
+    MISC = 114
+    MOTOR_PINS = 115
     BOXNAMES = 116
+    PIDNAMES = 117
     WP = 118
     BOXIDS = 119
     NAV_STATUS = 121
     NAV_CONFIG = 122
+    SET_RAW_RC = 200
+    SET_RAW_GPS = 201
+    SET_PID = 202
+    SET_BOX = 203
+    SET_RC_TUNING = 204
     ACC_CALIBRATION = 205
     MAG_CALIBRATION = 206
+    SET_MISC = 207
+    RESET_CONF = 208
     SET_WP = 209
     EEPROM_WRITE = 250
+    DEBUG = 254
 
 
 @dataclass(frozen=True, slots=True)
 class SensorReplies:
-    """`boxes`: the modes' names by permanent id, in the order of the status flags. `sensors`: STATUS's word for them.
+    """`boxes`: the modes' names by permanent id, in the order of the status flags.
 
-    `channels`: in RC. `heading_from`: headings begin at 0 or at -180. `fix_3d`: RAW_GPS's word for it.
+    `sensors`: in STATUS; by default accelerometer, barometer, magnetometer and GPS.
+    `channels`: in RC. `heading_from`: headings begin at 0 or at -180. `fix_3d`: the code of a 3D fix in RAW_GPS.
     `currents_ca`: disarmed and armed, 0.01 A.
     """
 

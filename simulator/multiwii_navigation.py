@@ -7,10 +7,11 @@ interrupted mission.
 
 import math
 
+from protocols.msp.nav import NavAction
 from simulator.flight import METRES_PER_DEGREE, METRES_PER_DEGREE_EAST
 from simulator.multiwii_mission import MultiWiiMission
 from simulator.nav_status import Error, Mode, NavStatus, State
-from simulator.nav_waypoint import FLAG_LAST, Action, NavWaypoint
+from simulator.nav_waypoint import FLAG_LAST, NavWaypoint
 from simulator.waypoint_craft import WaypointCraft
 
 _CRUISE_MS = 3.0
@@ -98,21 +99,21 @@ class MultiWiiNavigation:
             self._abort(Error.WP_CRC)
             return
         match self.step.action:
-            case Action.WAYPOINT | Action.POSHOLD_TIME | Action.POSHOLD_UNLIM | Action.LAND:
+            case NavAction.WAYPOINT | NavAction.POSHOLD_TIME | NavAction.POSHOLD_UNLIM | NavAction.LAND:
                 self._begin_leg()
-            case Action.RTH:
+            case NavAction.RTH:
                 self._poi = None
                 height_m = max(self._craft.height_m, self.step.alt_cm / 100 or _RTH_HEIGHT_M)
                 self._rth_height_m = min(height_m, HIGHEST_M)
                 self.state = State.RTH_START
-            case Action.JUMP if 0 < self.step.p1 < self.number:
+            case NavAction.JUMP if 0 < self.step.p1 < self.number:
                 self._jumps = self.step.p2 if self._jumps == _NO_JUMP else self._jumps
                 self.state = State.DO_JUMP
-            case Action.JUMP:
+            case NavAction.JUMP:
                 self._abort(Error.INVALID_JUMP)
-            case Action.SET_HEAD:
+            case NavAction.SET_HEAD:
                 self._poi = None
-            case Action.SET_POI:
+            case NavAction.SET_POI:
                 self._poi = (self.step.lat_e7, self.step.lon_e7)
             case _:
                 self._abort(Error.INVALID_DATA)
@@ -143,11 +144,11 @@ class MultiWiiNavigation:
         # passed still counts.
         if not arrived and (self._poi is None or _distance_m(self._craft.position, self._poi) > WP_RADIUS_M):
             return
-        if self.step.action == Action.LAND:
+        if self.step.action == NavAction.LAND:
             self.state = State.LAND_IN_PROGRESS
-        elif self.step.flag == FLAG_LAST or self.step.action == Action.POSHOLD_UNLIM:
+        elif self.step.flag == FLAG_LAST or self.step.action == NavAction.POSHOLD_UNLIM:
             self._abort(Error.FINISH)
-        elif self.step.action == Action.POSHOLD_TIME:
+        elif self.step.action == NavAction.POSHOLD_TIME:
             self._held_s = 0.0
             self.state = State.HOLD_TIMED
         else:

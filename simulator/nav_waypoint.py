@@ -3,31 +3,19 @@
 
 import struct
 from dataclasses import dataclass
-from enum import IntEnum
+
+from protocols.msp.nav import NavAction
 
 _LAYOUT = struct.Struct("<BBiiihhhB")
 WAYPOINT_SIZE = _LAYOUT.size
 FLAG_LAST, FLAG_HOME = 0xA5, 0x48
 
 
-class Action(IntEnum):
-    """A waypoint's action, in MultiWii's numbers."""
-
-    WAYPOINT = 1
-    POSHOLD_UNLIM = 2
-    POSHOLD_TIME = 3
-    RTH = 4
-    SET_POI = 5
-    JUMP = 6
-    SET_HEAD = 7
-    LAND = 8
-
-
 @dataclass(frozen=True, slots=True)
 class NavWaypoint:
     """`action` may be any byte. Degrees * 1e7 and centimetres; the meaning of p1 to p3 depends on the action."""
 
-    action: int = Action.RTH
+    action: int = NavAction.RTH
     lat_e7: int = 0
     lon_e7: int = 0
     alt_cm: int = 0

@@ -4,17 +4,17 @@
 import math
 
 from simulator.flight import (
+    EMPTY_BATTERY_V,
+    FIELD_ALTITUDE_M,
     FIELD_LAT_E7,
     FIELD_LON_E7,
+    FULL_BATTERY_V,
     METRES_PER_DEGREE,
     METRES_PER_DEGREE_EAST,
     FlightState,
 )
 
-#: The launch field above the sea, metres.
-FIELD_ALTITUDE_M = 131.0
 _CLIMB_MS = 2.0
-_FULL_BATTERY_V = 12.6
 _FLIGHT_SAG_VS = 0.002
 _BANK_DEG, _NOSE_DOWN_DEG = 2.0, 8.0
 
@@ -73,7 +73,7 @@ class WaypointCraft:
             roll=_BANK_DEG if is_moving else 0.0,
             pitch=_NOSE_DOWN_DEG if is_moving else 0.0,
             heading=self.heading,
-            volts=max(_FULL_BATTERY_V - _FLIGHT_SAG_VS * self._flown, 10.2),
+            volts=max(FULL_BATTERY_V - _FLIGHT_SAG_VS * self._flown, EMPTY_BATTERY_V),
         )
 
     def _approach_height(self, height_m: float, seconds: float) -> None:

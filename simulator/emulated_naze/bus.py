@@ -69,7 +69,7 @@ class Bus:
         return value
 
     def write(self, offset: int, _: int, value: int) -> None:
-        """Handle a store. The bridge repeats a short one in the rest of the word, which no register uses."""
+        """Handle a store. The chip copies a short one to the rest of the word, which no register uses."""
         self._pace.charge_access()
         self._pace.saw(~offset, value)
         block = self._blocks.get(offset >> _BLOCK_BITS)

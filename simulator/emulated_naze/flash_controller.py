@@ -8,7 +8,6 @@ from simulator.emulated_naze.image import FLASH_BASE, FLASH_SIZE
 from simulator.emulated_naze.switches import EmulatedCounters, EmulatedFaults
 
 PAGE_SIZE = 1024
-_KEYR, _SR, _CR, _AR, _OBR, _WRPR = 0x04, 0x0C, 0x10, 0x14, 0x1C, 0x20
 _KEYS = (0x4567_0123, 0xCDEF_89AB)
 _PROGRAM_ERROR, _PROTECTION_ERROR, _END = 1 << 2, 1 << 4, 1 << 5
 _PG, _PER, _MER, _STRT, _LOCK = 1, 1 << 1, 1 << 2, 1 << 6, 1 << 7
@@ -47,25 +46,25 @@ class FlashController:
 
     def read(self, offset: int) -> int:
         match offset:
-            case 0x0C:
+            case 0x0C:  # SR
                 return self._status
-            case 0x10:
+            case 0x10:  # CR
                 return self._control
-            case 0x1C:
+            case 0x1C:  # OBR
                 return 0x03FF_FFFC
-            case 0x20:
+            case 0x20:  # WRPR
                 return 0xFFFF_FFFF
         return 0
 
     def write(self, offset: int, value: int) -> None:
         match offset:
-            case 0x04:
+            case 0x04:  # KEYR
                 self._take_key(value)
-            case 0x0C:
+            case 0x0C:  # SR
                 self._status &= ~(value & (_PROGRAM_ERROR | _PROTECTION_ERROR | _END))
-            case 0x10:
+            case 0x10:  # CR
                 self._write_control(value)
-            case 0x14:
+            case 0x14:  # AR
                 self._address = value
 
     def _take_key(self, key: int) -> None:

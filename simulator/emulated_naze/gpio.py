@@ -3,7 +3,7 @@
 
 from simulator.emulated_naze.bus import Registers
 
-_CRL, _CRH, _IDR, _ODR, _BSRR, _BRR = 0x00, 0x04, 0x08, 0x0C, 0x10, 0x14
+_CRL, _CRH, _IDR, _ODR = 0x00, 0x04, 0x08, 0x0C
 _ALL_FLOATING = 0x4444_4444
 _PINS = 16
 
@@ -30,9 +30,9 @@ class Gpio(Registers):
     def write(self, offset: int, value: int) -> None:
         output = self.words.get(_ODR, 0)
         match offset:
-            case 0x10:
+            case 0x10:  # BSRR
                 self.words[_ODR] = output & ~(value >> 16) | value & 0xFFFF
-            case 0x14:
+            case 0x14:  # BRR
                 self.words[_ODR] = output & ~value
             case _:
                 super().write(offset, value)

@@ -7,7 +7,6 @@ from typing import Protocol
 from simulator.emulated_naze.clock import Alarm, Clock
 from simulator.emulated_naze.nvic import Nvic
 
-_CR1, _CR2, _DR, _SR1, _SR2, _CCR = 0x00, 0x04, 0x10, 0x14, 0x18, 0x1C
 _PE, _START, _STOP, _ACK, _POS, _SWRST = 1, 1 << 8, 1 << 9, 1 << 10, 1 << 11, 1 << 15
 _ERROR_INTERRUPT, _EVENT_INTERRUPT, _BUFFER_INTERRUPT = 1 << 8, 1 << 9, 1 << 10
 _SB, _ADDR, _BTF, _RXNE, _TXE, _AF = 1, 2, 4, 1 << 6, 1 << 7, 1 << 10
@@ -74,31 +73,31 @@ class I2c:
     def read(self, offset: int) -> int:
         """Read a word, and clear the flags that reading clears."""
         match offset:
-            case 0x00:
+            case 0x00:  # CR1
                 return self._cr1
-            case 0x04:
+            case 0x04:  # CR2
                 return self._cr2
-            case 0x10:
+            case 0x10:  # DR
                 return self._read_data()
-            case 0x14:
+            case 0x14:  # SR1
                 return self._sr1
-            case 0x18:
+            case 0x18:  # SR2
                 return self._read_sr2()
-            case 0x1C:
+            case 0x1C:  # CCR
                 return self._ccr
         return self._rest.get(offset, 0)
 
     def write(self, offset: int, value: int) -> None:
         match offset:
-            case 0x00:
+            case 0x00:  # CR1
                 self._write_cr1(value)
-            case 0x04:
+            case 0x04:  # CR2
                 self._cr2 = value
-            case 0x10:
+            case 0x10:  # DR
                 self._write_data(value & 0xFF)
-            case 0x14:
+            case 0x14:  # SR1
                 self._sr1 &= value | ~_ERRORS
-            case 0x1C:
+            case 0x1C:  # CCR
                 self._ccr = value
             case _:
                 self._rest[offset] = value

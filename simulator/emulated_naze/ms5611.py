@@ -5,7 +5,6 @@ import random
 
 ADDRESS = 0x77
 _READ_ADC, _READ_PROM = 0x00, 0xA0
-_CONVERT_PRESSURE, _CONVERT_TEMPERATURE = 0x40, 0x50
 #: The coefficients and the conversions of the data sheet's example: 20 degrees, 1000 hPa.
 _PROM = (0x1234, 40127, 36924, 23317, 23282, 33464, 28312)
 _PRESSURE, _TEMPERATURE = 9_085_466, 8_569_150
@@ -36,9 +35,9 @@ class Ms5611:
         self._awaits_command = False
         self._command = byte
         match byte & 0xF0:
-            case 0x40:
+            case 0x40:  # pressure
                 self._converted = _PRESSURE + self._noise.randint(-_PRESSURE_NOISE, _PRESSURE_NOISE)
-            case 0x50:
+            case 0x50:  # temperature
                 self._converted = _TEMPERATURE
 
     def read(self) -> int:

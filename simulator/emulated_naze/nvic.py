@@ -4,9 +4,8 @@
 from enum import IntEnum
 
 _FIRST_IRQ = 16
-_SET_ENABLE, _CLEAR_ENABLE, _SET_PENDING, _CLEAR_PENDING = 0x100, 0x180, 0x200, 0x280
+_CLEAR_ENABLE, _SET_PENDING, _CLEAR_PENDING = 0x180, 0x200, 0x280
 _PRIORITY = 0x400
-_IRQS = 64
 # The STM32F103 implements the upper four bits of a priority.
 _PRIORITY_MASK = 0xF0
 _LOWEST = 0x100

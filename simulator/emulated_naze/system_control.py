@@ -8,7 +8,7 @@ from simulator.emulated_naze.systick import SYSTICK_EXCEPTION, SysTick
 
 BASE = 0xE000_E000
 SIZE = 0x1000
-_CPUID, _ICSR, _VTOR, _AIRCR = 0xD00, 0xD04, 0xD08, 0xD0C
+_ICSR, _VTOR, _AIRCR = 0xD04, 0xD08, 0xD0C
 _CORTEX_M3_R1P1 = 0x411F_C231
 _HANDLER_PRIORITIES = 0xD18
 _FIRST_PRIORITY = 4
@@ -47,11 +47,11 @@ class SystemControl:
             first = _FIRST_PRIORITY + offset - _HANDLER_PRIORITIES
             return sum(self._nvic.priority(first + byte) << 8 * byte for byte in range(4))
         match offset:
-            case 0xD00:
+            case 0xD00:  # CPUID
                 return _CORTEX_M3_R1P1
-            case 0xD04:
+            case 0xD04:  # ICSR
                 return self._nvic.active
-            case 0xD0C:
+            case 0xD0C:  # AIRCR
                 return _READ_KEY << 16 | self._nvic.priority_group << 8
         return self._rest.get(offset, 0)
 

@@ -29,13 +29,13 @@ class SysTick:
 
     def read(self, offset: int) -> int:
         match offset:
-            case 0x10:
+            case 0x10:  # CTRL
                 control = self._control | (_HAS_FIRED if self._has_fired else 0)
                 self._has_fired = False
                 return control
-            case 0x14:
+            case 0x14:  # LOAD
                 return self._reload
-            case 0x18:
+            case 0x18:  # VAL
                 self._on_look()
                 if not self._alarm.is_set:
                     return 0
@@ -45,15 +45,15 @@ class SysTick:
 
     def write(self, offset: int, value: int) -> None:
         match offset:
-            case 0x10:
+            case 0x10:  # CTRL
                 self._control = value & (_ENABLE | _INTERRUPT | _CORE_CLOCK)
                 if not value & _ENABLE:
                     self._alarm.cancel()
                 elif not self._alarm.is_set:
                     self._restart()
-            case 0x14:
+            case 0x14:  # LOAD
                 self._reload = value & _MASK
-            case 0x18:
+            case 0x18:  # VAL
                 self._has_fired = False
                 if self._alarm.is_set:
                     self._restart()

@@ -7,7 +7,7 @@ from simulator.emulated_naze.bus import Registers
 from simulator.emulated_naze.clock import Clock
 from simulator.emulated_naze.nvic import Nvic
 
-_CR1, _DIER, _SR, _EGR, _CNT, _PSC, _ARR, _CCR1 = 0x00, 0x0C, 0x10, 0x14, 0x24, 0x28, 0x2C, 0x34
+_CR1, _DIER, _SR, _CNT, _PSC, _ARR, _CCR1 = 0x00, 0x0C, 0x10, 0x24, 0x28, 0x2C, 0x34
 _ENABLED = 1
 _UPDATE = 1
 
@@ -40,13 +40,13 @@ class Timer(Registers):
     def write(self, offset: int, value: int) -> None:
         """Write a word. A flag of the status register is cleared by writing a zero."""
         match offset:
-            case 0x10:
+            case 0x10:  # SR
                 value &= self.words.get(_SR, 0)
-            case 0x14:
+            case 0x14:  # EGR
                 if value & _UPDATE:
                     self._started_ns = self._clock.now_ns
                 return
-            case 0x24:
+            case 0x24:  # CNT
                 self._started_ns = self._clock.now_ns
         super().write(offset, value)
         self._interrupt()

@@ -8,7 +8,6 @@ from simulator.emulated_naze.clock import Alarm, Clock
 from simulator.emulated_naze.dma import DmaChannel
 from simulator.emulated_naze.nvic import Nvic
 
-_SR, _DR, _BRR, _CR1, _CR3 = 0x00, 0x04, 0x08, 0x0C, 0x14
 _OVERRUN, _RECEIVED, _TRANSMITTED, _EMPTY = 1 << 3, 1 << 5, 1 << 6, 1 << 7
 _RECEIVER, _TRANSMITTER, _RECEIVED_INTERRUPT, _EMPTY_INTERRUPT, _ENABLE = 1 << 2, 1 << 3, 1 << 5, 1 << 7, 1 << 13
 _DMA_RECEIVES, _DMA_TRANSMITS = 1 << 6, 1 << 7
@@ -73,33 +72,33 @@ class Usart:
 
     def read(self, offset: int) -> int:
         match offset:
-            case 0x00:
+            case 0x00:  # SR
                 return self._status
-            case 0x04:
+            case 0x04:  # DR
                 self._status &= ~(_RECEIVED | _OVERRUN)
                 self._interrupt()
                 return self._data
-            case 0x08:
+            case 0x08:  # BRR
                 return self._divider
-            case 0x0C:
+            case 0x0C:  # CR1
                 return self._cr1
-            case 0x14:
+            case 0x14:  # CR3
                 return self._cr3
         return 0
 
     def write(self, offset: int, value: int) -> None:
         match offset:
-            case 0x00:
+            case 0x00:  # SR
                 self._status &= value | ~(_RECEIVED | _TRANSMITTED)
-            case 0x04:
+            case 0x04:  # DR
                 self._send(value & 0xFF)
-            case 0x08:
+            case 0x08:  # BRR
                 self._divider = value
                 self._set_baud()
-            case 0x0C:
+            case 0x0C:  # CR1
                 self._cr1 = value
                 self._load()
-            case 0x14:
+            case 0x14:  # CR3
                 self._cr3 = value
                 self._load()
         self._interrupt()

@@ -15,14 +15,14 @@ from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
 from protocols.msp.commands import Msp
 from protocols.msp.frame import MspParser
-from protocols.msp.nav import LAST, Nav
+from protocols.msp.nav import LAST, Nav, NavAction
 from simulator.fc_kinds import make_board, new_eeprom
 from simulator.inav_boxes import BOXES
 from simulator.inav_mission import CAPACITY
 from simulator.msp_board import MspBoard
 from simulator.msp_options import MspOptions
 from simulator.multiwii_mission import MultiWiiMission
-from simulator.nav_waypoint import FLAG_HOME, FLAG_LAST, WAYPOINT_SIZE, Action, NavWaypoint, unpack_waypoint
+from simulator.nav_waypoint import FLAG_HOME, FLAG_LAST, WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
 from simulator.options import Faults
 from tests.bridge.test_inav import RULES, packed, plan
 from tests.bridge.test_inav_boards import ACCEPTED, board_with, without_home
@@ -135,8 +135,8 @@ def test_record_fields_without_an_item_field_survive_a_read_and_a_write() -> Non
         waypoint(1, p3=0b110),
         waypoint(2, flag=FLAG_HOME),
         waypoint(0, lat_e7=0, lon_e7=0, flag=FLAG_HOME),
-        waypoint(3, Action.LAND, p2=130, p3=1),
-        waypoint(4, Action.RTH, lat_e7=0, lon_e7=0, alt_cm=0, flag=FLAG_LAST),
+        waypoint(3, NavAction.LAND, p2=130, p3=1),
+        waypoint(4, NavAction.RTH, lat_e7=0, lon_e7=0, alt_cm=0, flag=FLAG_LAST),
     ]
     bench = Bench(9)
     bench.eeprom[: 5 * WAYPOINT_SIZE] = b"".join(leg.pack(number) for number, leg in enumerate(legs, 1))

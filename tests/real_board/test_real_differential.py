@@ -16,7 +16,7 @@ from protocols.msp.mission import (
     encode_read,
 )
 from simulator.emulated_naze.image import Image
-from simulator.msp_port import HarakiriCommand as Msp
+from simulator.msp_sensors import MspCommand as Msp
 from simulator.options import SimOptions, Tree
 from tests.support.naze_bench import Bench, WireBench, mission
 from tests.support.real_bench import Figure, RealBench
@@ -25,7 +25,7 @@ _EXCHANGES = 100
 #: Longer than any reply and any write of the configuration.
 _EXCHANGE_S = 0.5
 #: Measurements and the pilot's settings, of which only the lengths must be equal.
-_MEASURED = {Msp.STATUS, Msp.RAW_IMU, Msp.RC, Msp.RAW_GPS, Msp.COMP_GPS, Msp.ATTITUDE, Msp.ALTITUDE, Msp.BAT}
+_MEASURED = {Msp.STATUS, Msp.RAW_IMU, Msp.RC, Msp.RAW_GPS, Msp.COMP_GPS, Msp.ATTITUDE, Msp.ALTITUDE, Msp.ANALOG}
 _MEASURED |= {Msp.DEBUG, Msp.MOTOR, Msp.WP}
 #: Replies with settings of this craft, which the model does not have.
 _SETTINGS = frozenset((Msp.RC_TUNING, Msp.PID, Msp.BOX, Msp.SERVO, Msp.MISC))

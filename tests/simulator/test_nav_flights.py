@@ -10,9 +10,9 @@ import pytest
 from bridge.model.ground_track import distance_m
 from bridge.model.verdict import Result
 from protocols.mission_item import Command
-from protocols.msp.nav import LEGS, NavRecord
+from protocols.msp.nav import LEGS, NavAction, NavRecord
 from simulator.inav_boxes import BOXES, NAV_WP
-from simulator.nav_waypoint import Action, unpack_waypoint
+from simulator.nav_waypoint import unpack_waypoint
 from simulator.options import Faults
 from tests.support.msp_bench import MspBench, waypoint
 from tests.support.nav_rows import ROWS, Row, table
@@ -56,7 +56,7 @@ class Flight:
             seconds, before = self.bench.now - before, self.bench.now
             if error == TOO_FAR:
                 return "stops"
-            if action in (Action.JUMP, Action.SET_POI, Action.SET_HEAD) or not state:
+            if action in (NavAction.JUMP, NavAction.SET_POI, NavAction.SET_HEAD) or not state:
                 if error == FINISHED and self._height_is_steady():
                     return "hovers"
                 continue
@@ -73,11 +73,11 @@ class Flight:
 
     def _ended(self, state: int, action: int, error: int) -> str:
         if state == LANDED or (state == LANDING and self._kind == "inav" and self._height() <= 0):
-            return "lands at home" if action == Action.RTH else "lands"
-        if action == Action.RTH and state in (HOVERS_AT_HOME, HOLDS_FOR_EVER):
+            return "lands at home" if action == NavAction.RTH else "lands"
+        if action == NavAction.RTH and state in (HOVERS_AT_HOME, HOLDS_FOR_EVER):
             return "hovers at home"
         if error == FINISHED and self._height_is_steady():
-            return "lands" if action == Action.LAND else "hovers"
+            return "lands" if action == NavAction.LAND else "hovers"
         return ""
 
     def _height(self) -> float:

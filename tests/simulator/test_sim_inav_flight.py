@@ -8,7 +8,8 @@ from math import hypot
 
 import pytest
 
-from simulator.nav_waypoint import FLAG_HOME, FLAG_LAST, Action, NavWaypoint
+from protocols.msp.nav import NavAction
+from simulator.nav_waypoint import FLAG_HOME, FLAG_LAST, NavWaypoint
 from simulator.options import Faults
 from tests.support.msp_bench import MspBench, waypoint
 
@@ -90,7 +91,7 @@ def test_during_a_mission_lower_modes_are_reported_too() -> None:
 
 
 def test_a_hold_lasts_its_time() -> None:
-    flight = Flight(waypoint(3, Action.POSHOLD_TIME, p1=20, p2=400), waypoint(6))
+    flight = Flight(waypoint(3, NavAction.POSHOLD_TIME, p1=20, p2=400), waypoint(6))
     flight.until(is_finished)
     held = [status for status in flight.seen if status[1] == 4]
     assert {status[3] for status in held} == {1}
@@ -98,7 +99,7 @@ def test_a_hold_lasts_its_time() -> None:
 
 
 def test_a_jump_is_repeated_as_given() -> None:
-    flight = Flight(waypoint(5), waypoint(9), waypoint(13), waypoint(action=Action.JUMP, p1=1, p2=2), waypoint(17))
+    flight = Flight(waypoint(5), waypoint(9), waypoint(13), waypoint(action=NavAction.JUMP, p1=1, p2=2), waypoint(17))
     flight.until(is_finished)
     assert flight.numbers() == [1, 2, 3, 1, 2, 3, 1, 2, 3, 5]
 
@@ -109,7 +110,7 @@ def test_an_invalid_jump_written_in_flight_crashes_the_board() -> None:
     flight.bench.faults.boxes = 0
     flight.bench.run(1)
     flight.bench.write(1, waypoint(5))
-    flight.bench.write(2, waypoint(action=Action.JUMP, p1=0, p2=1, flag=FLAG_LAST))
+    flight.bench.write(2, waypoint(action=NavAction.JUMP, p1=0, p2=1, flag=FLAG_LAST))
     flight.bench.faults.boxes = NAV_WP
     flight.bench.run(30)
     assert flight.bench.board.truth(flight.bench.now) is None
@@ -118,20 +119,22 @@ def test_an_invalid_jump_written_in_flight_crashes_the_board() -> None:
 
 
 def test_a_jump_forever_never_ends() -> None:
-    flight = Flight(waypoint(5), waypoint(9), waypoint(13), waypoint(action=Action.JUMP, p1=1, p2=-1))
+    flight = Flight(waypoint(5), waypoint(9), waypoint(13), waypoint(action=NavAction.JUMP, p1=1, p2=-1))
     with pytest.raises(AssertionError):
         flight.until(is_finished, 200)
 
 
 def test_records_without_a_position_are_skipped() -> None:
-    flight = Flight(waypoint(3), waypoint(action=Action.SET_HEAD, p1=90), waypoint(6, Action.SET_POI), waypoint(9))
+    flight = Flight(
+        waypoint(3), waypoint(action=NavAction.SET_HEAD, p1=90), waypoint(6, NavAction.SET_POI), waypoint(9)
+    )
     flight.until(is_finished)
     assert flight.numbers() == [1, 4]
 
 
 @pytest.mark.parametrize(("p1", "state"), [(0, 13), (1, 10)])
 def test_a_return_home_ends_above_it_or_on_it(p1: int, state: int) -> None:
-    flight = Flight(waypoint(10), waypoint(action=Action.RTH, p1=p1))
+    flight = Flight(waypoint(10), waypoint(action=NavAction.RTH, p1=p1))
     flight.until(lambda status: status[1] == state)
     assert flight.seen[-1][:2] == (RTH, state)
     assert flight.away_from(waypoint(0)) < 1
@@ -141,13 +144,13 @@ def test_a_return_home_ends_above_it_or_on_it(p1: int, state: int) -> None:
 
 @pytest.mark.parametrize(("rth", "last", "state"), [(1, 0, 13), (0, 500, 10)])
 def test_the_last_waypoints_p1_decides_on_landing_after_a_return(rth: int, last: int, state: int) -> None:
-    flight = Flight(waypoint(10), waypoint(action=Action.RTH, p1=rth), waypoint(20, p1=last))
+    flight = Flight(waypoint(10), waypoint(action=NavAction.RTH, p1=rth), waypoint(20, p1=last))
     flight.until(lambda status: status[1] == state)
     assert flight.numbers() == [1, 2]
 
 
 def test_a_landing_ends_the_mission_on_the_ground() -> None:
-    flight = Flight(waypoint(10), waypoint(14, Action.LAND))
+    flight = Flight(waypoint(10), waypoint(14, NavAction.LAND))
     flight.until(is_finished)
     truth = flight.bench.board.truth(flight.bench.now)
     assert truth is not None

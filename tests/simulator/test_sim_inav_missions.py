@@ -9,14 +9,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from protocols.msp.frame import request
+from protocols.msp.nav import NavAction
 from simulator.msp_options import MspOptions
-from simulator.nav_waypoint import FLAG_LAST, Action, NavWaypoint
+from simulator.nav_waypoint import FLAG_LAST, NavWaypoint
 from simulator.options import Faults
 from simulator.simulated_board import Power
 from tests.support.msp_bench import GETINFO, LOAD, SAVE, SET_WP, WP, MspBench, waypoint
 
 VERSIONS = ("6.1.1", "7.1.2", "8.0.1", "9.0.1", "9.1.0")
-FAKE = NavWaypoint(Action.RTH, 0, 0, 0, 0, 0, 0, FLAG_LAST)
+FAKE = NavWaypoint(NavAction.RTH, 0, 0, 0, 0, 0, 0, FLAG_LAST)
 THREE = [waypoint(0), waypoint(1), waypoint(2)]
 NAV_WP_BIT = 13  # of 9.1.0's BOXIDS
 
@@ -193,7 +194,7 @@ def test_an_invalid_jump_is_acknowledged_and_crashes_the_board(version: str, p1:
     bench = MspBench("inav", MspOptions(version=version))
     bench.upload(THREE)
     bench.write(1, waypoint(0))
-    bench.write(2, waypoint(action=Action.JUMP, p1=p1))
+    bench.write(2, waypoint(action=NavAction.JUMP, p1=p1))
     assert bench.board.power is Power.CRASHED
     assert not bench.board.is_alive
     assert bench.ask(GETINFO, timeout=5.0) is None
@@ -204,7 +205,7 @@ def test_an_invalid_jump_is_acknowledged_and_crashes_the_board(version: str, p1:
 
 def test_a_jump_is_read_back_as_it_was_written() -> None:
     bench = MspBench("inav")
-    jump = waypoint(action=Action.JUMP, p1=1, p2=2)
+    jump = waypoint(action=NavAction.JUMP, p1=1, p2=2)
     bench.upload([*THREE, jump])
     assert bench.read(4) == replace(jump, flag=FLAG_LAST)
 
@@ -223,7 +224,7 @@ def test_a_jump_is_read_back_as_it_was_written() -> None:
 )
 def test_an_invalid_jump_blocks_arming(jump: dict[str, int], arms: bool) -> None:
     bench = MspBench("inav")
-    bench.upload([*THREE, waypoint(action=Action.JUMP, **jump), waypoint(4)])
+    bench.upload([*THREE, waypoint(action=NavAction.JUMP, **jump), waypoint(4)])
     bench.faults.armed = True
     bench.run(1.0)
     assert bench.board.armed is arms

@@ -5,8 +5,9 @@ import struct
 
 import pytest
 
+from protocols.msp.nav import NavAction
 from simulator.msp_options import MspOptions
-from simulator.nav_waypoint import FLAG_LAST, Action
+from simulator.nav_waypoint import FLAG_LAST
 from simulator.options import Faults
 from tests.support.msp_bench import SET_WP, MspBench, waypoint
 
@@ -97,7 +98,7 @@ def test_blank_records_are_returned_even_above_the_capacity() -> None:
 
 def flying() -> MspBench:
     bench = MspBench("multiwii", faults=Faults(boxes=0))
-    bench.upload([waypoint(10), waypoint(20, Action.POSHOLD_TIME, p1=5), waypoint(30), waypoint(action=4, p1=1)])
+    bench.upload([waypoint(10), waypoint(20, NavAction.POSHOLD_TIME, p1=5), waypoint(30), waypoint(action=4, p1=1)])
     bench.faults.armed, bench.faults.boxes = True, MISSION
     bench.run(2)
     return bench
@@ -121,7 +122,7 @@ def test_a_mission_ends_with_a_landing_at_home() -> None:
 @pytest.mark.parametrize(("p1", "state"), [(0, 3), (7, 10)])
 def test_a_return_home_lands_if_the_waypoint_read_last_has_p1(p1: int, state: int) -> None:
     bench = MspBench("multiwii", faults=Faults(boxes=0))
-    bench.upload([waypoint(1, Action.POSHOLD_TIME, p1=p1), waypoint(2)])
+    bench.upload([waypoint(1, NavAction.POSHOLD_TIME, p1=p1), waypoint(2)])
     assert bench.read(1).p1 == p1
     bench.faults.armed, bench.faults.boxes = True, RETURN
     bench.run(60)
@@ -142,7 +143,7 @@ def test_in_a_mission_writes_get_no_reply_and_reads_are_empty() -> None:
 @pytest.mark.parametrize(("target", "error"), [(3, 6), (0, 6), (-1, 6), (1, 4)])
 def test_a_jump_goes_back_or_ends_the_mission(target: int, error: int) -> None:
     bench = MspBench("multiwii", faults=Faults(boxes=0))
-    bench.upload([waypoint(5), waypoint(9), waypoint(action=Action.JUMP, p1=target, p2=1)])
+    bench.upload([waypoint(5), waypoint(9), waypoint(action=NavAction.JUMP, p1=target, p2=1)])
     bench.faults.armed, bench.faults.boxes = True, MISSION
     bench.run(120)
     assert status(bench)[4] == error
@@ -164,7 +165,7 @@ def flown_numbers(bench: MspBench, seconds: float) -> list[int]:
 @pytest.mark.parametrize(("hold", "seconds"), [(65, 65), (66, 0.5), (70, 4.5)])
 def test_a_hold_is_counted_in_16_bits(hold: int, seconds: float) -> None:
     bench = MspBench("multiwii", faults=Faults(boxes=0))
-    bench.upload([waypoint(0, Action.POSHOLD_TIME, p1=hold), waypoint(5)])
+    bench.upload([waypoint(0, NavAction.POSHOLD_TIME, p1=hold), waypoint(5)])
     bench.faults.armed, bench.faults.boxes = True, MISSION
     while status(bench)[1] != 4:
         bench.run(0.05)
@@ -174,7 +175,7 @@ def test_a_hold_is_counted_in_16_bits(hold: int, seconds: float) -> None:
     assert bench.now - began == pytest.approx(seconds, abs=0.5)
 
 
-@pytest.mark.parametrize("action", [Action.SET_POI, Action.SET_HEAD])
+@pytest.mark.parametrize("action", [NavAction.SET_POI, NavAction.SET_HEAD])
 def test_the_end_is_missed_on_a_record_without_a_position(action: int) -> None:
     bench = MspBench("multiwii", faults=Faults(boxes=0))
     bench.upload([waypoint(number) for number in range(1, 6)])
@@ -183,7 +184,7 @@ def test_the_end_is_missed_on_a_record_without_a_position(action: int) -> None:
 
 
 def test_a_jump_within_a_jump_never_ends() -> None:
-    jumps = [waypoint(action=Action.JUMP, p1=1, p2=1)] * 2
+    jumps = [waypoint(action=NavAction.JUMP, p1=1, p2=1)] * 2
     bench = MspBench("multiwii", faults=Faults(boxes=0))
     bench.upload([waypoint(1), waypoint(2), *jumps, waypoint(3)])
     assert 5 not in flown_numbers(bench, 300)
@@ -192,7 +193,7 @@ def test_a_jump_within_a_jump_never_ends() -> None:
 @pytest.mark.parametrize(("alt_cm", "height_m"), [(0, 20), (5000, 50)])
 def test_a_return_home_has_a_minimum_height(alt_cm: int, height_m: int) -> None:
     bench = MspBench("multiwii", faults=Faults(boxes=0))
-    bench.upload([waypoint(5, alt_cm=1000), waypoint(action=Action.RTH, alt_cm=alt_cm)])
+    bench.upload([waypoint(5, alt_cm=1000), waypoint(action=NavAction.RTH, alt_cm=alt_cm)])
     flown_numbers(bench, 120)
     truth = bench.board.truth(bench.now)
     assert truth is not None

@@ -12,7 +12,8 @@ import pytest
 import serial
 
 from protocols.msp.frame import request
-from simulator.nav_waypoint import FLAG_LAST, Action
+from protocols.msp.nav import NavAction
+from simulator.nav_waypoint import FLAG_LAST
 from tests.support.msp_bench import Frame, split_frames, waypoint
 from tests.support.programs import NAZE_BRIDGE, REPOSITORY, TIMEOUT_S, control, free_port, run_naze_bridge, until
 
@@ -124,7 +125,7 @@ def test_after_a_crash_the_port_is_gone_until_a_power_cycle(start: Callable[...,
     simulator = start("--kind", "inav")
     with simulator.client() as client:
         client.payload(209, waypoint(1).pack(1))
-        client.payload(209, waypoint(action=Action.JUMP, p1=0).pack(2))
+        client.payload(209, waypoint(action=NavAction.JUMP, p1=0).pack(2))
         with pytest.raises(ConnectionError):
             client.ask(20)
     with pytest.raises(ConnectionRefusedError):

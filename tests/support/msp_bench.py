@@ -7,9 +7,10 @@ from operator import xor
 from typing import NamedTuple
 
 from protocols.msp.frame import Direction, MspParser, request
+from protocols.msp.nav import NavAction
 from simulator.fc_kinds import make_board
 from simulator.msp_options import MspOptions
-from simulator.nav_waypoint import FLAG_LAST, Action, NavWaypoint, unpack_waypoint
+from simulator.nav_waypoint import FLAG_LAST, NavWaypoint, unpack_waypoint
 from simulator.options import Faults
 
 SET_WP, WP, GETINFO, SAVE, LOAD = 209, 118, 20, 19, 18
@@ -118,7 +119,7 @@ def split_frames(data: bytes) -> list[Frame]:
     return frames
 
 
-def waypoint(index: int = 0, action: int = Action.WAYPOINT, **fields: int) -> NavWaypoint:
+def waypoint(index: int = 0, action: int = NavAction.WAYPOINT, **fields: int) -> NavWaypoint:
     """A waypoint near the field, different for each index."""
     usual = {"lat_e7": 453838000 + 900 * index, "lon_e7": 84733000 + 700 * (index % 7), "alt_cm": 2000, "flag": 0}
     return NavWaypoint(action, **usual | fields)

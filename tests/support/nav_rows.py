@@ -132,11 +132,10 @@ ROWS = (
 def table() -> str:
     lines = ["| sent | INAV: records | flown | MultiWii: records | flown |", "|---|---|---|---|---|"]
     for row in ROWS:
-        cells = [row.name]
-        for kind, flight in (("inav", row.inav), ("multiwii", row.multiwii)):
-            verdict = row.verdict(kind)
-            cells += [_records(verdict), flight or "rejected"]
-        lines.append(f"| {' | '.join(cells)} |")
+        inav = _records(row.verdict("inav")), row.inav or "rejected"
+        multiwii = _records(row.verdict("multiwii")), row.multiwii or "rejected"
+        differences = ("same" if one == other else other for one, other in zip(inav, multiwii, strict=True))
+        lines.append(f"| {' | '.join((row.name, *inav, *differences))} |")
     return "\n".join(lines) + "\n"
 
 

@@ -9,13 +9,13 @@ from protocols.msp.frame import request
 from protocols.msp.mission import WpRecord
 from simulator.emulated_naze.board import EmulatedNaze
 from simulator.emulated_naze.image import Image
-from simulator.msp_port import HarakiriCommand
+from simulator.msp_sensors import MspCommand
 from simulator.simulated_board import Power
 from tests.support.naze_bench import WireBench
 
 #: Adds a name and a value to the table printed at the end.
 Figure = Callable[[str, object], None]
-IDENT = request(HarakiriCommand.IDENT)
+IDENT = request(MspCommand.IDENT)
 #: Reception begins earlier, and bytes received then wait for the end of the boot.
 _DEAF_S = 0.6
 _LONGEST_BOOT_S = 12.0
@@ -98,7 +98,7 @@ class RealBench(WireBench):
 def calibrated_flash(image: Image) -> bytes:
     """The flash of a board after calibrating its accelerometer, without which it does not arm."""
     bench = RealBench(image)
-    bench.ask(request(HarakiriCommand.ACC_CALIBRATION))
+    bench.ask(request(MspCommand.ACC_CALIBRATION))
     bench.run(_CALIBRATION_S)
     bench.wait_for_boot()
     bench.naze.power_off(bench.now)
