@@ -99,6 +99,17 @@ def test_a_fresh_card_is_set_up_in_one_run(tmp_path: Path, model: str) -> None:
     assert missing_steps(pi, answers) == []
 
 
+@pytest.mark.parametrize(("serial0", "config"), [("ttyAMA10", "[all]\nenable_uart=1\n"), ("ttyAMA0", "[all]\n")])
+def test_a_pi_5_whose_serial0_is_the_header_loses_its_console(tmp_path: Path, serial0: str, config: str) -> None:
+    """Its bootloaders since 2025-02-12 do that for enable_uart=1, which Ubuntu sets, and a card used in a Pi 4."""
+    pi = FreshPi(tmp_path, "5")
+    pi.path("/dev/serial0").unlink()
+    pi.path("/dev/serial0").symlink_to(serial0)
+    pi.write(CONFIG, config)
+    pi.carry_out(missing_steps(pi, SetupChoices()))
+    assert "console=serial0" not in pi.read(CMDLINE)
+
+
 def test_a_failed_hotspot_is_retried(tmp_path: Path) -> None:
     pi = FreshPi(tmp_path, "4")
     answers = SetupChoices(hotspot=("naze field", "long-enough"))
@@ -145,9 +156,11 @@ def test_an_enabled_getty_is_disabled(tmp_path: Path) -> None:
         ("#enable_uart=1\n", False),
         ("enable_uart=1\n[all]\nenable_uart=0\n", False),
         ("enable_uart=10\n", False),
+        ("[pi4]\nenable_uart=1\n", False),
+        ("[pi4]\nenable_uart=0\n[all]\nenable_uart=1\n[cm5]\nenable_uart=0\n", True),
     ],
 )
-def test_the_last_entry_in_config_txt_counts(tmp_path: Path, given: str, is_on: bool) -> None:
+def test_the_last_entry_for_all_models_in_config_txt_counts(tmp_path: Path, given: str, is_on: bool) -> None:
     pi = FreshPi(tmp_path, "4")
     pi.write(CONFIG, given)
     purposes = [step.purpose for step in missing_steps(pi, SetupChoices())]

@@ -30,10 +30,12 @@ def check_port(host: Host, fc: FcAddress) -> Checked:
     if host.path(device).exists():
         return ok("port", fc.path if str(device) == fc.path else f"{fc.path} is {device}")
     there = [f"/dev/{name}" for pattern in _PORTS for name in host.names("/dev", pattern)]
-    if fc.path.startswith(("/dev/serial0", "/dev/ttyAMA", "/dev/ttyS")):
-        remedy = "enable the UART on the header: sudo naze-bridge setup"
-    else:
+    if not fc.path.startswith(("/dev/serial0", "/dev/ttyAMA", "/dev/ttyS")):
         remedy = "plug the flight controller in"
+    elif model is None:
+        remedy = "enable this UART in the board's own boot settings"
+    else:
+        remedy = "enable the UART on the header: sudo naze-bridge setup"
     if there:
         remedy += f"; or set fc to a port that exists: {', '.join(there)}"
     return problem("port", f"{fc.path} is missing", remedy)

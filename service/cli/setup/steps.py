@@ -25,9 +25,6 @@ _NM_DEVICES = "/run/NetworkManager/devices"
 _AVAHI_FILE = "/etc/avahi/services/naze-bridge.service"
 _OTHERS_FILE = "/etc/udev/rules.d/59-naze-bridge-others.rules"
 _WANTED_BY = "/etc/systemd/system/multi-user.target.wants/naze-bridge.service"
-#: On all models except the Pi 5 the console's names mean the UART on the header.
-_HEADER_CONSOLES = ("serial0", "ttyAMA0", "ttyS0")
-_PI_5_CONSOLES = ("ttyAMA0",)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,8 +50,7 @@ def missing_steps(host: Host, answers: SetupChoices) -> list[Step]:
 
 
 def _console(host: Host, answers: SetupChoices) -> Iterator[Step]:
-    model = pi_model(host)
-    consoles = _PI_5_CONSOLES if model is not None and model.header_uart == "/dev/ttyAMA0" else _HEADER_CONSOLES
+    consoles = _header_consoles(host)
     file = boot_file(host, "cmdline.txt")
     changes: list[Change] = []
     if file is not None:
@@ -69,6 +65,20 @@ def _console(host: Host, answers: SetupChoices) -> Iterator[Step]:
             changes.append(Run(("systemctl", "disable", *_now(host), wanted)))
     if changes:
         yield Step("free the UART on the header from the login console", changes, needs_reboot=in_cmdline)
+
+
+def _header_consoles(host: Host) -> list[str]:
+    """The console names that mean the UART on the header.
+
+    On a Pi 5 serial0 is the debug socket, except with enable_uart=1 from the bootloader of 2025-02-12 on.
+    """
+    names = ["ttyAMA0", "ttyS0", "serial0"]
+    model = pi_model(host)
+    if model is None or model.header_uart != "/dev/ttyAMA0":
+        return names
+    config = host.read(boot_file(host, "config.txt") or "")
+    is_header = _is_on(config, "enable_uart=1") or str(host.resolve("/dev/serial0")) == model.header_uart
+    return names if is_header else names[:1]
 
 
 def _uart(host: Host, answers: SetupChoices) -> Iterator[Step]:
@@ -86,9 +96,11 @@ def _uart(host: Host, answers: SetupChoices) -> Iterator[Step]:
 
 
 def _is_on(text: str, line: str) -> bool:
-    """True if the last setting of that key in config.txt is `line`."""
+    """True if the last setting of that key in config.txt, in a section for all models, is `line`."""
     key, _, _ = line.rpartition("=")
-    given = re.findall(rf"^[ \t]*{re.escape(key)}(=\S*)?[ \t]*$", text, re.MULTILINE)
+    parts = re.split(r"^[ \t]*\[(.*)\]", text, flags=re.MULTILINE)  # alternately a section's body and the next name
+    for_all = "".join(body for name, body in zip(["all", *parts[1::2]], parts[::2], strict=True) if name == "all")
+    given = re.findall(rf"^[ \t]*{re.escape(key)}(=\S*)?[ \t]*$", for_all, re.MULTILINE)
     return bool(given) and f"{key}{given[-1] or '=on'}" == line
 
 
