@@ -26,8 +26,8 @@ def read_mission_file(data: bytes, name: str, note: Note = no_note) -> list[Miss
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
-        remedy = "give a QGC WPL 110 (.waypoints) or a QGroundControl plan (.plan)"
-        raise MissionFileError(name, f"line {line}", "this is not text", remedy) from None
+        remedy = "give a QGC WPL 110 (.waypoints) or a QGroundControl plan (.plan), saved as UTF-8"
+        raise MissionFileError(name, f"line {line}", "this is not UTF-8 text", remedy) from None
     read = read_qgc_plan if text.lstrip().startswith("{") or _is_plan(name) else read_qgc_wpl
     return read(text, name, note)
 

@@ -20,6 +20,7 @@ from protocols.mission_item import MissionItem, MissionResult, degrees_to_e7, is
 from protocols.mission_record import identify
 from service.cli.mission_source import load_mission
 from service.cli.mission_table import mission_table
+from service.cli.options import PATH
 from service.cli.printing import print_json, print_table
 from service.cli.sentences import complain, say
 from service.daemon.mission_data import verdict_data
@@ -58,7 +59,7 @@ def _place(_ctx: click.Context, _param: click.Parameter, text: str | None) -> tu
 
 
 @click.command()
-@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILE...")
+@click.argument("files", nargs=-1, required=True, type=PATH, metavar="FILE...")
 @click.option("--strict", is_flag=True, help="Changed values and dropped items count as rejection (exit code 1).")
 @click.option(
     "--kind",

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 import click
 
+from service.cli.options import PATH
 from service.cli.sentences import INTERRUPTED, complain, fail
 from service.daemon.client import ControlError, Interrupted, NoDaemonError, ask_daemon
 from service.daemon.mission_data import Json
@@ -29,7 +30,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 def daemon_options(command: F) -> F:
     state_dir = click.option(
         "--state-dir",
-        type=click.Path(path_type=Path),
+        type=PATH,
         show_default="as the daemon's",
         help="State directory of the running daemon.",
     )

@@ -19,6 +19,7 @@ from protocols.mission_item import MissionItem, MissionResult
 from service.cli.mission_client import ClientError, connect
 from service.cli.mission_source import load_mission
 from service.cli.mission_table import mission_table
+from service.cli.options import PATH
 from service.cli.printing import print_table
 from service.cli.sentences import fail, say
 from service.daemon.client import ControlError, ask_daemon
@@ -32,7 +33,7 @@ _CONNECT_TIMEOUT_S = 30.0
 
 
 @click.command()
-@click.argument("file", type=click.Path(path_type=Path), default=_EXAMPLE)
+@click.argument("file", type=PATH, default=_EXAMPLE)
 @click.option("--once", is_flag=True, help="Exit after the demonstration.")
 @click.option("--port", type=click.IntRange(1, 65535), default=14550, show_default=True, help="UDP port.")
 def demo(file: Path, once: bool, port: int) -> None:

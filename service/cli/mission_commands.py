@@ -11,6 +11,7 @@ from protocols.mission_file import MissionFileError, write_mission_file, write_q
 from service.cli.daemon_client import ask, ask_with_progress, bridge_options
 from service.cli.mission_source import load_mission, save_mission
 from service.cli.mission_table import mission_table
+from service.cli.options import PATH
 from service.cli.printing import print_json, print_table
 from service.cli.sentences import complain, fail, say
 from service.daemon.mission_data import Json, mission_findings, mission_items
@@ -23,7 +24,7 @@ _STANDARD_OUTPUT = Path("-")
 
 
 @click.command()
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=PATH)
 @click.option("--erase", is_flag=True, help="Erase without asking if no item of the file can be stored.")
 @bridge_options
 def push(file: Path, erase: bool, state_dir: Path | None, fc: str | None, as_json: bool) -> None:
@@ -50,7 +51,7 @@ def _would_erase(delivery: Json) -> bool:
 
 
 @click.command()
-@click.argument("file", type=click.Path(path_type=Path), required=False)
+@click.argument("file", type=PATH, required=False)
 @click.option("--all", "with_others", is_flag=True, help="Also read the missions in INAV's store that are not loaded.")
 @bridge_options
 def pull(file: Path | None, with_others: bool, state_dir: Path | None, fc: str | None, as_json: bool) -> None:

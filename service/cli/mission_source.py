@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Mission files on disk."""
 
+import errno
 import os
 from pathlib import Path
 
@@ -30,8 +31,7 @@ def mission_bytes(path: Path) -> bytes:
     try:
         return read_bounded(path, MAX_BYTES)
     except (OSError, ValueError) as error:
-        name = click.format_filename(path)
-        raise MissionFileError(name, "", reason(error).lower(), "check the path and its permissions") from None
+        raise _failed(path, error) from None
 
 
 def save_mission(path: Path, text: str) -> None:
@@ -39,10 +39,10 @@ def save_mission(path: Path, text: str) -> None:
 
     A link stays a link, and only regular files are replaced: as root, renaming over a device would destroy it.
     """
-    name = click.format_filename(path)
     try:
         target = Path(os.path.realpath(path))  # still a link if it leads to itself
         if target.is_symlink() or (target.exists() and not target.is_file()):
+            name = click.format_filename(path)
             raise MissionFileError(name, "", "it is not a regular file", "name a file for the mission")
         draft = target.with_name(f".naze-bridge-{os.getpid()}")
         with draft.open("x", encoding="utf-8") as file:  # "x": an existing file, above all a link, is not ours
@@ -54,4 +54,10 @@ def save_mission(path: Path, text: str) -> None:
                 draft.unlink(missing_ok=True)
                 raise
     except (OSError, ValueError) as error:
-        raise MissionFileError(name, "", reason(error).lower(), "check the path and its permissions") from None
+        raise _failed(path, error) from None
+
+
+def _failed(path: Path, error: OSError | ValueError) -> MissionFileError:
+    is_full = isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
+    remedy = "delete other files there" if is_full else "check the path and its permissions"
+    return MissionFileError(click.format_filename(path), "", reason(error), remedy)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from service.cli.options import PATH
 from service.settings import DEFAULT_GCS, SettingsError, load_settings
 from service.settings.load import CONFIG_VARIABLE
 
@@ -15,12 +16,12 @@ from service.settings.load import CONFIG_VARIABLE
 @click.option("--gcs", metavar="GCS", multiple=True, help=f"Ground stations; may be repeated. Default: {DEFAULT_GCS}")
 @click.option(
     "--config",
-    type=click.Path(path_type=Path),
+    type=PATH,
     envvar=CONFIG_VARIABLE,
     help="TOML file with all settings; conf.d/*.toml in its folder override it.",
 )
-@click.option("--state-dir", type=click.Path(path_type=Path), help="Folder for stored missions.")
-@click.option("--record-uart", type=click.Path(path_type=Path), help="File to record the port's traffic into.")
+@click.option("--state-dir", type=PATH, help="Folder for stored missions.")
+@click.option("--record-uart", type=PATH, help="File to record the port's traffic into.")
 @click.option("--verbose", is_flag=True, help="Also show debug events.")
 @click.option("--check-config", is_flag=True, help="Check the settings and exit.")
 def run(

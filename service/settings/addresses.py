@@ -145,6 +145,20 @@ def parse_gcs(text: str) -> GcsAddress:
     return GcsAddress(kind, *parse_host_port(text, f"{host}:{port}" if host else rest, _GCS_FORMS))
 
 
+def parse_table(entry: object, setting: str, example: str, keys: Sequence[str]) -> tuple[GcsAddress, dict[str, object]]:
+    """The address of a link's table {address = ...}, and the table itself; other keys than `keys` are errors."""
+    if not isinstance(entry, dict) or not isinstance(entry.get("address"), str):
+        raise AddressError(f'{setting}: {entry!r} is not a table with address = "{example}"')
+    address = parse_gcs(entry["address"])
+    known = ("address", *keys)
+    for key in entry:
+        if key not in known:
+            raise AddressError(
+                f"{setting} {address}: {key!r} is not a setting of this table; known are {', '.join(known)}"
+            )
+    return address, entry
+
+
 def _meant_gcs(word: str, rest: str) -> str:
     near = get_close_matches(word.lower(), _GCS_KINDS, n=1)
     if near and rest:

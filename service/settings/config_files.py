@@ -71,6 +71,9 @@ def _read_file(path: Path, problems: list[Problem]) -> dict[str, Given]:
     except OSError as error:
         problems.append(Problem(str(path), f"this cannot be read: {reason(error)}"))
         return {}
+    except UnicodeDecodeError:
+        problems.append(Problem(str(path), "this is not UTF-8 text: save it with that encoding"))
+        return {}
     except (ValueError, RecursionError) as error:
         problems.append(Problem(str(path), f"this is not valid TOML (text needs quotes, a list brackets): {error}"))
         return {}

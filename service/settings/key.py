@@ -4,6 +4,7 @@
 import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
 from reprlib import Repr
 from typing import NamedTuple
@@ -129,13 +130,14 @@ def yes_no() -> Reader:
     return Reader(read, lambda word: {"true": True, "false": False}.get(word.lower(), word))
 
 
-def choice(words: Sequence[str], parse: Callable[[str], object] = str) -> Reader:
-    """One of several words, converted by `parse`."""
+def choice(kind: type[Enum]) -> Reader:
+    """A word: the value of one member of `kind`."""
 
     def read(value: object, _folder: Path) -> object:
-        if not isinstance(value, str) or value not in words:
-            raise _wrong(value, " or ".join(f'"{word}"' for word in words))
-        return parse(value)
+        try:
+            return kind(value)
+        except ValueError:
+            raise _wrong(value, " or ".join(f'"{each.value}"' for each in kind)) from None
 
     return Reader(read)
 

@@ -7,7 +7,6 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
 from service.settings.addresses import GcsAddress, SerialFc, parse_gcs, split_gcs
 from service.settings.config_files import Given, nearest, read_files
 from service.settings.key import ENVIRONMENT_PREFIX, Problem, SettingsError, Unfit
@@ -38,7 +37,7 @@ def default_state_dir() -> Path:
 
 def load_settings(
     config: Path | None,
-    fc: str | None,
+    named_fc: str | None,
     gcs: Sequence[str],
     state_dir: Path | None,
     record_uart: Path | None = None,
@@ -47,24 +46,24 @@ def load_settings(
 ) -> Settings:
     """Load the settings for `run`; SettingsError lists all problems."""
     problems: list[Problem] = []
-    given = {} if config is None else read_files(config, problems)
-    given |= _read_environment(os.environ, problems)
     flags = {
-        "fc": fc,
+        "fc": named_fc,
         "state_dir": None if state_dir is None else str(state_dir),
         "record_uart": None if record_uart is None else str(record_uart),
         "log_level": "debug" if verbose else None,
     }
-    given |= {name: Given(value, f"--{name.replace('_', '-')}") for name, value in flags.items() if value is not None}
-    values = _read_values(given, problems)
+    given, values = _read(config, flags, problems)
     links: Sequence[tuple[GcsAddress, WriteAccess]] = values.get("gcs", ())
     addresses = _named_links(gcs, problems) or [address for address, _ in links] or [parse_gcs(DEFAULT_GCS)]
     tlog = _tlog_limits(values, given, problems)
     zenoh = ZenohSettings(**_table("zenoh", values)) if "zenoh" in given else None
     web = WebSettings(**_table("web", values)) if "web" in given else None
-    problems += _recording_problems(values, given)
+    fc, record_to = values.get("fc"), values.get("record_uart")
+    if isinstance(fc, SerialFc) and str(record_to) == fc.path:
+        text = f"record_uart {record_to} is the flight controller's port: name a file"
+        problems.append(Problem(given["record_uart"].where, text))
     links_are_from = "--gcs" if gcs else given["gcs"].where if "gcs" in given else ""
-    conflicts = port_conflicts(values.get("fc"), addresses, values.get("share", ()), zenoh, web)
+    conflicts = port_conflicts(fc, addresses, values.get("share", ()), zenoh, web)
     problems += [Problem(links_are_from, text) for text in conflicts]
     if zenoh is not None:
         problems += _zenoh_problems(zenoh, given)
@@ -88,12 +87,21 @@ def takeoff_limit_m() -> int:
     named = os.environ.get(CONFIG_VARIABLE)
     config = Path(named or SERVICE_CONFIG)
     problems: list[Problem] = []
-    given = read_files(config, problems) if named or config.exists() else {}
-    given |= _read_environment(os.environ, problems)
-    limit: int = _read_values(given, problems).get("takeoff_max_m", TAKEOFF_MAX_M)
+    _, values = _read(config if named or config.exists() else None, {}, problems)
+    limit: int = values.get("takeoff_max_m", Settings().takeoff_max_m)
     if problems:
         raise SettingsError(problems)
     return limit
+
+
+def _read(
+    config: Path | None, flags: Mapping[str, str | None], problems: list[Problem]
+) -> tuple[dict[str, Given], dict[str, Any]]:
+    """The settings given in files, environment and flags, and their values."""
+    given = {} if config is None else read_files(config, problems)
+    given |= _read_environment(os.environ, problems)
+    given |= {name: Given(value, f"--{name.replace('_', '-')}") for name, value in flags.items() if value is not None}
+    return given, _read_values(given, problems)
 
 
 def _read_environment(environment: Mapping[str, str], problems: list[Problem]) -> dict[str, Given]:
@@ -151,14 +159,6 @@ def _tlog_limits(values: dict[str, Any], given: Mapping[str, Given], problems: l
 def _table(table: str, values: Mapping[str, Any]) -> dict[str, Any]:
     start = f"{table}."
     return {name.removeprefix(start): value for name, value in values.items() if name.startswith(start)}
-
-
-def _recording_problems(values: Mapping[str, Any], given: Mapping[str, Given]) -> Iterator[Problem]:
-    """Problems of a file for recording."""
-    fc, record_to = values.get("fc"), values.get("record_uart")
-    if isinstance(fc, SerialFc) and str(record_to) == fc.path:
-        text = f"record_uart {record_to} is the flight controller's port: name a file"
-        yield Problem(given["record_uart"].where, text)
 
 
 def _zenoh_problems(zenoh: ZenohSettings, given: Mapping[str, Given]) -> Iterator[Problem]:

@@ -3,7 +3,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import Enum
+from enum import Enum, StrEnum
 from pathlib import Path
 
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
@@ -15,8 +15,15 @@ from service.settings.write_access import WriteAccess
 from service.settings.zenoh import ZenohSettings
 
 DEFAULT_GCS = "udpin:0.0.0.0:14550"
-DEFAULT_SYSID = 1
-DEFAULT_LOG_LEVEL = "info"
+
+
+class LogLevel(StrEnum):
+    """From the least to the most important."""
+
+    DEBUG = "debug"
+    INFO = "info"
+    WARNING = "warning"
+    ERROR = "error"
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,13 +47,13 @@ class Settings:
     """The settings of a daemon. Without `state_dir` nothing is stored; `tlog` None: telemetry is not recorded.
 
     `access`: write permission per link, by its address as text; links not in it are open. `zenoh` None: not used.
-    `web` None: no status page. `log_level`: debug, info, warning or error.
+    `web` None: no status page.
     """
 
     fc: FcAddress = AutoFc()  # noqa: RUF009  # frozen
     gcs: Sequence[GcsAddress] = ()
     state_dir: Path | None = None
-    sysid: int = DEFAULT_SYSID
+    sysid: int = 1
     takeoff_max_m: int = TAKEOFF_MAX_M
     tlog: TlogLimits | None = None
     record_uart: Path | None = None
@@ -56,4 +63,4 @@ class Settings:
     share: Sequence[ShareSettings] = ()
     zenoh: ZenohSettings | None = None
     web: WebSettings | None = None
-    log_level: str = DEFAULT_LOG_LEVEL
+    log_level: LogLevel = LogLevel.INFO

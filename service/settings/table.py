@@ -5,24 +5,18 @@ import re
 from functools import partial
 from pathlib import Path
 
-from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
 from bridge.model.autopilot import Autopilot
 from service.settings.addresses import parse_fc
 from service.settings.key import Key, Unfit, choice, file_name, several, table, text, whole, yes_no
-from service.settings.settings import (
-    DEFAULT_GCS,
-    DEFAULT_LOG_LEVEL,
-    DEFAULT_SYSID,
-    PassThroughRule,
-    TlogLimits,
-)
+from service.settings.settings import DEFAULT_GCS, LogLevel, PassThroughRule, Settings, TlogLimits
 from service.settings.share import parse_share
-from service.settings.web import DEFAULT_LISTEN, parse_listen
+from service.settings.web import WebSettings, parse_listen
 from service.settings.write_access import parse_link
-from service.settings.zenoh import DEFAULT_PREFIX, I_KNOW, PayloadEncoding, ZenohProfile, check_name, check_rates
+from service.settings.zenoh import I_KNOW, PayloadEncoding, ZenohProfile, ZenohSettings, check_name, check_rates
 
-LOG_LEVELS = ("debug", "info", "warning", "error")
+_DEFAULT = Settings()
 _LIMITS = TlogLimits()
+_ZENOH = ZenohSettings()
 
 
 def _endpoint(entry: object, _folder: Path) -> str:
@@ -69,25 +63,25 @@ KEYS = (
         "~/.local/state/naze-bridge.",
         example='"/var/lib/naze-bridge"',
     ),
-    Key("sysid", whole(1, 255), "MAVLink system id of the vehicle, 1..255.", str(DEFAULT_SYSID)),
+    Key("sysid", whole(1, 255), "MAVLink system id of the vehicle, 1..255.", str(_DEFAULT.sysid)),
     Key(
         "takeoff_max_m",
         whole(2, 255),
         "Maximum take-off altitude of a mission, metres, 2..255; a higher one is lowered to it.",
-        str(TAKEOFF_MAX_M),
+        str(_DEFAULT.takeoff_max_m),
     ),
     Key(
         "autopilot",
-        choice([each.value for each in Autopilot], Autopilot),
+        choice(Autopilot),
         'The sender of MAVLink on the port: "auto" detects it, "harakiri" is translated, "other" is passed through.',
-        f'"{Autopilot.AUTO.value}"',
+        f'"{_DEFAULT.autopilot.value}"',
     ),
     Key(
         "pass_through",
-        choice([each.value for each in PassThroughRule], PassThroughRule),
+        choice(PassThroughRule),
         "Messages for an autopilot in pass-through from links with neither key_file nor writers: "
         '"missions" (and parameters and requests), or "everything": arming, modes and control, too.',
-        f'"{PassThroughRule.MISSIONS.value}"',
+        f'"{_DEFAULT.pass_through.value}"',
     ),
     Key("record_tlog", yes_no(), "Record telemetry, for replay in Mission Planner.", "true"),
     Key("tlog_file_mb", whole(1, 1024), "Size of one telemetry log, megabytes, 1..1024.", str(_LIMITS.file_size >> 20)),
@@ -111,16 +105,16 @@ KEYS = (
     ),
     Key(
         "log_level",
-        choice(LOG_LEVELS),
+        choice(LogLevel),
         "Minimum level of logged events: debug, info, warning or error.",
-        f'"{DEFAULT_LOG_LEVEL}"',
+        f'"{_DEFAULT.log_level}"',
         is_live=True,
     ),
     Key(
         "zenoh.prefix",
         text(parse=partial(check_name, "zenoh.prefix")),
         "First chunk of all zenoh keys.",
-        f'"{DEFAULT_PREFIX}"',
+        f'"{_ZENOH.prefix}"',
     ),
     Key(
         "zenoh.vehicle",
@@ -130,15 +124,15 @@ KEYS = (
     ),
     Key(
         "zenoh.encoding",
-        choice([each.value for each in PayloadEncoding], PayloadEncoding),
+        choice(PayloadEncoding),
         "Encoding of payloads: json or cbor.",
-        f'"{PayloadEncoding.JSON.value}"',
+        f'"{_ZENOH.encoding.value}"',
     ),
     Key(
         "zenoh.profile",
-        choice([each.value for each in ZenohProfile], ZenohProfile),
+        choice(ZenohProfile),
         "Data volume: full sends each sample; metered a group every 5 s, or 30 s if unchanged, but arming at once.",
-        f'"{ZenohProfile.FULL.value}"',
+        f'"{_ZENOH.profile.value}"',
     ),
     Key(
         "zenoh.rates",
@@ -186,7 +180,7 @@ KEYS = (
         "web.listen",
         text('"HOST:PORT"', parse_listen),
         "Address of the status page: 0.0.0.0:8080 for the whole network, 127.0.0.1:8080 for this machine only.",
-        f'"{DEFAULT_LISTEN}"',
+        f'"{WebSettings().listen}"',
     ),
     Key(
         "web.hosts",

@@ -6,7 +6,6 @@ from pathlib import Path
 
 from service.settings.addresses import host_port, parse_host_port
 
-DEFAULT_LISTEN = "127.0.0.1:8080"
 _FORMS = 'write "0.0.0.0:8080" for the whole network, "127.0.0.1:8080" for this machine only'
 
 

@@ -15,17 +15,12 @@ from pathlib import Path
 
 from bridge.gcs.station import Peer
 from protocols.mavlink.signing import key_from_passphrase
-from service.settings.addresses import AddressError, GcsAddress, parse_gcs
+from service.settings.addresses import AddressError, GcsAddress, parse_gcs, parse_table
 from storage.os_error import reason
 
 Network = IPv4Network | IPv6Network
 
-_KEYS = ("address", "key_file", "writers")
 _MAX_PASSPHRASE = 4096
-
-
-class WriteAccessError(AddressError):
-    """A table that cannot be used; the text is one sentence."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,17 +48,12 @@ def parse_link(entry: object, folder: Path) -> tuple[GcsAddress, WriteAccess]:
     """Read one entry of `gcs`: a connection string or a table. A relative `key_file` is looked for in `folder`."""
     if isinstance(entry, str):
         return parse_gcs(entry), WriteAccess()
-    if not isinstance(entry, dict) or not isinstance(entry.get("address"), str):
-        raise WriteAccessError(f'gcs: {entry!r} is neither text nor a table with address = "udpin:0.0.0.0:14550"')
-    address = parse_gcs(entry["address"])
-    for key in entry:
-        if key not in _KEYS:
-            raise WriteAccessError(f"gcs {address}: {key!r} is not a setting of a link; known are {', '.join(_KEYS)}")
-    key_file, writers = entry.get("key_file"), entry.get("writers")
+    address, table = parse_table(entry, "gcs", "udpin:0.0.0.0:14550", ["key_file", "writers"])
+    key_file, writers = table.get("key_file"), table.get("writers")
     if key_file is not None and (not isinstance(key_file, str) or not key_file):
-        raise WriteAccessError(f"gcs {address}: key_file must be the name of a file that holds the passphrase")
+        raise AddressError(f"gcs {address}: key_file must be the name of a file that holds the passphrase")
     if writers is not None and not isinstance(writers, list):
-        raise WriteAccessError(f'gcs {address}: writers must be a list of networks like ["192.168.4.0/24"]')
+        raise AddressError(f'gcs {address}: writers must be a list of networks like ["192.168.4.0/24"]')
     return address, WriteAccess(
         None if key_file is None else read_key(folder / key_file),
         None if writers is None else tuple(_network(address, writer) for writer in writers),
@@ -77,18 +67,18 @@ def read_key(path: Path) -> bytes:
         with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode):
-                raise WriteAccessError(f"key_file {path} is not a file")
+                raise AddressError(f"key_file {path} is not a file")
             if status.st_mode & stat.S_IRWXO:
-                raise WriteAccessError(f"key_file {path} is readable by other users: run chmod 600 {path}")
+                raise AddressError(f"key_file {path} is readable by other users: run chmod 600 {path}")
             passphrase = file.read(_MAX_PASSPHRASE + 1).decode()
     except OSError as error:
-        raise WriteAccessError(f"key_file {path} cannot be read: {reason(error)}") from error
+        raise AddressError(f"key_file {path} cannot be read: {reason(error)}") from error
     except UnicodeDecodeError:
         # Not "from" the error, which quotes the passphrase.
-        raise WriteAccessError(f"key_file {path} holds no text: write the passphrase into it, on one line") from None
+        raise AddressError(f"key_file {path} holds no text: write the passphrase into it, on one line") from None
     passphrase = passphrase.removesuffix("\n").removesuffix("\r")
     if not passphrase or "\n" in passphrase or len(passphrase) > _MAX_PASSPHRASE:
-        raise WriteAccessError(f"key_file {path} must hold the passphrase on one line, and nothing else")
+        raise AddressError(f"key_file {path} must hold the passphrase on one line, and nothing else")
     return key_from_passphrase(passphrase)
 
 
@@ -96,4 +86,4 @@ def _network(address: GcsAddress, text: object) -> Network:
     try:
         return ip_network(str(text))
     except ValueError as error:
-        raise WriteAccessError(f"gcs {address}: writers: {error}; write 192.168.4.0/24 or 192.168.4.7") from error
+        raise AddressError(f"gcs {address}: writers: {error}; write 192.168.4.0/24 or 192.168.4.7") from error

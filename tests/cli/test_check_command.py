@@ -87,7 +87,7 @@ def test_json_has_one_object_per_file_with_the_documented_keys(files: dict[str, 
     assert rejected["items"] == rejected["records"] == cleared["items"] == cleared["records"] == []
     assert list(missing) == ["file", "error"]
     assert missing["file"] == str(files["missing"])
-    assert "no such file" in missing["error"]
+    assert "No such file" in missing["error"]
     item_keys = ["seq", "command", "frame", "p1", "p2", "p3", "p4", "lat_e7", "lon_e7", "alt_m"]
     assert {tuple(item) for item in accepted["items"]} == {tuple(item_keys)}
     assert {tuple(finding) for finding in accepted["findings"]} == {
@@ -146,13 +146,13 @@ def test_any_path_is_shown_unchanged(tmp_path: Path, name: str) -> None:
         path.write_text(write_qgc_wpl([HOME, POINT]))
         assert name in run(path).stdout.replace("\n", "")
     else:
-        assert "is a directory" in run(path).stderr
+        assert "Is a directory" in run(path).stderr
 
 
 def test_an_endless_file_is_refused() -> None:
     result = run("/dev/zero")
     assert result.exit_code == 2
-    assert "larger than" in result.stderr
+    assert "larger than 8 MB" in result.stderr
 
 
 def test_the_examples_have_the_intended_results() -> None:

@@ -72,4 +72,4 @@ def test_an_installation_has_the_example(tmp_path: Path) -> None:
 def test_a_missing_file_is_one_sentence(tmp_path: Path) -> None:
     ended = run_naze_bridge("demo", "--once", tmp_path / "none")
     assert ended.returncode == 2
-    assert ended.stderr.startswith(f"naze-bridge: {tmp_path / 'none'}: no such file")
+    assert ended.stderr.startswith(f"naze-bridge: {tmp_path / 'none'}: No such file")

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`push`, `pull`, `clear` and `status` as used by a person and by a script, with a running daemon."""
 
+import errno
 import json
 import math
 import os
@@ -16,8 +17,9 @@ from typing import Any
 
 import pytest
 
-from protocols.mission_file import read_mission_file
+from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import Command
+from service.cli.mission_source import save_mission
 from tests.support.benches import Starter
 from tests.support.plan import HOME, PlanRow, judge, plain_plan, plan_text, records_of, waypoint
 from tests.support.programs import Daemon, run_naze_bridge
@@ -130,7 +132,7 @@ def test_a_list_that_is_too_long_is_refused_without_a_table(daemon: Daemon, tmp_
 
 
 def test_an_unreadable_file_gives_exit_status_2(daemon: Daemon, tmp_path: Path) -> None:
-    assert_one_sentence(ask(daemon, "push", tmp_path / "none"), 2, "none", "no such file")
+    assert_one_sentence(ask(daemon, "push", tmp_path / "none"), 2, "none", "No such file")
 
 
 def test_unset_values_are_null_in_json(daemon: Daemon, tmp_path: Path) -> None:
@@ -227,7 +229,17 @@ def test_pull_into_a_link_to_itself_is_refused(daemon: Daemon, tmp_path: Path) -
 
 
 def test_pull_into_a_missing_folder_is_refused(daemon: Daemon, tmp_path: Path) -> None:
-    assert_one_sentence(ask(daemon, "pull", tmp_path / "none" / "held"), 1, "no such file or directory")
+    assert_one_sentence(ask(daemon, "pull", tmp_path / "none" / "held"), 1, "No such file or directory")
+
+
+def test_a_full_disk_is_named_with_its_remedy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "")
+
+    monkeypatch.setattr(Path, "replace", full)
+    with pytest.raises(MissionFileError, match="No space left on device; delete other files there"):
+        save_mission(tmp_path / "held.waypoints", "text")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_pull_into_standard_output_is_a_mission_file(daemon: Daemon) -> None:

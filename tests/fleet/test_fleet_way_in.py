@@ -86,7 +86,7 @@ def test_an_invalid_prefix_is_one_sentence(prefix: str) -> None:
 
 def test_an_unusable_zenoh_file_is_one_sentence(tmp_path: Path) -> None:
     missing = tmp_path / "none.json5"
-    assert f"{missing} cannot be read: no such file" in sentence_of("list", "--zenoh-config", missing)
+    assert f"{missing} cannot be read: No such file" in sentence_of("list", "--zenoh-config", missing)
     broken = tmp_path / "broken.json5"
     for text in ("{", '{mode: "aeroplane"}', '{no_such_key: 1, "', "\0\0"):
         broken.write_text(text)
@@ -117,4 +117,4 @@ def test_an_unusable_name_is_one_sentence() -> None:
 def test_an_unusable_folder_is_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     reason = sentence_of("enroll", "kite", "--folder", tmp_path / "file")
-    assert reason.endswith("members.json cannot be read: not a directory")
+    assert reason.endswith("members.json cannot be read: Not a directory")

@@ -198,7 +198,7 @@ async def test_noise_is_not_passed_on() -> None:
     [
         ("tcpin:5761", "is not a table with address"),
         ({"address": "udpout:h:1"}, "write tcpin:ADDR:PORT or udpin:ADDR:PORT"),
-        ({"address": "tcpin:5761", "writes": True}, "'writes' is not a setting of a share"),
+        ({"address": "tcpin:5761", "writes": True}, "'writes' is not a setting of this table"),
         ({"address": "tcpin:5761", "write": "yes"}, "must be true or false"),
     ],
 )

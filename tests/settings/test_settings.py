@@ -186,7 +186,7 @@ def test_odd_values_give_one_short_sentence(folder: Path, text: str, words: str)
     ("content", "words"),
     [
         (b"fc = auto", "this is not valid TOML (text needs quotes, a list brackets): Invalid value (at line 1"),
-        (b"\xff\xfef\0c\0", "this is not valid TOML"),
+        (b"\xff\xfef\0c\0", "this is not UTF-8 text: save it with that encoding"),
         (b"a = " + b"[" * 5000, "this is not valid TOML"),
         (b"#" * (2 << 20), "this cannot be read: it is larger than 1 MB"),
     ],

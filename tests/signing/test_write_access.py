@@ -91,11 +91,14 @@ def test_with_an_empty_list_no_address_may_write(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("entry", "reason"),
     [
-        ("7", "neither text nor a table"),
-        ("{}", "neither text nor a table"),
-        ("{address = 7}", "neither text nor a table"),
+        ("7", "is not a table with address"),
+        ("{}", "is not a table with address"),
+        ("{address = 7}", "is not a table with address"),
         ('{address = "radio:x"}', "is not a ground station connection"),
-        (f'{{address = "{LINK}", keyfile = "k"}}', "'keyfile' is not a setting of a link; known are address, key_file"),
+        (
+            f'{{address = "{LINK}", keyfile = "k"}}',
+            "'keyfile' is not a setting of this table; known are",
+        ),
         (f'{{address = "{LINK}", key_file = 7}}', "key_file must be the name of a file"),
         (f'{{address = "{LINK}", key_file = ""}}', "key_file must be the name of a file"),
         (f'{{address = "{LINK}", key_file = "none"}}', "cannot be read: No such file"),

@@ -11,6 +11,7 @@ import click
 
 from service.cli.daemon_client import SERVICE_STATE
 from service.cli.doctor.checked import Checked, Grade
+from service.cli.options import PATH
 from service.cli.printing import print_json
 from service.cli.sentences import say
 from service.daemon.client import STATUS, ControlError, ask_daemon
@@ -27,11 +28,11 @@ _COLOURS = {Grade.OK: "green", Grade.NOTE: "yellow", Grade.PROBLEM: "red"}
 @click.option("--fc", metavar="FC", help="The flight controller's connection, as for `run`.")
 @click.option(
     "--config",
-    type=click.Path(path_type=Path),
+    type=PATH,
     envvar=CONFIG_VARIABLE,
     help="The daemon's configuration. Default: the service's, if it is installed.",
 )
-@click.option("--state-dir", type=click.Path(path_type=Path), help="The daemon's folder for missions.")
+@click.option("--state-dir", type=PATH, help="The daemon's folder for missions.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per line for each check.")
 def doctor(fc: str | None, config: Path | None, state_dir: Path | None, as_json: bool) -> None:
     """Diagnose problems of this machine, each with its remedy.

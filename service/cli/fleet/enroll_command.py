@@ -6,7 +6,8 @@ from pathlib import Path
 import click
 
 from service.cli.fleet.enrolment import EnrolmentError, FleetFolder, Role
-from service.cli.fleet.options import PATH, check_endpoint
+from service.cli.fleet.options import check_endpoint
+from service.cli.options import PATH
 from service.cli.sentences import fail
 from service.settings.zenoh import DEFAULT_PREFIX, ZenohSettingsError
 

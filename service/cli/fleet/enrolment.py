@@ -60,7 +60,7 @@ class FleetFolder:
         except FileNotFoundError:
             return {}
         except OSError as error:
-            raise EnrolmentError(f"{path} cannot be read: {reason(error).lower()}") from error
+            raise EnrolmentError(f"{path} cannot be read: {reason(error)}") from error
         except (ValueError, AttributeError) as error:
             raise EnrolmentError(f"{path} is not a list of members: {error}") from error
 
@@ -78,7 +78,7 @@ class FleetFolder:
             self._write("router.json5", self.router_config(members))
             self._write("members.json", {each: its.value for each, its in members.items()})
         except OSError as error:
-            raise EnrolmentError(f"{self.path} cannot be written: {reason(error).lower()}") from error
+            raise EnrolmentError(f"{self.path} cannot be written: {reason(error)}") from error
         return [own] if not self.is_tls else [own, *(self.path / f"{name}.{kind}" for kind in ("pem", "key"))]
 
     def router_config(self, members: Mapping[str, Role]) -> Json:

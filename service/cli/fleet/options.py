@@ -12,10 +12,9 @@ import zenoh
 
 from service.cli.fleet.conditions import FIELDS, parse_condition
 from service.cli.fleet.session import DEFAULT_ENDPOINT, FleetError, open_session
+from service.cli.options import PATH
 from service.cli.sentences import INTERRUPTED, fail
 from service.settings.zenoh import ZenohSettings, ZenohSettingsError, check_name
-
-PATH = click.Path(path_type=Path)
 
 F = TypeVar("F", bound=Callable[..., Any])
 

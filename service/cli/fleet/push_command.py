@@ -11,7 +11,6 @@ import zenoh
 from protocols.mission_file import MissionFileError, read_mission_file
 from service.cli.fleet.conditions import Condition, matching
 from service.cli.fleet.options import (
-    PATH,
     address_options,
     all_option,
     fleet_session,
@@ -33,6 +32,7 @@ from service.cli.fleet.tables import (
 from service.cli.fleet.trial import Trial, try_mission
 from service.cli.fleet.vehicle import BridgeState
 from service.cli.mission_source import mission_bytes
+from service.cli.options import PATH
 from service.cli.printing import print_json, print_table
 from service.cli.sentences import INTERRUPTED, complain
 

@@ -155,7 +155,7 @@ def _from_file(path: Path) -> zenoh.Config:
         path.open("rb").close()  # zenoh's own message for a missing file is long
         return zenoh.Config.from_file(str(path))
     except OSError as error:
-        raise FleetError(f"{path} cannot be read: {reason(error).lower()}") from error
+        raise FleetError(f"{path} cannot be read: {reason(error)}") from error
     except zenoh.ZError as error:
         raise FleetError(f"{path} is not a zenoh configuration: {in_short(error)}") from error
 

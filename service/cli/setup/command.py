@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 
 from service.cli.doctor.command import diagnose
+from service.cli.options import PATH
 from service.cli.sentences import fail
 from service.cli.setup.change import Machine, SetupError, Step, is_root
 from service.cli.setup.steps import GCS_PORT, PAGE_PORT, STATE_FOLDER, SetupChoices, missing_steps
@@ -31,14 +32,14 @@ _ADDRESS_OF_HOTSPOT = "10.42.0.1"
 @click.command()
 @click.option("--fc", default="auto", show_default=True, metavar="FC", help="The flight controller, as for `run`.")
 @click.option("--hotspot", metavar="SSID", help="Open a Wi-Fi network of this name. Default: keep the current one.")
-@click.option("--password-file", type=click.Path(path_type=Path), help="File with the hotspot's password.")
+@click.option("--password-file", type=PATH, help="File with the hotspot's password.")
 @click.option("--country", metavar="CC", help="Wi-Fi country, such as DE: the radio stays off without one.")
 @click.option("--name", metavar="HOST", help="Name of this machine on the network: HOST.local.")
 @click.option("--no-page", is_flag=True, help="Do not serve the status page.")
-@click.option("--key-file", type=click.Path(path_type=Path), help="File with a MAVLink signing passphrase.")
+@click.option("--key-file", type=PATH, help="File with a MAVLink signing passphrase.")
 @click.option("--yes", is_flag=True, help="Ask no questions: use the options and their defaults.")
 @click.option("--dry-run", is_flag=True, help="Show the changes without making them.")
-@click.option("--root", type=click.Path(path_type=Path), default="/", hidden=True)
+@click.option("--root", type=PATH, default="/", hidden=True)
 def setup(
     fc: str,
     hotspot: str | None,
@@ -169,7 +170,7 @@ def _line_of(path: Path) -> str:
     try:
         lines = path.read_text().splitlines()
     except OSError as error:
-        raise click.UsageError(f"{path} cannot be read: {reason(error).lower()}") from error
+        raise click.UsageError(f"{path} cannot be read: {reason(error)}") from error
     except UnicodeDecodeError:
         raise click.UsageError(f"{path} is not a text file") from None  # the error would quote the secret
     if len(lines) != 1 or not lines[0].strip():
