@@ -12,7 +12,7 @@ from typing import Protocol
 
 import serial
 
-from service.links.port_holder import explain_port_error, find_console
+from service.links.port_holder import BUSY, explain_port_error, find_console
 from service.machine.threads import BackgroundThread
 from service.settings.addresses import UNKNOWN_HOST_HINT, AutoFc, FcAddress, SerialFc, TcpFc, family_of
 from storage.os_error import reason
@@ -39,6 +39,10 @@ class PortError(Exception):
     """The device cannot be opened now; the text is one sentence for the user."""
 
 
+class PortInUseError(PortError):
+    """Another program uses the device. To name it, all processes are searched."""
+
+
 def device_opener(address: FcAddress) -> Callable[[], Awaitable[Device]]:
     """A function that opens the device, also again after a loss. For AutoFc see PortFinder."""
     assert not isinstance(address, AutoFc)
@@ -63,7 +67,7 @@ def open_serial(path: str) -> serial.Serial:
     """Open a serial port for exclusive use; PortError if that fails."""
     console = find_console(path)
     if console is not None:
-        raise PortError(
+        raise PortInUseError(
             f"{path} is used by a login console: sudo systemctl disable --now serial-getty@{console}.service,"
             " and remove its console=... from cmdline.txt"
         )
@@ -73,7 +77,8 @@ def open_serial(path: str) -> serial.Serial:
         port = serial.Serial(path, 115200, timeout=0, write_timeout=0, inter_byte_timeout=0, exclusive=True)
         _keep_dtr(port.fileno())
     except (serial.SerialException, OSError) as error:
-        raise PortError(explain_port_error(path, error)) from error
+        kind = PortInUseError if error.errno in BUSY else PortError
+        raise kind(explain_port_error(path, error)) from error
     except termios.error as error:
         raise PortError(f"{path} is not a serial port") from error
     os.set_blocking(port.fileno(), False)

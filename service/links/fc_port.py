@@ -5,12 +5,12 @@ import asyncio
 import os
 import socket
 from collections.abc import Awaitable, Callable
-from contextlib import suppress
+from contextlib import closing, suppress
 
 import serial
 import structlog
 
-from service.links.fc_device import DEVICE_ERRORS, Device, PortError
+from service.links.fc_device import DEVICE_ERRORS, Device, PortError, PortInUseError
 from service.links.traffic import Traffic
 from storage.os_error import reason
 
@@ -20,6 +20,8 @@ MOVED_ON = "searching for the flight controller on another port"
 
 _READ_SIZE = 4096
 _RETRY_S = 0.25
+#: A search through all processes four times a second would take a sixth of a core.
+_IN_USE_RETRY_S = 2.0
 #: Unsent bytes above this are dropped: ground stations can send faster than a UART.
 _MAX_UNSENT = 8192
 #: At this rate, reads are gathered: a delay of 2 ms costs the pilot less than so many wake-ups cost the CPU. Timers
@@ -75,12 +77,15 @@ class FcPort:
         """Open the port and keep reopening it; cancel to end."""
         try:
             while True:
+                pause_s = _RETRY_S
                 try:
                     self._device = await self._open()
                 except (PortError, OSError) as error:
                     level = _log.debug if str(error) == self.trouble else _log.warning
                     level("fc.port_unavailable", why=str(error))
                     self.trouble = str(error)
+                    if isinstance(error, PortInUseError):
+                        pause_s = _IN_USE_RETRY_S
                 else:
                     self._descriptor = self._device.fileno()
                     self._is_tcp = isinstance(self._device, socket.socket) and self._device.family != socket.AF_UNIX
@@ -90,7 +95,7 @@ class FcPort:
                     self._on_open()
                     await self._closed.wait()
                 # Also after a loss: a TCP adapter in use accepts each connection and closes it at once.
-                await asyncio.sleep(_RETRY_S)
+                await asyncio.sleep(pause_s)
         finally:
             self._shut(STOPPED)
 
@@ -215,6 +220,8 @@ class FcPort:
         self._unsent.clear()
         self._speed = None
         self._closed.set()
-        with suppress(*DEVICE_ERRORS):  # it is opened again in any case
-            device.close()
+        with suppress(*DEVICE_ERRORS), closing(device):  # it is opened again in any case
+            if isinstance(device, serial.Serial):
+                # The kernel would wait up to 30 s for a board that accepts no bytes, and the event loop with it.
+                device.reset_output_buffer()
         self._on_close(why)

@@ -9,6 +9,9 @@ from pathlib import Path
 
 from service.machine.host import Host
 
+#: Errors of opening a port that another program uses.
+BUSY = (errno.EBUSY, errno.EAGAIN)
+
 
 def explain_port_error(path: str, error: OSError) -> str:
     """Turn an error from opening `path` into one sentence: what, where, what to do."""
@@ -21,7 +24,7 @@ def explain_port_error(path: str, error: OSError) -> str:
         return f"{path} is missing: plug the flight controller in, or name another port (fc)"
     if code in (errno.EACCES, errno.EPERM):
         return f"{path}: no permission; add the user to the group that owns it: sudo usermod -aG dialout $USER"
-    if code in (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK):
+    if code in BUSY:
         host = Host()
         others = (process for process in host.processes() if process.pid != os.getpid())
         holder = next((process for process in others if host.has_open(process, path)), None)

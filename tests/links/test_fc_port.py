@@ -16,7 +16,7 @@ import serial
 from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkSplitter
-from service.links.fc_device import device_opener
+from service.links.fc_device import device_opener, open_serial
 from service.links.fc_port import FcPort
 from service.links.traffic import Traffic
 from service.settings.addresses import SerialFc
@@ -231,6 +231,17 @@ async def test_queued_frames_are_dropped_when_the_speed_changes(line: Line) -> N
     assert bytes(came) == b"for the new speed"
 
 
+async def test_unsent_bytes_are_dropped_when_the_port_closes(line: Line) -> None:
+    """Closing would wait for them: up to 30 s on a USB board that hangs."""
+    port = line.start()
+    await until_async(lambda: line.opened, "the port")
+    await until_async(lambda: port.write(bytes(4000)) or port.dropped_bytes, "a full port")  # type: ignore[func-returns-value]
+    await line.stop()
+    on_the_wire = 4096
+    assert len(line.take()) <= on_the_wire
+    assert line.take() == b""
+
+
 async def test_dtr_stays_on_when_the_port_closes(line: Line) -> None:
     """Boards with an Arduino's reset circuit restart when it comes on again."""
     attributes = termios.tcgetattr(line._terminal)
@@ -280,3 +291,25 @@ async def test_after_each_loss_there_is_a_pause(monkeypatch: pytest.MonkeyPatch)
     assert opened == 1
     running.cancel()
     await asyncio.wait([running])
+
+
+async def test_a_port_in_use_is_tried_less_often(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each try searches all processes for the program that uses it."""
+    monkeypatch.setattr("service.links.fc_port._RETRY_S", 0)
+    monkeypatch.setattr("service.links.fc_port._IN_USE_RETRY_S", 3600)
+    tried = 0
+
+    async def open_device() -> serial.Serial:
+        nonlocal tried
+        tried += 1
+        return open_serial(str(line.path))
+
+    with serial.Serial(str(line.path), exclusive=True):
+        port = FcPort(open_device, lambda: None, lambda _data: None, lambda _why: None, Traffic())
+        running = asyncio.get_running_loop().create_task(port.run())
+        await until_async(lambda: port.trouble, "the failure")
+        for _ in range(50):
+            await asyncio.sleep(0)
+        assert tried == 1
+        running.cancel()
+        await asyncio.wait([running])
