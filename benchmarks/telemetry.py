@@ -2,10 +2,10 @@
 """The cost of telemetry over MSP: CPU, the time from a reply to its datagram, and noise.
 
 CPU: the daemon polls a simulated Naze that keeps the pace of a UART, and sends the 100 datagrams per second that one
-ground station requested, or only attitudes. Latency: the other end of the terminal is in this process and replies at
-once; each attitude is numbered, so that a datagram is matched with its reply. The floor of both is a bare loop that
-polls its own board at the same rates at the same time (benchmarks.floors). Noise needs no port: a bridge that has
-found a flight controller gets it in simulated time.
+ground station requested, or only attitudes. Latency: the other end of the terminal is in this process; each attitude
+is numbered, so that a datagram is matched with its reply. The floor of both is a bare loop that polls its own board at
+the same rates at the same time (benchmarks.floors). Noise needs no port: a bridge that has found a flight controller
+gets it in simulated time.
 """
 
 import math
@@ -30,6 +30,7 @@ from benchmarks.processes import daemon, floor_program, simulated_naze
 from bridge.bridge import Bridge
 from bridge.config import BridgeConfig
 from bridge.gcs.station import Peer
+from bridge.line.msp_link import byte_time_s
 from bridge.model.events import Level
 from bridge.vehicle.telemetry_table import TELEMETRY
 from protocols.mavlink.codec import FrameWriter, pack
@@ -62,6 +63,7 @@ _NOISE_BYTES = 10_000_000
 _CHUNK_BYTES = 1000
 _SAMPLES = 100
 _SEED = 1
+_BAUD = 115200
 
 
 def measure() -> list[Figure]:
@@ -172,14 +174,14 @@ def _noise() -> list[Figure]:
         events.append(event)
 
     now = 0.0
-    bridge = Bridge(BridgeConfig((115200,)), log_event, now)
+    bridge = Bridge(BridgeConfig((_BAUD,)), log_event, now)
     bridge.session.opened(now)
     ground, controller = Peer("udp", "noise"), Controller()
     while "fc.found" not in events:
         now += 0.01
         bridge.tick(now)
         for data in bridge.take_fc_output():
-            bridge.fc_received(controller.answer(data), now)
+            bridge.fc_received(b"".join(controller.answers(data)), now)
     bridge.gcs_received(ground, _frame(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3)), now, datagram=True)
     events.clear()
     false_frames = 0
@@ -187,7 +189,7 @@ def _noise() -> list[Figure]:
     tracemalloc.start()
     chunks = _NOISE_BYTES // _CHUNK_BYTES
     for number in range(chunks):
-        now += _CHUNK_BYTES * 10 / 115200
+        now += _CHUNK_BYTES * byte_time_s(_BAUD)
         bridge.fc_received(chance.randbytes(_CHUNK_BYTES), now)
         bridge.tick(now)
         bridge.take_fc_output()
@@ -268,23 +270,22 @@ class Controller:
         self._answers = MspAnswers(lambda: Craft(fly(1.0, 0.0, armed=False), False, 1, None), Tree.TESTCODE3)
         self._number = 0
 
-    def answer(self, data: bytes) -> bytes:
+    def answers(self, data: bytes) -> Iterator[bytes]:
         """The replies to the requests in `data`."""
-        replies = b""
         for request in self._parser.feed(data):
             self.asked += 1
             if request.command == Msp.ATTITUDE:
                 self._number = (self._number + 1) % ATTITUDES
-                replies += reply(request.command, struct.pack("<4h", self._number, 0, 0, 0))
+                attitude = reply(request.command, struct.pack("<4h", self._number, 0, 0, 0))
                 self.attitudes_at[self._number] = time.perf_counter()
+                yield attitude
             else:
-                replies += self._answers.answer(request.command, request.payload)
-        return replies
+                yield self._answers.answer(request.command, request.payload)
 
 
 @contextmanager
 def instant_controller(link: Path) -> Iterator[Controller]:
-    """Run one behind a pseudo-terminal."""
+    """Run one behind a pseudo-terminal: each reply is there at once, but only after the previous one has been sent."""
     near, far = os.openpty()
     tty.setraw(far)
     link.symlink_to(os.ttyname(far))
@@ -292,7 +293,9 @@ def instant_controller(link: Path) -> Iterator[Controller]:
 
     def serve() -> None:
         while data := os.read(near, 4096):
-            os.write(near, controller.answer(data))
+            for answer in controller.answers(data):
+                os.write(near, answer)
+                time.sleep(len(answer) * byte_time_s(_BAUD))
 
     # Ends with the process: the terminal is never closed while it waits for a byte.
     threading.Thread(target=serve, daemon=True).start()

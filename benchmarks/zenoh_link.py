@@ -183,7 +183,7 @@ class _Fed:
         bridge.tick(self._now)
         # A reply may trigger the next request; flush() would write it to a port that is not open.
         while output := bridge.take_fc_output():
-            bridge.fc_received(self._controller.answer(b"".join(output)), self._now)
+            bridge.fc_received(b"".join(self._controller.answers(b"".join(output))), self._now)
         self._daemon.flush()
         return self._controller.asked - before
 

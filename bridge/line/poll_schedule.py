@@ -82,6 +82,7 @@ class _Slot:
     least_cost: float
     request: Send = field(init=False)
     cost: float = field(init=False)
+    reply_payload: int = field(init=False)
     wanted_s: float = inf
     interval_s: float = inf
     asked_at: float = -inf
@@ -91,10 +92,12 @@ class _Slot:
     refusals: int = 0
 
     def __post_init__(self) -> None:
-        self.expect(frame_size(self.poll.command, self.poll.reply_payload))  # until one was seen
+        self.expect(self.poll.reply_payload)  # until one was seen
 
-    def expect(self, size: int) -> None:
-        """Set the size of its reply, bytes. Its cost is that of both frames, or the board's time if that is longer."""
+    def expect(self, reply_payload: int) -> None:
+        """Set its reply's payload, bytes. Its cost is that of both frames, or the board's time if that is longer."""
+        self.reply_payload = reply_payload
+        size = frame_size(self.poll.command, reply_payload)
         self.request = Send(self.poll.frame, self.poll.command, size)
         self.cost = max(len(self.poll.frame) + size, self.least_cost)
 
@@ -194,13 +197,12 @@ class PollSchedule:
         is_slowed = slot.misses > _TOLERATED_MISSES or self._quality < 1
         slot.misses = 0
         self._quality = min(self._quality + _RECOVERY, 1.0)
-        size = frame_size(frame.command, len(frame.payload))
         if frame.direction is Direction.ERROR:
             slot.refusals += 1
             self._fit()
-        elif slot.refusals or size != slot.request.reply_size:
+        elif slot.refusals or len(frame.payload) != slot.reply_payload:
             slot.refusals = 0
-            slot.expect(size)
+            slot.expect(len(frame.payload))
             self._fit()
         elif is_slowed:
             # The others follow with their own replies.

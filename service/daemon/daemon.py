@@ -182,6 +182,8 @@ class Daemon:
     def _forward(self) -> None:
         """Carry out only the outputs of pass-through: the rest would cost too much thousands of times a second."""
         self.gcs.send()
+        if self._tlog is not None:
+            self._tlog.record()
         if self._followers and self.bridge.report.fresh and (fresh := self.bridge.report.take_fresh()):
             for follower in self._followers:
                 follower.telemetry(fresh)

@@ -34,11 +34,18 @@ class TlogRecorder:
         self._epoch_us = self._present_epoch_us()
         self._is_flying = False
         self._awaits_vehicle = True
+        self._frames: list[bytes] = []
         self._writer = DiskWriter("telemetry log", self._write, self._folder.close)
 
     def on_frames(self, frames: Sequence[bytes]) -> None:
-        """Record whole frames that were sent or received just now; the caller must not modify them."""
-        self._writer.put((time.monotonic_ns(), self._is_flying, frames), sum(map(len, frames)))
+        """Take whole frames that were received or are being sent."""
+        self._frames += frames
+
+    def record(self) -> None:
+        """Record the frames taken since the last call: after the datagrams were sent, which must not wait for this."""
+        if self._frames:
+            frames, self._frames = self._frames, []
+            self._writer.put((time.monotonic_ns(), self._is_flying, frames), sum(map(len, frames)))
 
     def flies(self, *, is_flying: bool) -> None:
         """Mark the following frames as part of a flight, or not."""
@@ -50,6 +57,7 @@ class TlogRecorder:
         return f"telemetry log: {self._folder.describe()}{dropped}"
 
     def close(self) -> None:
+        self.record()
         self._writer.close()
 
     def _write(self, taken: list[_Taken]) -> None:

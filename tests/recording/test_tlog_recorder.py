@@ -28,6 +28,7 @@ def test_a_step_of_the_clock_begins_a_new_file(tmp_path: Path, step_ns: int) -> 
     deadline = time.monotonic() + TIMEOUT_S
     for number in count():
         recorder.on_frames([frame(number)])
+        recorder.record()
         files = set(tmp_path.iterdir())
         if files:
             # The first file exists; now the clock is set.
@@ -60,7 +61,9 @@ def test_the_first_heartbeat_in_a_file_is_the_vehicles(tmp_path: Path, version: 
     ahead_ns = 0
     recorder = TlogRecorder(tmp_path, TlogLimits(), lambda: time.time_ns() + ahead_ns)
     recorder.on_frames([station, frame(1)])
+    recorder.record()
     recorder.on_frames([frame(2), station, vehicle, station])
+    recorder.record()
     deadline = time.monotonic() + TIMEOUT_S
     while not (first := list(tmp_path.iterdir())):
         assert time.monotonic() < deadline
@@ -68,7 +71,9 @@ def test_the_first_heartbeat_in_a_file_is_the_vehicles(tmp_path: Path, version: 
     ahead_ns = HOUR_NS
     while len(later := set(tmp_path.iterdir()) - set(first)) == 0:
         recorder.on_frames([station])
+        recorder.record()
         recorder.on_frames([frame(3)])
+        recorder.record()
         assert time.monotonic() < deadline
         time.sleep(0.01)
     recorder.on_frames([vehicle, station])
@@ -85,6 +90,7 @@ def test_a_small_correction_of_the_clock_changes_nothing(tmp_path: Path) -> None
     deadline = time.monotonic() + TIMEOUT_S
     while not any(path.stat().st_size > 200 for path in tmp_path.iterdir()):
         recorder.on_frames([frame(1)])
+        recorder.record()
         assert time.monotonic() < deadline
         time.sleep(0.05)
     recorder.close()
