@@ -80,8 +80,9 @@ class MissionFiles:
 
     async def check(self, request: Request) -> Json:
         """The mission as the flight controller would hold it."""
+        name, body = await _received(request)
         async with self._turn:
-            _, items = await _read(request)
+            items = await _parsed(name, body)
             try:
                 verdict = await self._api.check(items)
             except ControlError as error:
@@ -92,18 +93,23 @@ class MissionFiles:
 
     async def write(self, request: Request) -> str:
         """Start writing; returns the write's id. The caller has checked the token."""
-        name, items = await _read(request)
+        name, body = await _received(request)
+        items = await _parsed(name, body)
         return self._writer.begin(name, partial(self._api.push, items, f"{name}, from the page"))
 
 
-async def _read(request: Request) -> tuple[str, list[MissionItem]]:
+async def _received(request: Request) -> tuple[str, bytes]:
+    """The file's name and contents. A slow phone takes seconds to send them."""
     name = request.query_params.get("name", "")[-_MAX_NAME:] or "mission file"
     if request.headers.get("content-type") != _CONTENT_TYPE:
         raise HTTPException(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, f"Send the file as {_CONTENT_TYPE}.")
     try:
-        body = await request.body()
+        return name, await request.body()
     except ClientDisconnect as error:
         raise HTTPException(HTTPStatus.BAD_REQUEST, "The file was not received completely.") from error
+
+
+async def _parsed(name: str, body: bytes) -> list[MissionItem]:
     try:
         items = await asyncio.to_thread(read_mission_file, body, name)
     except MissionFileError as error:
@@ -112,4 +118,4 @@ async def _read(request: Request) -> tuple[str, list[MissionItem]]:
         raise HTTPException(HTTPStatus.UNPROCESSABLE_ENTITY, f"{name} has {len(items)} items; the limit is {MAX_ROWS}.")
     if not items:
         raise HTTPException(HTTPStatus.UNPROCESSABLE_ENTITY, f"{name} has no items: choose another file.")
-    return name, items
+    return items
