@@ -6,8 +6,10 @@ any number of {"progress": ...} lines and one last line with "result" or "error"
 """
 
 import asyncio
+import errno
 import json
 import os
+import socket
 from contextlib import suppress
 from pathlib import Path
 
@@ -45,8 +47,11 @@ class ControlServer:
     async def start(self) -> None:
         """Listen; ControlError if that fails.
 
-        A socket that a killed daemon left behind is replaced: the state lock proves that it is dead.
+        A socket that a killed daemon left behind is replaced, but not a live one: in an unusable state directory there
+        is no state lock.
         """
+        if _is_live(self._path):
+            raise ControlError(f"another daemon answers on {self._path}: stop it, or use another --state-dir")
         try:
             if not self._path.parent.exists():
                 self._path.parent.mkdir(0o700)
@@ -109,6 +114,13 @@ class ControlServer:
             pass
         except asyncio.CancelledError:  # by close(); asyncio's streams would log it as an error
             send({"error": "the daemon stopped before it could reply; `pull` shows what the flight controller holds"})
+
+
+def _is_live(path: Path) -> bool:
+    with suppress(OSError), socket.socket(socket.AF_UNIX) as connection:
+        connection.setblocking(False)
+        return connection.connect_ex(str(path)) in (0, errno.EAGAIN)  # EAGAIN: many clients wait
+    return False
 
 
 async def _send_all(writer: asyncio.StreamWriter) -> None:

@@ -18,6 +18,8 @@ _ENDPOINT = re.compile(r"(?P<protocol>[a-z_]+)/(?P<host>\[[^\]]*\]|[^:/?#]+):(?P
 _CONNECT_TIMEOUT_S = 2.0
 #: How long to wait for a rejection of our own certificate: in TLS 1.3 it comes after the handshake.
 _REFUSAL_S = 0.5
+#: X509_V_ERR_CERT_NOT_YET_VALID and _HAS_EXPIRED: a Pi without a network resumes the time of its last shutdown.
+_BY_CLOCK = (9, 10)
 _OVER_TCP = ("tcp", "tls", "ws")
 
 
@@ -38,7 +40,8 @@ def _trouble(endpoint: str, files: TlsFiles) -> str:
             if match["protocol"] == "tls":
                 return _tls_trouble(connection, host, files)
     except ssl.SSLCertVerificationError as error:
-        return f"the router's certificate is not accepted: {error.verify_message}"
+        hint = "; check our clock, too" if error.verify_code in _BY_CLOCK else ""
+        return f"the router's certificate is not accepted: {error.verify_message}{hint}"
     except ssl.SSLError as error:
         return f"no secure connection: {_words(error)}"
     except (socket.gaierror, UnicodeError):  # UnicodeError: an empty or too long part of the name

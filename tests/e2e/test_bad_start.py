@@ -86,6 +86,9 @@ def test_the_daemon_works_without_a_state_directory(start: Starter, tmp_path: Pa
     file.write_text("not a directory")
     daemon = start.daemon("sim:", state_dir=file / "state")
     daemon.wait()
+    link = f"udpin:127.0.0.1:{free_port()}"
+    second = run_naze_bridge("run", "--fc", "sim:", "--gcs", link, "--state-dir", str(daemon.state_dir))
+    assert_refused(second, "another daemon answers on", "--state-dir")
     with udp_station(daemon.address) as station:
         station.send_heartbeat()
         assert "memory" in station.wait_for("STATUSTEXT").text

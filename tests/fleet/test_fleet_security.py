@@ -171,7 +171,7 @@ def test_a_missing_certificate_is_named(tls: Fleet) -> None:
 @pytest.mark.parametrize(
     ("issue", "reason"),
     [
-        (lambda own, _: own.issue_cert("localhost", **_PAST), "certificate has expired"),
+        (lambda own, _: own.issue_cert("localhost", **_PAST), "certificate has expired; check our clock, too"),
         (lambda own, _: own.issue_cert("elsewhere.example"), "Hostname mismatch"),
         (lambda _, other: other.issue_cert("localhost"), "unable to get local issuer certificate"),
     ],
