@@ -202,9 +202,9 @@ class Ground:
         datagrams, self._datagrams = self._datagrams, []
         return datagrams
 
-    def to(self, station: Station, message: Message) -> None:
-        """Send a message to one ground station."""
-        self._send(station.peer, self._writer(station.peer), message)
+    def to(self, station: Station, *together: Message) -> None:
+        """Send messages in one datagram to one ground station."""
+        self._send(station.peer, self._writer(station.peer), *together)
 
     def mission_ack(self, station: Station, result: MissionResult, mission_type: int = 0) -> None:
         """Send a MISSION_ACK."""
@@ -228,11 +228,11 @@ class Ground:
         self._send(peer, self._writer(peer), heartbeat)
         self._introduce(peer, heartbeat)
 
-    def _send(self, peer: Peer, writer: FrameWriter, message: Message) -> None:
-        frame = writer.frame(pack(message), self._version(peer))
-        self._datagrams.append((peer, frame))
+    def _send(self, peer: Peer, writer: FrameWriter, *together: Message) -> None:
+        frames = [writer.frame(pack(message), self._version(peer)) for message in together]
+        self._datagrams.append((peer, b"".join(frames)))
         if not self.stations.is_listener(peer):
-            self.on_frames([frame])
+            self.on_frames(frames)
 
     def broadcast(self, message: Message) -> None:
         self.multicast(pack(message), self.everyone())

@@ -171,7 +171,8 @@ class MissionUploads:
                 elif now >= upload.reminder_at:
                     upload.waits_for_answer(now)
                     if upload.reminder_at < inf:
-                        self._send_request(upload.station, upload.count - 1)
+                        # MAVSDK allows five repeats; only a request for the item after the one before resets its count.
+                        self._send_requests(upload.station, *range(max(upload.count - 2, 0), upload.count))
             self._uploads.due = min((upload.next_tick() for upload in self._uploads), default=inf)
         if now >= self.answers.due:
             self.answers.tick(now)
@@ -319,16 +320,17 @@ class MissionUploads:
         assert isinstance(state, Receiving)
         state.request.asked(state.wanted, now)
         self._uploads.schedule(upload)
-        self._send_request(upload.station, state.wanted)
+        self._send_requests(upload.station, state.wanted)
         # Without items, a station at another address may have started again: it would take this request for its own
         # list's, whose MISSION_COUNT it repeats until it has one.
         if state.request.is_repeated and state.items:
             for elsewhere in self._elsewhere(upload, now):
-                self._send_request(elsewhere, state.wanted)
+                self._send_requests(elsewhere, state.wanted)
 
-    def _send_request(self, station: Station, seq: int) -> None:
-        """Request an item by id 40: the only one that Mission Planner understands in both modes."""
-        self._ground.to(station, messages.MAVLink_mission_request_message(station.sysid, station.compid, seq))
+    def _send_requests(self, station: Station, *seqs: int) -> None:
+        """Request items in one datagram, by id 40: the only one that Mission Planner understands in both modes."""
+        request = partial(messages.MAVLink_mission_request_message, station.sysid, station.compid)
+        self._ground.to(station, *map(request, seqs))
 
     def _delivery(self, upload: Upload, judged: Judged) -> Conversation[DeliveryResult]:
         """Store the list and write it; a rejected one is only stored, unless its sender sent too many of them."""

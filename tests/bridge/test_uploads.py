@@ -1034,25 +1034,6 @@ def test_a_repeated_last_item_gets_no_reply_until_the_final_ack() -> None:
     assert world.naze.counters.flash_writes == 2
 
 
-@pytest.mark.parametrize("in_turn", [True, False])
-def test_a_station_that_waits_for_the_final_ack_hears_from_us(*, in_turn: bool) -> None:
-    """QGroundControl reports a failed write 1.5 s after its last item, unless it gets a request."""
-    world, station = holding()
-    world.store.delay_s = 1.0
-    other, items = GroundStation(world, "other"), waypoints(10)
-    heard_at = [world.now]
-    answers_requests(world, station, items)
-    station.on_message.append(lambda message: heard_at.append(world.now) if "MISSION" in message.get_type() else None)
-    if not in_turn:
-        receiving(world, other, waypoints(5, 3), 5)
-    station.send(count_message(10))
-    world.wait_until(lambda _: bool(acks(station)), 30)
-    assert acks(station) == [A.ACCEPTED]
-    assert world.stored == records_of(items)
-    assert max(later - earlier for earlier, later in pairwise(heard_at)) < 1.5
-    assert requested(station)[-1] == 9
-
-
 def test_a_lost_final_ack_is_sent_again() -> None:
     world, station = holding()
     items = waypoints(20)

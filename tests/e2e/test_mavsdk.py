@@ -23,7 +23,7 @@ from mavsdk.asyncio.plugins.param.param import ParamAsync
 from mavsdk.asyncio.plugins.telemetry.telemetry import TelemetryAsync
 
 from protocols.mission_item import Command
-from tests.support.benches import Bench
+from tests.support.benches import Bench, Starter
 from tests.support.plan import (
     HOME,
     PlanRow,
@@ -103,6 +103,15 @@ async def test_a_written_list_is_read_back(shared: Bench, count: int) -> None:
         await missions.upload_mission(raw_items(plan))
         assert shared.board.records() == records_of(judge(plan))
         assert [fields(item) for item in await missions.download_mission()] == expected_fields(plan)
+
+
+async def test_mavsdk_waits_while_a_list_is_written_slowly(start: Starter) -> None:
+    """146 records take 3 s at 9600 baud; MAVSDK's timeout is 2.5 s."""
+    bench = start.bench("--baud", "9600")
+    plan = mixed_plan(146)
+    async with vehicle_at(bench.daemon.port) as vehicle:
+        await MissionRawAsync(vehicle).upload_mission(raw_items(plan))
+    assert bench.board.records() == records_of(judge(plan))
 
 
 async def test_unset_parameters_are_nan(shared: Bench) -> None:
