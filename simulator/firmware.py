@@ -91,6 +91,8 @@ class Firmware:
         self._sender = MavlinkSender()
         # Harakiri's own list and MAVLink upload, also alongside the extension.
         self._floppy = Floppy(flash, self._board, self._missions, self._send_message)
+        if not (self._missions or self._config.is_valid):
+            self._floppy.clear()
         self._cli = CommandLine(options.tree, self._cli_status)
         self._schedule = MavlinkSchedule(now)
         self._frsky_number, self._frsky_time = 0, now
@@ -180,9 +182,13 @@ class Firmware:
         """Write the whole configuration; the firmware does not verify it (writeParams)."""
         self._board.config_write_due = None
         with contextlib.suppress(FlashError):
-            # With the extension the list is written first and survives a power cut; without it they are one block.
-            self._floppy.save()
-            self._config.save(self._board.wp_radius_cm)
+            # With the extension the list has flash of its own; without it, it is part of the configuration.
+            if self._missions:
+                self._floppy.save()
+            self._config.erase()
+            if not self._missions:
+                self._floppy.save()
+            self._config.program(self._board.wp_radius_cm)
         self._stall()
 
     def _stall(self) -> None:

@@ -11,7 +11,8 @@ from simulator.flight import FIELD_ALTITUDE_M, FlightState
 from simulator.inav_boxes import ANGLE, ARM, BOXES, NAMES, NAV_ALTHOLD, NAV_RTH, NAV_WP
 from simulator.inav_mission import CAPACITY, FAKE, InavMission
 from simulator.inav_navigation import InavNavigation
-from simulator.msp_firmware import Boot, MspFirmware, PortHabits, error, reply
+from simulator.msp_firmware import Boot, MspFirmware, PortHabits
+from simulator.msp_port import error, reply
 from simulator.msp_sensors import DRAWN_MAH, RSSI, MspCommand, SensorReplies
 from simulator.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
 from simulator.waypoint_craft import WaypointCraft

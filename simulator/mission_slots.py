@@ -135,7 +135,7 @@ def _sealed(header: bytes) -> bytes:
 
 
 class StoredConfig:
-    """The only simulated setting. A power cut during a write loses it, as in Harakiri."""
+    """The only simulated setting. A power cut between `erase` and `program` loses it, as in Harakiri."""
 
     def __init__(self, flash: NorFlash, options: SimOptions) -> None:
         self._flash = flash
@@ -143,13 +143,24 @@ class StoredConfig:
         self._default_cm = options.wp_radius_cm
         self._seconds = options.config_write_ms / 1000 / 2
 
+    @property
+    def is_valid(self) -> bool:
+        value, inverse = self._read()
+        return value ^ inverse == 0xFFFF
+
     def load(self) -> int:
         """gps_wp_radius, cm; the default if the page is not valid."""
-        value, inverse = _CONFIG.unpack(self._flash.read(self._page * PAGE_SIZE, _CONFIG.size))
-        return int(value) if value ^ inverse == 0xFFFF else self._default_cm
+        return self._read()[0] if self.is_valid else self._default_cm
 
-    def save(self, wp_radius_cm: int) -> None:
-        """Write gps_wp_radius. FlashError, PowerCutError."""
+    def erase(self) -> None:
+        """FlashError, PowerCutError."""
         self._flash.erase(self._page, self._seconds)
+
+    def program(self, wp_radius_cm: int) -> None:
+        """Write gps_wp_radius to the erased page. FlashError, PowerCutError."""
         data = _CONFIG.pack(wp_radius_cm, wp_radius_cm ^ 0xFFFF)
         self._flash.program(self._page * PAGE_SIZE, data, self._seconds)
+
+    def _read(self) -> tuple[int, int]:
+        value, inverse = _CONFIG.unpack(self._flash.read(self._page * PAGE_SIZE, _CONFIG.size))
+        return value, inverse

@@ -1,19 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The interface between a simulated MSP board and its firmware: INAV, MultiWii, and those with telemetry only."""
 
-import struct
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from protocols.msp.frame import Direction, MspFrame
 from simulator.flight import Craft, FlightState
 from simulator.msp_options import MspOptions
-from simulator.msp_v2 import frame_v2
 from simulator.options import Counters, Faults
-
-_JUMBO = 255
-_HIGHEST_V1_COMMAND = 255
 
 
 class CrashError(Exception):
@@ -100,22 +94,3 @@ class MspFirmware(ABC):
 
 
 BootFirmware = Callable[[Boot], MspFirmware]
-
-
-def reply(command: int, payload: bytes = b"") -> bytes:
-    """Encode a reply frame; from 255 bytes up a jumbo frame: size 255, command, the real size as 16 bits."""
-    if command > _HIGHEST_V1_COMMAND:
-        return frame_v2(">", command, payload)
-    if len(payload) < _JUMBO:
-        return MspFrame(Direction.REPLY, command, payload).encode()
-    body = struct.pack("<BBH", _JUMBO, command, len(payload)) + payload
-    checksum = 0
-    for byte in body:
-        checksum ^= byte
-    return b"$M>" + body + bytes((checksum,))
-
-
-def error(command: int) -> bytes:
-    if command > _HIGHEST_V1_COMMAND:
-        return frame_v2("!", command)
-    return MspFrame(Direction.ERROR, command).encode()

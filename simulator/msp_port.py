@@ -138,7 +138,7 @@ class MspAnswers:
         if command in _ACKNOWLEDGED:
             return reply(command)
         answer = self._read(command)
-        return MspFrame(Direction.ERROR, command).encode() if answer is None else reply(command, answer)
+        return error(command) if answer is None else reply(command, answer)
 
     def _read(self, command: int) -> bytes | None:
         craft = self._craft()
@@ -186,3 +186,7 @@ class MspAnswers:
 
 def reply(command: int, payload: bytes = b"") -> bytes:
     return MspFrame(Direction.REPLY, command, payload).encode()
+
+
+def error(command: int) -> bytes:
+    return MspFrame(Direction.ERROR, command).encode()

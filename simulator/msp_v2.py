@@ -3,6 +3,7 @@
 
 import struct
 
+from protocols.msp.frame import crc8
 from simulator.msp_port import MspReceiver
 
 _HEADER_SIZE = 8
@@ -48,20 +49,4 @@ class MspReceiverV2(MspReceiver):
             return None
         body, checksum = bytes(frame[3:-1]), frame[-1]
         frame.clear()
-        return (command, body[5:]) if crc8_dvb_s2(body) == checksum else None
-
-
-def frame_v2(direction: str, command: int, payload: bytes = b"") -> bytes:
-    """Encode a frame; `direction` is '>', or '!' for an error."""
-    body = struct.pack("<BHH", 0, command, len(payload)) + payload
-    return b"$X" + direction.encode() + body + bytes((crc8_dvb_s2(body),))
-
-
-def crc8_dvb_s2(data: bytes) -> int:
-    """The checksum of MSP v2, bit by bit as in crc.c."""
-    crc = 0
-    for byte in data:
-        crc ^= byte
-        for _ in range(8):
-            crc = crc << 1 & 0xFF ^ (0xD5 if crc & 0x80 else 0)
-    return crc
+        return (command, body[5:]) if crc8(body) == checksum else None

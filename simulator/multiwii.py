@@ -5,7 +5,8 @@ import struct
 from dataclasses import replace
 
 from simulator.flight import FlightState
-from simulator.msp_firmware import Boot, MspFirmware, PortHabits, error, reply
+from simulator.msp_firmware import Boot, MspFirmware, PortHabits
+from simulator.msp_port import error, reply
 from simulator.msp_sensors import MspCommand, SensorReplies
 from simulator.multiwii_mission import MultiWiiMission
 from simulator.multiwii_navigation import HIGHEST_M, SAFE_DISTANCE_M, WP_RADIUS_M, MultiWiiNavigation

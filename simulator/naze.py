@@ -12,7 +12,7 @@ from simulator.firmware import Firmware, Protocol, ResetError
 from simulator.flash import ERASED, NorFlash, PowerCutError
 from simulator.flight import Craft
 from simulator.mission_commands import MissionCommands
-from simulator.mission_slots import flash_size
+from simulator.mission_slots import StoredConfig, flash_size
 from simulator.missions import Board, BootMissions
 from simulator.options import Counters, Faults, SimOptions
 from simulator.receive_ring import GATHER_SECONDS
@@ -70,6 +70,8 @@ class SimulatedNaze(SimulatedBoard):
     @property
     def stored(self) -> bytes:
         """The valid mission records in flash, as the next boot would load them."""
+        if not (self.faults.extension or StoredConfig(self._flash, self.options).is_valid):
+            return b""
         return self._boot_missions(self._flash, Board(self.options, self.faults, self.options.wp_radius_cm)).stored
 
     @property

@@ -9,7 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from simulator.flight import FlightState, fly
-from simulator.msp_firmware import Boot, MspFirmware, PortHabits, error, reply
+from simulator.msp_firmware import Boot, MspFirmware, PortHabits
+from simulator.msp_port import error, reply
 from simulator.msp_sensors import MspCommand, SensorReplies
 
 _ARM = "ARM"

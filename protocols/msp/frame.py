@@ -53,7 +53,7 @@ class MspFrame:
         direction = bytes((self.direction.value,))
         if self.is_v2 or self.command > _HIGHEST_V1_COMMAND:
             body = _V2_HEADER.pack(0, self.command, len(self.payload)) + self.payload
-            return b"$X" + direction + body + bytes((_crc8(body),))
+            return b"$X" + direction + body + bytes((crc8(body),))
         size = len(self.payload)
         if size >= _JUMBO and self.direction is not Direction.REQUEST:
             body = bytes((_JUMBO, self.command)) + size.to_bytes(2, "little") + self.payload
@@ -151,12 +151,13 @@ def _decode(frame: bytearray) -> MspFrame | None:
         payload_at = 7 if frame[3] == _JUMBO and direction is not Direction.REQUEST else 5
         return None if reduce(xor, frame[3:]) else MspFrame(direction, frame[4], bytes(frame[payload_at:-1]))
     body = frame[3:-1]
-    if _crc8(body) != frame[-1]:
+    if crc8(body) != frame[-1]:
         return None
     return MspFrame(direction, int.from_bytes(body[1:3], "little"), bytes(body[_V2_HEADER.size :]), is_v2=True)
 
 
-def _crc8(data: bytes | bytearray) -> int:
+def crc8(data: bytes | bytearray) -> int:
+    """The checksum of v2, DVB-S2's."""
     crc = 0
     for byte in data:
         crc = _CRC_TABLE[crc ^ byte]

@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The patched firmware's own MAVLink upload, in the model; tests/real_board checks the image."""
 
+from itertools import count
+
 from simulator.options import Faults, SimOptions, TelemetryProtocol
+from simulator.simulated_board import Power
 from tests.support import mavlink_missions as page
-from tests.support.naze_bench import Bench
+from tests.support.mavlink_ground import MavlinkGround
+from tests.support.naze_bench import BOOT_SECONDS, Bench
 
 
 def test_an_upload_becomes_the_stored_list() -> None:
@@ -17,3 +21,24 @@ def test_an_interrupted_upload_keeps_the_old_list() -> None:
 def test_an_upload_while_armed_is_an_error() -> None:
     bench = Bench(SimOptions(tele_prot=TelemetryProtocol.MAVLINK), Faults())
     page.an_upload_while_armed_is_an_error(bench, lambda: setattr(bench.naze.faults, "armed", True))
+
+
+def test_without_the_extension_a_power_cut_during_the_write_loses_the_list() -> None:
+    """Harakiri keeps it in its configuration, of which there is one copy (writeParams)."""
+    for operation in count(1):
+        bench = Bench(faults=Faults(extension=False, msp=False))
+        ground = MavlinkGround(bench)
+        bench.run(1)
+        assert ground.upload(3) == page.ACCEPTED
+        bench.run(3)
+        assert len(bench.naze.stored_records) == 3
+        bench.naze.faults.power_cut_at_flash_operation = operation
+        assert ground.upload(4) == page.ACCEPTED
+        bench.run(3)
+        if bench.naze.power is not Power.OFF:
+            break
+        bench.naze.power_on(bench.now)
+        bench.run(BOOT_SECONDS + 0.1)
+        assert bench.naze.stored_records == []
+    assert operation > 1
+    assert len(bench.naze.stored_records) == 4

@@ -62,7 +62,8 @@ class Simulated:
         self._now += milliseconds / 1000
         due = self._board.config_write_due
         if due is not None and not self._board.armed and self._now >= due:
-            self._config.save(self._board.wp_radius_cm)
+            self._config.erase()
+            self._config.program(self._board.wp_radius_cm)
             self._board.config_write_due = None
 
     def arm(self, armed: bool) -> None:
