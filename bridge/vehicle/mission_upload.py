@@ -91,7 +91,7 @@ class MissionUploads:
         if present is None and not count and self.answers.repeat_cancelled(station, now):
             return
         if present is None or not self._is_for(present, count, now):
-            self._begin(station, count, now)
+            self._begin(station, count, now, is_next=present is not None)
 
     def clear_all(self, station: Station, mission_type: int, now: float) -> None:
         """MISSION_CLEAR_ALL. `mission_type`: of the answer, MISSION or ALL."""
@@ -121,7 +121,7 @@ class MissionUploads:
         if state.is_of_another_list(item):
             # Two lists must never be mixed: the previous one is discarded.
             self._supersede(upload, now)
-            self._begin(station, upload.count, now)
+            self._begin(station, upload.count, now, is_next=True)
             return
         taken = state.is_doubtful(item, now) or state.take(item, now)
         if isinstance(taken, Judged):
@@ -194,9 +194,11 @@ class MissionUploads:
 
     # State changes of an upload.
 
-    def _begin(self, station: Station, count: int, now: float, mission_type: int = _MISSION) -> None:
+    def _begin(
+        self, station: Station, count: int, now: float, mission_type: int = _MISSION, *, is_next: bool = False
+    ) -> None:
         self.is_active = True
-        self.answers.forget(station)
+        is_next |= self.answers.forget(station)
         for older in self._uploads:
             older.is_superseded |= older.station == station
         if not self._ground.allows(station, Cost.UPLOAD):
@@ -205,7 +207,7 @@ class MissionUploads:
             self.answers.end(station, _TOO_MANY_UPLOADS.ack, count, now, mission_type)
             return
         incident = f"upload-{next(self._incidents)}"
-        upload = Upload(station, count, incident, Waiting(Announced(), now), mission_type)
+        upload = Upload(station, count, incident, Waiting(Announced(), now), mission_type, is_next)
         self._uploads.add(upload)
         armed = self._missions.armed_refusal()
         if armed is not None:
@@ -291,7 +293,7 @@ class MissionUploads:
             self._supersede(upload, now)
             return False
         if isinstance(state, Receiving):
-            state.count_repeated()
+            state.doubt()
             self._request(upload, now)
         return True
 
@@ -311,7 +313,8 @@ class MissionUploads:
             elif rejection := check_count(upload.count, answer.rules):
                 event = Ended(Refusal(rejection.ack, rejection.finding.text()))
             else:
-                event = Ready(upload.count, begin_check(upload.count, answer.rules, self._missions.vehicle.place()))
+                check = begin_check(upload.count, answer.rules, self._missions.vehicle.place())
+                event = Ready(upload.count, check, upload.is_next)
             self._handle(upload, event, now)
 
     def _request(self, upload: Upload, now: float) -> None:

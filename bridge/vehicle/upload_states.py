@@ -17,6 +17,8 @@ from protocols.mission_item import MissionItem, MissionResult
 
 #: After Mission Planner's "Write Fast" has ended, delayed items may still arrive for this long.
 _LAST_ITEMS_S = 0.3
+#: After a station's next MISSION_COUNT, items of its former list may still arrive for this long.
+_FORMER_ITEMS_S = 2.0
 #: The timeout of an item request.
 _FIRST_TIMEOUT_S = 0.25
 _MAX_TIMEOUT_S = 1.5
@@ -47,10 +49,11 @@ class Turn(Event):
 
 @dataclass(frozen=True, slots=True)
 class Ready(Event):
-    """The flight controller can take a list of `count` items."""
+    """The flight controller can take a list of `count` items; `is_next`: of a station that has just sent another."""
 
     count: int
     check: ListCheck
+    is_next: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,10 +191,12 @@ class Receiving(UploadState):
         self.items: dict[int, MissionItem] = {}
         self._judged = 0  # items 0.._judged-1 have arrived and are checked
         self.request = ItemRequest()
+        self._in_order_until = now + _FORMER_ITEMS_S if event.is_next else now
         self._progress_at = now
         self._longest_pause_s = 0.0
         #: Perhaps the ground station has begun another list of this length. The next items show it.
         self._is_in_doubt = False
+        self._was_in_doubt = False
         self._doubtful: MissionItem | None = None
 
     @property
@@ -215,30 +220,36 @@ class Receiving(UploadState):
         """The time to repeat the request, or to give up."""
         return min(self.deadline, self.request.due)
 
-    def count_repeated(self) -> None:
-        """MISSION_COUNT has arrived again: the client has restarted, or the network duplicated it."""
+    def doubt(self) -> None:
+        """A second MISSION_COUNT or a pause: the client has restarted, or the network duplicates or delays."""
         self._is_in_doubt = bool(self.items)
+        self._was_in_doubt |= self._is_in_doubt
 
     def is_of_another_list(self, item: MissionItem) -> bool:
         """True if the ground station has started again, perhaps with another list.
 
-        Its MISSION_COUNT may be lost: a request for the former list's item also seems to answer it. "Write Fast" does
-        not wait for the request, so its first items may be lost.
+        Its MISSION_COUNT may be lost: a request for the former list's item also seems to answer it, and MAVProxy sends
+        it only once. "Write Fast" does not wait for the request, so its first items may be lost.
         """
         held = self.items.get(item.seq, item)
         # As text, because NaN, "not given", differs from itself.
-        signs = self._is_in_doubt, item.seq == 0, repr(held) != repr(item)
-        return sum(signs) >= 2
+        return (self._was_in_doubt and item.seq == 0) or repr(held) != repr(item)
 
     def is_doubtful(self, item: MissionItem, now: float) -> bool:
-        """True for a new item after a second MISSION_COUNT or a long pause, until it is repeated.
+        """True for a new item that may be another list's.
+
+        Soon after a former list: unless it is requested. After a second MISSION_COUNT or a long pause: until it is
+        repeated.
 
         MAVProxy and QGroundControl answer a request for the former list's item with that of their new list, whose
         MISSION_COUNT is on its way, or lost. Item 0 is requested until then. Mission Planner repeats its item instead.
         """
         if item.seq not in self.items:
+            if item.seq > self._judged and now < self._in_order_until:
+                return True
             pause_s = now - self._progress_at
-            self._is_in_doubt |= pause_s >= self._longest_pause_s + _ABANDONED_S and bool(self.items)
+            if pause_s >= self._longest_pause_s + _ABANDONED_S:
+                self.doubt()
             if self._is_in_doubt and repr(item) != repr(self._doubtful):
                 self._doubtful = item
                 return True
@@ -302,6 +313,8 @@ class Upload:
     state: UploadState
     #: MAV_MISSION_TYPE of the final MISSION_ACK.
     mission_type: int
+    #: Its ground station has sent another list just before.
+    is_next: bool = False
     #: Its ground station has announced another list while this one was written.
     is_superseded: bool = False
     #: Its ground station has sent a MISSION_COUNT of 0.
