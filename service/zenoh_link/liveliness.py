@@ -22,7 +22,7 @@ class Liveliness:
         self._own = ""
         self._token: zenoh.LivelinessToken | None = None
         self.others: set[str] = set()
-        self._neighbours: dict[str, str] = {}
+        self._neighbours: set[str] = set()
 
     def declare(self, session: zenoh.Session, alive: str) -> None:
         """Declare the token and find others; called on the session's thread. `alive`: the tokens' key prefix."""
@@ -66,8 +66,5 @@ class Liveliness:
         }
 
     def _joined(self, peer_id: str, kind: str, is_there: bool) -> None:
-        if is_there:
-            self._neighbours[peer_id] = kind
-        else:
-            self._neighbours.pop(peer_id, None)
+        (self._neighbours.add if is_there else self._neighbours.discard)(peer_id)
         self._note("info", "zenoh.joined" if is_there else "zenoh.left", neighbour=peer_id, kind=kind)

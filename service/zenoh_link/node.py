@@ -33,7 +33,7 @@ from service.zenoh_link.history import History
 from service.zenoh_link.keys import ZenohKey
 from service.zenoh_link.liveliness import Liveliness
 from service.zenoh_link.mavlink_link import MavlinkLink
-from service.zenoh_link.outage_log import OutageLog
+from service.zenoh_link.outage_log import log_outages
 from service.zenoh_link.overview import overview_of
 from service.zenoh_link.payload import Payloads, plain
 from service.zenoh_link.publisher import Publisher
@@ -57,8 +57,7 @@ class Node(Follower):
         self._daemon = daemon
         self._loop = asyncio.get_running_loop()
         config = make_config(settings)
-        endpoints, files = connect_endpoints(config), tls_files(config)
-        self._outage = OutageLog(lambda: endpoint_trouble(endpoints, files)) if endpoints else None
+        self._endpoints, self._tls_files = connect_endpoints(config), tls_files(config)
         self._thread = SessionThread(config, self._declare)
         clock = SampleClock(self._loop.time)
         self._payloads = Payloads(settings.encoding, clock.unix_s)
@@ -77,6 +76,7 @@ class Node(Follower):
         self._held: HeldMission | None = None
         self._pending_publish: asyncio.Handle | None = None
         self._tick: asyncio.TimerHandle | None = None
+        self._outages: asyncio.Task[None] | None = None
 
     def start(self) -> None:
         """Join as soon as there is a session to join."""
@@ -84,11 +84,16 @@ class Node(Follower):
         self._daemon.add_follower(self)
         self._thread.start()
         self._every_second()
+        if self._endpoints:
+            diagnose = partial(endpoint_trouble, self._endpoints, self._tls_files)
+            self._outages = self._loop.create_task(log_outages(diagnose, lambda: self._presence.is_alone))
 
     async def close(self) -> None:
         """Leave; takes at most a second."""
         if self._tick is not None:
             self._tick.cancel()
+        if self._outages is not None:
+            self._outages.cancel()
         await self._queries.close()
         self._thread.close()
 
@@ -163,8 +168,6 @@ class Node(Follower):
     def _every_second(self) -> None:
         self._tick = self._loop.call_later(_STATE_INTERVAL_S, self._every_second)
         self._publish_whole()
-        if self._outage is not None:
-            self._outage.look(self._presence.is_alone, self._loop.time())
 
     def _publish_whole(self) -> None:
         self._pending_publish = None
