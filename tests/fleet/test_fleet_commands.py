@@ -187,7 +187,7 @@ def test_the_subscriber_in_the_docs_works(fleet: Fleet, tmp_path: Path) -> None:
         command = [sys.executable, "-c", code.replace("tcp/192.168.4.1:7447", fleet.router.endpoint)]
         reader = subprocess.Popen(command, stdout=log, stderr=log)
     try:
-        until(lambda: "fleet/kite/v1/telemetry/position {" in output.read_text(), "a position")
+        until(lambda: "fleet/kite/v1/telemetry/position b'{" in output.read_text(), "a position")
     finally:
         reader.kill()
         reader.wait()

@@ -5,14 +5,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from service.cli.fleet.push import FleetPush
-from service.cli.fleet.vehicle import BridgeState
+from service.cli.fleet.vehicle import BridgeId
 
 ACCEPTED = {"result": {"ack": "MAV_MISSION_ACCEPTED", "text": "Mission verified: 3 records", "findings": []}}
 NAMES = ("a", "b", "c")
 
 
 def push_to(*names: str) -> FleetPush:
-    return FleetPush(names, [BridgeState(name, f"{number}") for number, name in enumerate(names)])
+    return FleetPush(names, [BridgeId(name, f"{number}") for number, name in enumerate(names)])
 
 
 def test_a_failure_does_not_affect_the_others() -> None:
@@ -48,7 +48,7 @@ def test_a_missing_result_has_one_of_three_reasons() -> None:
 
 
 def test_a_name_used_by_two_bridges_gets_nothing() -> None:
-    fleet = FleetPush(["a", "b"], [BridgeState("a", "1"), BridgeState("a", "2"), BridgeState("b", "3")])
+    fleet = FleetPush(["a", "b"], [BridgeId("a", "1"), BridgeId("a", "2"), BridgeId("b", "3")])
     assert fleet.waiting == ["b"]
     assert "several bridges" in str(fleet.vehicles["a"].error)
 

@@ -13,13 +13,9 @@ from service.cli.fleet.vehicle import FleetVehicle
 Condition = Callable[[FleetVehicle], bool]
 
 
-def _kind(hint: object) -> type:
-    """The type of a known value."""
-    kinds = get_args(hint) or (hint,)
-    return next(kind for kind in (bool, str, float) if kind in kinds or kind is float)
-
-
-FIELDS = {each.name: _kind(each.type) for each in fields(FleetVehicle) if each.name != "session_id"}
+#: With the type of a known value: of `float | None`, float.
+FIELDS: dict[str, Any] = {each.name: (*get_args(each.type), each.type)[0] for each in fields(FleetVehicle)}
+del FIELDS["session_id"]
 _FORM = re.compile(r"\s*(?P<field>\w+)\s*(?P<sign>!=|<=|>=|=|<|>)\s*(?P<value>.*?)\s*")
 _SIGNS: dict[str, Callable[[Any, Any], bool]] = {
     "=": operator.eq,

@@ -2,7 +2,7 @@
 """`fleet mavlink`: one vehicle's MAVLink between zenoh and local ground stations."""
 
 import asyncio
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 import zenoh
 
@@ -64,14 +64,11 @@ class GcsRelay:
     def gcs_gone(self, peer: Peer) -> None:
         self._peers.pop(peer, None)
 
-    def displaced(self, peers: Mapping[Peer, float]) -> Peer:
-        return displaced(peers)
+    remove_default_peer = gcs_gone
+    displaced = staticmethod(displaced)
 
     def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
         self._peers[peer] = None
-
-    def remove_default_peer(self, peer: Peer) -> None:
-        self._peers.pop(peer, None)
 
     def _input_is(self, accepted: bool) -> None:
         was_refused, self._accepts_input = self._accepts_input is False, accepted

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Payloads received over zenoh, as plain data that is safe to print. They may be foreign, so nothing here raises."""
+"""Payloads received over zenoh, as plain data that is safe to print.
+
+They may come from any program, so nothing here raises: a value that is missing or of another type is None.
+"""
 
 from typing import Any
 
@@ -11,7 +14,7 @@ from service.zenoh_link.payload import decoded
 
 
 def decode(sample: zenoh.Sample | zenoh.ReplyError) -> Json | None:
-    """The object in a payload, JSON or CBOR by its encoding; None if there is none."""
+    """The object in a payload, JSON or CBOR by its encoding."""
     try:
         value = decoded(sample.payload.to_bytes(), str(sample.encoding))
     except (ValueError, RecursionError, cbor2.CBORError):
@@ -20,7 +23,7 @@ def decode(sample: zenoh.Sample | zenoh.ReplyError) -> Json | None:
 
 
 def part(data: Json, *path: str) -> Any:
-    """data[path[0]][path[1]]...; None if it is missing."""
+    """data[path[0]][path[1]]..."""
     value: Any = data
     for key in path:
         value = value.get(key) if isinstance(value, dict) else None
@@ -28,24 +31,21 @@ def part(data: Json, *path: str) -> Any:
 
 
 def text(data: Json, *path: str) -> str | None:
-    """The text at a path, without control characters of a terminal; None if there is none."""
+    """The text without control characters, which could act on a terminal."""
     value = part(data, *path)
     return "".join(each if each.isprintable() else "?" for each in value) if isinstance(value, str) else None
 
 
 def number(data: Json, *path: str) -> float | None:
-    """The number at a path; None if there is none."""
     value = part(data, *path)
     return value if isinstance(value, int | float) and not isinstance(value, bool) else None
 
 
 def whole(data: Json, *path: str) -> int | None:
-    """The whole number at a path; None if there is none."""
     value = part(data, *path)
     return value if isinstance(value, int) and not isinstance(value, bool) else None
 
 
 def flag(data: Json, *path: str) -> bool | None:
-    """The truth value at a path; None if there is none."""
     value = part(data, *path)
     return value if isinstance(value, bool) else None

@@ -10,7 +10,7 @@ import zenoh
 from protocols.mission_item import MissionItem
 from service.cli.fleet.payload import part, text, whole
 from service.cli.fleet.roll_call import replies_of
-from service.cli.fleet.vehicle import BridgeState
+from service.cli.fleet.vehicle import BridgeId
 from service.daemon.mission_data import Json, mission_items
 from service.zenoh_link.keys import MISSION_CURRENT, full
 
@@ -29,7 +29,7 @@ class Held:
     error: str | None = None
 
 
-def pull(session: zenoh.Session, prefix: str, names: Collection[str], bridges: Collection[BridgeState]) -> list[Held]:
+def pull(session: zenoh.Session, prefix: str, names: Collection[str], bridges: Collection[BridgeId]) -> list[Held]:
     """Read the missions; one result per vehicle, sorted by name. Replies of storages are ignored."""
     meant = [bridge for bridge in bridges if bridge.vehicle in names]
     used = Counter(bridge.vehicle for bridge in meant)

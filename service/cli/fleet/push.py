@@ -13,7 +13,7 @@ import zenoh
 from service.cli.fleet.payload import decode, part, text, whole
 from service.cli.fleet.roll_call import replies_of
 from service.cli.fleet.session import NO_COMMANDS, ask_each
-from service.cli.fleet.vehicle import BridgeState
+from service.cli.fleet.vehicle import BridgeId
 from service.daemon.mission_data import Json
 from service.zenoh_link.keys import STATE, UPLOAD, full
 
@@ -46,7 +46,7 @@ class PushState:
 class FleetPush:
     """Every vehicle's progress, by name. A name used by several bridges fails at once."""
 
-    def __init__(self, names: Iterable[str], bridges: Iterable[BridgeState]) -> None:
+    def __init__(self, names: Iterable[str], bridges: Iterable[BridgeId]) -> None:
         uses = Counter(bridge.vehicle for bridge in bridges)
         self.vehicles = {name: PushState(name, error=_TWO if uses[name] > 1 else None) for name in names}
 
@@ -106,7 +106,7 @@ def push(
     session: zenoh.Session,
     prefix: str,
     fleet: FleetPush,
-    bridges: Collection[BridgeState],
+    bridges: Collection[BridgeId],
     mission: bytes,
     show: Callable[[FleetPush], None],
     *,

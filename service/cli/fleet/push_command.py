@@ -30,7 +30,7 @@ from service.cli.fleet.tables import (
     verify_table,
 )
 from service.cli.fleet.trial import Trial, try_mission
-from service.cli.fleet.vehicle import BridgeState
+from service.cli.fleet.vehicle import BridgeId
 from service.cli.mission_source import mission_bytes
 from service.cli.options import PATH
 from service.cli.printing import print_json, print_table
@@ -129,7 +129,7 @@ def _read(file: Path, names: tuple[str, ...], to_all: bool) -> tuple[bytes, int]
 
 def _meant(
     session: zenoh.Session, prefix: str, names: tuple[str, ...], conditions: list[Condition]
-) -> tuple[set[BridgeState], list[str]]:
+) -> tuple[set[BridgeId], list[str]]:
     """All bridges, and the names of the vehicles to serve."""
     bridges = alive(session, prefix)
     found = chosen(bridges, names, prefix)

@@ -2,12 +2,13 @@
 """The vehicles that are alive, and their states: one query to the whole fleet."""
 
 from collections.abc import Collection
+from queue import SimpleQueue
 
 import zenoh
 
 from service.cli.fleet.payload import decode
-from service.cli.fleet.session import FleetError, ask
-from service.cli.fleet.vehicle import BridgeState, FleetVehicle, as_fleet, bridge_of, in_order, replier, vehicle_of
+from service.cli.fleet.session import FleetError, send_query
+from service.cli.fleet.vehicle import BridgeId, FleetVehicle, as_fleet, bridge_of, in_order, replier, vehicle_of
 from service.daemon.mission_data import Json
 from service.zenoh_link.keys import ALIVE, STATE, full
 
@@ -15,7 +16,7 @@ from service.zenoh_link.keys import ALIVE, STATE, full
 _TIMEOUT_S = 2.0
 
 
-def alive(session: zenoh.Session, prefix: str) -> set[BridgeState]:
+def alive(session: zenoh.Session, prefix: str) -> set[BridgeId]:
     """The bridges that have a liveliness token."""
     replies = list(session.liveliness().get(full(prefix, "*", f"{ALIVE}/*"), timeout=_TIMEOUT_S))
     if any(reply.err is not None for reply in replies):
@@ -35,13 +36,15 @@ def roll_call(session: zenoh.Session, prefix: str) -> list[FleetVehicle]:
 
 
 def replies_of(
-    session: zenoh.Session, selector: str, bridges: Collection[BridgeState], timeout_s: float
-) -> dict[BridgeState, Json | None]:
+    session: zenoh.Session, selector: str, bridges: Collection[BridgeId], timeout_s: float
+) -> dict[BridgeId, Json | None]:
     """What these bridges reply, None for a payload that cannot be read. Ends when all have. A storage is ignored."""
-    found: dict[BridgeState, Json | None] = {}
-    # Without bridges there is no reply to wait for.
-    replies = ask(session, selector, timeout_s=timeout_s) if bridges else ()
-    for reply in replies:
+    found: dict[BridgeId, Json | None] = {}
+    if not bridges:
+        return found
+    replies: SimpleQueue[zenoh.Reply | None] = SimpleQueue()
+    send_query(session, selector, replies.put, timeout_s)
+    for reply in iter(replies.get, None):
         bridge = replier(reply)
         if reply.ok is not None and bridge is not None and bridge in bridges:
             found[bridge] = decode(reply.ok)
@@ -50,7 +53,7 @@ def replies_of(
     return found
 
 
-def chosen(bridges: set[BridgeState], names: tuple[str, ...], prefix: str) -> list[str]:
+def chosen(bridges: set[BridgeId], names: tuple[str, ...], prefix: str) -> list[str]:
     """The names to use: the given ones, or all; FleetError if one is not alive."""
     there = sorted({bridge.vehicle for bridge in bridges}, key=in_order)
     if not there:

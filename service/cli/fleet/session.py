@@ -11,7 +11,6 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
-from typing import Any
 
 import zenoh
 
@@ -55,16 +54,6 @@ def open_session(connect: Sequence[str] = (), config_file: Path | None = None) -
         raise FleetError(f"cannot join the fleet: {trouble}") from error
 
 
-def ask(
-    session: zenoh.Session, selector: str, payload: bytes | None = None, timeout_s: float = 2.0
-) -> Iterator[zenoh.Reply]:
-    """Yield the replies of all matching vehicles to a query as they arrive."""
-    replies: queue.SimpleQueue[zenoh.Reply | None] = queue.SimpleQueue()
-    send_query(session, selector, replies.put, lambda: replies.put(None), payload, timeout_s)
-    while (reply := replies.get()) is not None:
-        yield reply
-
-
 #: Why a vehicle that is alive does not reply to a command.
 NO_COMMANDS = "accepts no commands: zenoh.commands is off there, or the router denies access"
 
@@ -84,14 +73,7 @@ def ask_each(
     replies: queue.SimpleQueue[tuple[str, zenoh.Reply | None]] = queue.SimpleQueue()
 
     def start(name: str) -> None:
-        send_query(
-            session,
-            full(prefix, name, suffix),
-            lambda reply: replies.put((name, reply)),
-            lambda: replies.put((name, None)),
-            payload,
-            timeout_s,
-        )
+        send_query(session, full(prefix, name, suffix), lambda reply: replies.put((name, reply)), timeout_s, payload)
 
     waiting, running = iter(names), 0
     while True:
@@ -108,15 +90,14 @@ def ask_each(
 def send_query(
     session: zenoh.Session,
     selector: str,
-    replied: Callable[[zenoh.Reply], Any],
-    ended: Callable[[], Any],
-    payload: bytes | None,
+    replied: Callable[[zenoh.Reply | None], object],
     timeout_s: float,
+    payload: bytes | None = None,
 ) -> None:
-    """Send a query; gives all replies (two vehicles of one name send two), then `ended`, on zenoh's threads."""
+    """Send a query. `replied` is called on zenoh's threads: with each reply (vehicles may share a name), then None."""
     session.get(
         selector,
-        zenoh.handlers.Callback(replied, ended),
+        zenoh.handlers.Callback(replied, lambda: replied(None)),
         target=zenoh.QueryTarget.ALL,
         consolidation=zenoh.ConsolidationMode.NONE,
         payload=payload,

@@ -26,21 +26,24 @@ _ANSWERS = {
 }
 
 
-def _table(caption: Text | None = None) -> Table:
-    padding = (0, 1, 0, 0)
-    return Table(box=box.SIMPLE_HEAD, padding=padding, show_edge=False, caption=caption, caption_justify="left")
+#: Titles of columns whose cells are aligned to the right, and of those that may take several lines.
+_NUMBERS = ("Battery", "Latitude", "Longitude", "Height", "Heard", "Records")
+_FOLDED = ("Vehicle", "Details")
+
+
+def _table(*titles: str, caption: Text | None = None) -> Table:
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False, caption=caption, caption_justify="left")
+    for title in titles:
+        is_folded, is_number = title in _FOLDED, title in _NUMBERS
+        table.add_column(title, justify="right" if is_number else "left", no_wrap=not is_folded, overflow="fold")
+    return table
 
 
 def watch_table(rows: Sequence[tuple[FleetVehicle, float | None, str]]) -> Table:
     """One row per bridge, each on one line of 80 columns: vehicle, age of its state, problem."""
-    table = _table()
-    table.add_column("Vehicle", no_wrap=True, overflow="ellipsis", max_width=20)
-    table.add_column("Armed", no_wrap=True)
-    for title in ("Battery", "Height"):
-        table.add_column(title, justify="right", no_wrap=True)
-    table.add_column("Mission", no_wrap=True)
-    table.add_column("Heard", justify="right", no_wrap=True)
-    table.add_column("Problem, or mode", no_wrap=True, overflow="ellipsis", max_width=20)
+    table = _table("Vehicle", "Armed", "Battery", "Height", "Mission", "Heard", "Problem, or mode")
+    for column in (table.columns[0], table.columns[-1]):
+        column.no_wrap, column.overflow, column.max_width = True, "ellipsis", 20
     for vehicle, age_s, problem in rows:
         name, _, armed, battery, _, _, height, mission = _cells(vehicle)
         age = Text(_UNKNOWN if age_s is None else f"{age_s:.0f} s")
@@ -51,13 +54,8 @@ def watch_table(rows: Sequence[tuple[FleetVehicle, float | None, str]]) -> Table
 
 def fleet_table(fleet: Sequence[FleetVehicle]) -> Table:
     caption = Text("".join(f"\n{line}" for line in complaints(fleet)), style="yellow")
-    table = _table(caption)
-    table.add_column("Vehicle", overflow="fold")
-    table.add_column("Speaks", no_wrap=True)
-    table.add_column("Armed")
-    for title in ("Battery", "Latitude", "Longitude", "Height"):
-        table.add_column(title, justify="right", no_wrap=True)
-    table.add_column("Mission", no_wrap=True)
+    titles = ("Vehicle", "Speaks", "Armed", "Battery", "Latitude", "Longitude", "Height", "Mission")
+    table = _table(*titles, caption=caption)
     for vehicle in fleet:
         table.add_row(*_cells(vehicle))
     return table
@@ -65,14 +63,13 @@ def fleet_table(fleet: Sequence[FleetVehicle]) -> Table:
 
 def complaints(fleet: Iterable[FleetVehicle]) -> list[str]:
     """The problems of the fleet, a line each."""
-    lines: dict[str, None] = {}
+    lines = []
     for vehicle in fleet:
         if vehicle.bridges > 1:
-            line = f"{vehicle.name}: {vehicle.bridges} bridges use this name; give each one its own (zenoh.vehicle)"
-            lines[line] = None
+            lines.append(f"{vehicle.name}: {vehicle.bridges} bridges use this name; give each its own (zenoh.vehicle)")
         if not vehicle.answers:
-            lines[f"{vehicle.name}: alive, but sends no state"] = None
-    return list(lines)
+            lines.append(f"{vehicle.name}: alive, but sends no state")
+    return list(dict.fromkeys(lines))
 
 
 def _cells(vehicle: FleetVehicle) -> list[Text]:
@@ -122,10 +119,7 @@ def progress_bars(item_count: int) -> Iterator[Callable[[FleetPush], None]]:
 
 
 def push_table(fleet: FleetPush) -> Table:
-    table = _table()
-    table.add_column("Vehicle", overflow="fold")
-    table.add_column("Push", no_wrap=True)
-    table.add_column("Details")
+    table = _table("Vehicle", "Push", "Details")
     for progress in fleet.vehicles.values():
         table.add_row(Text(progress.vehicle), _result(progress), Text(_words(progress)))
     return table
@@ -164,17 +158,12 @@ def _held(trial: Trial) -> str:
 def _trial_table(
     trials: Sequence[Trial], question: str, answer: Callable[[Trial], tuple[bool | None, str]], caption: str = ""
 ) -> Table:
-    table = _table(Text(caption))
-    table.add_column("Vehicle", overflow="fold")
-    table.add_column("Records", justify="right", no_wrap=True)
-    table.add_column("Checksum", no_wrap=True)
-    table.add_column(question, no_wrap=True)
-    table.add_column("Details")
+    table = _table("Vehicle", "Records", "Checksum", question, "Details", caption=Text(caption))
     for trial in trials:
         known, details = answer(trial)
         count = "" if trial.count is None else str(trial.count)
-        row = (Text(trial.vehicle), count, trial.checksum or "", _ANSWERS[known], Text(trial.error or details))
-        table.add_row(*row)
+        said = Text(trial.error or details)
+        table.add_row(Text(trial.vehicle), count, trial.checksum or "", _ANSWERS[known], said)
     return table
 
 

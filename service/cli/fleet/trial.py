@@ -10,7 +10,7 @@ from bridge.model.finding import Finding, News
 from service.cli.fleet.payload import decode, number, part, text, whole
 from service.cli.fleet.pull import pull
 from service.cli.fleet.session import NO_COMMANDS, ask_each
-from service.cli.fleet.vehicle import BridgeState
+from service.cli.fleet.vehicle import BridgeId
 from service.zenoh_link.keys import CHECK
 
 _TIMEOUT_S = 15.0
@@ -43,7 +43,7 @@ class Trial:
 
 
 def try_mission(
-    session: zenoh.Session, prefix: str, names: Collection[str], bridges: Collection[BridgeState], mission: bytes
+    session: zenoh.Session, prefix: str, names: Collection[str], bridges: Collection[BridgeId], mission: bytes
 ) -> list[Trial]:
     """Have each vehicle check the mission and send the checksum of its current one."""
     trials = {name: Trial(name) for name in names}

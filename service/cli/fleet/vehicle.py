@@ -15,7 +15,7 @@ from service.zenoh_link.keys import ALIVE, vehicle_in
 
 
 @dataclass(frozen=True, slots=True, order=True)
-class BridgeState:
+class BridgeId:
     """A bridge that is alive: the vehicle's name, and zenoh's id of the session, which no two bridges share."""
 
     vehicle: str
@@ -45,7 +45,7 @@ class FleetVehicle:
     mission_checksum: str | None = None
 
 
-def bridge_of(key: str, prefix: str) -> BridgeState | None:
+def bridge_of(key: str, prefix: str) -> BridgeId | None:
     """The bridge that a liveliness token's key belongs to; None for other keys."""
     match key.split("/"):
         case [first, name, *middle, session_id] if first == prefix and "/".join(middle) == ALIVE:
@@ -53,18 +53,18 @@ def bridge_of(key: str, prefix: str) -> BridgeState | None:
                 check_name("the name", name)
             except ZenohSettingsError:
                 return None
-            return BridgeState(name, session_id)
+            return BridgeId(name, session_id)
     return None
 
 
-def replier(reply: zenoh.Reply) -> BridgeState | None:
+def replier(reply: zenoh.Reply) -> BridgeId | None:
     """The bridge that sent a reply: the key names the vehicle, the sender the session. None for a storage."""
     if reply.ok is None or reply.replier_id is None:
         return None
-    return BridgeState(vehicle_in(reply.ok.key_expr), str(reply.replier_id.zid))
+    return BridgeId(vehicle_in(reply.ok.key_expr), str(reply.replier_id.zid))
 
 
-def vehicle_of(bridge: BridgeState, state: Json | None) -> FleetVehicle:
+def vehicle_of(bridge: BridgeId, state: Json | None) -> FleetVehicle:
     """Make a vehicle from the payload of its `state`; None: it sent none."""
     if state is None:
         return FleetVehicle(bridge.vehicle, bridge.session_id)

@@ -15,7 +15,7 @@ import zenoh
 
 from service.cli.fleet.payload import decode, number, part
 from service.cli.fleet.session import send_query
-from service.cli.fleet.vehicle import BridgeState, FleetVehicle, as_fleet, bridge_of, replier, vehicle_of
+from service.cli.fleet.vehicle import BridgeId, FleetVehicle, as_fleet, bridge_of, replier, vehicle_of
 from service.daemon.mission_data import Json
 from service.zenoh_link.keys import ALIVE, OVERVIEW, STATE, full, vehicle_in
 from service.zenoh_link.overview import state_of
@@ -33,7 +33,7 @@ class Watch:
         self._prefix = prefix
         self._clock = clock
         self._lock = threading.Lock()
-        self._bridges: set[BridgeState] = set()
+        self._bridges: set[BridgeId] = set()
         self._states: dict[str, _Heard] = {}
         self._followed: dict[str, zenoh.Subscriber[None]] = {}
 
@@ -46,7 +46,7 @@ class Watch:
 
     def ask(self, name: str) -> None:
         """Query a vehicle's state ("*": all vehicles)."""
-        send_query(self._session, self._key(name, STATE.suffix), self.reply, lambda: None, None, _STATE_TIMEOUT_S)
+        send_query(self._session, self._key(name, STATE.suffix), self.reply, _STATE_TIMEOUT_S)
 
     def token(self, sample: zenoh.Sample) -> None:
         """Take a liveliness token: a bridge appeared or disappeared."""
@@ -77,10 +77,10 @@ class Watch:
             self.ask(name)
         self._take(sample, state, None)
 
-    def reply(self, reply: zenoh.Reply) -> None:
-        """Take a bridge's reply. A storage's is ignored: it may be of a vehicle that is long gone."""
-        bridge = replier(reply)
-        if reply.ok is not None and bridge is not None:
+    def reply(self, reply: zenoh.Reply | None) -> None:
+        """Take a bridge's reply; None, the end, does nothing. A storage's may be of a vehicle that is long gone."""
+        bridge = reply and replier(reply)
+        if reply is not None and reply.ok is not None and bridge is not None:
             self._take(reply.ok, decode(reply.ok), bridge)
 
     def look(self) -> tuple[list[FleetVehicle], list[float | None]]:
@@ -100,7 +100,7 @@ class Watch:
     def _key(self, name: str, suffix: str) -> str:
         return full(self._prefix, name, suffix)
 
-    def _take(self, sample: zenoh.Sample, state: Json | None, bridge: BridgeState | None) -> None:
+    def _take(self, sample: zenoh.Sample, state: Json | None, bridge: BridgeId | None) -> None:
         if state is None:
             return
         with self._lock:
@@ -126,7 +126,7 @@ class _Heard:
     state: Json
     made_at: float
     offset_s: float
-    replier: BridgeState | None
+    replier: BridgeId | None
 
 
 @contextmanager
