@@ -266,6 +266,9 @@ class Vehicle:
             self._place_home(has_armed=was_armed is False and reading.armed is True)
         elif kind is GlobalPosition or kind is Height:
             self._place_home(has_armed=False)
+        elif isinstance(reading, GpsFix) and reading.fix is Fix.NO_FIX:
+            # What is sent with each position is sent without one, too: it has the height.
+            self.news.add(GlobalPosition)
 
     def _estimated(self, power: Power) -> Power:
         """Fill in cells and remaining charge if the flight controller does not report them."""

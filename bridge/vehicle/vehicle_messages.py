@@ -89,7 +89,7 @@ _MAX_RSSI = 254
 #: ATTITUDE is sent most often, and pymavlink's object would cost as much as the frame itself.
 _ATTITUDE = messages.MAVLink_attitude_message.unpacker
 _UNKNOWN_RATES = (math.nan, math.nan, math.nan)
-#: An armed craft above this height or speed is in the air.
+#: An armed craft this far above or below home, or faster, is in the air.
 _FLYING_M, _FLYING_M_S = 1.0, 0.5
 _THROTTLE = 2
 _STICK_LOW_US, _STICK_HIGH_US = 1000, 2000
@@ -143,11 +143,11 @@ class Moment:
                 continue
         return made
 
-    def altitude_m(self, position: GlobalPosition) -> float | None:
+    def altitude_m(self) -> float | None:
         """Above mean sea level: home's altitude plus the height above it, finer than the GPS's whole metres."""
-        home, height = self.vehicle.home, self.fresh(Height)
+        home, height, position = self.vehicle.home, self.fresh(Height), self.fresh(GlobalPosition)
         if home is None or home.altitude_m is None or height is None:
-            return position.altitude_m
+            return None if position is None else position.altitude_m
         return home.altitude_m + height.height_m
 
 
@@ -264,17 +264,25 @@ def gps_raw_int(at: Moment) -> Message:
 
 
 def global_position_int(at: Moment) -> Message:
-    """GLOBAL_POSITION_INT: mm, cm/s, 0.01 degrees. Position, velocity and height have no "unknown"."""
-    position, height, orientation = at.need(GlobalPosition), at.need(Height), at.fresh(Orientation)
+    """GLOBAL_POSITION_INT: mm, cm/s, 0.01 degrees. Position, velocity and height have no "unknown".
+
+    Mission Planner shows no other height. So without a fix it carries the last known place, as ArduPilot's does, and
+    zeros if there was none, which Mission Planner and QGroundControl ignore.
+    """
+    height, place, orientation = at.need(Height), at.vehicle.last(GlobalPosition), at.fresh(Orientation)
+    altitude_m, north_m_s, east_m_s = at.altitude_m(), 0.0, 0.0
+    if (position := at.fresh(GlobalPosition)) is not None:
+        known(altitude_m)
+        north_m_s, east_m_s = known(position.north_m_s), known(position.east_m_s)
     is_north_known = orientation is not None and orientation.is_north_known
     return messages.MAVLink_global_position_int_message(
         at.boot_ms,
-        position.lat_e7,
-        position.lon_e7,
-        _fit(round(known(at.altitude_m(position)) * 1000), 32),
+        0 if place is None else place.lat_e7,
+        0 if place is None else place.lon_e7,
+        _fit(round((altitude_m or 0.0) * 1000), 32),
         _fit(round(height.height_m * 1000), 32),
-        _fit(round(known(position.north_m_s) * 100), 16),
-        _fit(round(known(position.east_m_s) * 100), 16),
+        _fit(round(north_m_s * 100), 16),
+        _fit(round(east_m_s * 100), 16),
         _fit(round(-height.climb_m_s * 100), 16),
         round(orientation.heading_deg * 100) % 36000 if orientation and is_north_known else _UNKNOWN_U16,
     )
@@ -289,11 +297,10 @@ def vfr_hud(at: Moment) -> Message:
     orientation, channels_us = at.need(Orientation), at.need(Sticks).channels_us
     if len(channels_us) <= _THROTTLE:
         raise Unknown
-    position, height, gps = at.fresh(GlobalPosition), at.fresh(Height), at.fresh(GpsFix)
+    height, gps, altitude_m = at.fresh(Height), at.fresh(GpsFix), at.altitude_m()
     speed = math.nan if gps is None or gps.ground_speed_m_s is None else gps.ground_speed_m_s
     air = at.fresh(Airspeed)
     airspeed = math.nan if at.vehicle.airframe is Airframe.FIXED_WING else speed
-    altitude_m = None if position is None else at.altitude_m(position)
     throttle = (channels_us[_THROTTLE] - _STICK_LOW_US) * 100 // (_STICK_HIGH_US - _STICK_LOW_US)
     return messages.MAVLink_vfr_hud_message(
         airspeed if air is None else air.airspeed_m_s,
@@ -461,7 +468,7 @@ def extended_sys_state(at: Moment) -> Message:
         speed = None if gps is None else gps.ground_speed_m_s
         if height is None:
             landed = messages.MAV_LANDED_STATE_UNDEFINED
-        elif height.height_m > _FLYING_M or abs(height.climb_m_s) > _FLYING_M_S or (speed or 0) > _FLYING_M_S:
+        elif abs(height.height_m) > _FLYING_M or abs(height.climb_m_s) > _FLYING_M_S or (speed or 0) > _FLYING_M_S:
             landed = messages.MAV_LANDED_STATE_IN_AIR
     return messages.MAVLink_extended_sys_state_message(messages.MAV_VTOL_STATE_UNDEFINED, landed)
 

@@ -3,6 +3,7 @@
 
 import math
 import struct
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -14,7 +15,7 @@ from bridge.controllers.table import PROFILES
 from bridge.fc.msp_telemetry import hear_msp
 from bridge.fc.profile import FlightController, Profile, Spoken
 from bridge.model.airframe import Airframe, airframe
-from bridge.model.vehicle import FlightState, Power, Source, Vehicle
+from bridge.model.vehicle import FlightState, GlobalPosition, Power, Source, Vehicle
 from bridge.vehicle import vehicle_messages as make
 from bridge.vehicle.telemetry_table import TELEMETRY
 from protocols.mavlink.codec import FrameWriter, Packed, pack
@@ -99,7 +100,8 @@ def test_a_current_sensor_below_zero_is_no_huge_consumption() -> None:
 def test_without_a_fix_there_is_no_position() -> None:
     state = with_replies(Vehicle(), HARAKIRI, STATUS=status(), RAW_GPS=gps(fix=0), ALTITUDE=bytes(6))
     assert make.gps_raw_int(at(state)).fix_type == m.GPS_FIX_TYPE_NO_FIX
-    assert at(state).made((make.global_position_int,)) == []
+    position = fields(make.global_position_int(at(state)))
+    assert [position[name] for name in ("lat", "lon", "alt", "relative_alt", "vx", "vy", "vz")] == [0] * 7
     assert at(state).made((make.home_position,)) == []
     with_replies(state, HARAKIRI, ATTITUDE=attitude(), RC=struct.pack("<8H", *[1500] * 8))
     hud = fields(make.vfr_hud(at(state)))
@@ -120,6 +122,34 @@ def test_a_first_fix_in_motion_has_no_direction_yet() -> None:
     position = fields(make.global_position_int(at(state)))
     assert (position["vx"], position["vy"], position["vz"], position["relative_alt"]) == (250, 0, -20, 1500)
     assert position["hdg"] == U16
+
+
+def test_the_height_is_shown_without_a_fix() -> None:
+    """Mission Planner shows only relative_alt of GLOBAL_POSITION_INT. ArduPilot sends the last known place, too."""
+    state = with_replies(Vehicle(), HARAKIRI, STATUS=status(), ALTITUDE=struct.pack("<ih", 3000, -70))
+    state.take_news()
+    with_replies(state, HARAKIRI, RAW_GPS=gps(fix=0))
+    assert GlobalPosition in state.take_news()  # so it is sent
+    position = fields(make.global_position_int(at(state)))
+    assert (position["lat"], position["lon"], position["relative_alt"], position["vz"]) == (0, 0, 30000, 70)
+    with_replies(state, HARAKIRI, RAW_GPS=gps())
+    with_replies(state, HARAKIRI, RAW_GPS=gps(lat=453838000 + 90))
+    shown = fields(make.global_position_int(at(state)))
+    last = state.last(GlobalPosition)
+    assert last is not None
+    state.hear(replace(last, heard_at=-10.0))
+    with_replies(state, HARAKIRI, ALTITUDE=struct.pack("<ih", 1000, -70), RAW_GPS=gps(fix=0))
+    lost = fields(make.global_position_int(at(state)))
+    assert (lost["lat"], lost["lon"]) == (shown["lat"], shown["lon"])
+    assert (lost["relative_alt"], lost["vx"], lost["vy"], lost["alt"]) == (10000, 0, 0, shown["alt"] - 20000)
+
+
+@pytest.mark.parametrize("height_m", [-30, 30])
+def test_a_craft_far_above_or_below_its_home_is_in_the_air(height_m: int) -> None:
+    altitude = struct.pack("<ih", height_m * 100, 0)
+    state = with_replies(Vehicle(), HARAKIRI, STATUS=status(flags=1 << 5), ALTITUDE=altitude, RAW_GPS=gps(speed=0))
+    assert state.armed
+    assert make.extended_sys_state(at(state)).landed_state == m.MAV_LANDED_STATE_IN_AIR
 
 
 def test_a_craft_that_never_moved_has_zero_velocity() -> None:
