@@ -130,6 +130,7 @@ def test_the_package_has_no_paths_of_the_build_machine(package: Path) -> None:
             assert content is None or str(_REPOSITORY).encode() not in content.read(), member.name
 
 
+@pytest.mark.timeout(1800)  # dpkg compiles all libraries three times: a minute on an idle machine
 def test_it_is_installed_used_upgraded_removed_and_purged(root: BareRoot) -> None:
     assert "sudo naze-bridge setup" in root.run("dpkg --install /root/naze-bridge.deb")
     assert root.run("id --name --user naze-bridge") == "naze-bridge\n"
