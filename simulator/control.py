@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Control of a simulated board by another process: set faults, pull the plug, read the counters.
 
-    FAULT VALUE         a field of the board's faults and a number (switches: 0 or 1)
+    FAULT NUMBER        set a field of the board's faults (switches: 0 or 1)
     power on|off
     reset               the CPU's reset line
     plug, unplug

@@ -9,7 +9,7 @@ from itertools import accumulate
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from protocols.uart_capture import UartAction, UartEvent
 
-#: The reply deadline: even a flight controller that is writing its flash is faster.
+#: The reply deadline: a flight controller is faster even while it writes its flash.
 _LONGEST_WAIT_S = 5.0
 #: A request this shortly before the port was closed, or the recording ended, might have been answered.
 _CUT_SHORT_S = 0.5
@@ -62,7 +62,7 @@ def take_apart(events: Sequence[UartEvent]) -> Conversation:
                     question = found.command, found.payload
                     asked.append(Exchange(known.setdefault(question, question), event.at))
             exchanges += asked
-            # A repeated request means that the earlier one was given up.
+            # A repeated request replaces the earlier one, which timed out.
             questions = {exchange.question for exchange in asked}
             waiting = [earlier for earlier in waiting if earlier.question not in questions] + asked
         while answered_by == number:

@@ -12,7 +12,7 @@ from simulator.memory_file import open_memory
 from simulator.options import Faults
 from simulator.run_board import Running, run_board
 
-#: A computer that needs longer than this time for it gets a slower board.
+#: A computer that falls further behind gets a slower board.
 _LONGEST_STEP_S = 0.005
 
 

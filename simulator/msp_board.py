@@ -81,7 +81,6 @@ class MspBoard(SimulatedBoard):
             return None
 
     def next_wakeup(self, now: float) -> float:
-        """The time for the next call of `advance`; infinity if nothing will happen by itself."""
         due = self._next_event()
         departure = self._ring.next_departure()
         if due is not None and self._firmware:

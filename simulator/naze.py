@@ -63,7 +63,6 @@ class SimulatedNaze(SimulatedBoard):
         return self._firmware is not None and self._firmware.armed
 
     def truth(self, now: float) -> Craft | None:
-        """The craft's true state, which only the simulation knows."""
         self._run_until(now)
         return self._firmware.craft_at(now) if self._firmware else None
 
@@ -85,10 +84,7 @@ class SimulatedNaze(SimulatedBoard):
         return self._flash.operations
 
     def next_wakeup(self, now: float) -> float:
-        """The time for the next call of `advance`; infinity if nothing will happen by itself.
-
-        Late loops are computed at their nominal times, so close requests are handled in one call.
-        """
+        # Late loops are computed at their nominal times, so close requests are handled in one call.
         work = self._next_event()
         if work is None:
             work = inf

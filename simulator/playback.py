@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Replays the flight controller of a UART capture, to reproduce field problems, or in simulated time in a test.
 
-Unsolicited data is sent at its recorded time, replies on request, because the current bridge may send different
-requests, or the same ones sooner or later. Each request gets the reply that the same request got at this time of the
-recording, with the same delay, and none if it got none. Invented replies:
+Unsolicited data is sent at its recorded time. Replies are sent on request, because the current bridge may send other
+requests, or the same ones at other times: the reply, if any, that the same request got at this time of the recording,
+with the same delay. Invented replies:
 
 - A request that was never recorded gets MSP's error frame, as from firmware that does not know it, if the flight
   controller answered anything at that time.

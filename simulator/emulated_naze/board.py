@@ -96,7 +96,6 @@ class EmulatedNaze(SimulatedBoard):
         self._run_chip_until(now)
 
     def next_wakeup(self, now: float) -> float:
-        """The time for the next call of `advance`; infinity if nothing will happen by itself."""
         return now + _STEP_S if self.power is Power.RUNNING else inf
 
     # -- time ------------------------------------------------------------------------------------------------

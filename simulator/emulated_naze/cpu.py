@@ -128,7 +128,7 @@ class Cpu:
         self._wants_pause = True
 
     def _run_stretch(self, end_ns: int) -> bool:
-        """Execute until then; False if the slice ended earlier."""
+        """Execute until `end_ns`; False if the slice ended earlier."""
         cycles = (end_ns - self._clock.now_ns) * self._core_hz() // 1_000_000_000
         self._wants_pause = self._has_returned = False
         self._execute(max(int(cycles / _CYCLES_PER_INSTRUCTION), 1) + 1)

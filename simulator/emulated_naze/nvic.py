@@ -104,11 +104,10 @@ class Nvic:
         return self._active[-1] if self._active else 0
 
     def priority(self, exception: int) -> int:
-        """The priority of an exception; lower is more urgent."""
+        """Lower is more urgent."""
         return self._priorities.get(exception, 0)
 
     def set_priority(self, exception: int, priority: int) -> None:
-        """Set the priority of any exception."""
         self._priorities[exception] = priority & _PRIORITY_MASK
 
     def _group(self, exception: int) -> int:

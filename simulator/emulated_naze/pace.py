@@ -7,9 +7,9 @@ read lets more time pass than the one before, up to the next alarm.
 
 from simulator.emulated_naze.clock import Clock
 
-#: The time of an access while the number of instructions since the last pause is unknown.
+#: The time charged for an access: the number of instructions since the last pause is unknown.
 _ACCESS_NS = 150
-#: The number of accesses without a change that do not yet count as a busy-wait loop.
+#: With more accesses than this that change nothing, it is a busy-wait loop.
 _NORMAL_ACCESSES = 24
 _SKIP_NS = 500
 _LONGEST_SKIP_NS = 50_000

@@ -154,6 +154,17 @@ def test_the_reported_result_is_true_on_a_bad_line(rate: float) -> None:
     assert A.ACCEPTED in outcomes
 
 
+def test_a_list_lost_with_the_configuration_in_a_power_cut_is_reported() -> None:
+    world, station = mavlink_only()
+    assert Upload(station, waypoints(5)).run() is A.ACCEPTED
+    world.faults.power_cut_at_flash_operation = 2
+    assert Upload(station, waypoints(4, 1)).run() is A.DENIED
+    world.power_on()
+    world.wait_until(lambda w: station.texts()[-1] == "The mission arrived incomplete: write it again", 30)
+    assert world.store.outcomes() == [Outcome.VERIFIED, Outcome.FAILED]
+    assert not world.stored
+
+
 def test_for_an_unpatched_harakiri_on_msp_the_pilot_learns_the_reason() -> None:
     faults = Faults(extension=False)
     world = World(SimOptions(tele_prot=TelemetryProtocol.MAVLINK), faults, speeds=(115200,))
