@@ -6,7 +6,7 @@ import os
 import socket
 import termios
 from collections.abc import Awaitable, Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from functools import partial
 from typing import Protocol
 
@@ -76,6 +76,9 @@ def open_serial(path: str) -> serial.Serial:
         # the line.
         port = serial.Serial(path, 115200, timeout=0, write_timeout=0, inter_byte_timeout=0, exclusive=True)
         _keep_dtr(port.fileno())
+        with suppress(*DEVICE_ERRORS):  # few drivers have this mode
+            # Without it an FT232R keeps a short reply for 16 ms, in case more bytes follow.
+            port.set_low_latency_mode(True)
     except (serial.SerialException, OSError) as error:
         kind = PortInUseError if error.errno in BUSY else PortError
         raise kind(explain_port_error(path, error)) from error

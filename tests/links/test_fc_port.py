@@ -254,6 +254,22 @@ async def test_dtr_stays_on_when_the_port_closes(line: Line) -> None:
     assert not termios.tcgetattr(line._terminal)[2] & termios.HUPCL
 
 
+async def test_usb_chips_deliver_short_replies_at_once(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Like most drivers, a pty's has no such mode: the port is used all the same."""
+    asked: list[bool] = []
+    real = serial.Serial.set_low_latency_mode
+
+    def set_mode(port: serial.Serial, is_low: bool) -> None:
+        asked.append(is_low)
+        real(port, is_low)
+
+    monkeypatch.setattr(serial.Serial, "set_low_latency_mode", set_mode)
+    line.start()
+    await until_async(lambda: line.opened, "the port")
+    assert asked == [True]
+    await line.stop()
+
+
 @pytest.mark.parametrize("error", [OSError("unplugged"), termios.error(5, "unplugged"), ValueError("unplugged")])
 async def test_a_port_that_takes_no_speed_counts_as_lost(
     line: Line, error: Exception, monkeypatch: pytest.MonkeyPatch
