@@ -19,11 +19,12 @@ from pathlib import Path
 
 from benchmarks.figure import Figure, Floor
 from benchmarks.missions import COUNT, random_mission
-from benchmarks.processes import ENVIRONMENT, NAZE_BRIDGE, ROOT, daemon, free_udp_port, wait_for
-from benchmarks.zenoh_programs import ALL_TELEMETRY, configuration, cpu_s
+from benchmarks.processes import ENVIRONMENT, ROOT, cpu_s, daemon, wait_for
+from benchmarks.zenoh_programs import ALL_TELEMETRY, configuration
 from protocols.mission_file import write_qgc_wpl
 from service.settings.zenoh import DEFAULT_PREFIX
 from service.zenoh_link.keys import STATE, full
+from tests.support.programs import NAZE_BRIDGE, free_port
 from tests.support.zenoh_router import client, running_router
 
 _FEW, _MANY = 5, 50
@@ -126,6 +127,6 @@ def _vehicle(folder: Path, number: int, endpoint: str) -> Iterator[int]:
     own = folder / f"naze-{number}"
     own.mkdir()
     config = configuration(own, f"naze-{number}", endpoint)
-    gcs = f"udpin:127.0.0.1:{free_udp_port()}"
+    gcs = f"udpin:127.0.0.1:{free_port()}"
     with daemon(own, Path("sim:"), gcs, "--config", str(config)) as process:
         yield process.pid

@@ -16,8 +16,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.figure import Figure, Floor
-from benchmarks.forwarders import FLOOR, MAVLINK_ROUTER, MAVP2P, MAVPROXY, OURS, Forwarder, cpu_s, forwarders
+from benchmarks.forwarders import FLOOR, MAVLINK_ROUTER, MAVP2P, MAVPROXY, OURS, Forwarder, forwarders
 from benchmarks.line import Line, on_cpu
+from benchmarks.processes import cpu_s
 
 _ROUNDS = 3
 _RATES: dict[str, float | None] = {"500/s": 500.0, "3000/s": 3000.0, "unpaced": None}

@@ -43,12 +43,6 @@ def forwarders() -> list[Forwarder]:
     return found
 
 
-def cpu_s(pid: int) -> float:
-    """The CPU time of a process and its threads, user and system, seconds."""
-    tasks = [task for task in Path(f"/proc/{pid}/task").iterdir() if task.is_dir()]
-    return sum(int((task / "schedstat").read_text().split()[0]) for task in tasks) / 1e9
-
-
 @contextmanager
 def _floor(folder: Path, line: Line) -> Iterator[int]:
     program = folder / "forward_floor"

@@ -6,7 +6,6 @@ station answers from there, then one that requests nothing, then one that reques
 runs in another process and is not counted.
 """
 
-import os
 import socket
 import statistics
 import subprocess
@@ -19,7 +18,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from benchmarks.figure import Figure, Floor
-from benchmarks.processes import ENVIRONMENT, Board, daemon, floor_program, simulated_naze
+from benchmarks.processes import ENVIRONMENT, Board, cpu_s, daemon, floor_program, simulated_naze
 from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MavlinkSplitter
@@ -151,17 +150,11 @@ def udpout(ground: socket.socket) -> str:
 
 
 def cpu_percent(pid: int) -> float:
-    """Watch a process for a while; returns its user and system time in percent of one core."""
+    """Watch a process for a while; returns its CPU time in percent of one core."""
     time.sleep(_SETTLING_S)
-    before, began_at = _cpu_s(pid), time.perf_counter()
+    before, began_at = cpu_s(pid), time.perf_counter()
     time.sleep(_WATCHED_S)
-    return (_cpu_s(pid) - before) / (time.perf_counter() - began_at) * 100
-
-
-def _cpu_s(pid: int) -> float:
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    user, system = int(fields[11]), int(fields[12])
-    return (user + system) / os.sysconf("SC_CLK_TCK")
+    return (cpu_s(pid) - before) / (time.perf_counter() - began_at) * 100
 
 
 def resident_mb(pid: int) -> float:

@@ -19,7 +19,7 @@ from functools import partial
 from pathlib import Path
 
 from benchmarks.figure import Figure, Floor
-from benchmarks.processes import BenchmarkError, free_udp_port, inav_on_a_socket, inav_on_a_uart
+from benchmarks.processes import BenchmarkError, inav_on_a_socket, inav_on_a_uart
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile
 from bridge.missions.list_check import check_list
@@ -30,6 +30,7 @@ from protocols.msp.nav import WP_SIZE, NavRecord, encode_read_wp, encode_set_wp
 from service.daemon.daemon import Daemon
 from service.settings import Settings
 from service.settings.addresses import FcAddress, GcsAddress, SerialFc, TcpFc
+from tests.support.programs import free_port
 
 _COUNT = 120
 _ROUNDS, _RUNS = 3, 5
@@ -121,7 +122,7 @@ def _write_all(line: int, data: bytes) -> None:
 
 
 async def _push_all(fc: FcAddress, turn: int) -> list[float]:
-    daemon = Daemon(Settings(fc, [GcsAddress("udpout", "127.0.0.1", free_udp_port())]))
+    daemon = Daemon(Settings(fc, [GcsAddress("udpout", "127.0.0.1", free_port())]))
     running = asyncio.create_task(daemon.run())
     try:
         while isinstance(daemon.bridge.missions.fc_store, Refusal) or daemon.bridge.runner.is_busy:  # noqa: ASYNC110 - as in push

@@ -16,9 +16,8 @@ from functools import partial
 from pathlib import Path
 from socket import SOCK_STREAM
 
-from benchmarks.processes import NAZE_BRIDGE, ROOT, running, wait_for
-from benchmarks.zenoh_programs import cpu_s
-from tests.support.programs import free_port
+from benchmarks.processes import ROOT, cpu_s, running, wait_for
+from tests.support.programs import NAZE_BRIDGE, free_port
 from tests.support.zenoh_router import client, running_router
 
 _COUNTS = (1, 100, 400)

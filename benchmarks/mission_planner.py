@@ -13,11 +13,12 @@ from tempfile import TemporaryDirectory
 
 from benchmarks.figure import Figure, Floor
 from benchmarks.missions import COUNT
-from benchmarks.processes import daemon, floor_program, free_udp_port, simulated_naze, wait_for
+from benchmarks.processes import daemon, floor_program, simulated_naze, wait_for
 from protocols.mission_item import MissionResult
 from protocols.msp.mission import RECORD_SIZE
 from tests.support.mission_planner import MissionPlanner
 from tests.support.plan import plain_plan
+from tests.support.programs import free_port
 
 _RUNS = 7
 _NO_FLASH_TIME = ("--flash-stall", "0", "--program-stall", "0")
@@ -29,7 +30,7 @@ def measure() -> list[Figure]:
     connects_s: list[float] = []
     writes_s: list[float] = []
     floors_s: list[float] = []
-    port = free_udp_port()
+    port = free_port()
     with (
         TemporaryDirectory() as name,
         simulated_naze(Path(name), *_NO_FLASH_TIME) as board,

@@ -14,6 +14,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from tests.support.programs import NAZE_BRIDGE, free_port
+
 ROOT = Path(__file__).resolve().parent.parent
 #: The folder of saved figures (git-ignored).
 RESULTS = ROOT / "benchmarks" / "results"
@@ -21,8 +23,6 @@ RESULTS = ROOT / "benchmarks" / "results"
 ENVIRONMENT = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"} | {
     "PYTHONPYCACHEPREFIX": str(RESULTS / "bytecode")
 }
-#: The console script, without depending on where it is installed.
-NAZE_BRIDGE = [sys.executable, "-c", "from service.cli.program import start; start()"]
 _TIMEOUT_S = 30.0
 _POLL_S = 0.002
 
@@ -85,7 +85,7 @@ def simulated_naze(folder: Path, *options: str) -> Iterator[Board]:
 @contextmanager
 def inav_on_a_socket(folder: Path) -> Iterator[tuple[str, int]]:
     """Run `naze-bridge sim --kind inav --tcp`; yields its address."""
-    host, port = "127.0.0.1", free_tcp_port()
+    host, port = "127.0.0.1", free_port(socket.SOCK_STREAM)
     log = folder / "sim.log"
     with running([*NAZE_BRIDGE, "sim", "--kind", "inav", "--tcp", f"{host}:{port}"], log):
         wait_for(lambda: b"Simulated " in log.read_bytes(), "the simulated INAV is up")
@@ -143,15 +143,9 @@ def floor_program(folder: Path, *arguments: str) -> Iterator[tuple[int, Path]]:
         yield process.pid, log
 
 
-def free_udp_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
+def cpu_s(pid: int) -> float:
+    """The CPU time of a process, seconds, by its own clock: far finer than the ticks in /proc.
 
-
-def free_tcp_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
+    The clock id is computed like clock_getcpuclockid(3) on Linux.
+    """
+    return time.clock_gettime(~pid << 3 | 2)

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from benchmarks.figure import Figure, Floor
 from benchmarks.missions import COUNT, random_mission
-from benchmarks.processes import BenchmarkError, free_udp_port, simulated_naze
+from benchmarks.processes import BenchmarkError, simulated_naze
 from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.line.conversation import Conversation, LinkLost, Send
 from bridge.missions.fc_mission_store import PushResult
@@ -30,6 +30,7 @@ from protocols.msp.mission import RECORD_SIZE, MissionCommand, WpRecord
 from service.daemon.daemon import Daemon
 from service.settings import Settings
 from service.settings.addresses import GcsAddress, SerialFc
+from tests.support.programs import free_port
 
 _BAUD = 115200
 _RUNS = 20
@@ -55,7 +56,7 @@ def _times_ms(*options: str) -> list[float]:
 
 
 async def _push_all(link: Path) -> list[float]:
-    settings = Settings(SerialFc(str(link), _BAUD), [GcsAddress("udpout", "127.0.0.1", free_udp_port())])
+    settings = Settings(SerialFc(str(link), _BAUD), [GcsAddress("udpout", "127.0.0.1", free_port())])
     daemon = Daemon(settings)
     running = asyncio.create_task(daemon.run())
     try:

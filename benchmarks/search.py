@@ -18,12 +18,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.figure import Figure, Floor
-from benchmarks.processes import BenchmarkError, Board, DaemonProcess, daemon, free_udp_port, logged_at, simulated_naze
+from benchmarks.processes import BenchmarkError, Board, DaemonProcess, daemon, logged_at, simulated_naze
 from bridge.fc.states.base import Port, PortOpened
 from bridge.fc.states.searching import SPEEDS, Searching
 from bridge.line.runner import Runner
 from bridge.model.autopilot import Autopilot
 from simulator.options import SimOptions
+from tests.support.programs import free_port
 
 _RUNS = 5
 _RETURNS = 8
@@ -100,7 +101,7 @@ def _waiting_daemon(folder: Path, baud: int) -> Iterator[tuple[Board, DaemonProc
     """Run a daemon whose port is still missing."""
     with simulated_naze(folder, "--baud", str(baud)) as board:
         board.tell("unplug")
-        with daemon(folder, board.link, f"udpin:127.0.0.1:{free_udp_port()}", "--verbose") as process:
+        with daemon(folder, board.link, f"udpin:127.0.0.1:{free_port()}", "--verbose") as process:
             process.wait_for_event("fc.port_unavailable")
             yield board, process
 

@@ -24,6 +24,7 @@ from benchmarks.idle import cpu_percent, listener, resident_mb, udpout
 from benchmarks.missions import random_mission
 from benchmarks.processes import ENVIRONMENT, ROOT, daemon, simulated_naze
 from service.daemon.client import ask_daemon
+from tests.support.programs import free_port
 
 _PUSHES = 9
 _ADDRESSES = ("127.0.0.1", "127.0.0.2", "127.0.0.3")
@@ -37,9 +38,9 @@ def measure() -> list[Figure]:
     with tempfile.TemporaryDirectory() as directory, ExitStack() as stack:
         folder = Path(directory)
         board = stack.enter_context(simulated_naze(folder, "--baud", "115200"))
-        port = _free_tcp_port()
+        port, zenoh_port = free_port(socket.SOCK_STREAM), free_port(socket.SOCK_STREAM)
         config = folder / "config.toml"
-        config.write_text(f'[web]\nlisten = "0.0.0.0:{port}"\n[zenoh]\nlisten = ["tcp/127.0.0.1:{_free_tcp_port()}"]\n')
+        config.write_text(f'[web]\nlisten = "0.0.0.0:{port}"\n[zenoh]\nlisten = ["tcp/127.0.0.1:{zenoh_port}"]\n')
         ground = stack.enter_context(listener())
         bridge = stack.enter_context(daemon(folder, board.link, udpout(ground), "--config", str(config)))
         bridge.wait_for_event("fc.found")
@@ -116,13 +117,6 @@ def _ask(port: int, address: str, path: str) -> bool:
     except OSError:
         return False
     return answer.startswith(b"HTTP/1.1 200")
-
-
-def _free_tcp_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
 
 
 if __name__ == "__main__":

@@ -24,9 +24,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from benchmarks.figure import Figure, Floor
-from benchmarks.forwarders import cpu_s
 from benchmarks.idle import cpu_percent, listener, udpout
-from benchmarks.processes import daemon, floor_program, simulated_naze
+from benchmarks.processes import cpu_s, daemon, floor_program, simulated_naze
 from bridge.bridge import Bridge
 from bridge.config import BridgeConfig
 from bridge.gcs.station import Peer

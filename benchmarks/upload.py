@@ -14,8 +14,9 @@ from pathlib import Path
 
 from benchmarks.figure import Figure, Floor
 from benchmarks.missions import COUNT, random_mission
-from benchmarks.processes import daemon, floor_program, free_udp_port, simulated_naze, wait_for
+from benchmarks.processes import daemon, floor_program, simulated_naze, wait_for
 from benchmarks.station import Station
+from tests.support.programs import free_port
 
 _UPLOADS = 10
 _SLOW_UPLOADS = 5
@@ -75,7 +76,7 @@ def _slow_flash() -> list[Figure]:
 @contextmanager
 def _bridge(*sim_options: str) -> Iterator[int]:
     """Run daemon and flight controller; yields the port for ground stations once the daemon has found it."""
-    port = free_udp_port()
+    port = free_port()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         with (
