@@ -61,4 +61,7 @@ class DiskWriter(Generic[T]):
     def _flush(self) -> None:
         with self._lock:
             records, self._waiting, self._size = self._waiting, [], 0
-        self._write(records)
+        try:
+            self._write(records)
+        except Exception:  # a bug must not end the recording
+            _log.exception("daemon.fault", what=f"writing the {self._name}")

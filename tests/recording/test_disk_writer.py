@@ -6,6 +6,7 @@ import threading
 from structlog.testing import capture_logs
 
 from service.recording.disk_writer import DiskWriter
+from tests.support.programs import until
 
 ROOM = 1 << 20
 
@@ -47,3 +48,21 @@ def test_a_hung_disk_blocks_nothing_and_is_reported_once() -> None:
     writer.close()
     assert b"".join(written).endswith(bytes(ROOM))
     assert len(b"".join(written)) < ROOM + 10
+
+
+def test_a_record_that_cannot_be_written_is_logged_and_does_not_end_recording() -> None:
+    written: list[bytes] = []
+
+    def write(records: list[bytes]) -> None:
+        if records == [b"bad"]:
+            raise ValueError("bad")
+        written.extend(records)
+
+    writer = DiskWriter[bytes]("test", write, lambda: None)
+    with capture_logs() as events:
+        put(writer, b"bad")
+        until(lambda: events, "the log entry")
+        put(writer, b"good")
+        until(lambda: written, "the next record")
+    assert [event["event"] for event in events] == ["daemon.fault"]
+    writer.close()
