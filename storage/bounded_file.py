@@ -9,5 +9,6 @@ def read_bounded(path: Path, most: int) -> bytes:
     with path.open("rb") as file:
         data = file.read(most + 1)
     if len(data) > most:
-        raise OSError(f"it is larger than {most >> 20} MB")
+        size = f"{most >> 20} MB" if most >> 20 else f"{most >> 10} kB"
+        raise OSError(f"it is larger than {size}")
     return data

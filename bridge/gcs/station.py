@@ -18,8 +18,10 @@ class Peer(NamedTuple):  # hashed several times for each message: as a tuple, in
         return self.key[0] if isinstance(self.key, tuple) else self.key
 
     def __str__(self) -> str:
-        address = ":".join(str(part) for part in self.key[:2]) if isinstance(self.key, tuple) else str(self.key)
-        return f"{self.link} {address}"
+        if not isinstance(self.key, tuple):
+            return f"{self.link} {self.key}"
+        host, port = map(str, self.key[:2])
+        return f"{self.link} [{host}]:{port}" if ":" in host else f"{self.link} {host}:{port}"
 
 
 #: The telemetry log as a peer: it is served like a ground station, but no datagram is sent.

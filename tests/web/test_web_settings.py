@@ -83,7 +83,7 @@ def test_an_invalid_token_file_is_one_sentence(tmp_path: Path) -> None:
     for path, reason in {
         tmp_path / "open": f"other users can read the token in {tmp_path}/open: chmod 600 {tmp_path}/open",
         tmp_path / "empty": "is shorter than 12 characters",
-        tmp_path / "long": "cannot be read: it is larger than",
+        tmp_path / "long": "cannot be read: it is larger than 4 kB",
         tmp_path: "is not a file",
         tmp_path / "nowhere" / "token": "a token cannot be written to",
         tmp_path / "open" / "token": "cannot be read: Not a directory",
