@@ -16,13 +16,12 @@ from service.daemon.client import ControlError, Interrupted, NoDaemonError, ask_
 from service.daemon.mission_data import Json
 from service.settings import SettingsError, default_state_dir
 from service.settings.addresses import AddressError, parse_fc
+from service.settings.load import SERVICE_STATE
 from storage.store_error import StoreError
 
 _GOES_ON = "the daemon continues with the mission, and the result follows; to exit now, press Ctrl-C again"
 _LEFT = "interrupted; the daemon continues with the mission: see `naze-bridge missions list`"
 _WRITES = ("push", "restore")
-#: The service's state directory.
-SERVICE_STATE = Path("/var/lib/naze-bridge")
 
 F = TypeVar("F", bound=Callable[..., Any])
 

@@ -45,10 +45,11 @@ def demo(file: Path, once: bool, port: int) -> None:
         items = load_mission(file)
         state_dir = Path(tempfile.mkdtemp(prefix="naze-bridge-demo-"))
         try:
-            with _daemon(_free_port(port), state_dir) as (address, process):
-                _show(items, file, address, state_dir)
+            port = _free_port(port)
+            with _daemon(port, state_dir) as process:
+                _show(items, file, port, state_dir)
                 if not once:
-                    _stay(address, process, state_dir)
+                    _stay(port, process, state_dir)
         finally:
             shutil.rmtree(state_dir, ignore_errors=True)
     except MissionFileError as error:
@@ -96,14 +97,14 @@ def _latest_mission(state_dir: Path) -> Json:
 
 
 @contextmanager
-def _daemon(port: int, state_dir: Path) -> Iterator[tuple[int, subprocess.Popen[bytes]]]:
+def _daemon(port: int, state_dir: Path) -> Iterator[subprocess.Popen[bytes]]:
     arguments = ["run", "--fc", "sim:", "--gcs", f"udpin:0.0.0.0:{port}", "--state-dir", str(state_dir)]
     click.secho(f"$ naze-bridge {' '.join(arguments)}", bold=True)
     program = [sys.executable, "-c", "from service.cli.program import start; start()"]
     log = state_dir / "daemon.log"
     with log.open("wb") as stderr, subprocess.Popen([*program, *arguments], stderr=stderr) as process:  # noqa: S603
         try:
-            yield port, process
+            yield process
         finally:
             process.terminate()
 

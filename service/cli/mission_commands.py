@@ -14,9 +14,8 @@ from service.cli.mission_table import mission_table
 from service.cli.options import PATH
 from service.cli.printing import print_json, print_table
 from service.cli.sentences import complain, fail, say
-from service.daemon.mission_data import Json, mission_findings, mission_items
+from service.daemon.mission_data import ACCEPTED, Json, mission_findings, mission_items
 
-_ACCEPTED = "MAV_MISSION_ACCEPTED"
 _NO_SPACE = "MAV_MISSION_NO_SPACE"
 _UNREADABLE = 2
 _WOULD_ERASE = 3
@@ -47,7 +46,7 @@ def push(file: Path, erase: bool, state_dir: Path | None, fc: str | None, as_jso
 
 
 def _would_erase(delivery: Json) -> bool:
-    return delivery.get("verdict") == "CLEARED" and delivery["ack"] != _ACCEPTED
+    return delivery.get("verdict") == "CLEARED" and delivery["ack"] != ACCEPTED
 
 
 @click.command()
@@ -117,5 +116,5 @@ def show_delivery(delivery: Json, *, as_json: bool) -> None:
         say(f"{delivery['ack'].removeprefix('MAV_MISSION_')}: {delivery['text']}")
     if _would_erase(delivery):
         raise SystemExit(_WOULD_ERASE)
-    if delivery["ack"] != _ACCEPTED:
+    if delivery["ack"] != ACCEPTED:
         raise SystemExit(1)

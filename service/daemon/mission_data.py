@@ -13,6 +13,8 @@ from protocols.mission_record import identify
 
 Json = dict[str, Any]
 
+#: The value of "ack" for a mission that was accepted.
+ACCEPTED = "MAV_MISSION_ACCEPTED"
 #: The greatest number allowed in a request.
 MOST = 2**31 - 1
 

@@ -9,9 +9,7 @@ import os
 import select
 import sys
 import time
-from collections.abc import Mapping
 from contextlib import suppress
-from typing import Any
 
 import structlog
 from structlog.typing import EventDict, Processor
@@ -80,14 +78,12 @@ class _RateLimit:
         return event
 
 
-class _JournalLines:
-    """Renders JSON after the priority, without the time: journald adds its own."""
+_render_json = structlog.processors.JSONRenderer()
 
-    def __init__(self) -> None:
-        self._render = structlog.processors.JSONRenderer()
 
-    def __call__(self, logger: object, method: str, event: Mapping[str, Any]) -> str:
-        return f"<{_PRIORITIES[method]}>{self._render(logger, method, dict(event))!s}"
+def _journal_line(logger: object, method: str, event: EventDict) -> str:
+    """JSON after the priority, without the time: journald adds its own."""
+    return f"<{_PRIORITIES[method]}>{_render_json(logger, method, event)!s}"
 
 
 _least_level = _LeastLevel()
@@ -133,7 +129,7 @@ def set_up_logging(level: str) -> None:
 
 def _output() -> list[Processor]:
     if os.environ.get("JOURNAL_STREAM"):
-        return [_JournalLines()]
+        return [_journal_line]
     if sys.stderr is not None and sys.stderr.isatty():
         return [structlog.processors.TimeStamper(fmt="%H:%M:%S", utc=False), structlog.dev.ConsoleRenderer()]
     return [structlog.processors.TimeStamper(fmt="iso", utc=True), structlog.processors.JSONRenderer()]

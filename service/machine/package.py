@@ -13,9 +13,9 @@ def page(name: str) -> str:
     return str(_INSTALLED / name) if _IN_PACKAGE else name
 
 
-def version() -> str:
-    """The installed version; "unknown" in a folder that was never installed."""
+def version(package: str = "naze-bridge") -> str:
+    """The installed version of a Python package; "unknown" if it is not installed."""
     try:
-        return metadata.version("naze-bridge")
+        return metadata.version(package)
     except metadata.PackageNotFoundError:
         return "unknown"

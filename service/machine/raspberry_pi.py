@@ -21,8 +21,8 @@ class PiModel:
 def pi_model(host: Host) -> PiModel | None:
     """The machine's Raspberry Pi model; None on other machines.
 
-    On a Pi 5 /dev/serial0 is the debug socket between the HDMI plugs (ttyAMA10); the header has ttyAMA0. On earlier
-    models serial0 is the header's: ttyS0 where Bluetooth has the better UART, else ttyAMA0.
+    On a Pi 5 /dev/serial0 is usually the debug socket between the HDMI plugs (ttyAMA10); the header always has ttyAMA0.
+    On earlier models serial0 is the header's: ttyS0 where Bluetooth has the better UART, else ttyAMA0.
     """
     name = host.read("/proc/device-tree/model").rstrip("\0\n")
     if not name.startswith("Raspberry Pi"):

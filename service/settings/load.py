@@ -19,8 +19,9 @@ from service.settings.zenoh import ZenohSettings, ZenohSettingsError
 
 #: The environment variable for the configuration file itself.
 CONFIG_VARIABLE = "NAZE_BRIDGE_CONFIG"
-#: The service's configuration file, as in its unit.
+#: The service's configuration file and state directory, as in its unit.
 SERVICE_CONFIG = Path("/etc/naze-bridge/config.toml")
+SERVICE_STATE = Path("/var/lib/naze-bridge")
 
 
 def default_state_dir() -> Path:

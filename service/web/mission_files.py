@@ -19,7 +19,7 @@ from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
 from service.daemon.api import DaemonApi
 from service.daemon.client import ControlError
-from service.daemon.mission_data import Json
+from service.daemon.mission_data import ACCEPTED, Json
 from service.web.comparison import MAX_ROWS, checked_mission
 from storage.store_error import StoreError
 
@@ -60,7 +60,7 @@ class MissionWriter:
 
         try:
             answer = await write(progress)
-            state |= {"ok": answer["ack"] == "MAV_MISSION_ACCEPTED", "text": answer["text"]}
+            state |= {"ok": answer["ack"] == ACCEPTED, "text": answer["text"]}
         except (ControlError, StoreError, ValueError) as error:
             state["text"] = str(error)
         except Exception:

@@ -8,14 +8,13 @@ from bridge.model.vehicle_groups import Group
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
 from service.daemon.api import DaemonApi
-from service.daemon.mission_data import MOST, Json
+from service.daemon.mission_data import ACCEPTED, MOST, Json
 from service.settings.zenoh import STATE_NAME
 from service.zenoh_link import keys
 from service.zenoh_link.liveliness import RENAME
 from service.zenoh_link.queries import Answerer, QueryRefused, Question
 from service.zenoh_link.rates import MAX_REQUEST_HZ, MAX_REQUEST_S, SampleRates
 
-_ACCEPTED = "MAV_MISSION_ACCEPTED"
 _PAYLOAD = "the query's payload"
 #: Larger files are read by the command line only, not alongside a running link: a mission that fits has about 20 KB.
 _MAX_BYTES = 1 << 18
@@ -120,6 +119,6 @@ def _progress_of(question: Question, count: int) -> Callable[[Json], None]:
 
 
 def _end(answer: Json) -> Json:
-    if answer["ack"] != _ACCEPTED:
+    if answer["ack"] != ACCEPTED:
         raise QueryRefused(answer["text"], answer)
     return {"result": answer}

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import click
 
-from service.cli.daemon_client import SERVICE_STATE
 from service.cli.doctor.checked import Checked, Grade
 from service.cli.options import PATH
 from service.cli.printing import print_json
@@ -18,7 +17,7 @@ from service.daemon.client import STATUS, ControlError, ask_daemon
 from service.daemon.mission_data import Json
 from service.machine.host import Host
 from service.settings import Settings, SettingsError, load_settings
-from service.settings.load import CONFIG_VARIABLE, SERVICE_CONFIG
+from service.settings.load import CONFIG_VARIABLE, SERVICE_CONFIG, SERVICE_STATE
 from storage.store_error import StoreError
 
 _COLOURS = {Grade.OK: "green", Grade.NOTE: "yellow", Grade.PROBLEM: "red"}

@@ -8,7 +8,6 @@ import sqlite3
 from collections.abc import Callable
 from contextlib import closing
 from datetime import UTC, datetime
-from importlib import metadata
 from pathlib import Path
 
 from service.cli.doctor.checked import Checked, note, ok, problem
@@ -27,7 +26,7 @@ _LIBRARIES = ("pymavlink", "pyserial", "eclipse-zenoh")
 def check_versions(host: Host) -> Checked:
     """The versions, for a bug report."""
     system = next((line for line in host.read("/etc/os-release").splitlines() if line.startswith("PRETTY_NAME=")), "")
-    libraries = [f"{name} {_version_of(name)}" for name in _LIBRARIES]
+    libraries = [f"{name} {version(name)}" for name in _LIBRARIES]
     where = system.partition("=")[2].strip('"') or platform.system()
     return ok(
         "versions",
@@ -109,10 +108,3 @@ def _look_into(path: Path) -> Checked:
         return ok("missions", f"{count} stored in {path}, intact")
     remedy = "restart the bridge: it sets the file aside and begins a new one (sudo systemctl restart naze-bridge)"
     return problem("missions", f"{path} is damaged: {finding}", remedy)
-
-
-def _version_of(library: str) -> str:
-    try:
-        return metadata.version(library)
-    except metadata.PackageNotFoundError:
-        return "missing"

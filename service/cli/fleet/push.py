@@ -14,13 +14,12 @@ from service.cli.fleet.payload import decode, part, text, whole
 from service.cli.fleet.roll_call import replies_of
 from service.cli.fleet.session import NO_COMMANDS, ask_each
 from service.cli.fleet.vehicle import BridgeId
-from service.daemon.mission_data import Json
+from service.daemon.mission_data import ACCEPTED, Json
 from service.zenoh_link.keys import STATE, UPLOAD, full
 
 #: 146 records take 2 s at 115200 baud and half a minute at 9600; a bad line may double that.
 _PUSH_TIMEOUT_S = 120.0
 _STATE_TIMEOUT_S = 2.0
-_ACCEPTED = "MAV_MISSION_ACCEPTED"
 _LOOK = "`naze-bridge fleet list` shows what it holds"
 _LOST = f"it or the router disconnected before the result was known; {_LOOK} when it is back"
 _TWO = "several bridges use this name, and the mission is for one: give each its own name (zenoh.vehicle)"
@@ -84,7 +83,7 @@ class FleetPush:
             progress.records, progress.total = records, total
         result = part(reply, "result")
         if isinstance(result, dict):
-            if result.get("ack") == _ACCEPTED:
+            if result.get("ack") == ACCEPTED:
                 progress.result = result
             else:
                 progress.error = text(result, "text") or "this version does not understand its reply"

@@ -13,10 +13,10 @@ from service.cli.setup.change import Change, Run, Step, WriteFile
 from service.links.port_memory import PORTS_FILE
 from service.machine.host import Host
 from service.machine.raspberry_pi import boot_file, pi_model
+from service.settings.load import SERVICE_STATE
 
 SETTINGS_FILE = "/etc/naze-bridge/conf.d/setup.toml"
 KEY_FILE = "/etc/naze-bridge/gcs.key"
-STATE_FOLDER = "/var/lib/naze-bridge"
 PAGE_PORT = 8080
 GCS_PORT = 14550
 _HOTSPOT_FILE = "/etc/NetworkManager/system-connections/naze-bridge-hotspot.nmconnection"
@@ -158,7 +158,7 @@ def _settings(host: Host, answers: SetupChoices) -> Iterator[Step]:
 def _others(host: Host, answers: SetupChoices) -> Iterator[Step]:
     """Keep the name /dev/naze from USB devices that proved not to be a flight controller."""
     try:
-        others = json.loads(host.read(f"{STATE_FOLDER}/{PORTS_FILE}") or "{}").get("others", {})
+        others = json.loads(host.read(f"{SERVICE_STATE}/{PORTS_FILE}") or "{}").get("others", {})
         keys = [re.fullmatch(r"usb (\S+) (\w{4}):(\w{4}).*", key) for key in others]
     except (ValueError, AttributeError):
         return
