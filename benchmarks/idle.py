@@ -47,7 +47,7 @@ LIBRARIES = f"import asyncio, sqlite3, serial, structlog, fastcrc; {_DIALECT}"
 def measure() -> list[Figure]:
     """Measure one idle daemon, and several starts."""
     with tempfile.TemporaryDirectory() as name, simulated_naze(Path(name)) as board:
-        _first_heartbeat_s(Path(name), board)  # compiles what is not yet compiled, which costs time and memory
+        _first_heartbeat_s(Path(name), board)  # compiles missing bytecode, which costs time and memory
         return [*_idle(Path(name), board), *_starts(Path(name), board)]
 
 

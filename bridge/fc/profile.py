@@ -39,7 +39,7 @@ NO_MISSIONS = Refusal(MissionResult.UNSUPPORTED, "This flight controller stores 
 
 @dataclass(frozen=True, slots=True)
 class RuleSettings:
-    """The inputs of the mission rules. None stands for the firmware's default. capacity: records."""
+    """The inputs of the mission rules. None: the firmware's default. capacity: records."""
 
     takeoff_max_m: int
     wp_radius_cm: int | None = None

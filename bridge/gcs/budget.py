@@ -80,8 +80,8 @@ class Budgets:
 
     `has_standing`: True for a peer that has authenticated, or has precedence on its link (bridge.gcs.stations). It has
     its own budgets. The others share theirs by host: a stranger gains nothing from many ports. All of them share a
-    total, of which a host may use as much as it leaves to others: of n busy hosts each uses 1 / (n + 1), and as much
-    is left for a newcomer.
+    total, of which a host may use as much as it leaves: each of n busy hosts uses 1 / (n + 1), and a newcomer finds as
+    much.
     """
 
     def __init__(self, has_standing: Callable[[Peer], bool]) -> None:

@@ -22,8 +22,8 @@ TOO_MANY_WRITES = "Flash wear limit: try again in 10 minutes"
 class FlashBudget:
     """Shares the writes between the hosts with precedence on an open link; all others have one account.
 
-    The last writes are kept for hosts that have not written lately, one for each. Of the rest, a host gets no more once
-    it has used twice what is left: a single one gets 257 at once and 7 an hour. A host that gains precedence takes over
+    The last writes are kept for hosts that have not written lately, one for each. Of the rest, a host may use up
+    to twice as many as it leaves: alone it gets 257 at once and 7 an hour. A host that gains precedence takes over
     the account of one that has lost it: changing addresses gains nothing.
 
     A peer with the key or a listed address has its own budget, but its writes also count for the others.

@@ -7,7 +7,7 @@ from bridge.gcs.station import Peer
 
 #: A client repeats a request within 0.7 s; a pilot who tries again takes longer, and gets the reason again.
 _QUIET_S = 1.0
-#: The limit only means that at worst a text is repeated.
+#: Beyond this limit a text may be repeated.
 _MAX_TEXTS = 256
 
 

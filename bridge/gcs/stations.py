@@ -13,7 +13,7 @@ from bridge.gcs.station import Peer, Station
 
 #: A UDP peer that is silent for this long has left; a TCP peer leaves with its connection.
 EXPIRY_S = 60.0
-#: The same for a peer whose ids are all heard at another address now, as after Wi-Fi roaming.
+#: The same for a peer whose ids have all moved to another address, as after Wi-Fi roaming.
 MOVED_S = 5.0
 #: The minimum interval between searches for silent peers.
 _EXPIRY_INTERVAL_S = 1.0
@@ -26,7 +26,7 @@ MAX_LISTENERS = 8
 #: A peer is steady once it has been heard this often, with pauses of at least `_BEAT_S`, like heartbeats at 1 Hz.
 _STEADY_BEATS = 3
 _BEAT_S = 0.7
-#: The number of remembered addresses that a full link refused: at 20,000 a second, most of them for at least a second.
+#: The number of refused addresses that a full link remembers: at 20,000 a second, most of them for a second or more.
 _REMEMBERED = 1 << 16
 #: A connected station, whether or not it transfers a mission, is never silent for this long.
 _STILL_S = 1.0

@@ -33,7 +33,7 @@ EXCLUSIVE_TIMEOUT_S = 1.0
 #: The limit while the board may be stalled: the rest of the ring is kept for a resync and what follows.
 _OUTSTANDING_IN_DOUBT = 64
 _FIRST_GUESS_S = 0.03
-#: After this long without a byte, an incomplete frame is given up.
+#: An incomplete frame is dropped after this long without a byte.
 _LINE_SILENCE_S = 0.05
 _ANY_SIZE = 1 << 16
 _NO_COMMAND = -1

@@ -56,7 +56,7 @@ class Poll:
     needed_s: float
 
 
-#: STATUS comes most often: arming must be noticed during a mission transfer.
+#: STATUS is polled most often: arming must be noticed during a mission transfer.
 POLLS = (
     Poll(Msp.STATUS, request(Msp.STATUS), STATUS_SIZE, 0.25),
     Poll(Msp.ATTITUDE, request(Msp.ATTITUDE), 8, 1.0),

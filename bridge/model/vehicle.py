@@ -2,8 +2,8 @@
 """The vehicle: everything known about it, whichever protocol the flight controller speaks at the moment.
 
 Decoders fill it (bridge/fc), and everything shown anywhere is made from it: MAVLink messages, zenoh, the status page,
-metrics. Units are SI, angles are in degrees. None means unknown. A reading keeps the time at which it was heard, so
-that an old value can be told from a current one; a lost link clears nothing.
+metrics. Units are SI, angles are in degrees. None means unknown. A reading keeps its arrival time,
+which separates old values from current ones; a lost link clears nothing.
 """
 
 from collections.abc import Set
@@ -242,7 +242,7 @@ class Vehicle:
         #: The kinds of readings heard since the last `take_news`.
         self.news: set[type[Reading]] = set()
         self._cells = 1
-        #: False while home is only where the craft stands before its first arming.
+        #: False before the first arming, while home is only the place of the craft.
         self.is_home_settled = False
 
     @property

@@ -20,7 +20,7 @@ _MAX_READERS = 16
 _READING_S = 20.0
 #: Requests waiting for the list to be read; further ones are dropped, and their senders repeat them.
 _MAX_QUESTIONS = 32
-#: Mission Planner repeats a request after 2.5 s. A position comes within that time, unless there is no GPS.
+#: Mission Planner repeats a request after 2.5 s. A position arrives within that time if there is a GPS.
 _POSITION_WAIT_S = 2.0
 _ARMED = Refusal(MissionResult.DENIED, "Armed: disarm to read the mission")
 

@@ -69,7 +69,7 @@ class VehicleReporter:
         self._want = want
         #: Ages count up to this time, monotonic s.
         self.now = 0.0
-        #: Groups updated since the last `take_fresh`, some of which may no longer be watched.
+        #: Groups updated since the last `take_fresh`; some may no longer be watched.
         self.fresh: set[Group] = set()
         #: The groups in use: they are polled, and `take_fresh` returns the updated ones.
         self.watched: frozenset[Group] = frozenset()
@@ -94,7 +94,7 @@ class VehicleReporter:
         return fresh
 
     def group(self, group: Group) -> Any:
-        """One group as it is now: an instance of its class in bridge.model.vehicle_groups."""
+        """The current values of a group: an instance of its class in bridge.model.vehicle_groups."""
         self._session.settle_telemetry()
         return self._makers[group]()
 

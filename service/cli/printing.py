@@ -19,7 +19,7 @@ _BLANK_END = re.compile(r"(?: |\x1b\[[\d;]*m)+$", re.MULTILINE)
 def print_table(table: "RenderableType") -> None:
     """Print a table as wide as the terminal, or 80 columns in a file, without trailing blanks.
 
-    On a terminal that is too narrow its lines go on in the next row: a shortened number would be a wrong one.
+    On a terminal that is too narrow its lines wrap: a shortened number would be a wrong one.
     """
     from rich.console import Console
     from rich.measure import Measurement

@@ -89,7 +89,7 @@ def open_serial(path: str) -> serial.Serial:
 
 
 def _keep_dtr(descriptor: int) -> None:
-    """Let DTR stay on when the port closes: an Arduino with MultiWii resets when it comes on again, in flight, too."""
+    """Keep DTR on when the port closes: an Arduino with MultiWii resets when it is raised again, even in flight."""
     attributes = termios.tcgetattr(descriptor)
     attributes[2] &= ~termios.HUPCL
     termios.tcsetattr(descriptor, termios.TCSANOW, attributes)

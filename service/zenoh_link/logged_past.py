@@ -22,7 +22,7 @@ from service.daemon.mission_data import Json
 from service.recording.tlog_folder import is_log_name
 from service.zenoh_link.time_range import TimeRange
 
-#: Every log of ours has heartbeats, so a search never goes long without finding a record.
+#: Every log has heartbeats, so a search soon finds a record.
 _SEARCHED = (
     messages.MAVLINK_MSG_ID_HEARTBEAT,
     messages.MAVLINK_MSG_ID_STATUSTEXT,

@@ -94,7 +94,7 @@ class HarakiriMavlinkMissions(HarakiriStore):
         return PushResult(failure)
 
     def pull(self) -> Conversation[tuple[WpRecord, ...] | None]:
-        """Read its list. An empty one gets no answer at all."""
+        """Read its list. With an empty one the board does not answer."""
         for _ in range(_MAX_BEGINS):
             count = yield from self._question(m.MAVLink_mission_request_list_message(*_TARGET), _COUNT)
             if count is None:

@@ -44,7 +44,7 @@ def keep_unshown(records: Sequence[NavRecord], former: Sequence[NavRecord]) -> t
 
 
 def _shown(record: NavRecord) -> NavRecord:
-    """The record without what its item does not show."""
+    """The record without the values that its item does not show."""
     hidden = dict.fromkeys(_HIDDEN.get(record.action, ()), 0)
     record = replace(record, **{"p3": record.p3 & _ABOVE_SEA, "flag": 0, **hidden})
     match record.action:

@@ -11,7 +11,7 @@ from protocols.msp.frame import MspParser
 
 #: Harakiri sends eight times a second.
 _SILENCE_S = 1.0
-#: A Harakiri that hears us also answers MSP, which has more values.
+#: A Harakiri that receives requests also answers MSP, which has more values.
 _PROBE_INTERVAL_S = 5.0
 
 

@@ -25,7 +25,7 @@ _HARAKIRI_ARMED_SILENCE_S = 0.8
 _BYTES_BEFORE_LOSS = 1000
 #: Harakiri is probed for MSP, which it answers again once it is disarmed.
 _PROBE_INTERVAL_S = 1.0
-#: After this long without a byte, an incomplete frame is given up.
+#: An incomplete frame is dropped after this long without a byte.
 _LINE_SILENCE_S = 0.1
 #: The ids of an ordinary ground station; Harakiri answers any sender.
 _SYSID, _COMPID = 255, 190

@@ -89,7 +89,7 @@ class FleetPush:
                 progress.error = text(result, "text") or "this version does not understand its reply"
 
     def refused(self, vehicle: str, error: Json | None) -> None:
-        """Take an error reply; None stands for zenoh's own, a timeout."""
+        """Take an error reply; None: zenoh's own, a timeout."""
         progress = self.vehicles[vehicle]
         if not progress.is_done:
             progress.error = _TOO_LATE if error is None else text(error, "error") or "it gives no reason"

@@ -64,7 +64,7 @@ class Watch:
         self._take(sample, decode(sample), None)
 
     def overview(self, sample: zenoh.Sample) -> None:
-        """Take an overview; what it lacks is kept from the last state, and queried if that may have changed."""
+        """Take an overview. Missing values are kept from the last state, and queried if they may have changed."""
         name, overview = vehicle_in(sample.key_expr), decode(sample)
         if overview is None:
             return
@@ -78,7 +78,7 @@ class Watch:
         self._take(sample, state, None)
 
     def reply(self, reply: zenoh.Reply | None) -> None:
-        """Take a bridge's reply; None, the end, does nothing. A storage's may be of a vehicle that is long gone."""
+        """Take a bridge's reply; None, the end, does nothing. A storage's may be of a vehicle that left long ago."""
         bridge = reply and replier(reply)
         if reply is not None and reply.ok is not None and bridge is not None:
             self._take(reply.ok, decode(reply.ok), bridge)
