@@ -14,8 +14,9 @@ from typing import TypeVar, TypeVarTuple
 
 import structlog
 
-#: Questions to a thread that hangs; more are refused at once.
-MAX_WAITING = 32
+#: Questions to a thread that hangs; more are refused at once. All clients together ask fewer: 48 of the page, 16 over
+#: zenoh, 16 on the control socket.
+MAX_WAITING = 100
 
 T = TypeVar("T")
 Arguments = TypeVarTuple("Arguments")
@@ -62,7 +63,7 @@ class BackgroundThread:
             async with asyncio.timeout(self._ask_timeout_s):
                 return await asyncio.wrap_future(answer)
         except TimeoutError:
-            raise TimeoutError("the disk does not answer: it is slow or failing; check dmesg") from None
+            raise TimeoutError("the disk does not answer in time: it is busy or failing; check dmesg") from None
 
     def close(self, timeout_s: float) -> bool:
         """Run the remaining jobs and end; False on timeout."""

@@ -49,7 +49,7 @@ async def test_a_cancelled_question_does_not_end_the_thread() -> None:
 
 async def test_questions_to_a_hung_disk_end_in_time_and_do_not_pile_up() -> None:
     hangs = threading.Event()
-    thread = BackgroundThread("test", ask_timeout_s=0.01)
+    thread = BackgroundThread("test", ask_timeout_s=0.001)
     for _ in range(2 * MAX_WAITING):
         with pytest.raises(TimeoutError, match="the disk does not answer"):
             await thread.ask(hangs.wait)
