@@ -161,6 +161,10 @@ class ItemRequest:
         self._unanswered[seq] -= 1
         return self._unanswered[seq] >= 0 or now < self._asked_at + _REPEAT_AFTER_S
 
+    def may_be_copy(self, first_at: float, now: float) -> bool:
+        """True if an item came again too soon after `first_at` to answer a request sent since."""
+        return now < first_at + (self._round_trip_s or 0.0) / 2
+
     def answered(self, seq: int, now: float) -> None:
         """Update the timeout when an item arrives for the first time."""
         self._unanswered[seq] -= 1
@@ -198,6 +202,7 @@ class Receiving(UploadState):
         self._is_in_doubt = False
         self._was_in_doubt = False
         self._doubtful: MissionItem | None = None
+        self._doubtful_at = now
 
     @property
     def timeout(self) -> Refusal:
@@ -251,7 +256,9 @@ class Receiving(UploadState):
             if pause_s >= self._longest_pause_s + _ABANDONED_S:
                 self.doubt()
             if self._is_in_doubt and repr(item) != repr(self._doubtful):
-                self._doubtful = item
+                self._doubtful, self._doubtful_at = item, now
+                return True
+            if self._is_in_doubt and self.request.may_be_copy(self._doubtful_at, now):
                 return True
         self._is_in_doubt, self._doubtful = False, None
         return False

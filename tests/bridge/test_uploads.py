@@ -466,12 +466,14 @@ def test_two_lists_are_never_mixed_if_a_burst_loses_its_first_item() -> None:
     assert world.stored == records_of(after)
 
 
-def test_two_lists_are_never_mixed_if_a_request_is_on_its_way() -> None:
+@pytest.mark.parametrize("answered", [8, 18])
+@pytest.mark.parametrize("repeat", [0.0, 1.0])
+def test_two_lists_are_never_mixed_if_a_request_is_on_its_way(repeat: float, answered: int) -> None:
     """MAVProxy answers the request for an item of the former list with one of the new list, which has the same home."""
     world, station = holding()
-    station.radio = Radio(delay_s=0.05)
+    station.radio = Radio(repeat=repeat, delay_s=0.05)
     former = Upload(station, waypoints(20, 1))
-    world.wait_until(lambda _: len(former.requested) > 8, 10)
+    world.wait_until(lambda _: answered in former.requested, 10)
     former.stop()
     items = [*waypoints(1, 1), *waypoints(20, 2)[1:]]
     assert Upload(station, items).run() is A.ACCEPTED
