@@ -17,7 +17,6 @@ from simulator.msp_sensors import DRAWN_MAH, RSSI, MspCommand, SensorReplies
 from simulator.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
 from simulator.waypoint_craft import WaypointCraft
 
-_STEP_S = 0.05
 _STATUS_FLAGS = 32
 _SENSORS = 0b1000_1111  # accelerometer, barometer, compass, GPS, thermometer; bit 15 would be a failure
 _PITOT = 1 << 6
@@ -117,14 +116,10 @@ class InavFirmware(MspFirmware):
     def _state(self) -> FlightState:
         return self._craft.state()
 
-    def _fly_until(self, now: float) -> None:
-        if not self.armed:
-            self._clock = now
-        while self._clock + _STEP_S <= now:
-            self._clock += _STEP_S
-            if not self._navigation.is_in_mission:
-                self._mission.follow_selection()
-            self._navigation.step(_STEP_S, self._is_on(NAV_WP))
+    def _fly(self, seconds: float) -> None:
+        if not self._navigation.is_in_mission:
+            self._mission.follow_selection()
+        self._navigation.step(seconds, self._is_on(NAV_WP))
 
     def _is_on(self, box: int) -> bool:
         return bool(self._faults.boxes >> self._boxes.index(box) & 1)

@@ -9,6 +9,8 @@ from simulator.flight import Craft, FlightState
 from simulator.msp_options import MspOptions
 from simulator.options import Counters, Faults
 
+_STEP_S = 0.05
+
 
 class CrashError(Exception):
     """The firmware accessed invalid memory: the board is dead until a power cycle."""
@@ -80,9 +82,16 @@ class MspFirmware(ABC):
         self._fly_until(now)
         return Craft(self._state(), self.armed, self._flags(), self._home)
 
-    @abstractmethod
     def _fly_until(self, now: float) -> None:
-        """Let the craft move."""
+        if not self.armed:
+            self._clock = now
+        while self._clock + _STEP_S <= now:
+            self._clock += _STEP_S
+            self._fly(_STEP_S)
+
+    @abstractmethod
+    def _fly(self, seconds: float) -> None:
+        """Let the armed craft move. CrashError."""
 
     @abstractmethod
     def _state(self) -> FlightState:

@@ -14,7 +14,6 @@ from simulator.nav_status import Error, Mode, State
 from simulator.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
 from simulator.waypoint_craft import WaypointCraft
 
-_STEP_S = 0.05
 _VERSION, _QUADX, _MSP_VERSION = 241, 3, 0
 _CAPABILITY = 0x7000_0010  # navigation version 7, and the navigation bit
 _EEPROM_BYTE_S = 0.0033
@@ -26,8 +25,6 @@ _BOXES = tuple(_BOX_NAMES)
 _ARM, _RETURN, _MISSION = _BOXES.index(0), _BOXES.index(10), _BOXES.index(20)
 _FLAG_CRC_ERROR, _FLAG_HOME, _FLAG_HOLD, _FLAG_IN_PROGRESS = 0xFE, 0x01, 0x02, 0xFF
 _HOME, _HOLD = 0, 255
-
-
 _ACKNOWLEDGED = frozenset((MspCommand.ACC_CALIBRATION, MspCommand.MAG_CALIBRATION, MspCommand.EEPROM_WRITE))
 _SENSORS = SensorReplies(_BOX_NAMES, 2800, currents_ca=(0, 0))
 
@@ -61,13 +58,9 @@ class MultiWiiFirmware(MspFirmware):
     def _state(self) -> FlightState:
         return self._craft.state()
 
-    def _fly_until(self, now: float) -> None:
-        if not self.armed:
-            self._clock = now
-        while self._clock + _STEP_S <= now:
-            self._clock += _STEP_S
-            returns, in_mission = (self._faults.boxes >> box & 1 for box in (_RETURN, _MISSION))
-            self._navigation.fly(_STEP_S, Mode.RTH if returns else Mode.NAV if in_mission else Mode.NONE)
+    def _fly(self, seconds: float) -> None:
+        returns, in_mission = (self._faults.boxes >> box & 1 for box in (_RETURN, _MISSION))
+        self._navigation.fly(seconds, Mode.RTH if returns else Mode.NAV if in_mission else Mode.NONE)
 
     def _flags(self) -> int:
         kept = self._faults.boxes & ~(1 << _ARM | 1 << _RETURN | 1 << _MISSION)

@@ -87,9 +87,8 @@ class TelemetryFirmware(MspFirmware):
             self.armed = self._faults.armed
             self._home = (flight.lat_e7, flight.lon_e7)
 
-    def _fly_until(self, now: float) -> None:
-        self._flown += now - self._clock if self.armed else 0.0
-        self._clock = now
+    def _fly(self, seconds: float) -> None:
+        self._flown += seconds
 
     def _state(self) -> FlightState:
         return fly(self._clock - self._booted_at, self._flown, self.armed)
