@@ -313,13 +313,19 @@ def vfr_hud(at: Moment) -> Message:
 
 
 def sys_status(at: Moment) -> Message:
-    """SYS_STATUS: mV, cA; errors_comm counts the failed I2C reads. A silent sensor is not healthy."""
+    """SYS_STATUS: mV, cA; errors_comm counts the failed I2C reads.
+
+    A silent sensor is not healthy, nor is a GPS without a 3D fix: MAVSDK takes its bit for a good position.
+    """
     health = known(at.vehicle.last(Health))
     sensors = _ALWAYS_THERE
     for sensor, bit in _SENSORS.items():
         if sensor & health.sensors:
             sensors |= bit
     healthy = sensors if at.fresh(Health) is not None else 0
+    gps = at.vehicle.last(GpsFix)
+    if gps is not None and gps.fix is not Fix.THREE_D:
+        healthy &= ~messages.MAV_SYS_STATUS_SENSOR_GPS
     if at.vehicle.last(Sticks) is not None:
         sensors |= messages.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
         signal = at.vehicle.last(Signal)

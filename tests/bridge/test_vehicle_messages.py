@@ -152,6 +152,15 @@ def test_a_craft_far_above_or_below_its_home_is_in_the_air(height_m: int) -> Non
     assert make.extended_sys_state(at(state)).landed_state == m.MAV_LANDED_STATE_IN_AIR
 
 
+@pytest.mark.parametrize(("fix", "healthy"), [(0, False), (1, False), (2, True)])
+def test_a_gps_without_a_3d_fix_is_not_healthy(fix: int, *, healthy: bool) -> None:
+    """As with ArduPilot: to MAVSDK the bit means that the global position is good."""
+    state = with_replies(Vehicle(), INAV, STATUS=status(), RAW_GPS=gps(fix=fix))
+    shown = make.sys_status(at(state))
+    assert shown.onboard_control_sensors_present & m.MAV_SYS_STATUS_SENSOR_GPS
+    assert bool(shown.onboard_control_sensors_health & m.MAV_SYS_STATUS_SENSOR_GPS) == healthy
+
+
 def test_a_craft_that_never_moved_has_zero_velocity() -> None:
     state = with_replies(Vehicle(), HARAKIRI, STATUS=status(), ALTITUDE=bytes(6), RAW_GPS=gps(speed=0))
     position = fields(make.global_position_int(at(state)))
