@@ -100,7 +100,11 @@ class SessionThread:
         while not self._is_closing:
             try:
                 session = zenoh.open(self._config)
-                self._declare(session)
+                try:
+                    self._declare(session)
+                except Exception:
+                    session.close()  # type: ignore[no-untyped-call]  # else its token would count as another bridge
+                    raise
             except Exception as error:
                 # Also an error in a declaration: a thread that ends here would end zenoh without a word.
                 self._complain("zenoh.not_open", error)

@@ -3,10 +3,13 @@
 
 import threading
 
+import pytest
+import zenoh
 from structlog.testing import capture_logs
 
 from service.settings.zenoh import ZenohSettings
 from service.settings.zenoh_config import make_config
+from service.zenoh_link import session
 from service.zenoh_link.session import SessionThread
 from tests.support.programs import TIMEOUT_S, free_port
 
@@ -26,3 +29,24 @@ def test_a_job_that_raises_does_not_end_the_thread() -> None:
         assert done.wait(TIMEOUT_S)
         thread.close()
     assert "zenoh.not_sent" in [event["event"] for event in events]
+
+
+def test_a_failed_declaration_closes_its_session_and_is_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(session, "_RETRY_S", 0.01)
+    sessions: list[zenoh.Session] = []
+    declared = threading.Event()
+
+    def declare(opened: zenoh.Session) -> None:
+        sessions.append(opened)
+        if len(sessions) == 1:
+            raise zenoh.ZError("no such key")
+        declared.set()
+
+    # The same port again: zenoh could not open a second session beside the first.
+    thread = SessionThread(make_config(ZenohSettings(listen=(f"tcp/127.0.0.1:{free_port()}",))), declare)
+    with capture_logs() as events:
+        thread.start()
+        assert declared.wait(TIMEOUT_S)
+        thread.close()
+    assert sessions[0].is_closed()
+    assert [event["event"] for event in events] == ["zenoh.not_open", "zenoh.open"]
