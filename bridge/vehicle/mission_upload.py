@@ -112,7 +112,7 @@ class MissionUploads:
         if not isinstance(state, Receiving):
             # The next request or the final ack will follow anyway.
             if isinstance(state, Complete | Delivering):
-                upload.waits_for_answer(now)
+                upload.remind_later(now)
             return
         if item.seq >= upload.count:
             text = f"WP {item.seq} is beyond the {upload.count} items announced"
@@ -125,7 +125,7 @@ class MissionUploads:
             return
         taken = state.is_doubtful(item, now) or state.take(item, now)
         if isinstance(taken, Judged):
-            upload.waits_for_answer(now)
+            upload.remind_later(now)
             self._handle(upload, taken, now)
             self._begin_next(now)
         elif taken:
@@ -169,7 +169,7 @@ class MissionUploads:
                     state.request.lost()
                     self._request(upload, now)
                 elif now >= upload.reminder_at:
-                    upload.waits_for_answer(now)
+                    upload.remind_later(now)
                     if upload.reminder_at < inf:
                         # MAVSDK allows five repeats; only a request for the item after the one before resets its count.
                         self._send_requests(upload.station, *range(max(upload.count - 2, 0), upload.count))

@@ -66,8 +66,6 @@ class MissionWatch:
 
     def _catch_up(self) -> Conversation[MissionChange | None]:
         """Read the list; returns the text for the pilot if it is another one."""
-        if isinstance(self._missions.fc_store, Refusal):
-            return None
         is_first, before = not self._missions.is_settled, self._missions.held
         held = yield from self._missions.read_back()
         if held is NO_LINK:

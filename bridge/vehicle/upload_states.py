@@ -156,8 +156,8 @@ class ItemRequest:
         if self._round_trip_s is None or self._repeats >= _EQUAL_TIMEOUTS:
             self._timeout_s = min(self._timeout_s * 2, _MAX_TIMEOUT_S)
 
-    def needs_none(self, seq: int, now: float) -> bool:
-        """True if a repeated item needs no answer: it was requested as often, or the network made a copy."""
+    def explains_repeat(self, seq: int, now: float) -> bool:
+        """True if a repeated item was requested as often, or is a copy made by the network: it needs no answer."""
         self._unanswered[seq] -= 1
         return self._unanswered[seq] >= 0 or now < self._asked_at + _REPEAT_AFTER_S
 
@@ -226,7 +226,7 @@ class Receiving(UploadState):
         return min(self.deadline, self.request.due)
 
     def doubt(self) -> None:
-        """A second MISSION_COUNT or a pause: the client has restarted, or the network duplicates or delays."""
+        """After a second MISSION_COUNT or a pause: the client may have restarted."""
         self._is_in_doubt = bool(self.items)
         self._was_in_doubt |= self._is_in_doubt
 
@@ -241,13 +241,12 @@ class Receiving(UploadState):
         return (self._was_in_doubt and item.seq == 0) or repr(held) != repr(item)
 
     def is_doubtful(self, item: MissionItem, now: float) -> bool:
-        """True for a new item that may be another list's.
+        """True for a new item that may belong to another list.
 
-        Soon after a former list: unless it is requested. After a second MISSION_COUNT or a long pause: until it is
-        repeated.
-
-        MAVProxy and QGroundControl answer a request for the former list's item with that of their new list, whose
-        MISSION_COUNT is on its way, or lost. Item 0 is requested until then. Mission Planner repeats its item instead.
+        Soon after a former list these are all items but the requested one. After a second MISSION_COUNT or a long
+        pause it is every item until it is repeated: MAVProxy and QGroundControl may have answered a request for the
+        former list with an item of their new one, whose MISSION_COUNT is on its way or lost. Meanwhile item 0 is
+        requested. Mission Planner does not send that, but repeats its item.
         """
         if item.seq not in self.items:
             if item.seq > self._judged and now < self._in_order_until:
@@ -266,7 +265,7 @@ class Receiving(UploadState):
     def take(self, item: MissionItem, now: float) -> Judged | bool:
         """Keep an item; returns Judged at the end of the list, else True if the next item is to be requested."""
         if item.seq in self.items:
-            return not self.request.needs_none(item.seq, now)
+            return not self.request.explains_repeat(item.seq, now)
         self.request.answered(item.seq, now)
         self.items[item.seq] = item
         self._longest_pause_s = max(self._longest_pause_s, now - self._progress_at)
@@ -329,8 +328,8 @@ class Upload:
     #: When to request the last two items again, while the whole list waits for its write and result.
     reminder_at: float = inf
 
-    def waits_for_answer(self, now: float) -> None:
-        """Its ground station has sent its last item, or repeated it."""
+    def remind_later(self, now: float) -> None:
+        """The ground station has sent its last item or repeated it, and waits for the final MISSION_ACK."""
         self.reminder_at = now + _NO_ANSWER_S if self.count and not self.is_superseded else inf
 
     def next_tick(self) -> float:
