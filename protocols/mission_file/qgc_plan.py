@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """QGroundControl's .plan and Mission Planner's .mission (JSON; docs.qgroundcontrol.com, "Plan File Format").
 
-Fence and rally points next to a mission are ignored.
+A fence and rally points next to a mission are ignored with a note.
 An item's frame and params are as QGroundControl would send them; AltitudeMode only records their origin.
 Surveys and corridor scans list the plain items they are flown as; these are read. The planned home position becomes
 item 0, as QGroundControl sends it to an ArduPilot vehicle.
@@ -37,8 +37,11 @@ def read_qgc_plan(text: str, name: str, note: Note = no_note) -> list[MissionIte
     if not isinstance(mission, dict) or not isinstance(entries, list):
         raise MissionFileError(name, "", "the plan has no mission.items", _SAVE_AGAIN)
     _refuse_unknown_version(mission.get("version", _MISSION_VERSIONS[0]), _MISSION_VERSIONS, "its mission", name)
-    if not entries and (other := _other_part(plan)):
+    other = _other_parts(plan)
+    if other and not entries:
         raise MissionFileError(name, "", f"the plan holds {other} and no mission", "give the mission's own file")
+    if other:
+        note(f"the plan also holds {other}: ignored")
     if plan.get("fileType") is None:
         note("read as Mission Planner's own JSON: it has no fileType")
     items = [_home(mission.get("plannedHomePosition"), name)]
@@ -57,14 +60,15 @@ def _refuse_unknown_version(version: Any, known: tuple[int, ...], what: str, nam
         raise MissionFileError(name, "", text, "save it as a QGC WPL 110 file (.waypoints)")
 
 
-def _other_part(plan: dict[str, Any]) -> str | None:
+def _other_parts(plan: dict[str, Any]) -> str:
     """The non-empty parts of a plan other than the mission."""
     parts = {"a fence": ("geoFence", "circles", "polygons", "polygon"), "rally points": ("rallyPoints", "points")}
+    found = []
     for what, (part, *lists) in parts.items():
         held = plan.get(part)
         if isinstance(held, dict) and any(held.get(each) for each in lists):
-            return what
-    return None
+            found.append(what)
+    return " and ".join(found)
 
 
 def write_qgc_plan(items: Sequence[MissionItem]) -> str:

@@ -113,7 +113,7 @@ def check(
     try:
         limit_m = takeoff_limit_m() if takeoff_max_m is None else takeoff_max_m
     except SettingsError as error:
-        raise click.UsageError(f"{error}, or give --takeoff-max-m") from error
+        raise click.UsageError(f"{error}; or give --takeoff-max-m") from error
     rules = _RULES[kind](RuleSettings(limit_m, wp_radius_cm, capacity))
     codes = [_check_file(path, rules, home, strict, as_json) for path in files]
     ctx.exit(max(codes, key=_RANKS.index))

@@ -149,7 +149,7 @@ def several(wanted: str, parse: Callable[[object, Path], object], *, may_be_empt
         if not isinstance(value, list):
             raise _wrong(value, f"a list in brackets, {wanted}")
         if not value and not may_be_empty:
-            raise Unfit(f"is empty: write {wanted}, or omit it")
+            raise Unfit(f"is empty: give at least one, {wanted}, or omit it")
         return tuple(parse(entry, folder) for entry in value)
 
     return Reader(read, str.split)

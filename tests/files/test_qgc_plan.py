@@ -99,6 +99,21 @@ def test_mission_planners_own_json_is_read() -> None:
     assert notes == ["read as Mission Planner's own JSON: it has no fileType"]
 
 
+@pytest.mark.parametrize(
+    ("part", "notes"),
+    [
+        ({"geoFence": {"polygons": [{"polygon": [[1, 2]]}]}}, ["the plan also holds a fence: ignored"]),
+        ({"rallyPoints": {"points": [[1, 2, 3]]}}, ["the plan also holds rally points: ignored"]),
+        ({}, []),
+    ],
+)
+def test_an_ignored_fence_is_noted(part: dict[str, Any], notes: list[str]) -> None:
+    noted: list[str] = []
+    document = plan(simple()) | part
+    assert len(read_mission_file(json.dumps(document).encode(), "field.plan", noted.append)) == 2
+    assert noted == notes
+
+
 def test_a_survey_becomes_the_items_that_fly_it() -> None:
     survey = {
         "type": "ComplexItem",

@@ -61,7 +61,7 @@ def check_disk(state_dir: Path, free_of: Callable[[Path], int] = lambda path: sh
             folder = folder.parent
         if not folder.is_dir():
             remedy = f"move {folder} away, or name another state_dir"
-            return problem("disk", f"{state_dir} cannot be created, because {folder} is a file", remedy)
+            return problem("disk", f"{state_dir} cannot be used: {folder} is a file", remedy)
         free = free_of(folder)
     except PermissionError:
         return note("disk", f"no permission to read {state_dir}", "run doctor with sudo")

@@ -92,7 +92,8 @@ def check_console(host: Host, fc: FcAddress) -> Checked | None:
         remedies.append(f"sudo sed -i 's/console={named[1]}[^ ]* *//' {file} && sudo reboot")
     elif named := words.search(host.read("/proc/cmdline")):
         found.append(f"the kernel was started with {named[0]}")
-        remedies.append("remove that word from the boot loader's command line, and reboot")
+        by_hand = "remove that word from the boot loader's command line, and reboot"
+        remedies.append(by_hand if file is None else "sudo naze-bridge setup && sudo reboot")
     if not found:
         return ok("console", f"no login console on {device}")
     return problem("console", f"a login console has {device}: {'; '.join(found)}", "; then ".join(remedies))

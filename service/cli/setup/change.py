@@ -65,7 +65,7 @@ class Machine:
             # Readable from its first moment: Avahi reads a new file at once.
             replace_file(path, change.text.encode(), 0o600 if change.secret else 0o644)
         except OSError as error:
-            raise SetupError(f"{change.path} cannot be written: {reason(error)}; run setup with sudo") from error
+            raise SetupError(f"{change.path} cannot be written: {reason(error)}") from error
 
     def run(self, command: Sequence[str]) -> None:
         try:
