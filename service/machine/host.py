@@ -100,7 +100,7 @@ class Host:
         return [address for name in cards if (address := self.address(name)) is not None]
 
     def address(self, interface: str) -> str | None:
-        """A network interface's IPv4 address, asked of the kernel."""
+        """A network interface's IPv4 address; None if it has none."""
         request = struct.pack("256s", interface.encode()[:15])
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
             try:

@@ -65,7 +65,7 @@ def _uses(
 
 
 def _reaches(host: str, listening: str) -> bool:
-    """True if `host`, an address of this machine, is listened on; addresses other than the loopback's are not known."""
+    """True if a connection to `host` ends at `listening`. Of this machine's own addresses only the loopback's are known."""
     if host == listening:
         return True
     try:

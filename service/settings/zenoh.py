@@ -35,7 +35,7 @@ class ZenohProfile(Enum):
     METERED = "metered"
 
 
-#: The name of the `state` key in tables of rates.
+#: The name of the vehicle's state among the groups in tables of rates.
 STATE_NAME = "state"
 _MAX_RATE_HZ = 50.0
 

@@ -20,7 +20,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def check_endpoint(_context: click.Context, option: click.Parameter, value: Any) -> Any:
-    """Return an option's endpoints unchanged; BadParameter if one does not have zenoh's form."""
+    """An option's callback: BadParameter if an endpoint does not have zenoh's form."""
     for endpoint in value if option.multiple else [value]:
         if re.fullmatch(r"[a-z]+/.+:[0-9]+", endpoint) is None:
             raise click.BadParameter(f"{endpoint!r} is not an endpoint: write one like {DEFAULT_ENDPOINT}")
@@ -74,7 +74,7 @@ where_option = click.option(
 
 @contextmanager
 def fleet_session(where: dict[str, Any]) -> Iterator[tuple[zenoh.Session, str]]:
-    """Join the fleet for one command. An error ends the program with one sentence, Ctrl-C without any.
+    """Join the fleet for one command. An error ends the program with one sentence, Ctrl-C silently.
 
     `where`: the options for the fleet's address, which override the daemon's file.
     """

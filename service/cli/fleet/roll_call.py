@@ -38,7 +38,7 @@ def roll_call(session: zenoh.Session, prefix: str) -> list[FleetVehicle]:
 def replies_of(
     session: zenoh.Session, selector: str, bridges: Collection[BridgeId], timeout_s: float
 ) -> dict[BridgeId, Json | None]:
-    """What these bridges reply, None for a payload that cannot be read. Ends when all have. A storage is ignored."""
+    """These bridges' replies, None if unreadable. Ends when all have replied. Replies of storages are ignored."""
     found: dict[BridgeId, Json | None] = {}
     if not bridges:
         return found

@@ -18,9 +18,9 @@ _TIMEOUT_S = 15.0
 
 @dataclass(slots=True)
 class Trial:
-    """One vehicle's reply. `count` and `checksum`: of the records that the mission would become; `held`: that it holds.
+    """One vehicle's reply. `count`, `checksum`: of the records that the mission would become there.
 
-    `error`: why there is no verdict, or why it would not store the mission.
+    `held_count`, `held`: count and checksum of its present mission. `error`: why it gave no verdict, or would reject it.
     """
 
     vehicle: str
