@@ -65,7 +65,7 @@ def _uses(
 
 
 def _reaches(host: str, listening: str) -> bool:
-    """True if a connection to `host` ends at `listening`. Of this machine's own addresses only the loopback's are known."""
+    """True if a connection to `host` ends at `listening`. The machine's addresses other than loopback are unknown."""
     if host == listening:
         return True
     try:

@@ -20,7 +20,7 @@ _TIMEOUT_S = 15.0
 class Trial:
     """One vehicle's reply. `count`, `checksum`: of the records that the mission would become there.
 
-    `held_count`, `held`: count and checksum of its present mission. `error`: why it gave no verdict, or would reject it.
+    `held_count`, `held`: count and checksum of its present mission. `error`: why there is no verdict, or a rejection.
     """
 
     vehicle: str
