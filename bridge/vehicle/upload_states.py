@@ -161,9 +161,10 @@ class ItemRequest:
         self._unanswered[seq] -= 1
         return self._unanswered[seq] >= 0 or now < self._asked_at + _REPEAT_AFTER_S
 
-    def may_be_copy(self, first_at: float, now: float) -> bool:
-        """True if an item came again too soon after `first_at` to answer a request sent since."""
-        return now < first_at + (self._round_trip_s or 0.0) / 2
+    def is_repeat(self, seq: int, first_at: float, now: float) -> bool:
+        """True if an item came more often than requested, and is not the network's copy of the one at `first_at`."""
+        self._unanswered[seq] -= 1
+        return self._unanswered[seq] < 0 and now >= first_at + (self._round_trip_s or 0.0) / 2
 
     def answered(self, seq: int, now: float) -> None:
         """Update the timeout when an item arrives for the first time."""
@@ -254,11 +255,13 @@ class Receiving(UploadState):
             pause_s = now - self._progress_at
             if pause_s >= self._longest_pause_s + _ABANDONED_S:
                 self.doubt()
-            if self._is_in_doubt and repr(item) != repr(self._doubtful):
-                self._doubtful, self._doubtful_at = item, now
-                return True
-            if self._is_in_doubt and self.request.may_be_copy(self._doubtful_at, now):
-                return True
+            if self._is_in_doubt:
+                is_repeat = self.request.is_repeat(item.seq, self._doubtful_at, now)
+                if repr(item) != repr(self._doubtful):
+                    self._doubtful, self._doubtful_at = item, now
+                    return True
+                if not is_repeat:
+                    return True
         self._is_in_doubt, self._doubtful = False, None
         return False
 

@@ -495,6 +495,23 @@ def test_two_lists_are_never_mixed_if_items_of_the_former_are_late(count: int) -
     assert world.stored == records_of(items)
 
 
+def test_two_lists_are_never_mixed_if_a_request_and_its_repeat_are_on_their_way() -> None:
+    """MAVProxy answers both with its new list's last item."""
+    world, station = holding()
+    former, items = waypoints(5, 1), [*waypoints(1, 1), *waypoints(5, 2)[1:]]
+    receiving(world, station, former, 4)
+    world.wait_until(lambda _: 4 in requested(station), 2)
+    station.send(count_message(5))
+    for _ in range(2):
+        station.send(item_message(4, items[4]))
+        world.run(0.01)
+        assert state(world) is Receiving
+    answers_requests(world, station, items)
+    world.wait_until(lambda _: bool(acks(station)), 20)
+    assert acks(station) == [A.ACCEPTED]
+    assert world.stored == records_of(items)
+
+
 def test_two_lists_are_never_mixed_if_the_second_count_is_lost() -> None:
     """To Mission Planner the repeated request for item 1 answers its new MISSION_COUNT: it sends item 0."""
     world, station = holding()
