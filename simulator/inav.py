@@ -8,7 +8,7 @@ import struct
 from enum import IntEnum
 
 from simulator.flight import FIELD_ALTITUDE_M, FlightState
-from simulator.inav_boxes import ANGLE, ARM, BOXES, NAMES, NAV_ALTHOLD, NAV_RTH, NAV_WP
+from simulator.inav_boxes import ANGLE, ARM, BOXES, NAMES, NAV_ALTHOLD, NAV_RTH, NAV_WP, PLANE_BOXES
 from simulator.inav_mission import CAPACITY, FAKE, InavMission
 from simulator.inav_navigation import InavNavigation
 from simulator.msp_firmware import Boot, MspFirmware, PortHabits
@@ -17,7 +17,7 @@ from simulator.msp_sensors import DRAWN_MAH, RSSI, MspCommand, SensorReplies
 from simulator.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
 from simulator.waypoint_craft import WaypointCraft
 
-_STATUS_FLAGS = 32
+_PLANE = 1
 _SENSORS = 0b1000_1111  # accelerometer, barometer, compass, GPS, thermometer; bit 15 would be a failure
 _PITOT = 1 << 6
 _CYCLE_TIME_US = 500
@@ -60,7 +60,7 @@ class InavFirmware(MspFirmware):
     def __init__(self, boot: Boot) -> None:
         super().__init__(boot)
         self._version = tuple(int(part) for part in boot.options.version.split("."))
-        self._boxes = BOXES[boot.options.version]
+        self._boxes = PLANE_BOXES if boot.options.platform == _PLANE else BOXES[boot.options.version]
         channels = 34 if self._version >= (8, 0, 0) else 18
         self._sensors = SensorReplies(
             {box: NAMES[box] for box in self._boxes},
@@ -71,7 +71,13 @@ class InavFirmware(MspFirmware):
             fix_3d=2,
             currents_ca=(30, 1250),
         )
-        self.habits = PortHabits(buffer_size=192, cli_guard_s=0.1, obeys_r=self._version <= (8, 0, 1), speaks_v2=True)
+        self.habits = PortHabits(
+            buffer_size=192,
+            cli_guard_s=0.1,
+            obeys_r=self._version <= (8, 0, 1),
+            writes_first=frozenset((MspCommand.EEPROM_WRITE,)),
+            speaks_v2=True,
+        )
         self._mission = InavMission(boot.eeprom)
         self._craft = WaypointCraft()
         self._navigation = InavNavigation(self._mission, self._craft)
@@ -125,12 +131,12 @@ class InavFirmware(MspFirmware):
         return bool(self._faults.boxes >> self._boxes.index(box) & 1)
 
     def _flags(self) -> int:
-        """The modes in MSP_STATUS: navigation modes follow the flight, not the switch."""
+        """The modes: navigation modes follow the flight, not the switch."""
         in_mission, returning = self._navigation.is_in_mission, self._navigation.is_returning
         flown = {ARM: self.armed, NAV_WP: in_mission, NAV_RTH: returning}
         if in_mission or returning:
             flown |= {ANGLE: True, NAV_ALTHOLD: True}
-        flags = self._faults.boxes & (1 << _STATUS_FLAGS) - 1
+        flags = self._faults.boxes
         for box, is_on in flown.items():
             bit = 1 << self._boxes.index(box)
             flags = flags | bit if is_on else flags & ~bit

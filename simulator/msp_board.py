@@ -182,7 +182,7 @@ class MspBoard(SimulatedBoard):
                 answer = firmware.answer(*request, at)
                 self._busy = firmware.take_busy_seconds()
                 if answer is not None:
-                    self._ring.write(answer, at + (self._busy if firmware.habits.writes_first else 0.0))
+                    self._ring.write(answer, at + (self._busy if request[0] in firmware.habits.writes_first else 0.0))
                 return
             if not is_frames and not firmware.armed:
                 self._hear_letter(firmware, chr(byte))

@@ -21,14 +21,14 @@ class PortHabits:
     """The serial behaviour of a firmware.
 
     `buffer_size`: the largest payload. `cli_guard_s`: the silence after a '#' that opens the CLI; None without a CLI.
-    `obeys_r`: an 'R' restarts it into its bootloader. `writes_first`: replies wait until the EEPROM is written.
-    `speaks_v2`: it also understands MSP v2.
+    `obeys_r`: an 'R' restarts it into its bootloader. `writes_first`: commands whose replies wait until
+    the EEPROM is written. `speaks_v2`: it also understands MSP v2.
     """
 
     buffer_size: int
     cli_guard_s: float | None = None
     obeys_r: bool = False
-    writes_first: bool = False
+    writes_first: frozenset[int] = frozenset()
     speaks_v2: bool = False
 
 

@@ -11,6 +11,7 @@ from simulator.flight import Craft
 _LOWEST_US, _MIDDLE_US, _HIGHEST_US = 1000, 1500, 2000
 _CRUISE_US = 1450
 DRAWN_MAH, RSSI = 120, 920
+_STATUS_FLAGS = (1 << 32) - 1
 
 
 class MspCommand(IntEnum):
@@ -74,7 +75,8 @@ class SensorReplies:
         flight, armed = craft.flight, craft.armed
         match command:
             case MspCommand.STATUS:
-                return struct.pack("<HHHIB", self.cycle_time_us, 0, self.sensors, craft.boxes, 0)
+                flags = craft.boxes & _STATUS_FLAGS
+                return struct.pack("<HHHIB", self.cycle_time_us, 0, self.sensors, flags, 0)
             case MspCommand.RAW_IMU:
                 return struct.pack("<9h", 0, 0, 512, 0, 0, 0, 210, 0, -430)
             case MspCommand.MOTOR:

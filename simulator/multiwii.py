@@ -32,7 +32,7 @@ _SENSORS = SensorReplies(_BOX_NAMES, 2800, currents_ca=(0, 0))
 class MultiWiiFirmware(MspFirmware):
     """Its EEPROM is the mission: each waypoint is written as it arrives."""
 
-    habits = PortHabits(buffer_size=64, writes_first=True)
+    habits = PortHabits(buffer_size=64, writes_first=frozenset((MspCommand.SET_WP,)))
 
     def __init__(self, boot: Boot) -> None:
         super().__init__(boot)

@@ -2,7 +2,7 @@
 """Flight controllers with telemetry only, and autopilots that speak MAVLink themselves."""
 
 from bridge.fc.interview import Interview
-from bridge.fc.profile import FlightController, Profile, Spoken
+from bridge.fc.profile import SILENCE_WITH_H7_S, FlightController, Profile, Spoken
 from bridge.line.conversation import Conversation
 from bridge.model.airframe import airframe
 from bridge.model.flight_mode import FAILSAFE_BOX
@@ -33,7 +33,7 @@ def _recognise(board: Interview) -> Conversation[FlightController | None]:
     return FlightController(OTHER_MSP, name, boxes=boxes, version=version)
 
 
-OTHER_MSP = Profile("another MSP flight controller", "other", recognise=_recognise)
+OTHER_MSP = Profile("another MSP flight controller", "other", recognise=_recognise, silence_s=SILENCE_WITH_H7_S)
 #: Ground stations write missions to such an autopilot directly; only the command line can ask the bridge to.
 OTHER_MAVLINK = Profile(
     "another MAVLink autopilot",

@@ -10,14 +10,15 @@ from dataclasses import dataclass
 from enum import Enum
 
 from bridge.fc.session import FcSession
-from bridge.line.conversation import Conversation, LinkLost, ask, ask_status
+from bridge.line.conversation import Conversation, LinkLost, ask_status, receive, send
 from bridge.line.runner import Runner
 from bridge.missions.mission_service import MissionService
-from protocols.msp.commands import MspAction
+from protocols.msp.commands import Msp, MspAction
 from protocols.msp.frame import Direction, request
-from protocols.msp.telemetry import Sensor
+from protocols.msp.telemetry import STATUS_SIZE, Sensor
 
 _STATUS_CHECKS = 2
+_ASKS_AFTER_ACTION = 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +99,14 @@ def _act(action: FcAction, arm_mask: int) -> Conversation[ActionResult]:
             return ActionResult.ARMED
         if action.needs & ~status.sensors:
             return ActionResult.NO_SENSOR
-    reply = yield from ask(request(action.command), action.command, 0, tries=1, exclusive=True)
-    if reply is None:
+    yield from send(request(action.command), action.command, 0, exclusive=True)
+    reply = yield from receive(action.command)
+    asks = 0
+    while reply is None and asks < _ASKS_AFTER_ACTION:
+        # A flash write may still stall it. It replies in order: STATUS first means that the action's reply is lost.
+        asks += 1
+        yield from send(request(Msp.STATUS), Msp.STATUS, STATUS_SIZE)
+        reply = yield from receive(action.command, Msp.STATUS)
+    if reply is None or reply.command != action.command:
         return ActionResult.NO_ANSWER
     return ActionResult.DONE if reply.direction is Direction.REPLY else ActionResult.REFUSED

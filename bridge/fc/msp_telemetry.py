@@ -61,6 +61,7 @@ POLL_FOR: Mapping[type[Reading], Msp] = {
     Readiness: Msp.INAV_STATUS,
 }
 _MAX_RSSI = 1020
+_STATUS_FLAGS = 32
 #: A craft may turn the other way by then.
 _RATES_STALE_S = 0.3
 
@@ -137,7 +138,14 @@ def _status(vehicle: Vehicle, payload: bytes, controller: FlightController, now:
     before = vehicle.last(Health)
     load = None if before is None else before.cpu_load
     vehicle.hear(Health(now, Source.MSP, status.sensors, status.cycle_time_us, status.i2c_errors, load))
-    active = names_of_active(status.box_flags, controller.boxes)
+    hear_box_flags(vehicle, status.box_flags, controller, now, known=_STATUS_FLAGS)
+
+
+def hear_box_flags(vehicle: Vehicle, flags: int, controller: FlightController, now: float, *, known: int) -> None:
+    """Take the flags of the first `known` boxes. A plane's failsafe on INAV is not among the 32 of STATUS."""
+    active, before = names_of_active(flags, controller.boxes), vehicle.last(FlightState)
+    if before is not None and before.is_failsafe and FAILSAFE_BOX in controller.boxes[known:]:
+        active.add(FAILSAFE_BOX)
     armed = ARM_BOX in active if ARM_BOX in controller.boxes else None
     mode = flight_mode(active) if controller.boxes else None
     # While disarmed, the box only means that there is no RC link.

@@ -34,6 +34,10 @@ class Spoken(Enum):
 #: Fills the vehicle from the payload of a reply, heard at a time.
 Decoder = Callable[[Vehicle, bytes, "FlightController", float], None]
 
+MSP_SILENCE_S = 2.0
+#: An STM32H743 erases the sector of its settings in up to 2.2 s.
+SILENCE_WITH_H7_S = 2.5
+
 NO_MISSIONS = Refusal(MissionResult.UNSUPPORTED, "This flight controller stores no missions")
 
 
@@ -60,6 +64,7 @@ class Profile:
     are in bridge.fc.msp_telemetry. has_2d_fix: its RAW_GPS says 1 for 2D and 2 for 3D; others say 1 for any fix.
     has_gyro_deg_s: its RAW_IMU has the gyro in degrees a second, about the axes forward, left, up.
     accepts_any_byte: its parser acts on no byte runs inside a frame. turn_s: it serves one request in this time.
+    silence_s: after this long without a reply it is gone: unplugged, reset, or switched to another protocol.
     missions: how they are written to it, or the reply to any attempt.
     check_kind, rules: how `naze-bridge check --kind` calls it, and the rules it applies.
     mavlink_sender: MAVLink version, sysid and compid it sends with; None matches any.
@@ -78,6 +83,7 @@ class Profile:
     has_gyro_deg_s: bool = False
     accepts_any_byte: bool = False
     turn_s: float = 0.0
+    silence_s: float = MSP_SILENCE_S
     missions: OpenStore | Refusal = NO_MISSIONS
     check_kind: str | None = None
     rules: Callable[[RuleSettings], MissionRules] | None = None

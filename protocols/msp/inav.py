@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from protocols.msp.telemetry import Sensor
 
-_STATUS = struct.Struct("<HHHHBI")
+_STATUS = struct.Struct("<HHHHBIQ")
 _ANALOG = struct.Struct("<BHhiiiIBH")
 _AIRSPEED = struct.Struct("<I")
 _RTC = struct.Struct("<IH")
@@ -50,13 +50,14 @@ ARMING_BLOCKERS = {
 
 @dataclass(frozen=True, slots=True)
 class InavStatus:
-    """MSP2_INAV_STATUS. load_percent: of the CPU. blockers: the reasons that prevent arming."""
+    """MSP2_INAV_STATUS. load_percent: of the CPU. blockers: the reasons that prevent arming. box_flags: 64 bits."""
 
     cycle_time_us: int
     i2c_errors: int
     sensors: Sensor
     load_percent: int
     blockers: tuple[str, ...]
+    box_flags: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,9 +76,9 @@ def decode_inav_status(payload: bytes) -> InavStatus | None:
     """Decode MSP2_INAV_STATUS; None if it is too short."""
     if len(payload) < _STATUS.size:
         return None
-    cycle_us, i2c_errors, sensors, load, _, flags = _STATUS.unpack_from(payload)
+    cycle_us, i2c_errors, sensors, load, _, flags, box_flags = _STATUS.unpack_from(payload)
     blockers = tuple(name for bit, name in ARMING_BLOCKERS.items() if flags >> bit & 1)
-    return InavStatus(cycle_us, i2c_errors, Sensor(sensors & _ALL_SENSORS), min(load, 100), blockers)
+    return InavStatus(cycle_us, i2c_errors, Sensor(sensors & _ALL_SENSORS), min(load, 100), blockers, box_flags)
 
 
 def decode_inav_analog(payload: bytes) -> InavAnalog | None:

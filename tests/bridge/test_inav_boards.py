@@ -253,3 +253,16 @@ def test_an_unfinished_frame_in_its_parser_does_not_hide_the_board(size: int) ->
     world.wait_until(lambda w: w.kind is inav.PROFILE, 15)
     assert Upload(GroundStation(world), plan(10)).run() is ACCEPTED
     assert not board.counters.cli_entered
+
+
+@pytest.mark.parametrize("write_ms", [1100.0, 2200.0])
+def test_a_slow_flash_write_neither_fails_nor_loses_the_link(write_ms: float) -> None:
+    """An STM32H743 erases the sector of its settings in 1.1 s, at most 2.2 s."""
+    board, world, station = board_with(eeprom_write_ms=write_ms, serial_task_ms=10.0)
+    station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+    assert Upload(station, plan(21)).run(10) is ACCEPTED
+    assert board.counters.flash_writes == 1
+    station.send(messages.MAVLink_command_long_message(1, 1, messages.MAV_CMD_PREFLIGHT_STORAGE, 0, 1, *[0] * 6))
+    world.run(5)
+    assert [ack.result for ack in station.messages("COMMAND_ACK")] == [messages.MAV_RESULT_ACCEPTED]
+    assert not world.events("fc.lost")

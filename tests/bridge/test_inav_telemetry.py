@@ -11,7 +11,7 @@ from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.nav import NavMode
 from simulator.fc_kinds import make_board
-from simulator.inav_boxes import BOXES, NAV_WP
+from simulator.inav_boxes import BOXES, NAV_WP, PLANE_BOXES
 from simulator.msp_board import MspBoard
 from simulator.msp_options import MspOptions
 from simulator.options import Faults
@@ -22,7 +22,7 @@ from tests.support.world import GroundStation, World
 
 PREARM = messages.MAV_SYS_STATUS_PREARM_CHECK
 RC_LINK, NOT_LEVEL = 1 << 18, 1 << 8
-FAILSAFE = 1 << BOXES["9.1.0"].index(27)
+FAILSAFE, PLANE_FAILSAFE = (1 << boxes.index(27) for boxes in (BOXES["9.1.0"], PLANE_BOXES))
 
 
 def introduced(**options: Any) -> tuple[MspBoard, World, GroundStation]:
@@ -70,17 +70,19 @@ def test_airspeed_is_measured_or_unknown(platform: int, pitot: bool) -> None:
         assert hud.airspeed == hud.groundspeed
 
 
-def test_a_failsafe_is_critical_at_once_and_only_in_flight() -> None:
-    board, world, station = introduced(faults=Faults(boxes=FAILSAFE))
+@pytest.mark.parametrize(("platform", "failsafe", "seconds"), [(0, FAILSAFE, 0.5), (1, PLANE_FAILSAFE, 1.5)])
+def test_a_failsafe_is_critical_at_once_and_only_in_flight(platform: int, failsafe: int, seconds: float) -> None:
+    """A plane's flag is not among the 32 of MSP_STATUS."""
+    board, world, station = introduced(platform=platform, faults=Faults(boxes=failsafe))
     assert station.messages("HEARTBEAT")[-1].system_status == messages.MAV_STATE_STANDBY
     board.faults.armed, board.faults.boxes = True, 0
     world.run(2)
     assert station.messages("HEARTBEAT")[-1].system_status == messages.MAV_STATE_ACTIVE
-    board.faults.boxes = FAILSAFE
-    world.run(0.5)
+    board.faults.boxes = failsafe
+    world.run(seconds)
     assert station.messages("HEARTBEAT")[-1].system_status == messages.MAV_STATE_CRITICAL
     board.faults.boxes = 0
-    world.run(0.5)
+    world.run(seconds)
     assert station.messages("HEARTBEAT")[-1].system_status == messages.MAV_STATE_ACTIVE
     texts = [(text.severity, text.text) for text in station.messages("STATUSTEXT") if "ailsafe" in text.text]
     assert texts == [

@@ -6,7 +6,7 @@ from bridge.controllers.inav.telemetry import INAV_DECODERS, INAV_POLLS
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import INAV_CAPACITY, inav_profile
 from bridge.fc.interview import Interview
-from bridge.fc.profile import FlightController, Profile
+from bridge.fc.profile import SILENCE_WITH_H7_S, FlightController, Profile
 from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import NAV_POLL, POLLS
 from bridge.model.airframe import Airframe
@@ -60,6 +60,7 @@ PROFILE = Profile(
     accepts_any_byte=True,
     # Its serial task runs 100 times a second (fc_tasks.c).
     turn_s=0.01,
+    silence_s=SILENCE_WITH_H7_S,
     missions=lambda board, vehicle, _: InavMissions(inav_profile(board.capacity), board, vehicle),
     check_kind="inav",
     rules=lambda settings: NavRules(inav_profile(settings.capacity or INAV_CAPACITY)),

@@ -3,6 +3,7 @@
 
 from collections.abc import Mapping
 
+from bridge.fc.msp_telemetry import hear_box_flags
 from bridge.fc.profile import Decoder, FlightController
 from bridge.line.poll_schedule import Poll
 from bridge.model.vehicle import Airspeed, Health, Power, Readiness, Signal, Source, Vehicle
@@ -30,14 +31,17 @@ INAV_POLLS = (
     Poll(Msp.RTC, request(Msp.RTC), RTC_SIZE, 2.0),
 )
 _MAX_RSSI = 1023
+#: In INAV_STATUS.
+_BOX_FLAGS = 64
 
 
-def _inav_status(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
+def _inav_status(vehicle: Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
     reply = decode_inav_status(payload)
     if reply is not None:
         load = reply.load_percent / 100
         vehicle.hear(Health(now, Source.MSP, reply.sensors, reply.cycle_time_us, reply.i2c_errors, load))
         vehicle.hear(Readiness(now, Source.MSP, reply.blockers))
+        hear_box_flags(vehicle, reply.box_flags, controller, now, known=_BOX_FLAGS)
 
 
 def _inav_analog(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:

@@ -6,7 +6,7 @@ from math import inf
 
 from bridge.fc.interview import Interview, NoAnswer
 from bridge.fc.msp_telemetry import hear_msp
-from bridge.fc.profile import FlightController, Profile, Spoken
+from bridge.fc.profile import MSP_SILENCE_S, FlightController, Profile, Spoken
 from bridge.fc.states.base import Event, Found, Identified, Lost, Port, State
 from bridge.line.conversation import Conversation, LinkLost
 from bridge.line.msp_link import MspLink, PendingReplies
@@ -16,8 +16,6 @@ from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter, is_disarmed_h
 from protocols.msp.command_line import EchoWatch
 from protocols.msp.frame import MspFrame
 
-#: A flight controller that sends no reply for this long is gone: unplugged, reset, or switched to another protocol.
-MSP_SILENCE_S = 2.0
 #: The same while bytes arrive that are not MSP: it was armed, and sends telemetry now. On a slow line a Harakiri's
 #: MAVLink is torn: before the change is believed, this many bytes may pass without a whole frame.
 _FOREIGN_SILENCE_S = 0.5
@@ -95,9 +93,10 @@ class MspLine(State):
 
     @property
     def _silence_s(self) -> float:
+        longest_s = MSP_SILENCE_S if self.controller is None else self.controller.profile.silence_s
         if not self._is_foreign:
-            return MSP_SILENCE_S
-        return min(_FOREIGN_SILENCE_S + _BYTES_BEFORE_CHANGE * self.link.byte_s, MSP_SILENCE_S)
+            return longest_s
+        return min(_FOREIGN_SILENCE_S + _BYTES_BEFORE_CHANGE * self.link.byte_s, longest_s)
 
     @property
     def _is_foreign(self) -> bool:
@@ -114,7 +113,7 @@ class MspLine(State):
         if heard is not None:
             return Found(Spoken.MAVLINK, self.speed, "heard where MSP was answered before", heard)
         # At a much lower speed than the telemetry's, the port reads only a few wrong bytes, or none.
-        why = "the incoming data is no longer MSP" if self._is_foreign else f"no answer for {MSP_SILENCE_S} s"
+        why = "the incoming data is no longer MSP" if self._is_foreign else f"no answer for {self._silence_s} s"
         # A board that was armed at the speed of FrSky telemetry has disarmed, and is back at its former, good speed.
         has_disarmed = self.speed == FRSKY_SPEED and self.port.vehicle.armed
         return Lost(why, () if has_disarmed else _ARMED_SPEEDS, self.unanswered())
