@@ -442,3 +442,46 @@ def test_after_a_push_that_fails_for_good_the_saved_mission_is_loaded() -> None:
     assert without_home(Download(bench.station).run()) == without_home(plan(13))
     assert "Saved mission loaded again" in bench.text()
     assert bench.world.store.outcomes().count(Outcome.VERIFIED) == 1
+
+
+@pytest.mark.parametrize("selected", [1, 2])
+def test_another_clients_change_to_a_mission_that_is_not_loaded_is_kept(selected: int) -> None:
+    """The sizes, the selection and the loaded mission are as before."""
+    bench = Bench(4, 6, faults=Faults(boxes=0, selected_mission=selected))
+    bench.faults.selected_mission = 0
+    missions = sets(4, 6)
+    changed = missions[2 - selected] = packed(plan(7 - 2 * (selected - 1), 9))
+    store(bench, *missions)
+    bench.world.run(4)
+    assert Upload(bench.station, plan(21, 7)).run() is ACCEPTED
+    assert bench.stored() == [packed(plan(21, 7)), changed]
+
+
+def test_while_the_other_missions_cannot_be_read_nothing_is_written() -> None:
+    """Another client writes a list just before the push, and reading it fails."""
+    bench = Bench(4, 6)
+    receive, frames = bench.board.receive, MspParser()
+    lost: list[int] = []
+
+    def receive_others(data: bytes, now: float) -> None:
+        for frame in frames.feed(data):
+            if bench.world.bridge.missions.writing and not lost:
+                store(bench, *sets(5, 7))
+            if bench.world.bridge.missions.writing and frame.command == Nav.WP and len(lost) < 5:
+                lost.append(frame.command)
+            else:
+                receive(frame.encode(), now)
+
+    bench.board.receive = receive_others  # type: ignore[method-assign]
+    assert Upload(bench.station, plan(21, 7)).run(5) is MissionResult.DENIED
+    assert lost
+    bench.world.run(5)
+    assert bench.stored() == sets(5, 7)
+    assert others_of(bench) == sets(5, 7)[1:]
+
+
+def store(bench: Bench, *missions: list[bytes]) -> None:
+    """Another client writes and saves these missions."""
+    for number, record in enumerate((record for mission in missions for record in mission), 1):
+        bench.eeprom[(number - 1) * WAYPOINT_SIZE + 1 : number * WAYPOINT_SIZE] = record
+    bench.board._firmware._mission.load()  # type: ignore[union-attr]

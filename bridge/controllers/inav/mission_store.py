@@ -47,8 +47,8 @@ class InavMissions(NavMissions):
     reads_armed = True
     #: The other missions that are written again behind a new list.
     _kept: tuple[Mission, ...] = ()
-    #: Records in the store before the loaded mission's first.
-    _before_loaded = 0
+    #: All records in the store, as last read or written while disarmed.
+    _stored: Mission = ()
     #: GETINFO's reply and the selected mission, as of the last read or write; None if it is being written.
     _seen: tuple[NavInfo, int] | None = None
     #: The same, as of the last check for changes, and whether the sticks were held for LOAD.
@@ -63,7 +63,8 @@ class InavMissions(NavMissions):
         """Write the list, with the other missions behind it, and verify it."""
         result = yield from super().push(records, progress)
         if result.failure is None:
-            self.others, self._before_loaded = self._kept, 0
+            self._stored = self._store_content(records or NOTHING)
+            self.others = self._kept
         return result
 
     def pull(self) -> Conversation[Mission | None]:
@@ -81,12 +82,12 @@ class InavMissions(NavMissions):
                 records.append(record)
             # If it armed during the reading, numbers count from the loaded mission's first record.
             if (yield from self._look()) == seen:
-                self._take_over(split_missions(records), seen)
+                self._take_over(records, seen)
                 return self._known
         return None
 
     def is_current(self) -> Conversation[bool]:
-        """Read GETINFO, the selected mission and some records: the sticks or another client may have changed them.
+        """Read GETINFO, the selection and some records of all missions: the sticks or another client may change them.
 
         A list that is incomplete, with another size each time, is still being written; once it is complete, it is read.
         """
@@ -112,10 +113,9 @@ class InavMissions(NavMissions):
         return True
 
     def _is_unchanged(self, seen: tuple[NavInfo, int] | None) -> Conversation[bool]:
-        if seen is None or seen != self._seen:
-            return seen is None
-        before = 0 if self._vehicle.armed else self._before_loaded
-        return (yield from self._has_same_records(self._known or (), before))
+        if seen != self._seen:
+            return False
+        return (yield from self._has_same_records((self._known or ()) if self._vehicle.armed else self._stored))
 
     def load(self) -> Conversation[Loading]:
         """Load the saved mission: INAV's list in RAM is empty after a restart."""
@@ -132,13 +132,13 @@ class InavMissions(NavMissions):
             return Loading.NO_ANSWER
         return Loading.LOADED if info.is_valid else Loading.NOT_NEEDED
 
-    def _take_over(self, missions: list[Mission], seen: tuple[NavInfo, int]) -> None:
-        self._seen = seen
+    def _take_over(self, records: list[NavRecord], seen: tuple[NavInfo, int]) -> None:
+        self._seen, missions = seen, split_missions(records)
         is_armed = bool(self._vehicle.armed)
         loaded = flown(missions, 1 if is_armed else seen[1])
         if not is_armed:
             self.others = tuple(mission for mission in missions if mission is not loaded)
-            self._before_loaded = sum(map(len, missions[: missions.index(loaded)])) if loaded else 0
+            self._stored = tuple(records)
         self._known = () if loaded == NOTHING else loaded
 
     def _rules(self) -> NavRules:
@@ -187,7 +187,8 @@ class InavMissions(NavMissions):
         if (yield from self._is_unchanged((yield from self._look()))):
             return before
         # Another client has written or loaded a list since: its other missions must be kept, too.
-        yield from self.pull()
+        if (yield from self.pull()) is None:
+            raise PushFailed(PushFailure.NO_ANSWER)
         return None
 
     def _restore(self, before: Mission | None) -> Conversation[bool]:

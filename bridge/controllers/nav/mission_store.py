@@ -119,11 +119,12 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
             before = yield from self._confirm(before)
             # Until the first record is read back, it may or may not have wiped the old list.
             failure, writing = PushFailure.UNCERTAIN, True
-            yield from self._write_surely(self._store_content(records or NOTHING), proven)
+            content = self._store_content(records or NOTHING)
+            yield from self._write_surely(content, proven)
             failure, writing = PushFailure.UNCERTAIN, False
             yield from self._keep()
             self._known = records
-            self._watch(records)
+            self._watch(content)
             return PushResult(None)
         except Stopped:
             if failure is PushFailure.NO_ANSWER or (writing and (yield from self._restore_at_once(before))):
@@ -222,16 +223,13 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
                     return answer[1]
         return None
 
-    def _has_same_records(self, known: tuple[NavRecord, ...], before: int = 0) -> Conversation[bool]:
-        """Compare the next records, and those that would show that a former list is back.
-
-        `before`: records in the store before the first.
-        """
+    def _has_same_records(self, known: tuple[NavRecord, ...]) -> Conversation[bool]:
+        """Compare the next records, and those that would show that a former list is back."""
         self._watch(known)
         count = min(ceil(len(known) / _CHECKS), _MOST_COMPARED)
         following = [(self._compared + step) % len(known) + 1 for step in range(count)]
         for number in (*self._telling, *following):
-            held = yield from self.read(before + number)
+            held = yield from self.read(number)
             if held is not None and held != known[number - 1]:
                 return False
         self._compared += count
