@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Flight controllers with telemetry only, and autopilots that speak MAVLink themselves."""
 
+from dataclasses import replace
+
+from bridge.controllers.multiwii.profile import CURRENTS_PER_A
 from bridge.fc.interview import Interview
 from bridge.fc.profile import SILENCE_WITH_H7_S, FlightController, Profile, Spoken
 from bridge.line.conversation import Conversation
@@ -9,6 +12,8 @@ from bridge.model.flight_mode import FAILSAFE_BOX
 from bridge.model.refusal import Refusal
 from protocols.mission_item import MissionResult
 
+#: IDENT's capability bit of all descendants of baseflight; MultiWii's own boards have 8 bits.
+_32_BIT = 1 << 31
 _BETAFLIGHT = "BTFL"
 #: Betaflight's permanent box ids (msp_box.c) of the modes that make a flight mode.
 _BETAFLIGHT_BOXES = {
@@ -22,7 +27,8 @@ def _recognise(board: Interview) -> Conversation[FlightController | None]:
     if ident is not None:
         boxes = yield from board.box_names()
         name = (yield from board.variant()) or f"MultiWii {ident.version}"
-        return FlightController(OTHER_MSP, name, airframe(ident.mixer), boxes, version=ident.release)
+        profile = OTHER_MSP if ident.capability & _32_BIT else OLD_MULTIWII
+        return FlightController(profile, name, airframe(ident.mixer), boxes, version=ident.release)
     name = (yield from board.variant()) or "unknown"
     version = None
     if name == _BETAFLIGHT:
@@ -34,6 +40,7 @@ def _recognise(board: Interview) -> Conversation[FlightController | None]:
 
 
 OTHER_MSP = Profile("another MSP flight controller", "other", recognise=_recognise, silence_s=SILENCE_WITH_H7_S)
+OLD_MULTIWII = replace(OTHER_MSP, currents_per_a=CURRENTS_PER_A)
 #: Ground stations write missions to such an autopilot directly; only the command line can ask the bridge to.
 OTHER_MAVLINK = Profile(
     "another MAVLink autopilot",

@@ -34,7 +34,8 @@ from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame
 from protocols.msp.telemetry import Sensor
 
 _HEARTBEAT = m.MAVLINK_MSG_ID_HEARTBEAT
-#: Five lost heartbeats. Only then is a new system id followed, if its component id is the same.
+#: Five lost heartbeats. Only then is a new system id followed, if its component id is the same, from its second
+#: heartbeat on: after a stall the frames of two autopilots arrive in any order.
 _GONE_S = 5.0
 #: The autopilot field of a heartbeat's payload, and its value from cameras and gimbals. MAVLink 2 may omit it.
 _AUTOPILOT_AT, _NO_AUTOPILOT = 5, bytes((m.MAV_AUTOPILOT_INVALID,))
@@ -81,6 +82,8 @@ class MavlinkTelemetry:
         #: Message id by the bytes of a frame's header that hold sender and message id.
         self._known: dict[bytes, int] = {}
         self._compid: int | None = None
+        #: The sender of a heartbeat since then.
+        self._successor: tuple[int, int] | None = None
         #: When the autopilot counts as gone if no heartbeat of it is heard; a Harakiri never does.
         self._gone_at = -math.inf
 
@@ -95,6 +98,7 @@ class MavlinkTelemetry:
             if msgid is not None:
                 unread[msgid] = frame, now
                 if msgid == _HEARTBEAT:
+                    self._successor = None
                     self._gone_at = max(self._gone_at, now + _GONE_S)
                     self._read(_HEARTBEAT)
         if self._is_harakiri:
@@ -112,6 +116,9 @@ class MavlinkTelemetry:
                 sender = bytes(frame.sender)
                 keys = {sender + msgid.to_bytes(size, "little"): msgid for msgid in self._readers for size in (1, 3)}
                 if self._known and keys != self._known:
+                    former, self._successor = self._successor, frame.sender
+                    if former != frame.sender:
+                        continue
                     # The values of two autopilots must not mix.
                     self._unread.clear()
                     self._vehicle.forget()
@@ -198,7 +205,9 @@ class MavlinkTelemetry:
         current = None if message.current_battery < 0 else message.current_battery / 100
         before = self._vehicle.last(Power)
         drawn = None if before is None or before.source is not Source.MAVLINK else before.drawn_mah
-        self._vehicle.hear(Power(now, Source.MAVLINK, _scaled(message.voltage_battery, 1000) or None, current, drawn))
+        voltage = _scaled(message.voltage_battery, 1000) or None
+        remaining = None if message.battery_remaining < 0 else min(message.battery_remaining, 100)
+        self._vehicle.hear(Power(now, Source.MAVLINK, voltage, current, drawn, remaining_percent=remaining))
 
     def _battery_status(self, message: Message, _now: float) -> None:
         power = self._vehicle.last(Power)
@@ -210,6 +219,9 @@ class MavlinkTelemetry:
         self._vehicle.hear(Pressure(now, Source.MAVLINK, message.press_abs, message.temperature / 100))
 
     def _rc_channels(self, message: Message, now: float) -> None:
+        if getattr(message, "port", 0):
+            # RC_CHANNELS_RAW with the channels above 8.
+            return
         values = [getattr(message, f"chan{number}_raw", _UNKNOWN_U16) for number in range(1, _CHANNELS + 1)]
         channels = [0 if value == _UNKNOWN_U16 else value for value in values]
         while channels and not channels[-1]:

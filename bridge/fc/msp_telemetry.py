@@ -152,16 +152,17 @@ def hear_box_flags(vehicle: Vehicle, flags: int, controller: FlightController, n
     vehicle.hear(FlightState(now, Source.MSP, armed, mode, bool(armed) and FAILSAFE_BOX in active))
 
 
-def _analog(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
+def _analog(vehicle: Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
     """A voltage of 0 is not measured, nor is a current while none was drawn, nor a strength before the first signal."""
     reply = decode_analog(payload)
     if reply is None:
         return
-    voltage = reply.battery_dv / 10 or None
-    if reply.current_ca is None or not (reply.current_ca or reply.drawn_mah):
+    voltage = reply.battery_v or None
+    if reply.current is None or not (reply.current or reply.drawn_mah):
         vehicle.hear(Power(now, Source.MSP, voltage))
     else:
-        vehicle.hear(Power(now, Source.MSP, voltage, reply.current_ca / 100, reply.drawn_mah))
+        current_a = reply.current / controller.profile.currents_per_a
+        vehicle.hear(Power(now, Source.MSP, voltage, current_a, reply.drawn_mah))
     if reply.rssi or vehicle.last(Signal) is not None:
         vehicle.hear(Signal(now, Source.MSP, min(reply.rssi / _MAX_RSSI, 1.0)))
 

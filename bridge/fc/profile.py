@@ -62,6 +62,7 @@ class Profile:
     recognise: MSP only; returns the flight controller if the interview shows that it is this kind.
     polls: the telemetry questions it answers. decoders: by command, for replies in its own layout; the common ones
     are in bridge.fc.msp_telemetry. has_2d_fix: its RAW_GPS says 1 for 2D and 2 for 3D; others say 1 for any fix.
+    currents_per_a: the unit of ANALOG's current is 1 A divided by this.
     has_gyro_deg_s: its RAW_IMU has the gyro in degrees a second, about the axes forward, left, up.
     accepts_any_byte: its parser acts on no byte runs inside a frame. turn_s: it serves one request in this time.
     silence_s: after this long without a reply it is gone: unplugged, reset, or switched to another protocol.
@@ -80,6 +81,7 @@ class Profile:
     polls: tuple[Poll, ...] = POLLS
     decoders: Mapping[int, Decoder] = field(default_factory=dict)
     has_2d_fix: bool = False
+    currents_per_a: int = 100
     has_gyro_deg_s: bool = False
     accepts_any_byte: bool = False
     turn_s: float = 0.0

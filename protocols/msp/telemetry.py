@@ -17,7 +17,8 @@ _RAW_GPS = struct.Struct("<BBiihH")
 _ATTITUDE = struct.Struct("<hhh")
 _ALTITUDE = struct.Struct("<ih")
 _ANALOG = struct.Struct("<BHH")
-_AMPERAGE = struct.Struct("<h")
+_ANALOG_WITH_CURRENT = struct.Struct("<BHHh")
+_ANALOG_WITH_VOLTAGE = struct.Struct("<BHHhH")
 _WP = struct.Struct("<Bii")
 _PLACE = struct.Struct("<ii")
 _NAV_WP_SIZE = 21
@@ -101,15 +102,15 @@ class AltitudeReply(NamedTuple):
 
 
 class Analog(NamedTuple):
-    """MSP_ANALOG: battery in 0.1 V, receiver strength 0..1023; mAh drawn and 0.01 A where the current is sent.
+    """MSP_ANALOG: receiver strength 0..1023; mAh drawn and current (0.01 A, on MultiWii 0.1 A) where they are sent.
 
-    A missing sensor reads 0.
+    A missing sensor reads 0. Where the voltage has only one byte, it ends at 25.5 V.
     """
 
-    battery_dv: int
+    battery_v: float
     rssi: int
     drawn_mah: int | None = None
-    current_ca: int | None = None
+    current: int | None = None
 
 
 class HomePoint(NamedTuple):
@@ -168,14 +169,17 @@ def decode_altitude(payload: bytes) -> AltitudeReply | None:
 
 
 def decode_analog(payload: bytes) -> Analog | None:
-    """Read MSP_ANALOG: 5 bytes on Harakiri, whose second field is always 0; 7 elsewhere."""
+    """Read MSP_ANALOG: 5 bytes on Harakiri, whose second field is always 0; 7 elsewhere; 9 on Betaflight."""
     if len(payload) < _ANALOG.size:
         return None
-    battery, drawn, rssi = _ANALOG.unpack_from(payload)
-    if len(payload) < _ANALOG.size + _AMPERAGE.size:
-        return Analog(battery, rssi)
-    (current,) = _AMPERAGE.unpack_from(payload, _ANALOG.size)
-    return Analog(battery, rssi, drawn, current)
+    battery_dv, drawn, rssi = _ANALOG.unpack_from(payload)
+    if len(payload) < _ANALOG_WITH_CURRENT.size:
+        return Analog(battery_dv / 10, rssi)
+    *_, current = _ANALOG_WITH_CURRENT.unpack_from(payload)
+    if len(payload) < _ANALOG_WITH_VOLTAGE.size:
+        return Analog(battery_dv / 10, rssi, drawn, current)
+    *_, battery_cv = _ANALOG_WITH_VOLTAGE.unpack_from(payload)
+    return Analog(battery_cv / 100, rssi, drawn, current)
 
 
 def decode_home(payload: bytes) -> HomePoint | None:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Missions to a Harakiri that answers only MAVLink, using its own mission messages."""
 
+import math
 import re
 import struct
 from dataclasses import replace
@@ -13,7 +14,10 @@ from bridge.controllers.harakiri import profile as harakiri
 from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.controllers.harakiri.single_precision import readable_e7
 from bridge.missions.list_check import check_list
+from bridge.missions.mission_service import HeldMission
 from bridge.model.mission_log import ArrivedMission, Outcome
+from bridge.model.refusal import Refusal
+from protocols.mavlink.dialect import messages
 from protocols.mission_item import Command, MissionItem, MissionResult
 from simulator.mission_slots import flash_size
 from simulator.naze import SimulatedNaze
@@ -163,6 +167,24 @@ def test_a_list_lost_with_the_configuration_in_a_power_cut_is_reported() -> None
     world.wait_until(lambda w: station.texts()[-1] == "The mission arrived incomplete: write it again", 30)
     assert world.store.outcomes() == [Outcome.VERIFIED, Outcome.FAILED]
     assert not world.stored
+
+
+@pytest.mark.parametrize("x", [math.nan, math.inf, 3e38, -300.0])
+@pytest.mark.parametrize("z", [math.nan, 1e9, 20.0])
+def test_an_item_with_impossible_values_ends_the_reading(x: float, z: float) -> None:
+    """An intact frame of a faulty board."""
+    world, station = mavlink_only()
+    assert Upload(station, mixed()).run(20) is A.ACCEPTED
+    wrong = messages.MAVLink_mission_item_message(255, 190, 1, 3, 16, 0, 1, 0, 2, 0, 0, x, 8.4, z)
+    frame = bytes(wrong.pack(messages.MAVLink(None, srcSystem=1, srcComponent=200), force_mavlink1=True))
+    answers: list[HeldMission | Refusal] = []
+    world.bridge.local.pull(answers.append, world.now)
+    end = world.now + 30
+    while not answers and world.now < end:
+        world.run(0.01)
+        world.bridge.fc_received(frame, world.now)
+    assert answers
+    assert not world.events("fc.lost")
 
 
 def test_for_an_unpatched_harakiri_on_msp_the_pilot_learns_the_reason() -> None:

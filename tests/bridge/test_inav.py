@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Missions to INAV and MultiWii NAV through the whole bridge: verification, faults, arming, clearing, progress."""
 
+import struct
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -14,6 +15,7 @@ from bridge.controllers.nav.rules import inav_profile
 from bridge.fc.profile import Profile
 from bridge.missions.list_check import check_list
 from bridge.model.mission_log import Outcome
+from bridge.model.vehicle import Power
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.frame import Direction, MspFrame, MspParser
@@ -420,3 +422,14 @@ def test_if_the_first_record_is_lost_the_old_list_is_reported_kept() -> None:
     assert inav.records == packed(plan(12))
     inav.drop = lambda _frame: ""
     assert Download(station).run()[1:] == plan(12)[1:]
+
+
+def test_multiwii_reports_the_current_in_tenths_of_an_ampere() -> None:
+    """Protocol.cpp, types.h: analog.amperage."""
+    board = FakeMultiwii()
+    board.answers = {**board.answers, 110: struct.pack("<BHHH", 120, 500, 0, 125)}
+    world, _ = found(board)
+    world.run(2)
+    power = world.bridge.session.vehicle.last(Power)
+    assert power is not None
+    assert (power.current_a, power.drawn_mah) == (12.5, 500)

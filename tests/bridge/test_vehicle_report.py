@@ -158,6 +158,27 @@ def test_two_autopilots_on_one_line_are_not_mixed() -> None:
         assert world.bridge.report.group(Group.ATTITUDE).roll_deg is None
 
 
+def test_after_a_stall_the_same_one_of_two_autopilots_is_shown() -> None:
+    """The other's heartbeats arrive first."""
+    world, autopilot, _ = passing()
+    autopilot.heartbeat = m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3)
+    world.bridge.report.watch(Group)
+    other = m.MAVLink(None, srcSystem=7, srcComponent=1)
+    world.run(2)
+    autopilot._due += 14
+    world.run(7)
+    for _ in range(6):
+        autopilot.outgoing += m.MAVLink_heartbeat_message(2, 3, 81 | 128, 4, 4, 3).pack(other)
+        world.run(0.5)
+        autopilot.send(autopilot.heartbeat)
+        world.run(0.5)
+    for sender, roll in ((other, 0.5), (autopilot.mavlink, 0.25)):
+        autopilot.outgoing += m.MAVLink_attitude_message(1, roll, 0, 0, 0, 0, 0).pack(sender)
+    world.run(0.1)
+    assert world.bridge.session.vehicle.armed is False
+    assert world.bridge.report.group(Group.ATTITUDE).roll_deg == 14.32
+
+
 def test_a_companion_on_board_does_not_replace_an_autopilot_that_restarts() -> None:
     world, autopilot, _ = passing()
     companion = m.MAVLink(None, srcSystem=1, srcComponent=191)
@@ -177,6 +198,25 @@ def test_an_unused_channel_does_not_move_the_others() -> None:
     autopilot.send(m.MAVLink_rc_channels_message(1, 5, 1500, 1501, 65535, 1502, 1800, *[65535] * 13, 127))
     world.run(0.05)
     assert world.bridge.report.group(Group.RC).channels_us == (1500, 1501, 0, 1502, 1800)
+
+
+def test_the_autopilots_own_remaining_charge_is_shown() -> None:
+    world, autopilot, _ = passing()
+    world.bridge.report.watch(Group)
+    autopilot.send(m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3))
+    autopilot.send(m.MAVLink_sys_status_message(7, 7, 6, 0, 12600, 100, 43, 0, 0, 0, 0, 0, 0))
+    world.run(0.05)
+    assert world.bridge.report.group(Group.BATTERY).remaining_percent == 43
+
+
+def test_the_second_block_of_channels_does_not_replace_the_first() -> None:
+    world, autopilot, _ = passing()
+    world.bridge.report.watch(Group)
+    autopilot.send(m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3))
+    for port in (0, 1):
+        autopilot.send(m.MAVLink_rc_channels_raw_message(1, port, *[1500 + port] * 8, 127))
+        world.run(0.05)
+    assert world.bridge.report.group(Group.RC).channels_us == (1500,) * 8
 
 
 def test_a_voltage_is_not_renewed_by_the_consumption() -> None:

@@ -60,9 +60,9 @@ def test_an_altitude_below_sea_level_is_negative() -> None:
 
 
 def test_the_current_is_read_if_present() -> None:
-    assert t.decode_analog(struct.pack("<BHH", 124, 0, 920)) == t.Analog(124, 920)
-    assert t.decode_analog(struct.pack("<BHHh", 124, 350, 920, 1234)) == t.Analog(124, 920, 350, 1234)
-    assert t.decode_analog(struct.pack("<BHHhH", 124, 350, 920, -5, 1240)) == t.Analog(124, 920, 350, -5)
+    assert t.decode_analog(struct.pack("<BHH", 124, 0, 920)) == t.Analog(12.4, 920)
+    assert t.decode_analog(struct.pack("<BHHh", 124, 350, 920, 1234)) == t.Analog(12.4, 920, 350, 1234)
+    assert t.decode_analog(struct.pack("<BHHhH", 255, 350, 920, -5, 3360)) == t.Analog(33.6, 920, 350, -5)
 
 
 @pytest.mark.parametrize(("sent", "kept"), [(4, 4), (8, 8), (10, 10), (18, 18), (34, 18)])

@@ -9,6 +9,7 @@ of its serial port; an item that cannot be sent safely rejects the list.
 A written list is read back, item by item. The rules round coordinates so that they survive single precision unchanged.
 """
 
+import struct
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -99,9 +100,9 @@ class HarakiriMavlinkMissions(HarakiriStore):
             count = yield from self._question(m.MAVLink_mission_request_list_message(*_TARGET), _COUNT)
             if count is None:
                 continue
-            items = yield from self._read_items(self._field(count, "count"))
-            if items is not None:
-                return tuple(map(_record, items))
+            records = yield from self._read_records(self._field(count, "count"))
+            if records is not None:
+                return records
         # No answer means an empty store; a lost line would have ended the conversation.
         return () if count is None else None
 
@@ -150,18 +151,17 @@ class HarakiriMavlinkMissions(HarakiriStore):
                 return True
         return False
 
-    def _read_items(self, count: int) -> Conversation[list[MissionItem] | None]:
-        items: list[MissionItem] = []
+    def _read_records(self, count: int) -> Conversation[tuple[WpRecord, ...] | None]:
+        records: list[WpRecord] = []
         for seq in range(count):
             message = m.MAVLink_mission_request_message(*_TARGET, seq)
             answer = yield from self._question(message, _ITEM, seq)
-            decoded = None if answer is None else self._decoder.decode(answer)
-            if decoded is None:
+            item = None if answer is None else self._decoder.decode(answer)
+            record = None if item is None else _record(item)
+            if record is None:
                 return None
-            params = (decoded.param1, decoded.param2, decoded.param3, decoded.param4)
-            lat_e7, lon_e7 = degrees_read_e7(decoded.x), degrees_read_e7(decoded.y)
-            items.append(MissionItem(seq, decoded.command, decoded.frame, *params, lat_e7, lon_e7, decoded.z))
-        return items
+            records.append(record)
+        return tuple(records)
 
     def _question(self, message: Message, answer_id: int, seq: int | None = None) -> Conversation[MavlinkFrame | None]:
         for _ in range(_TRIES):
@@ -186,19 +186,24 @@ def _message(seq: int, item: MissionItem) -> Message:
     return m.MAVLink_mission_item_message(*_TARGET, seq, Frame.GLOBAL_RELATIVE_ALT, command, 0, 1, *params, *place)
 
 
-def _record(item: MissionItem) -> WpRecord:
-    """The record that reads back as `item`."""
+def _record(item: Message) -> WpRecord | None:
+    """The record that reads back as this MISSION_ITEM; None if no record does."""
     is_turns = item.command == Command.NAV_LOITER_TURNS
-    return WpRecord(
-        lat_e7=item.lat_e7 or 0,
-        lon_e7=item.lon_e7 or 0,
-        height_m=int(item.alt_m),
-        roi_heading=int(item.p4),
-        time=0 if is_turns else int(item.p1),
-        radius_m=int(item.p2),
-        turns=int(item.p1) if is_turns else 0,
-        command=_COMMANDS.get(item.command, 0),
-    )
+    try:
+        record = WpRecord(
+            lat_e7=degrees_read_e7(item.x),
+            lon_e7=degrees_read_e7(item.y),
+            height_m=int(item.z),
+            roi_heading=int(item.param4),
+            time=0 if is_turns else int(item.param1),
+            radius_m=int(item.param2),
+            turns=int(item.param1) if is_turns else 0,
+            command=_COMMANDS.get(item.command, 0),
+        )
+        record.pack()
+    except (ValueError, OverflowError, struct.error):
+        return None
+    return record
 
 
 _HOME = WpRecord(0, 0, 0, 0, 0, 0, 0, 0)

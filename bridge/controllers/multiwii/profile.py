@@ -11,6 +11,8 @@ from bridge.line.poll_schedule import NAV_POLL, POLLS
 from bridge.model.airframe import airframe
 from protocols.msp.nav import NAV_CONFIG_SIZE, Nav, decode_nav_config
 
+#: types.h: analog.amperage.
+CURRENTS_PER_A = 10
 #: IDENT's capability bit of boards that fly missions.
 _NAV_CAPABILITY = 1 << 4
 
@@ -35,6 +37,7 @@ PROFILE = Profile(
     recognise=_recognise,
     polls=(*POLLS, NAV_POLL),
     accepts_any_byte=True,
+    currents_per_a=CURRENTS_PER_A,
     missions=lambda board, vehicle, _: MultiwiiMissions(multiwii_profile(board.capacity), board, vehicle),
     check_kind="multiwii",
     rules=lambda settings: NavRules(multiwii_profile(settings.capacity or MULTIWII_CAPACITY)),

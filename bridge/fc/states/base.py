@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import ClassVar
 
+from bridge.fc.mavlink_telemetry import MavlinkTelemetry
 from bridge.fc.profile import FlightController, Profile, Spoken
 from bridge.line.msp_link import MspLink, PendingReplies
 from bridge.line.poll_schedule import PollSchedule
@@ -89,6 +90,9 @@ class Port:
     met_family: str | None = None
     #: The family of the board that `vehicle` describes, which outlives a lost link and a change of protocol.
     family: str | None = None
+
+    #: Remembers which of several autopilots it follows.
+    telemetry: MavlinkTelemetry | None = None
 
     def meet(self, controller: FlightController) -> None:
         """Begin a new vehicle if this is a different board."""

@@ -46,9 +46,11 @@ class Mavlink(State):
         assert event.heard is not None
         profile = self._profile(event.heard)
         self.controller = FlightController(profile, profile.name)
-        port.meet(self.controller)
         self._is_harakiri = not profile.is_passed_through
-        self.telemetry = MavlinkTelemetry(port.vehicle, is_harakiri=self._is_harakiri)
+        if port.telemetry is None or self._is_harakiri or profile.family != port.family:
+            port.telemetry = MavlinkTelemetry(port.vehicle, is_harakiri=self._is_harakiri)
+        self.telemetry = port.telemetry
+        port.meet(self.controller)
         self._splitter, self._msp, self._sender = MavlinkSplitter(), MspParser(), _HarakiriSender()
         self._heard_at = self._last_byte_at = now
         self._look_at = now + _LINE_SILENCE_S
