@@ -48,6 +48,10 @@ class ActionResult(Enum):
     REFUSED = "Not supported by the flight controller"
 
 
+#: Without an answer it may be done.
+NOT_DONE = frozenset(ActionResult) - {ActionResult.DONE, ActionResult.FREEZES, ActionResult.NO_ANSWER}
+
+
 class FcActions:
     """Runs one action at a time, and none during a mission transfer."""
 

@@ -53,7 +53,7 @@ class FlashBudget:
         return True
 
     def not_written(self, peer: Peer) -> None:
-        """Take back a write: the flash held the same already."""
+        """Take back a write: the flash held the same already, or the flight controller refused."""
         account = self._account(peer)
         self._shares.spend(account, -1.0)
         if (bucket := self._proven.get(account)) is not None:

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from bridge.fc.actions import (
     CALIBRATE_ACCELEROMETER,
     CALIBRATE_COMPASS,
+    NOT_DONE,
     SAVE_SETTINGS,
     ActionResult,
     FcAction,
@@ -109,6 +110,8 @@ class CommandService:
 
     def _acted(self, station: Station, command: int, outcome: ActionResult) -> None:
         result = _OUTCOMES[outcome]
+        if outcome in NOT_DONE:
+            self._ground.flash.not_written(station.peer)
         severity = Severity.NOTICE if result is CommandResult.ACCEPTED else Severity.ERROR
         self._ground.say(severity, outcome.value, station)
         self._acknowledge(station, command, result)

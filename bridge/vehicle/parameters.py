@@ -72,6 +72,7 @@ class Parameters:
             if failure is PushFailure.NO_ANSWER or isinstance(failure, LinkLost):
                 self._ground.say(Severity.ERROR, f"No answer: {WP_RADIUS} may be set, read it again", station)
             elif failure is not None:
+                self._ground.flash.not_written(station.peer)
                 text = f"{WP_RADIUS} stays {fc_store.wp_radius_cm}: {failure.value}"
                 self._ground.say(Severity.ERROR, text, station)
             self._send(station if failure else None, WP_RADIUS)

@@ -127,6 +127,20 @@ def test_an_unchanged_list_is_not_counted() -> None:
     assert world.bridge.ground.flash.used(pilot.peer) == pytest.approx(1.0, abs=0.1)
 
 
+def test_a_command_that_the_board_did_not_execute_is_not_counted() -> None:
+    world = ready_world()
+    pilot = GroundStation(world)
+    world.faults.armed = True
+    for message in (
+        m.MAVLink_command_long_message(1, 1, m.MAV_CMD_PREFLIGHT_STORAGE, 0, 1, *[0] * 6),
+        m.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", 500, 9),
+    ):
+        # Before the bridge has noticed that it is armed.
+        pilot.send(message)
+        world.run(1)
+    assert world.bridge.ground.flash.used(pilot.peer) == 0
+
+
 @pytest.mark.parametrize(("hosts", "lists"), [(3, 4), (16, 1)])
 def test_the_pilots_list_precedes_those_of_frequent_writers(hosts: int, lists: int) -> None:
     world = World(SimOptions(flash_erase_ms=400.0), speeds=(115200,))
