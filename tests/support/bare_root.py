@@ -11,7 +11,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-_TIMEOUT_S = 300
+#: For one command that hangs. dpkg compiles all libraries, which takes minutes on a busy machine.
+_TIMEOUT_S = 900
 #: On a separate tmpfs, because an overlay cannot be on an overlay. /run is empty: no systemd runs here.
 _MAKE = """
 set -e
