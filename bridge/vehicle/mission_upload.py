@@ -123,7 +123,10 @@ class MissionUploads:
             self._supersede(upload, now)
             self._begin(station, upload.count, now, is_next=True)
             return
-        taken = state.is_doubtful(item, now) or state.take(item, now)
+        if state.is_doubtful(item, now):
+            self._uploads.schedule(upload)
+            return
+        taken = state.take(item, now)
         if isinstance(taken, Judged):
             upload.remind_later(now)
             self._handle(upload, taken, now)

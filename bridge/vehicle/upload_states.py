@@ -27,6 +27,8 @@ _EQUAL_TIMEOUTS = 3
 #: A message repeated within this time was duplicated by the network. Answering each copy would double every message
 #: that follows, and MAVSDK gives up after five repeats; a ground station that missed our request repeats it later.
 _REPEAT_AFTER_S = 0.1
+#: An answer to a request arrives within this time, or within a round trip. Mission Planner repeats an item after 0.45 s.
+_ANSWER_S = 0.4
 #: After a pause of this length, and its usual time for an item, a ground station may have given up its list and begun
 #: another: QGroundControl after 1.5 s, and then its user must act; MAVSDK after 2.5 s.
 _ABANDONED_S = 2.5
@@ -133,6 +135,8 @@ class ItemRequest:
     _seq: int | None = None
     _first_at: float = 0.0
     _asked_at: float = 0.0
+    #: When another item was requested last.
+    _other_asked_at: float = -inf
     _repeats: int = 0
     _timeout_s: float = _FIRST_TIMEOUT_S
     _round_trip_s: float | None = None
@@ -143,6 +147,7 @@ class ItemRequest:
         self.is_repeated = seq == self._seq
         if not self.is_repeated:
             self._seq, self._first_at, self._repeats = seq, now, 0
+            self._other_asked_at = self._asked_at
         self._asked_at = now
         self._unanswered[seq] += 1
         self.due = now + self._timeout_s
@@ -161,10 +166,13 @@ class ItemRequest:
         self._unanswered[seq] -= 1
         return self._unanswered[seq] >= 0 or now < self._asked_at + _REPEAT_AFTER_S
 
-    def is_repeat(self, seq: int, first_at: float, now: float) -> bool:
-        """True if an item came more often than requested, and is not the network's copy of the one at `first_at`."""
+    def is_unrequested(self, seq: int, first_at: float, now: float) -> bool:
+        """True if an item repeated since `first_at` is neither an answer to a request nor the network's copy."""
         self._unanswered[seq] -= 1
-        return self._unanswered[seq] < 0 and now >= first_at + (self._round_trip_s or 0.0) / 2
+        asked_at = self._asked_at if seq == self._seq else self._other_asked_at
+        round_trip_s = self._round_trip_s or 0.0
+        is_late = now >= asked_at + max(_ANSWER_S, round_trip_s)
+        return (is_late or self._unanswered[seq] < 0) and now >= first_at + round_trip_s / 2
 
     def answered(self, seq: int, now: float) -> None:
         """Update the timeout when an item arrives for the first time."""
@@ -256,11 +264,13 @@ class Receiving(UploadState):
             if pause_s >= self._longest_pause_s + _ABANDONED_S:
                 self.doubt()
             if self._is_in_doubt:
-                is_repeat = self.request.is_repeat(item.seq, self._doubtful_at, now)
+                is_unrequested = self.request.is_unrequested(item.seq, self._doubtful_at, now)
                 if repr(item) != repr(self._doubtful):
                     self._doubtful, self._doubtful_at = item, now
+                    # Not at once: each request for another item costs Mission Planner one of its tries.
+                    self.request.due = now + 1.25 * _ANSWER_S
                     return True
-                if not is_repeat:
+                if not is_unrequested:
                     return True
         self._is_in_doubt, self._doubtful = False, None
         return False

@@ -553,19 +553,43 @@ def test_two_lists_are_never_mixed_if_the_first_was_stuck_and_the_second_count_i
     assert world.stored == records_of(latter)
 
 
-def test_a_list_goes_on_after_a_long_pause() -> None:
-    """Mission Planner sends only its next item, whatever is requested."""
+class PlannerWrite:
+    """Mission Planner sends one item at a time, 450 ms x 11; a request for another one uses up a try at once."""
+
+    def __init__(self, world: World, station: GroundStation, items: list[MissionItem]) -> None:
+        self._world, self._station, self._items = world, station, items
+        self.seq, self.tries = -1, 0
+        station.on_message.append(self._receive)
+        station.send(count_message(len(items)))
+
+    def _receive(self, message: Message) -> None:
+        if message.get_type() != "MISSION_REQUEST":
+            return
+        if message.seq == self.seq + 1:
+            self.seq, self.tries = message.seq, 11
+        self._send(self.seq, self.tries)
+
+    def _send(self, seq: int, tries: int) -> None:
+        if (seq, tries) == (self.seq, self.tries) and tries:
+            self.tries -= 1
+            self._station.send(item_message(seq, self._items[seq]))
+            self._world.after(0.45, lambda: self._send(seq, tries - 1))
+
+
+@pytest.mark.parametrize("gap_s", [0.3, 2.4, 2.6, 3.0, 3.5, 4.0])
+@pytest.mark.parametrize("at_s", [0.3, 0.42, 0.51])
+@pytest.mark.parametrize("delay_s", [0.002, 0.03])
+def test_mission_planner_goes_on_after_a_gap_in_the_wifi(gap_s: float, at_s: float, delay_s: float) -> None:
     world, station = holding()
-    items = waypoints(12)
-    receiving(world, station, items, 6)
-    world.run(3.0)
-    for seq in range(6, 12):
-        station.take()
-        station.send(item_message(seq, items[seq]))
-        while seq < 11 and seq + 1 not in requested(station):
-            world.run(0.15)
-            station.send(item_message(seq, items[seq]))
-    world.wait_until(lambda _: bool(acks(station)), 5)
+    items = waypoints(146)
+    station.radio = Radio(delay_s=delay_s)
+    write = PlannerWrite(world, station, items)
+    world.run(at_s)
+    assert 0 < write.seq < 145
+    station.radio.loss = 1.0
+    world.run(gap_s)
+    station.radio.loss = 0.0
+    world.wait_until(lambda _: bool(acks(station)), 60)
     assert acks(station) == [A.ACCEPTED]
     assert world.stored == records_of(items)
 
