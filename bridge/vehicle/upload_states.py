@@ -27,7 +27,7 @@ _EQUAL_TIMEOUTS = 3
 #: A message repeated within this time was duplicated by the network. Answering each copy would double every message
 #: that follows, and MAVSDK gives up after five repeats; a ground station that missed our request repeats it later.
 _REPEAT_AFTER_S = 0.1
-#: An answer to a request arrives within this time, or within a round trip. Mission Planner repeats an item after 0.45 s.
+#: An answer arrives within this time, or within a round trip. Mission Planner repeats an item after 0.45 s.
 _ANSWER_S = 0.4
 #: After a pause of this length, and its usual time for an item, a ground station may have given up its list and begun
 #: another: QGroundControl after 1.5 s, and then its user must act; MAVSDK after 2.5 s.
