@@ -5,6 +5,7 @@ import asyncio
 import os
 import socket
 import termios
+import time
 from collections.abc import Awaitable, Callable
 from contextlib import ExitStack, suppress
 from functools import partial
@@ -19,6 +20,8 @@ from storage.os_error import reason
 
 #: Errors of an open port: pyserial raises the last two if it is unplugged, or its driver refuses the speed.
 DEVICE_ERRORS = (OSError, termios.error, ValueError)
+#: A poll takes 75 ms at 1200 baud.
+_LAST_FRAME_S = 0.1
 _TCP_TIMEOUT_S = 3.0
 #: A connection whose other end confirms nothing for this long is lost. After a gap in the Wi-Fi a new one carries data
 #: at once; the old one might wait for as long again as the gap was.
@@ -86,6 +89,17 @@ def open_serial(path: str) -> serial.Serial:
         raise PortError(f"{path} is not a serial port") from error
     os.set_blocking(port.fileno(), False)
     return port
+
+
+def send_last_frame(port: serial.Serial) -> None:
+    """Let a frame end before the port closes: a board takes the next requests for the rest of half a frame.
+
+    Then drop the rest. The kernel would wait up to 30 s for a board that accepts no bytes, and the event loop with it.
+    """
+    end = time.monotonic() + _LAST_FRAME_S
+    while port.out_waiting and time.monotonic() < end:
+        time.sleep(_LAST_FRAME_S / 20)
+    port.reset_output_buffer()
 
 
 def _keep_dtr(descriptor: int) -> None:

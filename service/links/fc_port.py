@@ -10,7 +10,7 @@ from contextlib import closing, suppress
 import serial
 import structlog
 
-from service.links.fc_device import DEVICE_ERRORS, Device, PortError, PortInUseError
+from service.links.fc_device import DEVICE_ERRORS, Device, PortError, PortInUseError, send_last_frame
 from service.links.traffic import Traffic
 from storage.os_error import reason
 
@@ -222,6 +222,5 @@ class FcPort:
         self._closed.set()
         with suppress(*DEVICE_ERRORS), closing(device):  # it is opened again in any case
             if isinstance(device, serial.Serial):
-                # The kernel would wait up to 30 s for a board that accepts no bytes, and the event loop with it.
-                device.reset_output_buffer()
+                send_last_frame(device)
         self._on_close(why)

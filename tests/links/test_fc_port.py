@@ -242,6 +242,18 @@ async def test_unsent_bytes_are_dropped_when_the_port_closes(line: Line) -> None
     assert line.take() == b""
 
 
+async def test_a_frame_is_sent_whole_before_the_port_closes(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A pty has no slow wire, so the driver's count of unsent bytes is replaced."""
+    unsent = [6, 4, 2, 0]
+    left_at_drop: list[int] = []
+    monkeypatch.setattr(serial.Serial, "out_waiting", property(lambda _port: unsent.pop(0)))
+    monkeypatch.setattr(serial.Serial, "reset_output_buffer", lambda _port: left_at_drop.append(len(unsent)))
+    line.start()
+    await until_async(lambda: line.opened, "the port")
+    await line.stop()
+    assert left_at_drop == [0]
+
+
 async def test_dtr_stays_on_when_the_port_closes(line: Line) -> None:
     """Boards with an Arduino's reset circuit restart when it comes on again."""
     attributes = termios.tcgetattr(line._terminal)
