@@ -69,6 +69,7 @@ lint: $(VENV)/.test-ready
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	! git grep -nE '$(UN_ENGLISH)' -- ':!LICENSE' ':!Makefile' ':!CONTRIBUTING.md'
+	! git grep -nE '^(<{7}|>{7}) '
 
 bench: $(VENV)/.test-ready
 	$(BIN)/python -m benchmarks $(ARGS)
