@@ -20,9 +20,11 @@ from protocols.msp.nav import Nav, UnsafeRecord, decode_wp, encode_set_wp
 _NEVER = {
     68: "REBOOT",
     200: "SET_RAW_RC",
+    201: "SET_RAW_GPS",
     214: "SET_MOTOR",
     245: "SET_PASSTHROUGH",
     255: "V2_FRAME",
+    **dict.fromkeys(range(0x1F01, 0x1F10), "a sensor's value"),
     0x201F: "SIMULATOR",
     **dict.fromkeys(range(0x2033, 0x2038), "a firmware update"),
     0x2230: "SET_AUX_RC",

@@ -22,6 +22,7 @@ from tests.support.programs import TIMEOUT_S, free_port
 _ASKED_AGAIN_S = 2.0
 IDENT, SET_PID, REBOOT, SET_MOTOR, EEPROM_WRITE = 100, 202, 68, 214, 250
 DATAFLASH_ERASE, V2_FRAME, SET_AUX_RC = 72, 255, 0x2230
+SET_RAW_GPS, MSP2_SENSOR_GPS = 201, 0x1F03
 
 
 class Program:
@@ -95,6 +96,8 @@ async def test_requests_are_answered_alongside_telemetry(is_v2: bool) -> None:
         (True, REBOOT, b"", "REBOOT is never forwarded"),
         (True, SET_AUX_RC, bytes(3), "SET_AUX_RC is never forwarded"),
         (True, V2_FRAME, bytes(9), "V2_FRAME is never forwarded"),
+        (True, SET_RAW_GPS, bytes(16), "SET_RAW_GPS is never forwarded"),
+        (True, MSP2_SENSOR_GPS, bytes(52), "a sensor's value is never forwarded"),
         (True, SET_PID, b"\x0d\x0d\x0d" + bytes(27), "could open this flight controller's command line"),
     ],
 )
