@@ -12,8 +12,8 @@ import select
 import time
 import tty
 
-from simulator.fc_kinds import make_board
-from simulator.msp_options import MspOptions
+from simulator.board.msp_options import MspOptions
+from simulator.commands.fc_kinds import make_board
 
 _AWAKE_S = 0.002
 _LONGEST_SLEEP_S = 0.05

@@ -60,7 +60,7 @@ class Board:
     control: Path
 
     def tell(self, *lines: str) -> None:
-        """Switch a fault, a plug or the power (simulator.control)."""
+        """Switch a fault, a plug or the power (simulator.links.control)."""
         with socket.socket(socket.AF_UNIX) as connection:
             connection.connect(str(self.control))
             with connection.makefile("rw") as stream:

@@ -23,7 +23,7 @@ from bridge.fc.states.base import Port, PortOpened
 from bridge.fc.states.searching import SPEEDS, Searching
 from bridge.line.runner import Runner
 from bridge.model.autopilot import Autopilot
-from simulator.options import SimOptions
+from simulator.board.options import SimOptions
 from tests.support.programs import free_port
 
 _RUNS = 5

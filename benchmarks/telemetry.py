@@ -37,9 +37,9 @@ from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.msp.commands import Msp
 from protocols.msp.frame import MspParser
-from simulator.flight import Craft, fly
-from simulator.msp_port import MspAnswers, reply
-from simulator.options import Tree
+from simulator.board.flight import Craft, fly
+from simulator.board.msp_port import MspAnswers, reply
+from simulator.board.options import Tree
 
 POLLS_HZ = 100
 #: With the regular polls (STATUS 4 Hz, RC 2 Hz, three others 2.5 Hz) these make 100 polls per second.

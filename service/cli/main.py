@@ -24,7 +24,7 @@ _COMMANDS = {
     "clear": LazyCommand("service.cli.mission_commands:clear", "Clear the mission on the flight controller."),
     "missions": LazyCommand("service.cli.stored_missions:missions", "List, show, compare and restore missions."),
     "fleet": LazyCommand("service.cli.fleet.command:fleet", "Manage many vehicles over Eclipse zenoh."),
-    "sim": LazyCommand("simulator.command:sim", "Simulate a flight controller."),
+    "sim": LazyCommand("simulator.commands.sim:sim", "Simulate a flight controller."),
     "demo": LazyCommand("service.cli.demo:demo", "Demonstrate a mission upload to a simulated Naze."),
 }
 

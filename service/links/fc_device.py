@@ -59,8 +59,8 @@ def device_opener(address: FcAddress) -> Callable[[], Awaitable[Device]]:
     if isinstance(address, TcpFc):
         return partial(_open_tcp, address, BackgroundThread("name lookup"))
     # Imported only here: a daemon on a real flight controller does not need a simulator in memory.
-    from simulator.naze import SimulatedNaze
-    from simulator.pipe_link import SimLink
+    from simulator.links.pipe_link import SimLink
+    from simulator.naze.board import SimulatedNaze
 
     # One board for all openings: its mission survives a lost port, as a real board's does.
     return SimLink(SimulatedNaze(), asyncio.get_running_loop()).start

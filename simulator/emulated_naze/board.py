@@ -7,12 +7,12 @@ Time is passed in (seconds of any monotonic clock), as for the simulated Naze.
 import logging
 from math import inf
 
+from simulator.board.simulated_board import Power, SimulatedBoard
 from simulator.emulated_naze.chip import Chip
 from simulator.emulated_naze.cpu import CpuFaultError
 from simulator.emulated_naze.harakiri_memory import HarakiriMemory, SpokenProtocol
 from simulator.emulated_naze.image import FLASH_SIZE, Image
 from simulator.emulated_naze.switches import EmulatedCounters, EmulatedFaults
-from simulator.simulated_board import Power, SimulatedBoard
 
 #: From power on to the main loop, without a GPS module.
 BOOT_S = 8.0

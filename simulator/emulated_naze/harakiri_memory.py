@@ -3,12 +3,12 @@
 
 from enum import Enum
 
+from simulator.board.flash import NorFlash
+from simulator.board.options import Faults, SimOptions
 from simulator.emulated_naze.dma import Memory
 from simulator.emulated_naze.flash_controller import PAGE_SIZE
 from simulator.emulated_naze.image import Image
-from simulator.flash import NorFlash
-from simulator.mission_slots import MissionSlots, flash_size
-from simulator.options import Faults, SimOptions
+from simulator.naze.mission_slots import MissionSlots, flash_size
 
 #: In the struct of flags `f` (mw.h of both trees), ARMED is the second.
 _FLAGS, _ARMED = "f", 1

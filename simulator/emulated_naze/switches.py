@@ -3,7 +3,7 @@
 
 from dataclasses import dataclass
 
-from simulator.options import BoardCounters, BoardFaults
+from simulator.board.options import BoardCounters, BoardFaults
 
 
 @dataclass(slots=True, kw_only=True)

@@ -11,7 +11,7 @@ from bridge.fc.states.msp import Polling
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
 from protocols.msp.mission import WpRecord
-from simulator.options import SimOptions
+from simulator.board.options import SimOptions
 from tests.support.conversations import (
     Upload,
     ack_message,

@@ -13,7 +13,7 @@ from bridge.fc.states.searching import SPEEDS, Searching
 from bridge.model.airframe import Airframe
 from protocols.mavlink.dialect import messages
 from protocols.msp.frame import request
-from simulator.options import Faults, SimOptions, TelemetryProtocol
+from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from tests.support.fake_controllers import (
     HARAKIRI_CAPABILITY,
     Loopback,

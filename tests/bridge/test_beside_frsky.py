@@ -5,7 +5,7 @@ import pytest
 
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
-from simulator.options import SimOptions, TelemetryProtocol
+from simulator.board.options import SimOptions, TelemetryProtocol
 from tests.support.conversations import Upload, waypoints
 from tests.support.world import GroundStation, World
 

@@ -17,7 +17,7 @@ from protocols.mavlink.dialect import messages
 from protocols.mission_file import read_mission_file
 from protocols.mission_item import MissionResult
 from protocols.uart_capture import UartEvent, read_capture
-from simulator.playback import CapturePlayer
+from simulator.commands.playback import CapturePlayer
 from tests.support.world import GroundStation, World
 
 CAPTURES = Path(__file__).parents[1] / "captures"

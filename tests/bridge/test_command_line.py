@@ -11,9 +11,9 @@ from bridge.fc.states.cli import Cli
 from bridge.fc.states.searching import Searching
 from protocols.mission_item import MissionResult
 from protocols.msp.frame import request
-from simulator.fc_kinds import make_board
-from simulator.naze import SimulatedNaze
-from simulator.options import Faults, SimOptions, Tree
+from simulator.board.options import Faults, SimOptions, Tree
+from simulator.commands.fc_kinds import make_board
+from simulator.naze.board import SimulatedNaze
 from tests.support.conversations import Upload, waypoints
 from tests.support.world import GroundStation, World
 

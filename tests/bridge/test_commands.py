@@ -10,7 +10,7 @@ from bridge.controllers.harakiri.mission_store import HarakiriMissions
 from bridge.missions.fc_mission_store import PushFailure
 from bridge.vehicle.telemetry_table import TELEMETRY
 from protocols.mavlink.dialect import Message, messages
-from simulator.options import Faults, SimOptions, TelemetryProtocol
+from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from tests.support.world import GroundStation, World, ready_world
 
 m = messages

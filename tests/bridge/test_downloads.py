@@ -13,8 +13,8 @@ from protocols.mission_item import Command, MissionResult
 from protocols.mission_record import pack_records
 from protocols.msp.frame import MspParser
 from protocols.msp.mission import MissionCommand
-from simulator.fc_kinds import make_board
-from simulator.options import Faults, SimOptions, TelemetryProtocol
+from simulator.board.options import Faults, SimOptions, TelemetryProtocol
+from simulator.commands.fc_kinds import make_board
 from tests.support.conversations import (
     Download,
     Upload,

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import Command
-from simulator.flight import FIELD_LAT_E7, FIELD_LON_E7
+from simulator.board.flight import FIELD_LAT_E7, FIELD_LON_E7
 from tests.support.world import GroundStation, World, ready_world
 
 _TIMEOUT_S = 30.0

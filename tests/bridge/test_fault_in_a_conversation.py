@@ -10,7 +10,7 @@ from bridge.model.mission_log import Outcome
 from bridge.model.refusal import Refusal
 from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import MissionResult
-from simulator.options import SimOptions
+from simulator.board.options import SimOptions
 from tests.support.conversations import Download, Upload, records_of, waypoints
 from tests.support.world import GroundStation, World, flash_holding
 

@@ -12,7 +12,7 @@ from bridge.fc.states.cli import Cli
 from bridge.fc.states.frsky import Frsky
 from bridge.fc.states.mavlink import Mavlink
 from bridge.fc.states.searching import Searching
-from simulator.options import Faults, SimOptions, TelemetryProtocol
+from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from tests.support.fake_controllers import DeafWhileArmed
 from tests.support.world import World
 

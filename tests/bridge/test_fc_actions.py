@@ -11,8 +11,8 @@ from bridge.fc.actions import ActionResult
 from bridge.vehicle.commands import _REFUSED
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.frame import MspParser
-from simulator.msp_sensors import SensorReplies
-from simulator.options import Faults, SimOptions, TelemetryProtocol
+from simulator.board.msp_sensors import SensorReplies
+from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from tests.support.conversations import waypoints
 from tests.support.world import GroundStation, World
 
@@ -196,7 +196,7 @@ def test_a_mission_transfer_waits_for_the_action_to_end() -> None:
 
 
 def test_calibrating_a_missing_sensor_is_denied(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("simulator.msp_port.SensorReplies", partial(SensorReplies, sensors=0b1011))
+    monkeypatch.setattr("simulator.board.msp_port.SensorReplies", partial(SensorReplies, sensors=0b1011))
     world, station = a_world()
     station.send(long(*COMPASS[:2]))
     world.run(0.3)

@@ -12,7 +12,7 @@ from bridge.gcs.station import Peer, Station
 from bridge.gcs.stations import Stations
 from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import MissionResult
-from simulator.options import SimOptions
+from simulator.board.options import SimOptions
 from tests.support.conversations import Upload, records_of, waypoints
 from tests.support.world import GroundStation, Radio, World, ready_world
 

@@ -7,8 +7,8 @@ from bridge.controllers.harakiri import profile as harakiri
 from bridge.fc.frsky_telemetry import FrskyTelemetry
 from bridge.model.vehicle import GlobalPosition, Height, Vehicle
 from protocols.frsky import FrskyReport
-from simulator.naze import SimulatedNaze
-from simulator.options import Faults, SimOptions, TelemetryProtocol
+from simulator.board.options import Faults, SimOptions, TelemetryProtocol
+from simulator.naze.board import SimulatedNaze
 from tests.support.world import World
 
 HERE = 453838000, 84733000

@@ -25,10 +25,10 @@ from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.tlog import read_tlog, tlog_record
 from protocols.uart_capture import read_capture
 from service.daemon.mission_data import to_json
-from simulator.fc_kinds import KINDS, make_board
-from simulator.naze import SimulatedNaze
-from simulator.options import Faults, SimOptions, TelemetryProtocol
-from simulator.simulated_board import SimulatedBoard
+from simulator.board.options import Faults, SimOptions, TelemetryProtocol
+from simulator.board.simulated_board import SimulatedBoard
+from simulator.commands.fc_kinds import KINDS, make_board
+from simulator.naze.board import SimulatedNaze
 from storage.mission_store import open_store
 from storage.store_error import StoreError
 from tests.support.corrupting_board import CorruptingBoard, RandomAutopilot

@@ -19,9 +19,9 @@ from bridge.model.mission_log import ArrivedMission, Outcome
 from bridge.model.refusal import Refusal
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import Command, MissionItem, MissionResult
-from simulator.mission_slots import flash_size
-from simulator.naze import SimulatedNaze
-from simulator.options import Faults, SimOptions, TelemetryProtocol
+from simulator.board.options import Faults, SimOptions, TelemetryProtocol
+from simulator.naze.board import SimulatedNaze
+from simulator.naze.mission_slots import flash_size
 from tests.support.conversations import Download, Upload, waypoints
 from tests.support.world import GroundStation, World
 

@@ -16,11 +16,11 @@ from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.frame import MspParser
 from protocols.msp.nav import LAST, Nav, NavAction
-from simulator.fc_kinds import make_board
-from simulator.inav_boxes import BOXES
-from simulator.msp_board import MspBoard
-from simulator.msp_options import MspOptions
-from simulator.options import Faults
+from simulator.board.msp_board import MspBoard
+from simulator.board.msp_options import MspOptions
+from simulator.board.options import Faults
+from simulator.commands.fc_kinds import make_board
+from simulator.inav.boxes import BOXES
 from tests.bridge.test_inav import plan
 from tests.support.conversations import Download, Upload, clear_message
 from tests.support.world import GroundStation, World

@@ -16,14 +16,14 @@ from protocols.mission_item import MissionResult
 from protocols.msp.commands import Msp
 from protocols.msp.frame import MspParser
 from protocols.msp.nav import LAST, Nav, NavAction
-from simulator.fc_kinds import make_board, new_eeprom
-from simulator.inav_boxes import BOXES
-from simulator.inav_mission import CAPACITY
-from simulator.msp_board import MspBoard
-from simulator.msp_options import MspOptions
-from simulator.multiwii_mission import MultiWiiMission
-from simulator.nav_waypoint import FLAG_HOME, FLAG_LAST, WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
-from simulator.options import Faults
+from simulator.board.msp_board import MspBoard
+from simulator.board.msp_options import MspOptions
+from simulator.board.nav_waypoint import FLAG_HOME, FLAG_LAST, WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
+from simulator.board.options import Faults
+from simulator.commands.fc_kinds import make_board, new_eeprom
+from simulator.inav.boxes import BOXES
+from simulator.inav.mission import CAPACITY
+from simulator.multiwii.mission import MultiWiiMission
 from tests.bridge.test_inav import RULES, packed, plan
 from tests.bridge.test_inav_boards import ACCEPTED, board_with, without_home
 from tests.support.conversations import Download, Upload, clear_message

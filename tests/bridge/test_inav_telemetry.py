@@ -10,11 +10,11 @@ from bridge.model.vehicle import GpsTime, Health, MissionLeg, Power
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.nav import NavMode
-from simulator.fc_kinds import make_board
-from simulator.inav_boxes import BOXES, NAV_WP, PLANE_BOXES
-from simulator.msp_board import MspBoard
-from simulator.msp_options import MspOptions
-from simulator.options import Faults
+from simulator.board.msp_board import MspBoard
+from simulator.board.msp_options import MspOptions
+from simulator.board.options import Faults
+from simulator.commands.fc_kinds import make_board
+from simulator.inav.boxes import BOXES, NAV_WP, PLANE_BOXES
 from tests.bridge.test_inav import plan
 from tests.bridge.test_inav_boards import board_with
 from tests.support.conversations import Upload

@@ -12,7 +12,7 @@ from bridge.model.vehicle import Orientation
 from protocols.mavlink.dialect import messages
 from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, request
-from simulator.options import Faults, SimOptions
+from simulator.board.options import Faults, SimOptions
 from tests.support.conversations import Download, records_of, waypoints
 from tests.support.world import GroundStation, World, flash_holding, ready_world
 

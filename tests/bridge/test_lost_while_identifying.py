@@ -13,8 +13,8 @@ import pytest
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.fc.states.msp import Identifying
 from bridge.fc.states.searching import SPEEDS
-from simulator.firmware import Protocol
-from simulator.options import SimOptions, TelemetryProtocol
+from simulator.board.options import SimOptions, TelemetryProtocol
+from simulator.naze.firmware import Protocol
 from tests.support.world import World
 
 #: Counted from when the board can be heard again.

@@ -24,8 +24,8 @@ from bridge.model.mission_log import Outcome
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.verdict import Result
 from protocols.mission_item import Command, MissionItem, MissionResult
-from simulator.fc_kinds import make_board
-from simulator.options import Faults, SimOptions, TelemetryProtocol
+from simulator.board.options import Faults, SimOptions, TelemetryProtocol
+from simulator.commands.fc_kinds import make_board
 from tests.support.conversations import Download, Upload, clear_message, waypoints
 from tests.support.world import GroundStation, World
 

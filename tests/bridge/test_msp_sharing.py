@@ -5,7 +5,7 @@ import pytest
 
 from protocols.msp.frame import MAX_REPLY, Direction, MspFrame
 from protocols.msp.nav import LAST, NavAction, NavRecord
-from simulator.fc_kinds import make_board
+from simulator.commands.fc_kinds import make_board
 from tests.support.fake_inav import FakeInav
 from tests.support.world import World
 

@@ -10,7 +10,7 @@ from bridge.model.mission_log import ArrivedMission, Outcome
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.frame import MspParser
 from protocols.msp.mission import MissionCommand
-from simulator.options import SimOptions
+from simulator.board.options import SimOptions
 from tests.support.conversations import Upload, records_of, waypoints
 from tests.support.world import GroundStation, World, flash_holding
 

@@ -13,9 +13,9 @@ import pytest
 from bridge.fc.states.searching import SPEEDS
 from bridge.line.msp_link import PROBE, RESYNC
 from protocols.msp.command_line import HAZARDS, RUB_OUT_LINE, RUN_LENGTH, is_clean, typed_and_rubbed_out
-from simulator.line import garble
-from simulator.options import SimOptions
-from simulator.traps import HazardWatch
+from simulator.board.line import garble
+from simulator.board.options import SimOptions
+from simulator.board.traps import HazardWatch
 from tests.support.world import World
 
 SENT = sorted(set(SPEEDS))

@@ -16,8 +16,8 @@ from bridge.model.refusal import ARMED, Refusal
 from protocols.mission_item import MissionResult
 from protocols.msp.frame import MspParser
 from protocols.msp.mission import MissionCommand
-from simulator.options import Faults, SimOptions
-from simulator.simulated_board import Power
+from simulator.board.options import Faults, SimOptions
+from simulator.board.simulated_board import Power
 from tests.support.conversations import records_of, waypoints
 from tests.support.world import World, flash_holding
 

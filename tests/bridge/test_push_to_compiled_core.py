@@ -11,12 +11,12 @@ from functools import cache
 import pytest
 
 from protocols.mission_item import MissionItem, MissionResult
-from simulator.compiled_core import load_core
-from simulator.flash import ERASED
-from simulator.mission_slots import flash_size
-from simulator.naze import SimulatedNaze
-from simulator.options import Faults, SimOptions
-from simulator.simulated_board import Power
+from simulator.board.flash import ERASED
+from simulator.board.options import Faults, SimOptions
+from simulator.board.simulated_board import Power
+from simulator.naze.board import SimulatedNaze
+from simulator.naze.compiled_core import load_core
+from simulator.naze.mission_slots import flash_size
 from tests.support.c_core import library
 from tests.support.conversations import records_of, waypoints
 from tests.support.world import World

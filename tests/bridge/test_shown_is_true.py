@@ -10,12 +10,12 @@ import pytest
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import MissionItem, MissionResult
-from simulator.fc_kinds import make_board
-from simulator.flight import Craft
-from simulator.inav_boxes import ANGLE as INAV_ANGLE
-from simulator.inav_boxes import BOXES as INAV_BOXES
-from simulator.inav_boxes import NAV_POSHOLD, NAV_WP
-from simulator.options import Faults, SimOptions, TelemetryProtocol
+from simulator.board.flight import Craft
+from simulator.board.options import Faults, SimOptions, TelemetryProtocol
+from simulator.commands.fc_kinds import make_board
+from simulator.inav.boxes import ANGLE as INAV_ANGLE
+from simulator.inav.boxes import BOXES as INAV_BOXES
+from simulator.inav.boxes import NAV_POSHOLD, NAV_WP
 from tests.support.conversations import Upload
 from tests.support.fake_controllers import DeafWhileArmed
 from tests.support.world import GroundStation, World

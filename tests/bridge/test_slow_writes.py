@@ -8,7 +8,7 @@ import pytest
 
 from protocols.mavlink.dialect import Message
 from protocols.mission_item import MissionResult
-from simulator.options import SimOptions
+from simulator.board.options import SimOptions
 from tests.support.conversations import Upload, count_message, item_message, records_of, waypoints
 from tests.support.world import GroundStation, Radio, World, flash_holding
 

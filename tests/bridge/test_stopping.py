@@ -11,7 +11,7 @@ from bridge.model.refusal import Refusal
 from protocols.mission_item import MissionResult
 from protocols.msp.frame import MspParser
 from protocols.msp.mission import MissionCommand
-from simulator.options import Faults, SimOptions
+from simulator.board.options import Faults, SimOptions
 from tests.support.conversations import Upload, count_message, records_of, waypoints
 from tests.support.world import GroundStation, Radio, World, flash_holding
 

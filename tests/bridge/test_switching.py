@@ -10,8 +10,8 @@ from bridge.controllers.harakiri import profile as harakiri
 from bridge.fc.profile import Profile
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
-from simulator.naze import SimulatedNaze
-from simulator.options import Faults, SimOptions, TelemetryProtocol
+from simulator.board.options import Faults, SimOptions, TelemetryProtocol
+from simulator.naze.board import SimulatedNaze
 from tests.support.conversations import Upload, records_of, waypoints
 from tests.support.fake_controllers import DeafWhileArmed, MavlinkOnly
 from tests.support.world import GroundStation, World, ready_world

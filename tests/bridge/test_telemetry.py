@@ -13,8 +13,8 @@ from bridge.vehicle.telemetry_table import TELEMETRY
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.commands import Msp
 from protocols.msp.frame import MspParser
-from simulator.flight import FlightState
-from simulator.options import Faults, SimOptions, Tree
+from simulator.board.flight import FlightState
+from simulator.board.options import Faults, SimOptions, Tree
 from tests.support.conversations import waypoints
 from tests.support.world import GroundStation, World
 

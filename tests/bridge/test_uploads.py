@@ -12,7 +12,7 @@ from bridge.model.mission_log import Outcome
 from bridge.vehicle.upload_states import Asking, Delivering, Receiving, UploadState
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
-from simulator.options import Faults, SimOptions, TelemetryProtocol
+from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from tests.support.conversations import (
     MISSION,
     Upload,

@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.model.vehicle_groups import Attitude, Battery, Gps, Group, Position, Rc, Status
-from simulator.options import SimOptions, TelemetryProtocol
+from simulator.board.options import SimOptions, TelemetryProtocol
 from tests.bridge.test_pass_through import Autopilot, passing
 from tests.support.world import GroundStation, World
 

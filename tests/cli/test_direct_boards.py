@@ -10,9 +10,9 @@ import pytest
 
 from protocols.mission_file import read_mission_file
 from protocols.mission_item import Command
-from simulator.fc_kinds import KINDS
-from simulator.inav_mission import CAPACITY
-from simulator.nav_waypoint import FLAG_LAST, NavWaypoint
+from simulator.board.nav_waypoint import FLAG_LAST, NavWaypoint
+from simulator.commands.fc_kinds import KINDS
+from simulator.inav.mission import CAPACITY
 from tests.support.benches import Starter
 from tests.support.plan import HOME, PlanRow, plan_text, waypoint
 from tests.support.programs import Board, run_naze_bridge

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from protocols.mission_item import Command
-from simulator.flight import FIELD_LAT_E7, FIELD_LON_E7
+from simulator.board.flight import FIELD_LAT_E7, FIELD_LON_E7
 from tests.support.benches import Bench
 from tests.support.dronekit import command, vehicle_at
 from tests.support.programs import until

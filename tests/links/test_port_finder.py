@@ -17,8 +17,8 @@ from service.daemon.daemon import Daemon
 from service.links.serial_ports import USB_CHIPS, serial_ports
 from service.settings import Settings
 from service.settings.addresses import AutoFc
-from simulator.naze import SimulatedNaze
-from simulator.pty_link import PtyLink
+from simulator.links.pty_link import PtyLink
+from simulator.naze.board import SimulatedNaze
 from tests.support.faulty_machine import FaultyMachine
 from tests.support.programs import until_async
 

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from protocols.frsky import FrskyParser, FrskyReport
-from simulator import frsky
-from simulator.flight import FlightState, fly
+from simulator.board.flight import FlightState, fly
+from simulator.naze import frsky
 
 #: The values 0x5E and 0x5D have to be escaped.
 HEADING_94 = bytes.fromhex("5e 10 0c 00 5e 21 5d3d 00 5e 14 5d3e 00 5e 1c 00 00 5e")

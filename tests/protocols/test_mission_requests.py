@@ -25,7 +25,7 @@ from protocols.msp.mission import (
     unmask,
     unpack_records,
 )
-from simulator.msp_port import MspReceiver
+from simulator.board.msp_port import MspReceiver
 
 #: Three in a row of one of these act on Harakiri's command line (serial.c, serialCom).
 HAZARDS = frozenset(b"\r#R")

@@ -15,9 +15,9 @@ from protocols.msp.mission import (
     encode_radius,
     encode_read,
 )
+from simulator.board.msp_sensors import MspCommand as Msp
+from simulator.board.options import SimOptions, Tree
 from simulator.emulated_naze.image import Image
-from simulator.msp_sensors import MspCommand as Msp
-from simulator.options import SimOptions, Tree
 from tests.support.naze_bench import Bench, WireBench, mission
 from tests.support.real_bench import Figure, RealBench
 

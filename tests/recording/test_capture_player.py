@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame, MspParser, request
 from protocols.uart_capture import UartAction, UartEvent
-from simulator.playback import CapturePlayer
+from simulator.commands.playback import CapturePlayer
 
 STATUS, IDENT = request(Msp.STATUS), request(Msp.IDENT)
 

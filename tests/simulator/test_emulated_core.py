@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import pytest
 
-from simulator.simulated_board import Power
+from simulator.board.simulated_board import Power
 from tests.support.table_program import RAM, Rig, Steps
 
 RCC_CR, RCC_CFGR, RCC_CSR = 0x4002_1000, 0x4002_1004, 0x4002_1024

@@ -3,7 +3,7 @@
 
 import pytest
 
-from simulator.simulated_board import Power
+from simulator.board.simulated_board import Power
 from tests.support.table_program import FLASH, RAM, Rig, Steps
 
 KEYR, SR, CR, AR = 0x4002_2004, 0x4002_200C, 0x4002_2010, 0x4002_2014

@@ -11,9 +11,9 @@ from bridge.model.ground_track import distance_m
 from bridge.model.verdict import Result
 from protocols.mission_item import Command
 from protocols.msp.nav import LEGS, NavAction, NavRecord
-from simulator.inav_boxes import BOXES, NAV_WP
-from simulator.nav_waypoint import unpack_waypoint
-from simulator.options import Faults
+from simulator.board.nav_waypoint import unpack_waypoint
+from simulator.board.options import Faults
+from simulator.inav.boxes import BOXES, NAV_WP
 from tests.support.msp_bench import MspBench, waypoint
 from tests.support.nav_rows import ROWS, Row, table
 

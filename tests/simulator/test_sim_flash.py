@@ -3,8 +3,8 @@
 
 import pytest
 
-from simulator.flash import PAGE_SIZE, FlashError, NorFlash, PowerCutError
-from simulator.options import Faults
+from simulator.board.flash import PAGE_SIZE, FlashError, NorFlash, PowerCutError
+from simulator.board.options import Faults
 
 
 def make() -> tuple[NorFlash, Faults, bytearray]:

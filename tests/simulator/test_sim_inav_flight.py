@@ -9,8 +9,8 @@ from math import hypot
 import pytest
 
 from protocols.msp.nav import NavAction
-from simulator.nav_waypoint import FLAG_HOME, FLAG_LAST, NavWaypoint
-from simulator.options import Faults
+from simulator.board.nav_waypoint import FLAG_HOME, FLAG_LAST, NavWaypoint
+from simulator.board.options import Faults
 from tests.support.msp_bench import MspBench, waypoint
 
 NAV_WP = 1 << 13

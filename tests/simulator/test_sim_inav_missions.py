@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from protocols.msp.frame import request
 from protocols.msp.nav import NavAction
-from simulator.msp_options import MspOptions
-from simulator.nav_waypoint import FLAG_LAST, NavWaypoint
-from simulator.options import Faults
-from simulator.simulated_board import Power
+from simulator.board.msp_options import MspOptions
+from simulator.board.nav_waypoint import FLAG_LAST, NavWaypoint
+from simulator.board.options import Faults
+from simulator.board.simulated_board import Power
 from tests.support.msp_bench import GETINFO, LOAD, SAVE, SET_WP, WP, MspBench, waypoint
 
 VERSIONS = ("6.1.1", "7.1.2", "8.0.1", "9.0.1", "9.1.0")

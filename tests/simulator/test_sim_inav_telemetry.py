@@ -6,8 +6,8 @@ import struct
 import pytest
 
 from protocols.msp.frame import request
-from simulator.msp_options import MspOptions
-from simulator.options import Faults
+from simulator.board.msp_options import MspOptions
+from simulator.board.options import Faults
 from tests.support.msp_bench import MspBench, waypoint
 
 VERSIONS = ("6.1.1", "7.1.2", "8.0.1", "9.0.1", "9.1.0")

@@ -18,8 +18,8 @@ import serial
 from protocols.mission_record import identify
 from protocols.msp.frame import MspFrame, MspParser, request
 from protocols.msp.mission import INFO_REQUEST, decode_info, encode_begin, encode_chunk, encode_commit
-from simulator.naze import SimulatedNaze
-from simulator.pipe_link import SimLink
+from simulator.links.pipe_link import SimLink
+from simulator.naze.board import SimulatedNaze
 from tests.support.naze_bench import mission
 from tests.support.programs import TIMEOUT_S, control, until
 
@@ -68,7 +68,7 @@ class Simulator:
     def __init__(self, directory: Path, *options: str) -> None:
         self.link = directory / "naze"
         self._control = directory / "control"
-        program = "from simulator.command import sim; sim()"
+        program = "from simulator.commands.sim import sim; sim()"
         arguments = ["--link", str(self.link), "--control", str(self._control), *options]
         self.process = subprocess.Popen([sys.executable, "-c", program, *arguments], stdout=subprocess.PIPE, text=True)
         assert self.process.stdout is not None
@@ -202,7 +202,7 @@ def test_it_ends_cleanly(start: Callable[..., Simulator], tmp_path: Path, number
 def test_obstacles_at_start_are_reported(tmp_path: Path, options: list[str], complaint: str) -> None:
     (tmp_path / "file").write_text("mine")
     (tmp_path / "link").symlink_to("file")
-    program = "from simulator.command import sim; sim()"
+    program = "from simulator.commands.sim import sim; sim()"
     arguments = [option.format(tmp_path) for option in options]
     done = subprocess.run([sys.executable, "-c", program, *arguments], capture_output=True, text=True, check=False)
     assert done.returncode == 1
@@ -243,7 +243,7 @@ def test_a_link_taken_over_by_another_simulator_is_not_removed(start: Callable[.
 def test_the_link_of_a_running_simulator_is_not_replaced(start: Callable[..., Simulator], tmp_path: Path) -> None:
     first = start()
     with serial.Serial(str(first.link), 115200, timeout=0.05, exclusive=True) as port:
-        program = "from simulator.command import sim; sim()"
+        program = "from simulator.commands.sim import sim; sim()"
         second = subprocess.run(
             [sys.executable, "-c", program, "--link", str(first.link)],
             capture_output=True,

@@ -9,8 +9,8 @@ from pymavlink.dialects.v20 import common as mavlink2
 
 from protocols.msp.frame import request
 from protocols.msp.mission import encode_radius
-from simulator.firmware import Protocol
-from simulator.options import Faults, SimOptions, TelemetryProtocol
+from simulator.board.options import Faults, SimOptions, TelemetryProtocol
+from simulator.naze.firmware import Protocol
 from tests.support.naze_bench import Bench
 
 IDENT = request(100)

@@ -3,8 +3,8 @@
 
 from itertools import count
 
-from simulator.options import Faults, SimOptions, TelemetryProtocol
-from simulator.simulated_board import Power
+from simulator.board.options import Faults, SimOptions, TelemetryProtocol
+from simulator.board.simulated_board import Power
 from tests.support import mavlink_missions as page
 from tests.support.mavlink_ground import MavlinkGround
 from tests.support.naze_bench import BOOT_SECONDS, Bench

@@ -30,8 +30,8 @@ from protocols.msp.mission import (
     encode_radius,
     encode_read,
 )
-from simulator.options import Faults, SimOptions
-from simulator.simulated_board import Power
+from simulator.board.options import Faults, SimOptions
+from simulator.board.simulated_board import Power
 from tests.support.naze_bench import BOOT_SECONDS, Bench, mission
 
 NOTHING = ListIdentity(0, 0)

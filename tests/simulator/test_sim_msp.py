@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from protocols.msp.frame import Direction, request
 from protocols.msp.mission import INFO_REQUEST
-from simulator.options import Faults, SimOptions
-from simulator.simulated_board import Power
+from simulator.board.options import Faults, SimOptions
+from simulator.board.simulated_board import Power
 from tests.support.naze_bench import BOOT_SECONDS, Bench
 
 IDENT = request(100)

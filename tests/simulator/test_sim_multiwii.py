@@ -6,9 +6,9 @@ import struct
 import pytest
 
 from protocols.msp.nav import NavAction
-from simulator.msp_options import MspOptions
-from simulator.nav_waypoint import FLAG_LAST
-from simulator.options import Faults
+from simulator.board.msp_options import MspOptions
+from simulator.board.nav_waypoint import FLAG_LAST
+from simulator.board.options import Faults
 from tests.support.msp_bench import SET_WP, MspBench, waypoint
 
 LENGTHS = {

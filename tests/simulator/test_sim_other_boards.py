@@ -13,7 +13,7 @@ import serial
 
 from protocols.msp.frame import request
 from protocols.msp.nav import NavAction
-from simulator.nav_waypoint import FLAG_LAST
+from simulator.board.nav_waypoint import FLAG_LAST
 from tests.support.msp_bench import Frame, split_frames, waypoint
 from tests.support.programs import NAZE_BRIDGE, REPOSITORY, TIMEOUT_S, control, free_port, run_naze_bridge, until
 

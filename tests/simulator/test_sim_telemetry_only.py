@@ -5,7 +5,7 @@ import struct
 
 import pytest
 
-from simulator.options import Faults
+from simulator.board.options import Faults
 from tests.support.msp_bench import MspBench, waypoint
 
 LENGTHS = {

@@ -6,9 +6,9 @@ import pytest
 from protocols.mission_record import identify
 from protocols.msp.frame import request
 from protocols.msp.mission import INFO_REQUEST, decode_info, encode_begin, encode_chunk
-from simulator.firmware import Protocol
-from simulator.options import Faults, SimOptions, TelemetryProtocol
-from simulator.simulated_board import Power
+from simulator.board.options import Faults, SimOptions, TelemetryProtocol
+from simulator.board.simulated_board import Power
+from simulator.naze.firmware import Protocol
 from tests.support.naze_bench import BOOT_SECONDS, Bench, mission
 
 IDENT = request(100)

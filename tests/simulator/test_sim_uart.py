@@ -4,9 +4,9 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simulator.line import garble
-from simulator.options import Counters
-from simulator.uart import Uart
+from simulator.board.line import garble
+from simulator.board.options import Counters
+from simulator.naze.uart import Uart
 
 BAUD = 115200
 BYTE = 10 / BAUD

@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 
 from protocols.msp.mission import RECORD_SIZE
-from simulator.compiled_core import open_library
+from simulator.naze.compiled_core import open_library
 
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 

@@ -9,7 +9,7 @@ from math import inf
 
 from protocols.mavlink.dialect import messages
 from protocols.msp.frame import Direction, MspFrame, MspParser
-from simulator.naze import SimulatedNaze
+from simulator.naze.board import SimulatedNaze
 
 HARAKIRI_CAPABILITY = 0x80000000
 

@@ -32,7 +32,7 @@ PRELOADED = (
     "service.zenoh_link.node",
     "rich.console",
     "rich.progress",
-    "simulator.command",
+    "simulator.commands.sim",
     "tests.support.forked",
     "uvicorn",
 )

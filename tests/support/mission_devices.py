@@ -3,12 +3,12 @@
 
 from typing import Protocol
 
-from simulator.compiled_core import load_core
-from simulator.flash import ERASED, NorFlash, PowerCutError
-from simulator.mission_commands import MissionCommands
-from simulator.mission_slots import StoredConfig, flash_size
-from simulator.missions import Board, BootMissions
-from simulator.options import Faults, SimOptions
+from simulator.board.flash import ERASED, NorFlash, PowerCutError
+from simulator.board.options import Faults, SimOptions
+from simulator.naze.compiled_core import load_core
+from simulator.naze.mission_commands import MissionCommands
+from simulator.naze.mission_slots import StoredConfig, flash_size
+from simulator.naze.missions import Board, BootMissions
 from tests.support.c_core import PowerCut, library
 
 

@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 from protocols.msp.frame import Direction, MspParser, request
 from protocols.msp.nav import NavAction
-from simulator.fc_kinds import make_board
-from simulator.msp_options import MspOptions
-from simulator.nav_waypoint import FLAG_LAST, NavWaypoint, unpack_waypoint
-from simulator.options import Faults
+from simulator.board.msp_options import MspOptions
+from simulator.board.nav_waypoint import FLAG_LAST, NavWaypoint, unpack_waypoint
+from simulator.board.options import Faults
+from simulator.commands.fc_kinds import make_board
 
 SET_WP, WP, GETINFO, SAVE, LOAD = 209, 118, 20, 19, 18
 

@@ -18,9 +18,9 @@ from protocols.msp.mission import (
     encode_commit,
     encode_read,
 )
-from simulator.far_end import FarEnd
-from simulator.naze import SimulatedNaze
-from simulator.options import Faults, SimOptions
+from simulator.board.far_end import FarEnd
+from simulator.board.options import Faults, SimOptions
+from simulator.naze.board import SimulatedNaze
 
 BOOT_SECONDS = SimOptions().boot_ms / 1000
 

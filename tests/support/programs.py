@@ -117,7 +117,7 @@ def control(address: Path, line: str) -> str:
 
 
 class Board(Program):
-    """`naze-bridge sim`. `line` sends commands to its control socket (simulator/control.py).
+    """`naze-bridge sim`. `line` sends commands to its control socket (simulator/links/control.py).
 
     `fc` is the value for a daemon's --fc: a socket with `tcp`, else a pseudo-terminal.
     """

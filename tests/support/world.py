@@ -39,11 +39,11 @@ from protocols.mission_record import identify
 from protocols.msp.command_line import is_clean
 from protocols.msp.frame import MspParser
 from protocols.msp.mission import WpRecord, unpack_records
-from simulator.flash import ERASED, PAGE_SIZE, NorFlash
-from simulator.line import garble
-from simulator.mission_slots import MissionSlots, flash_size, slot_pages
-from simulator.naze import SimulatedNaze
-from simulator.options import Faults, SimOptions
+from simulator.board.flash import ERASED, PAGE_SIZE, NorFlash
+from simulator.board.line import garble
+from simulator.board.options import Faults, SimOptions
+from simulator.naze.board import SimulatedNaze
+from simulator.naze.mission_slots import MissionSlots, flash_size, slot_pages
 
 #: Limit on waiting conversations: a flood of requests must not fill the bridge's memory.
 MAX_QUEUED = 12

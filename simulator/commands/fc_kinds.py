@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The simulated boards other than the Naze."""
+
+from functools import partial
+
+from simulator.board.msp_board import MspBoard
+from simulator.board.msp_firmware import BootFirmware
+from simulator.board.msp_options import MspOptions
+from simulator.board.options import Faults
+from simulator.board.telemetry_only import BASEFLIGHT, BETAFLIGHT, TelemetryFirmware
+from simulator.inav.firmware import InavFirmware
+from simulator.inav.mission import EEPROM_SIZE
+from simulator.multiwii.firmware import MultiWiiFirmware
+from simulator.multiwii.mission import blank_eeprom
+
+_FIRMWARE: dict[str, BootFirmware] = {
+    "inav": InavFirmware,
+    "multiwii": MultiWiiFirmware,
+    "betaflight": partial(TelemetryFirmware, BETAFLIGHT),
+    "baseflight": partial(TelemetryFirmware, BASEFLIGHT),
+}
+KINDS = tuple(_FIRMWARE)
+
+
+def new_eeprom(kind: str, options: MspOptions) -> bytearray:
+    """The EEPROM of a factory-new board."""
+    return blank_eeprom(options.capacity) if kind == "multiwii" else bytearray(EEPROM_SIZE)
+
+
+def make_board(
+    kind: str, options: MspOptions | None = None, faults: Faults | None = None, eeprom: memoryview | None = None
+) -> MspBoard:
+    """Create a board without power. `eeprom` outlives the board; None: a blank one."""
+    options = options or MspOptions()
+    if eeprom is None:
+        eeprom = memoryview(new_eeprom(kind, options))
+    return MspBoard(_FIRMWARE[kind], eeprom, options, faults)

@@ -1,0 +1,245 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A model of INAV as a copter with GPS and compass, versions 6.1.1 to 9.1.0 (src/main/fc/fc_msp.c).
+
+Its frame sizes and special cases were compared with INAV's own simulator of each version.
+"""
+
+import struct
+from enum import IntEnum
+
+from simulator.board.flight import FIELD_ALTITUDE_M, FlightState
+from simulator.board.msp_firmware import Boot, MspFirmware, PortHabits
+from simulator.board.msp_port import error, reply
+from simulator.board.msp_sensors import DRAWN_MAH, RSSI, MspCommand, SensorReplies
+from simulator.board.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
+from simulator.board.waypoint_craft import WaypointCraft
+from simulator.inav.boxes import ANGLE, ARM, BOXES, NAMES, NAV_ALTHOLD, NAV_RTH, NAV_WP, PLANE_BOXES
+from simulator.inav.mission import CAPACITY, FAKE, InavMission
+from simulator.inav.navigation import InavNavigation
+
+_PLANE = 1
+_SENSORS = 0b1000_1111  # accelerometer, barometer, compass, GPS, thermometer; bit 15 would be a failure
+_PITOT = 1 << 6
+_CYCLE_TIME_US = 500
+_ARMED_FLAGS = 0b1100  # armed, and armed once
+_LOAD_PERCENT = 7
+_WIND_CMS = 250  # from ahead
+_CELLS, _BATTERY_PERCENT = 3, 88
+_API_VERSION = bytes((0, 2, 5))
+_HDOP_E2 = 130
+_MISSION_SETTING = b"nav_wp_multi_mission_index\0"
+_FIELD_ALTITUDE_CM = round(FIELD_ALTITUDE_M * 100)
+#: The sticks that load the saved missions have to be held for 20 ticks, each of the first receiver frame after 20 ms:
+#: 0.4 s to 0.8 s (rc_controls.c). This is SBUS, at 14 ms.
+_LOAD_AFTER_S, _STICKS_HELD_S = 0.56, 0.8
+_STICK_END_US = 2000
+
+
+class InavCommand(IntEnum):
+    """The simulated commands that are INAV's own."""
+
+    API_VERSION = 1
+    FC_VARIANT = 2
+    FC_VERSION = 3
+    BOARD_INFO = 4
+    WP_MISSION_LOAD = 18
+    WP_MISSION_SAVE = 19
+    WP_GETINFO = 20
+    STATUS_EX = 150
+    RTC = 246
+    SETTING = 0x1003
+    INAV_STATUS = 0x2000
+    INAV_ANALOG = 0x2002
+    INAV_AIR_SPEED = 0x2009
+    INAV_MIXER = 0x2010
+
+
+class InavFirmware(MspFirmware):
+    """Boots with the saved missions in the EEPROM."""
+
+    def __init__(self, boot: Boot) -> None:
+        super().__init__(boot)
+        self._version = tuple(int(part) for part in boot.options.version.split("."))
+        self._boxes = PLANE_BOXES if boot.options.platform == _PLANE else BOXES[boot.options.version]
+        channels = 34 if self._version >= (8, 0, 0) else 18
+        self._sensors = SensorReplies(
+            {box: NAMES[box] for box in self._boxes},
+            _CYCLE_TIME_US,
+            _SENSORS | (_PITOT if boot.options.pitot else 0),
+            channels=channels if boot.options.receiver else 0,
+            heading_from=0,
+            fix_3d=2,
+            currents_ca=(30, 1250),
+        )
+        self.habits = PortHabits(
+            buffer_size=192,
+            cli_guard_s=0.1,
+            obeys_r=self._version <= (8, 0, 1),
+            writes_first=frozenset((MspCommand.EEPROM_WRITE,)),
+            speaks_v2=True,
+        )
+        self._mission = InavMission(boot.eeprom)
+        self._craft = WaypointCraft()
+        self._navigation = InavNavigation(self._mission, self._craft)
+        self._booted_at = boot.now
+        self._stick_loads = boot.faults.stick_loads
+        self._load_at: float | None = None
+        self._sticks_released_at = boot.now
+
+    @property
+    def stored(self) -> list[bytes]:
+        stored = self._mission.stored
+        return [stored[at : at + WAYPOINT_SIZE] for at in range(0, len(stored), WAYPOINT_SIZE)]
+
+    # -- the craft -------------------------------------------------------------------------------------------
+
+    def follow_pilot(self, now: float) -> None:
+        """Fly until `now`, arm and disarm. CrashError: the check before arming found a JUMP with an invalid target."""
+        self._fly_until(now)
+        self._follow_sticks(now)
+        flyable = self.armed or self._mission.is_flyable()
+        if self._faults.armed and not self.armed and flyable and not self._faults.arming_blockers:
+            self.armed = True
+            self._mission.follow_selection()
+            self._home = self._craft.position
+            self._navigation.arm()
+        elif self.armed and not self._faults.armed:
+            self.armed = False
+            self._navigation.disarm()
+            self._craft.rest()
+
+    def _follow_sticks(self, now: float) -> None:
+        if self._faults.selected_mission:
+            self._mission.selected = self._faults.selected_mission
+        if self._faults.stick_loads > self._stick_loads:
+            self._stick_loads = self._faults.stick_loads
+            self._load_at, self._sticks_released_at = now + _LOAD_AFTER_S, now + _STICKS_HELD_S
+        if self._load_at is not None and now >= self._load_at:
+            self._load_at = None
+            if not self.armed:
+                self._mission.load()
+
+    def _state(self) -> FlightState:
+        return self._craft.state()
+
+    def _fly(self, seconds: float) -> None:
+        if not self._navigation.is_in_mission:
+            self._mission.follow_selection()
+        self._navigation.step(seconds, self._is_on(NAV_WP))
+
+    def _is_on(self, box: int) -> bool:
+        return bool(self._faults.boxes >> self._boxes.index(box) & 1)
+
+    def _flags(self) -> int:
+        """The modes: navigation modes follow the flight, not the switch."""
+        in_mission, returning = self._navigation.is_in_mission, self._navigation.is_returning
+        flown = {ARM: self.armed, NAV_WP: in_mission, NAV_RTH: returning}
+        if in_mission or returning:
+            flown |= {ANGLE: True, NAV_ALTHOLD: True}
+        flags = self._faults.boxes
+        for box, is_on in flown.items():
+            bit = 1 << self._boxes.index(box)
+            flags = flags | bit if is_on else flags & ~bit
+        return flags
+
+    # -- MSP -------------------------------------------------------------------------------------------------
+
+    def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
+        """The reply frame: an error frame for refused or unknown commands."""
+        self._fly_until(now)
+        match command:
+            case MspCommand.SET_WP:
+                return self._set_waypoint(payload)
+            case MspCommand.WP:
+                return reply(command, self._waypoint(payload))
+            case InavCommand.SETTING:
+                is_known = payload == _MISSION_SETTING
+                return reply(command, bytes((self._mission.selected,))) if is_known else error(command)
+            case InavCommand.WP_GETINFO:
+                known = self._mission.known(self.armed)
+                return reply(command, bytes((0, CAPACITY, self._mission.is_valid, known)))
+            case InavCommand.WP_MISSION_SAVE:
+                return self._when_disarmed(command, len(payload) == 1 and not self.armed and self._save())
+            case InavCommand.WP_MISSION_LOAD:
+                return self._when_disarmed(command, len(payload) == 1 and not self.armed and self._mission.load())
+            case MspCommand.ACC_CALIBRATION | MspCommand.MAG_CALIBRATION:
+                return self._when_disarmed(command, True)
+            case MspCommand.EEPROM_WRITE:
+                self._busy += 0.0 if self.armed else self._options.eeprom_write_ms / 1000
+                return self._when_disarmed(command, True)
+        answer = self._read(command)
+        return error(command) if answer is None else reply(command, answer)
+
+    def _when_disarmed(self, command: int, done: bool) -> bytes:
+        return reply(command) if done and not self.armed else error(command)
+
+    def _save(self) -> bool:
+        saved = self._mission.save()
+        if saved:
+            self._counters.flash_writes += 1
+            self._busy += self._options.eeprom_write_ms / 1000
+        return saved
+
+    def _set_waypoint(self, payload: bytes) -> bytes:
+        """Acknowledge any waypoint of the right size, even if it is not stored."""
+        if len(payload) != WAYPOINT_SIZE:
+            return error(MspCommand.SET_WP)
+        closed = self._navigation.is_in_mission if self._version >= (8, 0, 0) else self.armed
+        if not closed:
+            self._mission.write(*unpack_waypoint(payload))
+        return reply(MspCommand.SET_WP)
+
+    def _waypoint(self, payload: bytes) -> bytes:
+        number = payload[0] if payload else 0
+        flight = self._craft.state()
+        match number:
+            case 0:
+                # With a fix, which this craft always has, home is its position until it arms.
+                waypoint = NavWaypoint(FAKE.action, *(self._home or self._craft.position), _FIELD_ALTITUDE_CM)
+            case 255:
+                waypoint = NavWaypoint(FAKE.action, flight.lat_e7, flight.lon_e7, round(flight.altitude_m * 100))
+            case _:
+                waypoint = self._mission.read(number, self.armed)
+        return waypoint.pack(number)
+
+    def _read(self, command: int) -> bytes | None:
+        craft = self.craft_at(self._clock)
+        flight = craft.flight
+        match command:
+            case InavCommand.API_VERSION:
+                return _API_VERSION
+            case InavCommand.FC_VARIANT:
+                return b"INAV"
+            case InavCommand.FC_VERSION:
+                return bytes(self._version)
+            case InavCommand.BOARD_INFO:
+                return b"SIMU\x00\x00\x02\x00\x04SIMU"
+            case InavCommand.STATUS_EX:
+                return (self._sensors.payload(MspCommand.STATUS, craft) or b"") + bytes(5)
+            case InavCommand.INAV_STATUS:
+                flags = self._faults.arming_blockers | (_ARMED_FLAGS if self.armed else 0)
+                status = struct.pack("<HHHHBI", _CYCLE_TIME_US, 0, self._sensors.sensors, _LOAD_PERCENT, 0, flags)
+                return status + craft.boxes.to_bytes(8, "little") + b"\0"
+            case InavCommand.INAV_ANALOG:
+                current = self._sensors.currents_ca[self.armed]
+                volts_e2 = round(flight.volts * 100)
+                drawn = (volts_e2 * current // 100, DRAWN_MAH, 1300)
+                return struct.pack("<BHHIIIIBH", _CELLS << 4, volts_e2, current, *drawn, 0, _BATTERY_PERCENT, RSSI)
+            case InavCommand.INAV_AIR_SPEED:
+                return struct.pack("<I", round(flight.speed_ms * 100) + _WIND_CMS if self._options.pitot else 0)
+            case InavCommand.INAV_MIXER:
+                return struct.pack("<BBBBBhBB", 0, 0, 0, self._options.platform, 0, -1, 12, 18)
+            case InavCommand.RTC:
+                unix_s = self._options.unix_s and self._options.unix_s + self._clock - self._booted_at
+                return struct.pack("<IH", int(unix_s), int(unix_s % 1 * 1000))
+            case MspCommand.NAV_STATUS:
+                return self._navigation.status().pack()
+        usual = self._sensors.payload(command, craft)
+        if command == MspCommand.RC and usual and self._clock < self._sticks_released_at:
+            # Roll and pitch; the throttle is low.
+            return struct.pack("<2H", _STICK_END_US, _STICK_END_US) + usual[4:]
+        if command == MspCommand.RAW_GPS and usual is not None:
+            return usual + struct.pack("<H", _HDOP_E2)
+        if command == MspCommand.ALTITUDE and usual is not None:
+            return usual + struct.pack("<i", round(flight.height_m * 100))
+        return usual

@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""INAV's waypoint mode of a copter: the navigation states of a mission.
+
+After navOnEnteringState_NAV_STATE_WAYPOINT_... of INAV 9.1.0 (src/main/navigation/navigation.c). Not simulated: the
+pilot's sticks, safe distances, and the climb before a return home.
+"""
+
+from enum import Enum
+
+from protocols.msp.nav import NavAction
+from simulator.board.flight import FIELD_ALTITUDE_M
+from simulator.board.msp_firmware import CrashError
+from simulator.board.nav_status import Error, Mode, NavStatus, State
+from simulator.board.nav_waypoint import FLAG_HOME, FLAG_LAST
+from simulator.board.waypoint_craft import WaypointCraft
+from simulator.inav.mission import CAPACITY, InavMission
+
+_CRUISE_MS = 3.0
+_MAX_MS = 10.0
+_MIN_MISSION_CMS = 50
+_HOVER_HEIGHT_M = 10.0
+_RTH_HEIGHT_M = 10.0
+_MEAN_SEA_LEVEL = 1
+
+
+class Phase(Enum):
+    """The flight phases, with their values in MSP_NAV_STATUS: mode, state, error."""
+
+    IDLE = (Mode.NONE, State.NONE, Error.NONE)
+    PRE_ACTION = (Mode.NAV, State.PROCESS_NEXT, Error.NONE)
+    ENROUTE = (Mode.NAV, State.WP_ENROUTE, Error.NONE)
+    HOLD = (Mode.NAV, State.HOLD_TIMED, Error.NONE)
+    LANDING = (Mode.NAV, State.LAND_IN_PROGRESS, Error.LANDING)
+    FINISHED = (Mode.NAV, State.WP_ENROUTE, Error.FINISH)
+    RTH_ENROUTE = (Mode.RTH, State.RTH_ENROUTE, Error.NONE)
+    RTH_HOVER = (Mode.RTH, State.HOVER_ABOVE_HOME, Error.NONE)
+    RTH_LANDING = (Mode.RTH, State.LAND_IN_PROGRESS, Error.LANDING)
+    RTH_LANDED = (Mode.RTH, State.LANDED, Error.NONE)
+
+
+_RETURNING = frozenset((Phase.RTH_ENROUTE, Phase.RTH_HOVER, Phase.RTH_LANDING, Phase.RTH_LANDED))
+
+
+class InavNavigation:
+    """Flies `craft`. An index is a waypoint's number less 1."""
+
+    def __init__(self, mission: InavMission, craft: WaypointCraft) -> None:
+        self._mission = mission
+        self._craft = craft
+        self._home = craft.position
+        self._restarts = True
+        self._held_s = 0.0
+        self.phase = Phase.IDLE
+        self.index = 0
+
+    @property
+    def is_in_mission(self) -> bool:
+        """True if the flight mode is NAV WP; during a mission's RTH it is NAV RTH."""
+        return self.phase is not Phase.IDLE and not self.is_returning
+
+    @property
+    def is_returning(self) -> bool:
+        return self.phase in _RETURNING
+
+    def arm(self) -> None:
+        """Take off: home is here."""
+        self._home = self._craft.position
+
+    def disarm(self) -> None:
+        """Stop; the mission restarts after the next arming."""
+        self.phase = Phase.IDLE
+        self._restarts = True
+        self.index = 0
+
+    def status(self) -> NavStatus:
+        """The content of MSP_NAV_STATUS, which always names a waypoint."""
+        mode, state, error = self.phase.value
+        number = self.index + 1
+        return NavStatus(mode, state, self._mission[self.index].action, number, error, round(self._craft.heading))
+
+    def step(self, seconds: float, is_requested: bool) -> None:
+        """Advance the flight; `is_requested`: the pilot's switch NAV WP is on. CrashError."""
+        if not is_requested:
+            self.phase = Phase.IDLE
+        elif self.phase is Phase.IDLE and self._mission.is_valid and self._mission.count:
+            self._begin()
+        match self.phase:
+            case Phase.IDLE:
+                self._craft.hover(_HOVER_HEIGHT_M, seconds)
+            case Phase.PRE_ACTION:
+                self.phase = Phase.ENROUTE
+            case Phase.ENROUTE:
+                self._fly_leg(seconds)
+            case Phase.HOLD:
+                self._hold(seconds)
+            case Phase.LANDING | Phase.RTH_LANDING:
+                self._land(seconds)
+            case Phase.FINISHED | Phase.RTH_HOVER:
+                self._craft.hover(self._craft.height_m, seconds)
+            case Phase.RTH_ENROUTE:
+                if self._craft.fly_to(self._home, _RTH_HEIGHT_M, _CRUISE_MS, seconds):
+                    self.phase = Phase.RTH_LANDING if self._mission.lands_after_rth else Phase.RTH_HOVER
+
+    def _begin(self) -> None:
+        if self._restarts or self.index == 0:
+            self._mission.start_jumps()
+            self.index = 0
+        self._restarts = False
+        self._pre_action()
+
+    def _pre_action(self) -> None:
+        """Execute waypoints without a place up to the next leg, which takes INAV 10 ms each. CrashError."""
+        for _ in range(CAPACITY):
+            waypoint = self._mission[self.index]
+            match waypoint.action:
+                case NavAction.RTH:
+                    self._restarts = True
+                    self.phase = Phase.RTH_ENROUTE
+                    return
+                case NavAction.JUMP if waypoint.p3:
+                    if waypoint.p1 < 0:
+                        raise CrashError
+                    if waypoint.p3 > 0:
+                        self._mission.set_jump(self.index, waypoint.p3 - 1)
+                    self.index = min(waypoint.p1, CAPACITY - 1)
+                case NavAction.JUMP | NavAction.SET_POI | NavAction.SET_HEAD:
+                    if waypoint.action == NavAction.JUMP:
+                        self._mission.set_jump(self.index, waypoint.p2)
+                    if self._is_last():
+                        self._finish()
+                        return
+                    self.index += 1
+                case _:
+                    self.phase = Phase.PRE_ACTION
+                    return
+
+    def _fly_leg(self, seconds: float) -> None:
+        waypoint = self._mission[self.index]
+        height = waypoint.alt_cm / 100
+        if waypoint.p3 & _MEAN_SEA_LEVEL:
+            height -= FIELD_ALTITUDE_M
+        flies_home = waypoint.flag == FLAG_HOME or not (waypoint.lat_e7 or waypoint.lon_e7)
+        target = self._home if flies_home else (waypoint.lat_e7, waypoint.lon_e7)
+        wanted = waypoint.p2 if waypoint.action == NavAction.POSHOLD_TIME else waypoint.p1
+        speed = min(wanted / 100, _MAX_MS) if wanted >= _MIN_MISSION_CMS else _CRUISE_MS
+        if not self._craft.fly_to(target, height, speed, seconds):
+            return
+        match waypoint.action:
+            case NavAction.LAND:
+                self.phase = Phase.LANDING
+            case NavAction.POSHOLD_TIME:
+                self.phase = Phase.HOLD
+                self._held_s = 0.0
+            case _:
+                self._next()
+
+    def _hold(self, seconds: float) -> None:
+        self._held_s += seconds
+        self._craft.hover(self._craft.height_m, seconds)
+        if self._held_s >= self._mission[self.index].p1:
+            self._next()
+
+    def _land(self, seconds: float) -> None:
+        self._craft.hover(0.0, seconds)
+        if self._craft.height_m <= 0:
+            if self.is_returning:
+                self.phase = Phase.RTH_LANDED
+            else:
+                self._finish()
+
+    def _next(self) -> None:
+        if self._is_last():
+            self._finish()
+        else:
+            self.index += 1
+            self._pre_action()
+
+    def _is_last(self) -> bool:
+        return self.index >= self._mission.count - 1 or self._mission[self.index].flag == FLAG_LAST
+
+    def _finish(self) -> None:
+        self._mission.end_jumps()
+        self._restarts = True
+        self.phase = Phase.FINISHED
