@@ -18,6 +18,7 @@ from pymavlink.dialects.v10 import ardupilotmega as mavlink_1
 
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import MissionResult
+from tests.support.mission_planner_screen import MissionPlannerScreen
 from tests.support.plan import PlanRow
 from tests.support.programs import TIMEOUT_S
 
@@ -79,6 +80,8 @@ class MissionPlanner:
         #: Every received message, whether a loop was waiting for it or not.
         self.received: list[Message] = []
         self.unacked_commands: list[int] = []
+        #: What its user reads and hears; times are those of time.monotonic().
+        self.screen = MissionPlannerScreen()
         # Read by "Write Fast"; no loop can take it away.
         self._requested, self._answer = 0, MissionResult.ACCEPTED
 
@@ -140,6 +143,7 @@ class MissionPlanner:
     def _note(self, message: Message) -> None:
         """Process a packet before any loop gets it."""
         self.received.append(message)
+        self.screen.take(time.monotonic(), message)
         self._sees_mavlink_2 |= message.get_msgbuf()[0] == 0xFD
         match message.get_type():
             case "HEARTBEAT":
@@ -248,6 +252,10 @@ class MissionPlanner:
 
     def arm(self) -> int | None:
         return self.command(messages.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+
+    def read_hud(self) -> str:
+        """The line that now stands on its HUD."""
+        return self.screen.hud(time.monotonic())
 
     def request_version(self) -> None:
         """AUTOPILOT_VERSION_REQUEST, 500 ms x 3; without a reply it assumes no capabilities."""
