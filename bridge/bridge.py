@@ -8,7 +8,7 @@ The path of a mission item to the flight controller, and back for verification:
     gcs_received -> Ground -> Guard -> MessageRouter -> MissionUploads -> ListCheck
         -> MissionService.deliver -> FcMissionStore.push -> MspLink
 An autopilot that speaks MAVLink itself is not represented but passed through, both ways:
-    FcSession <-> PassThrough <-> Ground
+    FcSession <-> Routes <-> Ground
 """
 
 from itertools import count
@@ -17,11 +17,11 @@ from math import inf
 from bridge.config import BridgeConfig
 from bridge.fc.actions import FcActions
 from bridge.fc.msp_sharing import MspSharing
-from bridge.fc.profile import FlightController
+from bridge.fc.profile import FlightController, Spoken
 from bridge.fc.session import FcSession
 from bridge.gcs.ground import FrameListener, Ground
 from bridge.gcs.guard import Guard
-from bridge.gcs.pass_through import PassThrough
+from bridge.gcs.routes import Routes
 from bridge.gcs.station import Peer, Severity
 from bridge.line.runner import Runner
 from bridge.missions.mission_service import NO_LINK, EndingListener, MissionService, MissionTransfer
@@ -56,8 +56,6 @@ class Bridge:
         self._config = config
         self._log_event = log_event
         self._was_armed = False
-        #: True while an autopilot speaks MAVLink itself: the bridge then does not wait for particular bytes.
-        self.is_passing_through = False
         self._announcer = LinkAnnouncer()
         incidents = count(1)
 
@@ -160,7 +158,7 @@ class Bridge:
                 self._incoming.forget(peer)
         if now >= self._announcer.due:
             self._say(self._announcer.tick(now, self.session.state.trouble))
-        if now >= self._vehicle.due and self._is_represented:
+        if now >= self._vehicle.due and not self.is_passing_through:
             self._vehicle.tick(now)
 
     def next_deadline(self) -> float:
@@ -171,27 +169,28 @@ class Bridge:
             self.ground.stations.due,
             self._announcer.due,
             self._watch.due,
-            self._vehicle.due if self._is_represented else inf,
+            inf if self.is_passing_through else self._vehicle.due,
         )
 
     # Between the parts.
 
     @property
-    def _is_represented(self) -> bool:
-        """False while an autopilot speaks MAVLink itself: the bridge then sends nothing in its name."""
-        return self._incoming.routes is None
+    def is_passing_through(self) -> bool:
+        """True while an autopilot speaks MAVLink itself: the bridge then sends nothing in its name."""
+        return self._incoming.routes is not None
 
     def _say(self, news: tuple[Severity, str] | None) -> None:
-        if news is not None and self._is_represented:
+        if news is not None and not self.is_passing_through:
             self.ground.say(*news)
 
     def _newcomer(self, peer: Peer) -> None:
-        if self._is_represented:
+        if not self.is_passing_through:
             self._vehicle.newcomer(peer)
 
     def _controller_changed(self, controller: FlightController | None, now: float) -> None:
         vehicle = self.session.vehicle
-        self.is_passing_through = controller is not None and controller.profile.is_passed_through
+        passes = controller is not None and controller.profile.spoken is Spoken.OTHER_MAVLINK
+        self._incoming.routes = Routes(self.ground) if passes else None
         if controller is None:
             trouble = self.session.state.trouble
             self.missions.use(Refusal(MissionResult.DENIED, trouble) if trouble else NO_LINK)
@@ -202,7 +201,6 @@ class Bridge:
         missions = controller.profile.missions
         store = missions if isinstance(missions, Refusal) else missions(controller, vehicle, self._config.rules)
         self.missions.use(store)
-        self._incoming.routes = PassThrough(self.ground) if self.is_passing_through else None
         self._say(self._announcer.found(controller, now))
         if not isinstance(store, Refusal):
             # Read its list at once: MISSION_CURRENT reports the count, and the first Read needs no wait.
@@ -221,7 +219,7 @@ class Bridge:
         news = self.session.vehicle.take_news()
         if self.report.watched:
             self.report.heard(news)
-        if self._is_represented:
+        if not self.is_passing_through:
             self._vehicle.heard(news, now)
         if FlightState in news:
             self._follow_arming(now)
@@ -234,5 +232,5 @@ class Bridge:
         self._was_armed = armed
         if armed and self._uploads.is_active:
             self._uploads.end(ARMED, now)
-        self.ground.record_flight(on=armed and self._is_represented)
+        self.ground.record_flight(on=armed and not self.is_passing_through)
         self._log_event("info", "vehicle.armed" if armed else "vehicle.disarmed")

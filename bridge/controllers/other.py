@@ -45,9 +45,8 @@ OLD_MULTIWII = replace(OTHER_MSP, currents_per_a=CURRENTS_PER_A)
 OTHER_MAVLINK = Profile(
     "another MAVLink autopilot",
     "MAVLink",
-    Spoken.MAVLINK,
+    Spoken.OTHER_MAVLINK,
     missions=Refusal(
         MissionResult.UNSUPPORTED, "This autopilot speaks MAVLink itself: write its missions from a ground station"
     ),
-    is_passed_through=True,
 )

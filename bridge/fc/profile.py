@@ -27,6 +27,8 @@ class Spoken(Enum):
 
     MSP = "MSP"
     MAVLINK = "MAVLink"
+    #: An autopilot that represents itself to ground stations. The bridge sends nothing in its name.
+    OTHER_MAVLINK = "MAVLink, passed through"
     FRSKY = "FrSky"
     CLI = "command line"
 
@@ -69,7 +71,6 @@ class Profile:
     missions: how they are written to it, or the reply to any attempt.
     check_kind, rules: how `naze-bridge check --kind` calls it, and the rules it applies.
     mavlink_sender: MAVLink version, sysid and compid it sends with; None matches any.
-    is_passed_through: an autopilot that represents itself to ground stations. The bridge sends nothing in its name.
     restarts_after_calibration: it reboots by itself when a calibration is done.
     notice: a warning for the pilot while this profile is active.
     """
@@ -90,7 +91,6 @@ class Profile:
     check_kind: str | None = None
     rules: Callable[[RuleSettings], MissionRules] | None = None
     mavlink_sender: tuple[int, int, int] | None = None
-    is_passed_through: bool = False
     restarts_after_calibration: bool = False
     notice: str | None = None
 

@@ -10,30 +10,29 @@ from bridge.fc.profile import FlightController, Profile, Spoken
 from bridge.fc.states.base import Closed, Event, Found, Identified, Lost, Port, PortClosed, PortOpened, State
 from bridge.fc.states.cli import Cli
 from bridge.fc.states.frsky import Frsky
-from bridge.fc.states.mavlink import Mavlink
+from bridge.fc.states.harakiri_mavlink import HarakiriMavlink
 from bridge.fc.states.msp import Identifying, Polling
+from bridge.fc.states.pass_through import PassThrough
 from bridge.fc.states.searching import Searching
 from bridge.line.runner import Runner
 from bridge.model.autopilot import Autopilot
 from bridge.model.events import EventLog, Level
 from protocols.mavlink.frame import MavlinkFrame
 
+_Next = Mapping[type[Event] | Spoken, type[State]]
+_LOST: _Next = {Lost: Searching, PortClosed: Closed}
+_MAVLINK: _Next = {Spoken.MAVLINK: HarakiriMavlink, Spoken.OTHER_MAVLINK: PassThrough}
+_MSP: _Next = {Identified: Polling, **_MAVLINK, Spoken.CLI: Cli, **_LOST}
 #: State -> event or search result -> next state. Any other event in a state is a bug.
-TRANSITIONS: Mapping[type[State], Mapping[type[Event] | Spoken, type[State]]] = {
+TRANSITIONS: Mapping[type[State], _Next] = {
     Closed: {PortOpened: Searching},
-    Searching: {
-        Spoken.MSP: Identifying,
-        Spoken.MAVLINK: Mavlink,
-        Spoken.FRSKY: Frsky,
-        Spoken.CLI: Cli,
-        Lost: Searching,
-        PortClosed: Closed,
-    },
-    Identifying: {Identified: Polling, Spoken.MAVLINK: Mavlink, Spoken.CLI: Cli, Lost: Searching, PortClosed: Closed},
-    Polling: {Identified: Polling, Spoken.MAVLINK: Mavlink, Spoken.CLI: Cli, Lost: Searching, PortClosed: Closed},
-    Mavlink: {Lost: Searching, PortClosed: Closed},
-    Frsky: {Lost: Searching, PortClosed: Closed},
-    Cli: {Lost: Searching, PortClosed: Closed},
+    Searching: {Spoken.MSP: Identifying, Spoken.FRSKY: Frsky, **_MAVLINK, Spoken.CLI: Cli, **_LOST},
+    Identifying: _MSP,
+    Polling: _MSP,
+    HarakiriMavlink: {Spoken.OTHER_MAVLINK: PassThrough, **_LOST},
+    PassThrough: {Spoken.MAVLINK: HarakiriMavlink, **_LOST},
+    Frsky: _LOST,
+    Cli: _LOST,
 }
 
 
@@ -102,12 +101,12 @@ class FcSession:
 
     def settle_telemetry(self) -> None:
         """Update the vehicle from the messages of a passed-through autopilot."""
-        if isinstance(self.state, Mavlink):
+        if isinstance(self.state, PassThrough):
             self.state.telemetry.settle()
 
     def send_mavlink(self, frame: bytes) -> None:
         """Pass a ground station's frame on to an autopilot that speaks MAVLink itself."""
-        if isinstance(self.state, Mavlink):
+        if isinstance(self.state, PassThrough):
             self._port.output.append(frame)
 
     def _handle(self, event: Event, now: float) -> None:

@@ -35,7 +35,7 @@ class LinkAnnouncer:
         silent_since, self._silent_since, self.due = self._silent_since, None, inf
         was_lost, self.is_lost = self.is_lost, False
         profile, before = controller.profile, self._known
-        is_switch = profile.spoken is Spoken.MAVLINK and not profile.is_passed_through and before is not None
+        is_switch = profile.spoken is Spoken.MAVLINK and before is not None
         if not is_switch:
             self._known = controller.name
         if profile.notice is not None and controller.name != before:

@@ -8,7 +8,7 @@ from math import inf
 from bridge.gcs.cost import Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.guard import Guard, GuardRefusal, Standing, denial
-from bridge.gcs.pass_through import PassThrough
+from bridge.gcs.routes import Routes
 from bridge.gcs.station import Peer, Severity, Station
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.mission_download import MissionDownloads
@@ -176,7 +176,7 @@ class Incoming:
         self._send_to_autopilot = send_to_autopilot
         self._ids = sysid, compid
         self._decoder = MavlinkDecoder()
-        self.routes: PassThrough | None = None
+        self.routes: Routes | None = None
 
     def received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> bool:
         """Handle bytes from a ground station; False if they are dropped. A datagram holds whole frames only."""
@@ -208,7 +208,7 @@ class Incoming:
         if self.routes is not None:
             self.routes.forget(peer)
 
-    def _pass_on(self, routes: PassThrough, station: Station, frame: MavlinkFrame, now: float) -> None:
+    def _pass_on(self, routes: Routes, station: Station, frame: MavlinkFrame, now: float) -> None:
         """Send a frame on to its targets, within its sender's rights."""
         peer = station.peer
         if not self._ground.budgets.allows(Cost.PASSED, peer, now):

@@ -19,6 +19,7 @@ _CRC_SIZE = 2
 _SIGNATURE_SIZE = 13
 _SIGNED = 0x01
 _HEARTBEAT, _HEARTBEAT_SIZE = 0, 9
+_AUTOPILOT, _NO_AUTOPILOT = 5, 8
 _BASE_MODE, _SAFETY_ARMED = 6, 0x80
 
 _MAGIC = re.compile(rb"[\xfd\xfe]")
@@ -89,6 +90,11 @@ def is_plausible_heartbeat(frame: MavlinkFrame) -> bool:
         return False
     vehicle_type, autopilot, _, state, version = payload[4:]
     return version == 3 and vehicle_type <= 45 and autopilot <= 20 and state <= 8 and frame.sysid != 0
+
+
+def is_autopilot_heartbeat(frame: MavlinkFrame) -> bool:
+    """True for an autopilot's HEARTBEAT: not a camera's, a gimbal's or a radio's."""
+    return is_plausible_heartbeat(frame) and frame.payload[_AUTOPILOT] != _NO_AUTOPILOT
 
 
 def is_disarmed_heartbeat(frame: MavlinkFrame) -> bool:

@@ -10,13 +10,14 @@ from bridge.fc.session import TRANSITIONS
 from bridge.fc.states.base import Closed, State
 from bridge.fc.states.cli import Cli
 from bridge.fc.states.frsky import Frsky
-from bridge.fc.states.mavlink import Mavlink
+from bridge.fc.states.harakiri_mavlink import HarakiriMavlink
+from bridge.fc.states.pass_through import PassThrough
 from bridge.fc.states.searching import Searching
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
-from tests.support.fake_controllers import DeafWhileArmed
+from tests.support.fake_controllers import DeafWhileArmed, MavlinkOnly
 from tests.support.world import World
 
-ARMED_IN = {Mavlink: TelemetryProtocol.MAVLINK, Frsky: TelemetryProtocol.FRSKY_9600}
+ARMED_IN = {HarakiriMavlink: TelemetryProtocol.MAVLINK, Frsky: TelemetryProtocol.FRSKY_9600}
 
 
 class BugError(Exception):
@@ -24,6 +25,8 @@ class BugError(Exception):
 
 
 def world_of(state: type[State]) -> World:
+    if state is PassThrough:
+        return World(peer=MavlinkOnly())
     faults = Faults()
     board = DeafWhileArmed(SimOptions(tele_prot=ARMED_IN.get(state, TelemetryProtocol.MSP)), faults)
     world = World(faults=faults, peer=board)

@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from bridge.controllers import other
 from bridge.gcs.station import Peer
 from protocols.mavlink.frame import MavlinkSplitter
+from simulator.naze.board import SimulatedNaze
 from tests.support.fake_controllers import QuietLine
 from tests.support.world import GroundStation, World
 
@@ -204,22 +205,34 @@ def test_damaged_frames_are_dropped_and_intact_ones_kept() -> None:
     assert len(intact) - len(passed) <= 2
 
 
-def test_the_bridge_sends_no_heartbeats_for_a_lost_autopilot() -> None:
-    """They would show a vehicle that is gone."""
-    world, _autopilot, (station, _) = passing()
-    is_passing = world.bridge.is_passing_through
-    assert is_passing
+def test_after_an_autopilot_is_unplugged_the_bridge_represents_its_own_vehicle() -> None:
+    world, autopilot, (station, _) = passing()
     world.unplug()
-    # The search that follows waits for bytes.
-    is_passing = world.bridge.is_passing_through
-    assert not is_passing
+    world.run(5)
+    assert any("Flight controller lost" in text for text in station.texts())
+    assert len(station.messages("HEARTBEAT")) >= 4
     station.take()
-    world.run(10)
-    assert station.messages() == []
+    station.send(mavlink.MAVLink_param_request_list_message(1, 1))
+    station.send(mavlink.MAVLink_mission_count_message(1, 1, 3))
+    world.run(0.5)
+    assert station.messages("PARAM_VALUE")
+    assert [ack.type for ack in station.messages("MISSION_ACK")] == [mavlink.MAV_MISSION_DENIED]
     world.plug()
     world.wait_until(lambda w: w.kind is other.OTHER_MAVLINK, 3)
-    world.run(3)
-    assert station.messages("HEARTBEAT")
+    autopilot.sent.clear()
+    station.frames.clear()
+    world.run(20)
+    assert station.frames == autopilot.sent != []
+
+
+def test_a_board_in_its_command_line_in_place_of_an_autopilot_is_reported() -> None:
+    world, _autopilot, (station, _) = passing()
+    world.unplug()
+    world.naze = SimulatedNaze()
+    world.naze.power_on_booted(world.now)
+    world.naze.receive(b"\r\r\r", world.now)
+    world.plug()
+    world.wait_until(lambda w: any("type exit" in text for text in station.texts()), 20)
 
 
 def test_frames_are_split_as_in_pymavlink() -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import pytest
 
 from bridge.fc.states.cli import Cli
-from bridge.fc.states.mavlink import Mavlink
+from bridge.fc.states.harakiri_mavlink import HarakiriMavlink
 from bridge.fc.states.msp import Identifying, Polling
 from protocols.mission_item import MissionItem, MissionResult
 from simulator.emulated_naze.board import EmulatedNaze
@@ -90,12 +90,12 @@ def test_arming_into_mavlink_on_a_slow_line(image: Image, flash: bytes, figure: 
     world.wait_until(lambda w: w.naze.armed, _STICKS_S)
     at_arming = world.now
     world.wait_until(
-        lambda w: isinstance(w.bridge.session.state, Mavlink) and w.bridge.session.vehicle.armed is True,
+        lambda w: isinstance(w.bridge.session.state, HarakiriMavlink) and w.bridge.session.vehicle.armed is True,
         _FOUND_WITHIN_S,
     )
     found_s = world.now - at_arming
     world.run(_FLIGHT_S)
-    assert isinstance(world.bridge.session.state, Mavlink)
+    assert isinstance(world.bridge.session.state, HarakiriMavlink)
     world.naze.faults.armed = False
     world.wait_until(lambda w: not w.naze.armed, _STICKS_S)
     back_s = world.wait_until(

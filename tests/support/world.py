@@ -23,12 +23,12 @@ from bridge.controllers.multiwii import profile as multiwii
 from bridge.controllers.table import PROFILES
 from bridge.fc.profile import Profile
 from bridge.fc.states.cli import Cli
-from bridge.fc.states.mavlink import Mavlink
+from bridge.fc.states.mavlink import MavlinkLine
 from bridge.fc.states.msp import Polling
 from bridge.fc.states.searching import SPEEDS
 from bridge.gcs.ground import FrameListener
 from bridge.gcs.guard import LinkAccess
-from bridge.gcs.pass_through import MAX_DATAGRAM_SIZE
+from bridge.gcs.routes import MAX_DATAGRAM_SIZE
 from bridge.gcs.station import Peer
 from bridge.line.conversation import Conclude, FindPending, Recall, Save, StoreEffect
 from bridge.model.events import Level
@@ -230,7 +230,7 @@ class World:
 
     @property
     def is_found(self) -> bool:
-        return isinstance(self.bridge.session.state, Polling | Mavlink)
+        return isinstance(self.bridge.session.state, Polling | MavlinkLine)
 
     @property
     def stored(self) -> tuple[WpRecord, ...]:

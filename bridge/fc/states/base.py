@@ -94,6 +94,19 @@ class Port:
     #: Remembers which of several autopilots it follows.
     telemetry: MavlinkTelemetry | None = None
 
+    def mavlink_of(self, frame: MavlinkFrame) -> Spoken:
+        """A Harakiri's MAVLink or another autopilot's.
+
+        A board met over MSP stays in its family unless it sends MAVLink 2; otherwise the sender decides.
+        """
+        if self.autopilot is not Autopilot.AUTO:
+            return Spoken.MAVLINK if self.autopilot is Autopilot.HARAKIRI else Spoken.OTHER_MAVLINK
+        family = self.met_family if frame.version == 1 else None
+        sender = frame.version, *frame.sender
+        ours = (profile for profile in self.profiles if profile.spoken is Spoken.MAVLINK)
+        is_ours = any(profile.family == family or profile.mavlink_sender == sender for profile in ours)
+        return Spoken.MAVLINK if is_ours else Spoken.OTHER_MAVLINK
+
     def meet(self, controller: FlightController) -> None:
         """Begin a new vehicle if this is a different board."""
         if controller.profile.family != self.family:

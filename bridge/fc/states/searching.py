@@ -108,7 +108,8 @@ class Searching(State):
                 self._conclude(Spoken.FRSKY, f"{visit.frsky.values_in_a_row} FrSky values in a row")
             elif visit.heartbeat is not None:
                 sender = f"system {visit.heartbeat.sysid} component {visit.heartbeat.compid}"
-                self._conclude(Spoken.MAVLINK, f"heard {sender}, no answer to {visit.probes} MSP probes")
+                why = f"heard {sender}, no answer to {visit.probes} MSP probes"
+                self._conclude(self.port.mavlink_of(visit.heartbeat), why)
             else:
                 self.speed = next(self._order)
                 self._visit = self._new_visit(now)

@@ -40,7 +40,7 @@ _ONLY_FROM_WRITERS = frozenset(
 )
 
 
-class PassThrough:
+class Routes:
     """The routes while one autopilot is on the port."""
 
     def __init__(self, ground: Ground) -> None:
