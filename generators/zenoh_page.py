@@ -89,7 +89,8 @@ def _type(name: str, field: Json) -> str:
         *others, last = map(str, field["enum"])
         return f"{', '.join(others)} or {last}"
     if "items" in object_schema(field):
-        kind = f"list of {_TYPES[_object_in(field)['type']]}s"
+        each = _type(name, _object_in(field))
+        kind = f"list of {each}" if " or " in each else f"list of {each}s"
         return f"{kind} or null" if _may_be_null(field) else kind
     if "anyOf" in field:
         return " or ".join(_type(name, each) for each in field["anyOf"])

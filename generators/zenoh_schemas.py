@@ -46,8 +46,17 @@ _ITEM_FIELDS: Json = {
     **dict.fromkeys(("lat_e7", "lon_e7"), _PLACE),
     "alt_m": _NUMBER,
 }
-_COUNT: Json = {"type": ["integer", "null"], "minimum": 0, "description": "records, home included; null: not known"}
+_COUNT: Json = {
+    "type": ["integer", "null"],
+    "minimum": 0,
+    "description": "records; on a Harakiri home is one; null: not known",
+}
 _CHECKSUM: Json = {"type": "string", "pattern": "^[0-9a-f]{8}$", "description": "CRC-32 over the records"}
+_SENT_SEQS: Json = {
+    "type": "array",
+    "items": {"type": ["integer", "null"]},
+    "description": "for each stored item, its number as sent; null: inserted",
+}
 _FINDING_FIELDS = {
     "seq": "the item as sent; null: the whole list",
     "field": "of the item, or count",
@@ -62,7 +71,7 @@ _SUMMARY_FIELDS = {
     "verdict": "of the rules",
     "item_count": "as received",
     "finding_count": "without filled-in defaults",
-    "record_count": "for the flight controller, home included",
+    "record_count": "for the flight controller; on a Harakiri home is one",
     "detail": "the reason for the outcome",
 }
 _WHAT = {
@@ -92,6 +101,7 @@ def schemas() -> dict[str, Json]:
         "findings": findings,
         "sent": items | {"description": "as received"},
         "stored": items | {"description": "as the flight controller holds them"},
+        "sent_seqs": _SENT_SEQS,
         "mission": {"type": ["integer", "null"], "description": "its number in the store; null: it is not stored"},
     }
     made = {group.value: _fields(_group(group.value)) for group in Group}
@@ -127,7 +137,7 @@ def schemas() -> dict[str, Json]:
     made["mission_current"] = {
         "count": _COUNT,
         "checksum": _CHECKSUM | {"type": ["string", "null"]},
-        "items": items | {"type": ["array", "null"]},
+        "items": items | {"type": ["array", "null"], "description": "as read back, numbered like that"},
     }
     summary = _described(_fields(MissionSummary), _SUMMARY_FIELDS) | {"checksum": _CHECKSUM}
     for name in ("received_at", "concluded_at"):
@@ -193,7 +203,8 @@ def _reply(upload: Json, items: Json, findings: Json) -> Json:
         {
             "result": {"enum": ["ACCEPTED", "CLEARED", "REJECTED"]},
             "ack": {"type": "string", "pattern": "^MAV_MISSION_"},
-            "items": items,
+            "items": items | {"description": "as they would be read back"},
+            "sent_seqs": _SENT_SEQS,
             "records": {"type": "array", "items": {"type": "string", "pattern": "^([0-9a-f]{2})+$"}},
             "count": {"type": "integer", "minimum": 0, "description": "of the records"},
             "checksum": _CHECKSUM,

@@ -24,7 +24,7 @@ SUMMARY = (
     " concluded_at"
 )
 #: The columns of `mission_contents` that its crc32 covers.
-CONTENTS = ("items", "findings", "stored_items", "roi_commands", "records")
+CONTENTS = ("items", "findings", "stored_items", "roi_commands", "records", "sent_seqs")
 
 # SQLite's auxiliary files of a database. The log holds commits that are not in the main file yet.
 _LOG = "-wal"
@@ -71,13 +71,13 @@ def read_database(path: Path) -> sqlite3.Connection:
     """Open the database read-only, with or without a running daemon; StoreError if that fails."""
     with explained(f"cannot read the mission store {path}"):
         # Neither created nor changed: the file may be another user's.
-        return _configured(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=0.5))
+        return configured(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=0.5))
 
 
 def memory_database() -> sqlite3.Connection:
     """A database of this release's schema that ends with the process."""
     connection = _connect(":memory:")
-    _apply_schema(connection, version=0)
+    migrate(connection)
     return connection
 
 
@@ -99,10 +99,10 @@ def _connect(path: Path | str) -> sqlite3.Connection:
     # connection, not necessarily the one that opened it. Only a tool such as sqlite3 can hold a lock, and a
     # ground station waits for it, so the timeout is short (seconds).
     connection = sqlite3.connect(path, timeout=0.5, isolation_level=None, check_same_thread=False)
-    return _configured(connection)
+    return configured(connection)
 
 
-def _configured(connection: sqlite3.Connection) -> sqlite3.Connection:
+def configured(connection: sqlite3.Connection) -> sqlite3.Connection:
     connection.row_factory = sqlite3.Row
     # A corrupt byte in one text must not hide all the other missions.
     connection.text_factory = lambda raw: raw.decode(errors="replace")
@@ -208,7 +208,7 @@ def _prepare(connection: sqlite3.Connection, path: Path) -> None:
             f"the mission store {path} is from a newer naze-bridge (schema {version}, this one knows "
             f"{latest}); install that release, or move the file away"
         )
-    _apply_schema(connection, version)
+    migrate(connection)
 
 
 def _schema_steps() -> list[str]:
@@ -217,8 +217,9 @@ def _schema_steps() -> list[str]:
     return [file.read_text() for file in sorted(folder.iterdir(), key=lambda file: file.name)]
 
 
-def _apply_schema(connection: sqlite3.Connection, version: int) -> None:
-    """Apply the steps after `version`, each in its own transaction."""
+def migrate(connection: sqlite3.Connection) -> None:
+    """Apply the steps that are missing, each in its own transaction."""
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
     for number, sql in enumerate(_schema_steps()[version:], start=version + 1):
         try:
             connection.executescript(f"BEGIN IMMEDIATE;\n{sql}\nPRAGMA user_version = {number};\nCOMMIT;")

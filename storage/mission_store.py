@@ -31,6 +31,7 @@ BUDGET = 200 << 20
 #: The fraction of the budget that is freed at once, so that not every mission pays for the search.
 _FREED_PART = 50
 _DELETED_AT_ONCE = 20
+_MOST_SENDERS = 16
 _BUDGET_IN_MEMORY = 8 << 20
 
 
@@ -42,7 +43,8 @@ class ReceivedMission:
     "udp 192.168.4.2:14550 sysid 255". items: as sent. verdict: ACCEPTED, CLEARED or REJECTED. ack: the
     MAV_MISSION_ name. stored_items: as the flight controller should hold them. records: the bytes written, of
     `record_count` records. checksum: their CRC-32. roi_commands: the command number that each stored region of
-    interest was sent as, by its seq.
+    interest was sent as, by its seq. sent_seqs: for each stored item, its number as sent, None if it was inserted;
+    empty in missions of older releases.
     """
 
     received_at: float
@@ -56,6 +58,7 @@ class ReceivedMission:
     record_count: int
     checksum: int
     roi_commands: dict[int, int]
+    sent_seqs: list[int | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,9 +116,10 @@ class MissionStore:
         with explained(f"cannot close {self._path}"):
             self._connection.close()
 
-    def add(self, received: ReceivedMission) -> int:
+    def add(self, received: ReceivedMission, sender: str = "") -> int:
         """Store a mission with the outcome PENDING; returns its number, which increases with every mission.
 
+        sender: the ground station that counts the items as in this list, see item_numbers().
         A full store drops others first: rejected and cancelled ones before the rest, verified ones last.
         """
         contents = (
@@ -124,12 +128,13 @@ class MissionStore:
             json.dumps(received.stored_items),
             json.dumps(received.roi_commands),
             received.records,
+            json.dumps(received.sent_seqs),
         )
         with self._transaction("cannot store the mission"):
             self._make_room()
             number = self._connection.execute(
                 "INSERT INTO missions (received_at, source, verdict, ack, item_count, finding_count,"
-                " record_count, checksum, outcome, detail) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, '')",
+                " record_count, checksum, outcome, sender, detail) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, '')",
                 (
                     received.received_at,
                     _text(received.source),
@@ -140,12 +145,13 @@ class MissionStore:
                     received.record_count,
                     received.checksum,
                     PENDING,
+                    _text(sender),
                 ),
             ).lastrowid
             assert number is not None  # an INSERT that did not raise has made a row
             self._connection.execute(
                 "INSERT INTO mission_contents (number, items, findings, stored_items, roi_commands, records,"
-                " crc32) VALUES (?, ?, ?, ?, ?, ?, ?)",
+                " sent_seqs, crc32) VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
                 (number, *contents, contents_crc32(contents)),
             )
             self._seal(number)
@@ -168,7 +174,9 @@ class MissionStore:
         if summary is None:
             return None
         with explained(f"cannot read mission {number} from {self._path}"):
-            row = self._connection.execute("SELECT * FROM mission_contents WHERE number = ?", (number,)).fetchone()
+            columns = ", ".join(CONTENTS)
+            question = f"SELECT {columns}, crc32 FROM mission_contents WHERE number = ?"  # noqa: S608 - constants
+            row = self._connection.execute(question, (number,)).fetchone()
         if row is None or contents_crc32(row[column] for column in CONTENTS) != row["crc32"]:
             raise self._damaged(number)
         received = ReceivedMission(
@@ -183,6 +191,7 @@ class MissionStore:
             record_count=summary.record_count,
             checksum=summary.checksum,
             roi_commands={int(seq): command for seq, command in json.loads(row["roi_commands"]).items()},
+            sent_seqs=json.loads(row["sent_seqs"] or "[]"),
         )
         return StoredMission(number, received, summary.outcome, summary.detail, summary.concluded_at)
 
@@ -195,6 +204,25 @@ class MissionStore:
                 (count, checksum),
             ).fetchone()
         return None if row[0] is None else self.get(row[0])
+
+    def item_numbers(self, count: int, checksum: int) -> dict[str, builtins.list[int | None]]:
+        """The sent_seqs of the stations that sent these records and have not read them back, by their add(sender)."""
+        with explained(f"cannot search {self._path}"):
+            rows = self._connection.execute(
+                f"SELECT sender, max(number) FROM missions WHERE record_count = ? AND checksum = ?"  # noqa: S608
+                f" AND outcome = '{VERIFIED}' AND sender != '' GROUP BY sender ORDER BY 2 DESC LIMIT {_MOST_SENDERS}",
+                (count, checksum),
+            ).fetchall()
+        found = {sender: self.get(number) for sender, number in rows}
+        return {sender: mission.received.sent_seqs for sender, mission in found.items() if mission is not None}
+
+    def note_reader(self, count: int, checksum: int, sender: str) -> None:
+        """The sender of these records has read them back, and counts the items as read."""
+        with self._transaction("cannot store a reading"):
+            self._connection.execute(
+                "UPDATE missions SET sender = '' WHERE record_count = ? AND checksum = ? AND sender = ?",
+                (count, checksum, _text(sender)),
+            )
 
     def pending(self) -> builtins.list[MissionSummary]:
         """The missions without a conclusion, oldest first."""

@@ -11,7 +11,7 @@ from contextlib import closing, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from storage.database import CONTENTS, SUMMARY, contents_crc32, row_crc32
+from storage.database import CONTENTS, SUMMARY, configured, contents_crc32, migrate, row_crc32
 from storage.store_error import FAILURES
 
 #: A damaged table may claim any number; a store within its budget holds fewer.
@@ -37,8 +37,11 @@ def salvage(damaged: Path, store: sqlite3.Connection) -> int:
 
 def _copy_missions(path: Path, store: sqlite3.Connection) -> int:
     copied = 0
-    with closing(sqlite3.connect(path, isolation_level=None)) as source:
+    with closing(configured(sqlite3.connect(path, isolation_level=None))) as source:
         source.text_factory = lambda raw: raw.decode(errors="surrogateescape")
+        source.row_factory = None
+        with suppress(*FAILURES):  # the file may be of an older release
+            migrate(source)
         store.execute("BEGIN IMMEDIATE")
         try:
             for number in range(1, _last_number(source) + 1):
@@ -75,8 +78,8 @@ def _copy_mission(number: int, source: sqlite3.Connection, store: sqlite3.Connec
     store.execute("SAVEPOINT mission")
     try:
         # STRICT tables reject values of the wrong type.
-        _insert(store, "missions", (*summary, row_crc))
-        _insert(store, "mission_contents", (number, *contents, crc32))
+        _insert(store, f"missions ({SUMMARY}, crc32)", (*summary, row_crc))
+        _insert(store, f"mission_contents (number, {', '.join(CONTENTS)}, crc32)", (number, *contents, crc32))
     except FAILURES:
         store.execute("ROLLBACK TO mission")
         return 0

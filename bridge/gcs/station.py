@@ -35,6 +35,11 @@ class Station(NamedTuple):
     sysid: int
     compid: int
 
+    @property
+    def identity(self) -> str:
+        """The same after a restart of either side, and after a TCP reconnection, which changes the port."""
+        return f"{self.peer.host} sysid {self.sysid} compid {self.compid}"
+
     def __str__(self) -> str:
         return f"{self.peer} sysid {self.sysid} compid {self.compid}"
 

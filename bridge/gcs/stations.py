@@ -236,6 +236,11 @@ class Stations:
     def peers(self) -> list[Peer]:
         return list(self._known)
 
+    def at(self, peer: Peer) -> list[Station]:
+        """The stations heard from a peer; several behind a radio or a router."""
+        known = self._known.get(peer)
+        return [] if known is None else [Station(peer, *speaker) for speaker in known.speakers]
+
     def is_listener(self, peer: Peer) -> bool:
         """True if a connected peer may only read."""
         known = self._known.get(peer)

@@ -6,11 +6,11 @@ A conversation is a generator. It yields one effect at a time and is sent the ef
 subclasses Stopped when the bridge is stopping and OutOfTime when the conversation's time limit has passed.
 """
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
-from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission
+from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission, RecalledMission
 from protocols.mavlink.codec import Packed
 from protocols.mission_record import ListIdentity
 from protocols.msp.commands import Msp
@@ -98,9 +98,17 @@ class Conclude:
 
 @dataclass(frozen=True, slots=True)
 class Recall:
-    """Look up the commands that a stored list was sent with. Answer: record number -> MAV_CMD, where they differ."""
+    """Look up a list that was verified before. Answer: a RecalledMission; None: there was none."""
 
     identity: ListIdentity
+
+
+@dataclass(frozen=True, slots=True)
+class NoteReader:
+    """A ground station has read the list `identity` back. `reader`: its Station.identity. Answer: None."""
+
+    identity: ListIdentity
+    reader: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,8 +116,8 @@ class FindPending:
     """Look up missions that were never concluded. Answer: a sequence of PendingMission."""
 
 
-Effect = TimeLimit | Send | Receive | Transmit | Await | Pause | Save | Conclude | Recall | FindPending
-StoreEffect = Save | Conclude | Recall | FindPending
+Effect = TimeLimit | Send | Receive | Transmit | Await | Pause | Save | Conclude | Recall | NoteReader | FindPending
+StoreEffect = Save | Conclude | Recall | NoteReader | FindPending
 
 _MAX_ASKS = 5
 
@@ -180,10 +188,15 @@ def conclude(number: int, outcome: Outcome, detail: str) -> Conversation[bool]:
     return bool(done)
 
 
-def recall(identity: ListIdentity) -> Conversation[Mapping[int, int] | None]:
-    """The commands that ambiguous records were sent with, by record number; None: no such list was ever verified."""
-    commands: Mapping[int, int] | None = yield Recall(identity)
-    return commands
+def recall(identity: ListIdentity) -> Conversation[RecalledMission | None]:
+    """A list that was verified before; None: there was none."""
+    mission: RecalledMission | None = yield Recall(identity)
+    return mission
+
+
+def note_reader(identity: ListIdentity, reader: str) -> Conversation[None]:
+    """Store that a ground station has read the list back: from now on it counts the items as read."""
+    yield NoteReader(identity, reader)
 
 
 def find_pending() -> Conversation[Sequence[PendingMission]]:

@@ -13,6 +13,7 @@ from bridge.line.conversation import (
     Conversation,
     FindPending,
     LinkLost,
+    NoteReader,
     OutOfTime,
     Pause,
     Recall,
@@ -196,7 +197,7 @@ class Runner:
                         continue
                     case Pause(seconds):
                         deadline = now + seconds
-                    case Save() | Conclude() | Recall() | FindPending():
+                    case Save() | Conclude() | Recall() | NoteReader() | FindPending():
                         self.store_effects.append(effect)
                         deadline = now + _STORE_TIMEOUT_S
                 self._awaited = effect

@@ -4,13 +4,13 @@
 Ground stations (bridge.vehicle.mission_upload, mission_download) and the command line (local_missions) both use it.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from math import inf
 from typing import Any, TypeVar
 
-from bridge.line.conversation import Conversation, LinkLost, Pause, Stopped, conclude, recall, save
+from bridge.line.conversation import Conversation, LinkLost, Pause, Stopped, conclude, note_reader, recall, save
 from bridge.line.runner import Runner
 from bridge.missions.fc_mission_store import (
     LIST_IS_GONE,
@@ -24,10 +24,10 @@ from bridge.missions.fc_mission_store import (
 )
 from bridge.missions.list_check import check_list
 from bridge.missions.mission_texts import summary
-from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission
+from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission, RecalledMission
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.vehicle import Vehicle
-from bridge.model.verdict import Result, Verdict
+from bridge.model.verdict import Result, SentSeqs, Verdict, is_renumbered
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.mission_record import ListIdentity, identify
 
@@ -72,13 +72,20 @@ class DeliveryResult:
 
 @dataclass(frozen=True, slots=True)
 class HeldMission:
-    """The flight controller's list, as last read."""
+    """The flight controller's list, as last read.
+
+    `sent_seqs`: the item numbers of each ground station that sent this list and has not read it since, by
+    Station.identity; only of those that count otherwise than `items`.
+    """
 
     identity: ListIdentity
     records: tuple[Any, ...]
     items: tuple[MissionItem, ...]
+    sent_seqs: Mapping[str, SentSeqs] = field(default_factory=dict)
 
 
+#: Ground stations whose own item numbers are remembered.
+_MOST_SENDERS = 16
 _ERASED_SOURCE = "copy from the flight controller"
 _ERASED = "erased there to make room; `naze-bridge missions restore` writes it again"
 _NO_COPY = "Nothing written: a mission that does not fit next to it could not be copied to the Pi"
@@ -242,7 +249,7 @@ class MissionService:
         result = yield from self._push(fc_store, arrived, progress)
         if result.failure is not None:
             return (yield from self._not_written(result.failure, pending))
-        self.held = HeldMission(identify(verdict.records), verdict.records, verdict.items)
+        self.held = self._held_now(arrived)
         lossy = summary(len(arrived.items), verdict)
         text = lossy or _verified_text(verdict, unchanged=result.unchanged)
         delivery = yield from self._conclude(number, Outcome.VERIFIED, MissionResult.ACCEPTED, text)
@@ -251,6 +258,25 @@ class MissionService:
         is_erased = verdict.result is Result.CLEARED
         change = "Mission erased" if is_erased else f"New mission, {len(verdict.items)} items"
         return replace(delivery, is_lossy=lossy is not None or is_erased, change=change)
+
+    def _held_now(self, arrived: ArrivedMission) -> HeldMission:
+        """The list that was just written."""
+        verdict = arrived.verdict
+        identity, before = identify(verdict.records), self.held
+        sent_seqs = {} if before is None or before.identity != identity else {**before.sent_seqs}
+        sent_seqs.pop(arrived.sender, None)
+        if arrived.sender and is_renumbered(verdict.sent_seqs):
+            sent_seqs[arrived.sender] = verdict.sent_seqs
+        newest = dict([*sent_seqs.items()][-_MOST_SENDERS:])
+        return HeldMission(identity, verdict.records, verdict.items, newest)
+
+    def note_reader(self, reader: str, now: float) -> None:
+        """A ground station (its Station.identity) has read the list: from now on it counts the items as read."""
+        if self.held is not None and reader in self.held.sent_seqs:
+            others = {sender: seqs for sender, seqs in self.held.sent_seqs.items() if sender != reader}
+            self.held = replace(self.held, sent_seqs=others)
+            noted = note_reader(self.held.identity, reader)
+            self.runner.start(noted, lambda _result, _at: None, now, in_background=True)
 
     def _not_written(self, failure: PushFailure, mission: PendingMission) -> Conversation[DeliveryResult]:
         """Store the failure, unless only reading the list will show the outcome."""
@@ -304,8 +330,9 @@ class MissionService:
         identity = identify(records)
         if self.held is not None and self.held.identity == identity:
             return self._refreshed(fc_store, self.held)
-        sent_as = yield from recall(identity)
-        held = HeldMission(identity, records, fc_store.items(records, sent_as or {}))
+        known = (yield from recall(identity)) or RecalledMission()
+        sent_seqs = {sender: seqs for sender, seqs in known.sent_seqs.items() if is_renumbered(seqs)}
+        held = HeldMission(identity, records, fc_store.items(records, known.sent_as), sent_seqs)
         if fc_store is self.fc_store:
             # By the time the store answers, another flight controller may be connected.
             self.held = held

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The stored record of a received mission."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
-from bridge.model.verdict import Verdict
+from bridge.model.verdict import SentSeqs, Verdict
 from protocols.mission_item import MissionItem
 from protocols.mission_record import ListIdentity
 
@@ -22,11 +23,27 @@ class Outcome(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ArrivedMission:
-    """A mission as received: its sender, the items as sent, and the verdict."""
+    """A mission as received: its source as text, the items as sent, and the verdict.
+
+    `sender`: Station.identity of the ground station; empty for other sources.
+    """
 
     source: str
     items: tuple[MissionItem, ...]
     verdict: Verdict[Any]
+    sender: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class RecalledMission:
+    """What the store knows about a list that was verified before.
+
+    `sent_as`: the commands that ambiguous records were sent with, by record number. `sent_seqs`: the item numbers of
+    each ground station that sent it and has not read it back since, by Station.identity.
+    """
+
+    sent_as: Mapping[int, int] = field(default_factory=dict)
+    sent_seqs: Mapping[str, SentSeqs] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

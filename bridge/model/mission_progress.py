@@ -4,6 +4,7 @@
 from dataclasses import dataclass
 from enum import Enum
 
+from bridge.model.verdict import SentSeqs
 from protocols.mission_item import MissionItem
 from protocols.msp.nav import FINISHED, LEGS, NavAction, NavMode, NavState, NavStatus
 
@@ -32,6 +33,11 @@ class FlownMission:
     items: tuple[MissionItem, ...] = ()
     seq: int = 0
     progress: Progress = Progress.UNKNOWN
+
+    def counted(self, sent_seqs: SentSeqs) -> tuple[int, int]:
+        """The current and the last item's number: as sent, or as read back if `sent_seqs` is empty."""
+        last = max(len(self.items) - 1, 0)
+        return (sent_seqs[self.seq] or 0, sent_seqs[last] or 0) if sent_seqs else (self.seq, last)
 
 
 class MissionProgress:

@@ -10,6 +10,8 @@ from bridge.model.finding import Finding, RejectingFinding
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.mission_record import MissionRecord
 
+#: Item numbers of a list as sent, by its item numbers as read back; None: not sent.
+SentSeqs = tuple[int | None, ...]
 RecordT = TypeVar("RecordT", bound=MissionRecord)
 
 
@@ -27,7 +29,8 @@ class Verdict(Generic[RecordT]):
 
     `records` is the list for the flight controller, `items` the same as read back; both empty unless ACCEPTED.
     `sent_as` maps a record's place to the MAV_CMD that it was sent as, where the record is ambiguous (a region of
-    interest). `findings` are in the order of the list; that of a rejection is the last.
+    interest). `sent_seqs` has, for each of `items`, the number of the item as sent; None: a speed change that was
+    inserted. `findings` are in the order of the list; that of a rejection is the last.
     """
 
     result: Result
@@ -36,6 +39,12 @@ class Verdict(Generic[RecordT]):
     items: tuple[MissionItem, ...] = ()
     findings: tuple[Finding, ...] = ()
     sent_as: Mapping[int, int] = field(default_factory=dict)
+    sent_seqs: SentSeqs = ()
+
+
+def is_renumbered(sent_seqs: SentSeqs) -> bool:
+    """True if an item of the list as read back has another number than it was sent with."""
+    return sent_seqs != tuple(range(len(sent_seqs)))
 
 
 #: The verdict on a list without items.

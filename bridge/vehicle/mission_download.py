@@ -74,7 +74,7 @@ class MissionDownloads:
                 self._ground.refuse(station, _ARMED)
         elif snapshot is not None and now < snapshot.until and snapshot.fc_store is self._missions.fc_store:
             snapshot.until = now + _READING_S
-            self._answer(question, snapshot.items)
+            self._answer(question, snapshot.items, now)
         else:
             self._ask(question, now)
 
@@ -112,9 +112,9 @@ class MissionDownloads:
             self._snapshots[question.station] = _Snapshot(held.items, now + _READING_S, self._missions.fc_store)
             if len(self._snapshots) > _MAX_READERS:
                 del self._snapshots[next(iter(self._snapshots))]
-            self._answer(question, held.items)
+            self._answer(question, held.items, now)
 
-    def _answer(self, question: _Question, items: tuple[MissionItem, ...]) -> None:
+    def _answer(self, question: _Question, items: tuple[MissionItem, ...], now: float) -> None:
         station = question.station
         if question.seq is None:
             # DroneKit takes home from a download, and waits forever without one: so an empty list has home if known.
@@ -122,6 +122,8 @@ class MissionDownloads:
             self._ground.to(station, messages.MAVLink_mission_count_message(station.sysid, station.compid, count))
         elif question.seq < len(items):
             self._send_item(question, items[question.seq])
+            if question.seq == len(items) - 1:
+                self._missions.note_reader(station.identity, now)
         elif question.seq == 0:
             self._send_item(question, self._home_item())
         else:

@@ -341,7 +341,7 @@ class MissionUploads:
     def _delivery(self, upload: Upload, judged: Judged) -> Conversation[DeliveryResult]:
         """Store the list and write it; a rejected one is only stored, unless its sender sent too many of them."""
         is_kept = judged.verdict.result is not Result.REJECTED or self._ground.allows(upload.station, Cost.STORED)
-        arrived = ArrivedMission(str(upload.station), judged.items, judged.verdict)
+        arrived = ArrivedMission(str(upload.station), judged.items, judged.verdict, upload.station.identity)
         return self._missions.deliver(arrived, is_kept=is_kept)
 
     def _delivered(self, upload: Upload, verdict: Verdict[Any], delivery: DeliveryResult | Refusal, now: float) -> None:

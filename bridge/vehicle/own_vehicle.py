@@ -18,6 +18,7 @@ from bridge.missions.mission_service import MissionService
 from bridge.model.flight_mode import FlightMode
 from bridge.model.mission_progress import FlownMission, MissionProgress, Progress
 from bridge.model.vehicle import STALE_S, FlightState, Health, Home, MissionLeg, Readiness, Reading
+from bridge.model.verdict import SentSeqs
 from bridge.vehicle import vehicle_messages as make
 from bridge.vehicle.link_announcer import LinkAnnouncer
 from bridge.vehicle.telemetry_table import NO_STREAM, TELEMETRY, Row
@@ -147,7 +148,9 @@ class OwnVehicle:
         at: Moment | None = None
         for row in rows:
             peers = self._rates.take_due(row.msgid, everyone, self._now)
-            if peers:
+            if peers and row.msgid == messages.MAVLINK_MSG_ID_MISSION_CURRENT:
+                self._send_current(peers)
+            elif peers:
                 at = at or self._moment()
                 for message in at.made(row.makers):
                     self._ground.multicast(pack(message), peers)
@@ -172,7 +175,7 @@ class OwnVehicle:
         elif msgid == messages.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
             made = [make.autopilot_version(self._session.vehicle)]
         elif (row := _ROWS.get(msgid)) is not None:
-            made = self._moment().made(row.makers)
+            made = self._moment(self._sent_seqs(station.peer)).made(row.makers)
         else:
             return None
         for message in made:
@@ -234,9 +237,10 @@ class OwnVehicle:
         polls.want(wanted)
         self._stale_s = {} if self._session.state.link is None else _stale_ages_s(polls.line_interval_s)
 
-    def _moment(self) -> Moment:
+    def _moment(self, sent_seqs: SentSeqs = ()) -> Moment:
         boot_ms = int((self._now - self._started_at) * 1000) & 0xFFFFFFFF
-        return Moment(self._session.vehicle, self._now, boot_ms, self._stale_s, self._flown_mission, self._unix_time_s)
+        mission = self._flown_mission
+        return Moment(self._session.vehicle, self._now, boot_ms, self._stale_s, mission, self._unix_time_s, sent_seqs)
 
     def _flown_mission(self) -> FlownMission:
         held = self._missions.held
@@ -266,11 +270,36 @@ class OwnVehicle:
         leg = self._session.vehicle.last(MissionLeg)
         before = self._progress.number, self._progress.progress
         reached = None if leg is None else self._progress.take(leg.status)
+        everyone = self._ground.everyone()
         if before != (self._progress.number, self._progress.progress):
-            self._ground.broadcast(make.mission_current(self._moment()))
+            self._send_current(everyone)
         seq = self._missions.seq_of(reached or 0)
         if seq:
-            self._ground.broadcast(make.mission_item_reached(seq))
+            for sent_seqs, peers in self._by_item_numbers(everyone):
+                number = (sent_seqs[seq] or 0) if sent_seqs else seq
+                self._ground.multicast(pack(make.mission_item_reached(number)), peers)
+
+    def _send_current(self, receivers: Sequence[Peer]) -> None:
+        for sent_seqs, peers in self._by_item_numbers(receivers):
+            self._ground.multicast(pack(make.mission_current(self._moment(sent_seqs))), peers)
+
+    def _by_item_numbers(self, peers: Sequence[Peer]) -> Iterable[tuple[SentSeqs, Sequence[Peer]]]:
+        """The peers that count the items alike; () stands for the numbers of the list as read back."""
+        held = self._missions.held
+        if held is None or not held.sent_seqs:
+            return [((), peers)]
+        alike: dict[SentSeqs, list[Peer]] = {}
+        for peer in peers:
+            alike.setdefault(self._sent_seqs(peer), []).append(peer)
+        return alike.items()
+
+    def _sent_seqs(self, peer: Peer) -> SentSeqs:
+        """The item numbers of a peer that sent the list and has not read it since; else ()."""
+        held = self._missions.held
+        if held is None or not held.sent_seqs:
+            return ()
+        known = (held.sent_seqs.get(station.identity) for station in self._ground.stations.at(peer))
+        return next(filter(None, known), ())
 
     def _tell_readiness(self) -> None:
         """Report the arming blockers whenever they change, except in flight."""

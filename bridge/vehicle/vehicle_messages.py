@@ -35,6 +35,7 @@ from bridge.model.vehicle import (
     Sticks,
     Vehicle,
 )
+from bridge.model.verdict import SentSeqs
 from protocols.mavlink import mode_messages
 from protocols.mavlink.codec import pack_payload
 from protocols.mavlink.dialect import Message, messages
@@ -112,7 +113,8 @@ def known(value: T | None) -> T:
 class Moment:
     """The vehicle at one moment. now: monotonic s. stale_s: ages at which readings are unknown, if not STALE_S.
 
-    unix_time_s: the Pi's clock at a monotonic time, None if it is not set.
+    unix_time_s: the Pi's clock at a monotonic time, None if it is not set. sent_seqs: the item numbers of the receiver,
+    if they are not those of the list as read back.
     """
 
     vehicle: Vehicle
@@ -121,6 +123,7 @@ class Moment:
     stale_s: Mapping[type[Reading], float] = field(default_factory=dict)
     mission: Callable[[], FlownMission] = FlownMission
     unix_time_s: Callable[[float], float | None] = lambda _now: None
+    sent_seqs: SentSeqs = ()
 
     def fresh(self, kind: type[ReadingT]) -> ReadingT | None:
         """The latest reading of a kind, unless it is stale."""
@@ -223,8 +226,9 @@ def autopilot_version(vehicle: Vehicle) -> Message:
 def mission_current(at: Moment) -> Message:
     """MISSION_CURRENT: `total` is 0 while the list is unknown."""
     mission = at.mission()
-    total = _NO_MISSION if mission.progress is Progress.NO_MISSION else max(len(mission.items) - 1, 0)
-    return messages.MAVLink_mission_current_message(mission.seq, total, mission.progress.value, 0)
+    seq, last = mission.counted(at.sent_seqs)
+    total = _NO_MISSION if mission.progress is Progress.NO_MISSION else last
+    return messages.MAVLink_mission_current_message(seq, total, mission.progress.value, 0)
 
 
 def mission_item_reached(seq: int) -> Message:

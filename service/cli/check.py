@@ -143,7 +143,7 @@ def _check_file(path: Path, rules: MissionRules, home: tuple[int, int] | None, s
 def _print_verdict(name: str, sent: Sequence[MissionItem], verdict: Verdict[Any]) -> None:
     click.secho(name, bold=True)
     if verdict.ack is not MissionResult.NO_SPACE:
-        print_table(mission_table(sent, verdict.items, verdict.findings))
+        print_table(mission_table(sent, verdict.items, verdict.findings, verdict.sent_seqs))
     say(f"{verdict.result.name}: {_summary(len(sent), verdict)}\n")
 
 

@@ -69,7 +69,7 @@ def _show(items: list[MissionItem], file: Path, port: int, state_dir: Path) -> N
         received = _latest_mission(state_dir)
         held = client.read()
     findings = mission_findings(received["findings"])
-    print_table(mission_table(items, held, findings))
+    print_table(mission_table(items, held, findings, received["sent_seqs"]))
     if result is not MissionResult.ACCEPTED:
         raise ClientError(f"the mission was not accepted: {'; '.join(client.texts)}")
     if held != mission_items(received["stored_items"]):

@@ -112,7 +112,7 @@ def show_delivery(delivery: Json, *, as_json: bool) -> None:
         if delivery.get("sent") and delivery["ack"] != _NO_SPACE:
             sent, stored = (mission_items(delivery[key]) for key in ("sent", "stored"))
             findings = mission_findings(delivery["findings"])
-            print_table(mission_table(sent, stored, findings))
+            print_table(mission_table(sent, stored, findings, delivery["sent_seqs"]))
         say(f"{delivery['ack'].removeprefix('MAV_MISSION_')}: {delivery['text']}")
     if _would_erase(delivery):
         raise SystemExit(_WOULD_ERASE)

@@ -22,14 +22,19 @@ _LONGEST_STORED = len("RETURN_TO_LAUNCH")
 _LONGEST_PAIR = 8
 
 
-def mission_table(sent: Sequence[MissionItem], stored: Sequence[MissionItem], findings: Sequence[Finding]) -> Table:
-    """One row per item sent, with "sent->stored" for each changed value or item number.
+def mission_table(
+    sent: Sequence[MissionItem],
+    stored: Sequence[MissionItem],
+    findings: Sequence[Finding],
+    sent_seqs: Sequence[int | None] = (),
+) -> Table:
+    """One row per item sent, with "sent->stored" for each changed value or item number, and one per inserted item.
 
     `stored` is the list as it reads back, empty for a rejected or cleared one; `findings` name the items missing in it,
-    and are printed below the table with their reasons, except filled-in defaults.
+    and are printed below the table with their reasons, except filled-in defaults. `sent_seqs`: see Verdict.
     """
     reasons = "".join(f"\n{finding.text()}" for finding in without_defaults(findings))
-    return rows_table(sent_and_stored(sent, stored, findings), reasons)
+    return rows_table(sent_and_stored(sent, stored, findings, sent_seqs), reasons)
 
 
 def rows_table(rows: Iterable[ItemRow], caption: str) -> Table:

@@ -68,7 +68,8 @@ def show(number: int, state_dir: Path | None, as_json: bool) -> None:
         return
     received = mission["received"]
     findings = mission_findings(received["findings"])
-    print_table(mission_table(mission_items(received["items"]), mission_items(received["stored_items"]), findings))
+    sent, stored = mission_items(received["items"]), mission_items(received["stored_items"])
+    print_table(mission_table(sent, stored, findings, received["sent_seqs"]))
     click.echo(f"{_local_time(received['received_at'])} from {received['source']}")
     say(f"{received['verdict']} ({received['ack']}), {mission['outcome']}: {mission['detail']}")
 

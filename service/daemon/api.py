@@ -150,6 +150,7 @@ def delivery_data(outcome: DeliveryResult | Refusal, arrived: ArrivedMission | N
             "verdict": arrived.verdict.result.name,
             "sent": as_dicts(arrived.items),
             "stored": as_dicts(arrived.verdict.items),
+            "sent_seqs": list(arrived.verdict.sent_seqs),
             "findings": as_dicts(arrived.verdict.findings),
             "mission": outcome.number if isinstance(outcome, DeliveryResult) else None,
         }

@@ -57,6 +57,7 @@ def verdict_data(verdict: Verdict[Any]) -> Json:
         "result": verdict.result.name,
         "ack": f"MAV_MISSION_{verdict.ack.name}",
         "items": [asdict(item) for item in verdict.items],
+        "sent_seqs": list(verdict.sent_seqs),
         "records": [record.pack().hex() for record in verdict.records],
         "count": identity.count,
         "checksum": f"{identity.checksum:08x}",

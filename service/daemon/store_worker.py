@@ -3,7 +3,7 @@
 
 import asyncio
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -11,8 +11,8 @@ from typing import Any, TypeVar
 
 import structlog
 
-from bridge.line.conversation import Conclude, FindPending, Recall, Save, StoreEffect
-from bridge.model.mission_log import ArrivedMission, PendingMission
+from bridge.line.conversation import Conclude, FindPending, NoteReader, Recall, Save, StoreEffect
+from bridge.model.mission_log import ArrivedMission, PendingMission, RecalledMission
 from protocols.mission_record import ListIdentity, identify, pack_records
 from service.machine.threads import BackgroundThread, post
 from storage.mission_store import MissionStore, ReceivedMission, open_store, store_in_memory
@@ -86,20 +86,25 @@ class StoreWorker:
             self._store.close()
 
     def _do(self, effect: StoreEffect) -> object:
-        nothing: object = {} if isinstance(effect, Recall) else None
+        nothing: object = RecalledMission() if isinstance(effect, Recall) else None
         if self._store is None:
             return nothing
         try:
             match effect:
                 case Save(mission):
-                    return self._store.add(_received(mission))
+                    return self._store.add(_received(mission), mission.sender)
                 case Conclude(number, outcome, detail):
                     self._store.conclude(number, outcome.value, detail, time.time())
                     return True
                 case Recall(identity):
                     found = self._store.latest_verified(identity.count, identity.checksum)
-                    sent_as: Mapping[int, int] | None = None if found is None else found.received.roi_commands
-                    return sent_as
+                    if found is None:
+                        return None
+                    numbers = self._store.item_numbers(identity.count, identity.checksum)
+                    sent_seqs = {sender: tuple(seqs) for sender, seqs in numbers.items()}
+                    return RecalledMission(found.received.roi_commands, sent_seqs)
+                case NoteReader(identity, reader):
+                    self._store.note_reader(identity.count, identity.checksum, reader)
                 case FindPending():
                     return [
                         PendingMission(
@@ -130,6 +135,7 @@ def _received(mission: ArrivedMission) -> ReceivedMission:
         record_count=identity.count,
         checksum=identity.checksum,
         roi_commands=dict(verdict.sent_as),
+        sent_seqs=list(verdict.sent_seqs),
     )
 
 

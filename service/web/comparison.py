@@ -49,7 +49,7 @@ def stored_mission(mission: Json) -> Json:
         "detail": mission["detail"],
         "checksum": received["checksum"],
         "findings": [finding.text() for finding in without_defaults(findings)[:MAX_ROWS]],
-        "rows": [row.to_json() for row in sent_and_stored(sent[:MAX_ROWS], stored, findings)],
+        "rows": [row.to_json() for row in sent_and_stored(sent[:MAX_ROWS], stored, findings, received["sent_seqs"])],
         "rows_left_out": max(len(sent) - MAX_ROWS, 0),
         "items": [shown(item) for item in (stored or sent)[:MAX_ROWS]],
     }
@@ -62,33 +62,46 @@ def checked_mission(items: Sequence[MissionItem], verdict: Json) -> Json:
     return {
         "verdict": verdict["result"],
         "findings": [finding.text() for finding in without_defaults(findings)],
-        "rows": [row.to_json() for row in sent_and_stored(items, stored, findings)],
+        "rows": [row.to_json() for row in sent_and_stored(items, stored, findings, verdict["sent_seqs"])],
         "rows_left_out": 0,
         "items": [shown(item) for item in (stored or items)],
     }
 
 
 def sent_and_stored(
-    sent: Sequence[MissionItem], stored: Sequence[MissionItem], findings: Sequence[Finding]
+    sent: Sequence[MissionItem],
+    stored: Sequence[MissionItem],
+    findings: Sequence[Finding],
+    sent_seqs: Sequence[int | None] = (),
 ) -> list[ItemRow]:
-    """One row per item sent. `stored`: empty for a list that was rejected or cleared.
+    """One row per item sent, and one per inserted item. `stored`: empty for a list that was rejected or cleared.
 
+    `sent_seqs`: the number as sent of each stored item. Missions of older releases lack them: taken to be in order.
     A row with no change but filled-in defaults is "same"; its `changes` still hold their reasons.
     """
     dropped = {finding.seq: finding.why for finding in findings if finding.becomes == DROPPED}
     rejected = {finding.seq: finding.why for finding in findings if finding.becomes == REJECTED}
     reasons = {(finding.seq, finding.field): finding.why for finding in findings}
     changed = {finding.seq for finding in without_defaults(findings)}
-    left = iter(stored)
+    numbers = sent_seqs or [seq for seq in range(len(sent)) if seq not in dropped]
+    held_of: dict[int, MissionItem] = {}
+    inserted_before: dict[int | None, MissionItem] = {}
+    for held, number, following in zip(stored, numbers, [*numbers[1:], None], strict=False):
+        if number is None:
+            inserted_before[following] = held
+        else:
+            held_of[number] = held
     rows = []
     for seq, item in enumerate(sent):  # findings use the place in the list, not the item's seq
+        if inserted := inserted_before.get(seq):
+            rows.append(ItemRow("added", None, inserted, {}))
         if seq in dropped:
             rows.append(ItemRow("dropped", item, None, {"command": dropped[seq]}))
         elif seq in rejected:
             rows.append(ItemRow("rejected", item, None, {"command": rejected[seq]}))
-        elif (held := next(left, None)) is not None:
+        elif seq in held_of:
             changes = {name: why for name in _VALUES if (why := reasons.get((seq, name)))}
-            rows.append(ItemRow("changed" if seq in changed else "same", item, held, changes))
+            rows.append(ItemRow("changed" if seq in changed else "same", item, held_of[seq], changes))
         else:
             rows.append(ItemRow("same", item, None, {}))
     return rows

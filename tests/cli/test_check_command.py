@@ -79,7 +79,7 @@ def test_strict_treats_changes_as_rejection(files: dict[str, Path]) -> None:
 def test_json_has_one_object_per_file_with_the_documented_keys(files: dict[str, Path]) -> None:
     result = run("--json", FIELD, files["rejected"], files["cleared"], files["missing"])
     accepted, rejected, cleared, missing = objects(result)
-    keys = ["file", "result", "ack", "items", "records", "count", "checksum", "findings"]
+    keys = ["file", "result", "ack", "items", "sent_seqs", "records", "count", "checksum", "findings"]
     assert list(accepted) == list(rejected) == list(cleared) == keys
     assert (accepted["file"], accepted["result"], accepted["ack"]) == (str(FIELD), "ACCEPTED", "MAV_MISSION_ACCEPTED")
     assert (rejected["result"], rejected["ack"]) == ("REJECTED", "MAV_MISSION_INVALID")
@@ -125,6 +125,28 @@ def test_a_person_sees_sent_and_stored_values_with_reasons() -> None:
         assert words in output
     assert "WP 1: Alt changed from 20 to 15 m (take-off 2..15 m)" in output
     assert "ACCEPTED: 13 of 14 items stored, 1 dropped, values changed: 6; 13 records, checksum " in output
+
+
+def test_items_keep_their_partners_where_numbers_differ(tmp_path: Path) -> None:
+    """INAV drops a TAKEOFF, shows a speed just before its leg, and inserts one where a jump changes the speed."""
+    path = tmp_path / "speeds.waypoints"
+    commands = [(22, 0.0, 0.0), (178, 1.0, 5.0), (201, 0.0, 0.0), (16, 0.0, 0.0), (178, 1.0, 8.0), (16, 0.0, 0.0)]
+    commands += [(16, 0.0, 0.0), (177, 4.0, 1.0)]
+    places = [replace(POINT, lat_e7=POINT.lat_e7 + 1000 * seq) for seq in range(8)]  # type: ignore[operator]
+    sent = [HOME, *(replace(p, command=c, p1=p1, p2=p2) for p, (c, p1, p2) in zip(places, commands, strict=True))]
+    path.write_text(write_qgc_wpl(sent))
+    (document,) = objects(run("--json", "--kind", "inav", path))
+    assert [item["command"] for item in document["items"]] == [16, 201, 178, 16, 178, 16, 16, 177]
+    assert document["sent_seqs"] == [0, 3, 2, 4, 5, 6, 7, 8]
+    rows = run("--kind", "inav", path).stdout.splitlines()
+    for words in (["1->-", "TAKEOFF"], ["2", "DO_CHANGE_SPEED"], ["3->1", "DO_SET_ROI"], ["4->3", "WAYPOINT"]):
+        assert any(row.split()[:2] == words for row in rows), words
+    commands = [(16, 0.0, 0.0), (16, 0.0, 0.0), (178, 1.0, 5.0), (16, 0.0, 0.0), (177, 1.0, 1.0), (16, 0.0, 0.0)]
+    sent = [HOME, *(replace(p, command=c, p1=p1, p2=p2) for p, (c, p1, p2) in zip(places, commands, strict=False))]
+    path.write_text(write_qgc_wpl(sent))
+    rows = run("--kind", "inav", path).stdout.splitlines()
+    for words in (["-->1", "DO_CHANGE_SPEED"], ["1->2", "WAYPOINT"], ["6->7", "WAYPOINT"]):
+        assert any(row.split()[:2] == words for row in rows), words
 
 
 def test_a_person_sees_why_a_list_is_rejected_or_cleared(files: dict[str, Path]) -> None:

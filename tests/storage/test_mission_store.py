@@ -40,6 +40,7 @@ RECEIVED = st.builds(
     record_count=UINT32,
     checksum=UINT32,
     roi_commands=st.dictionaries(st.integers(), st.integers(), max_size=5),
+    sent_seqs=st.lists(st.none() | st.integers(), max_size=5),
 )
 
 
@@ -174,16 +175,49 @@ def test_lookups_take_no_more_steps_in_a_larger_store(store: MissionStore) -> No
     assert all(steps(search) <= before for search, before in zip(searches, few, strict=True))
 
 
-def test_a_store_of_the_first_release_is_migrated(tmp_path: Path) -> None:
-    """Its rows had no checksum."""
-    with sqlite3.connect(tmp_path / "missions.db") as first:
+def test_each_sender_is_found_with_its_item_numbers_until_it_reads_the_list(store: MissionStore) -> None:
+    received = mission(1)
+    for sender, last in (("a", 2), ("b", 3), ("a", 4), ("", 5), ("c", 6)):
+        number = store.add(replace(received, sent_seqs=[0, last]), sender)
+        if sender != "c":
+            store.conclude(number, "VERIFIED", "", 0.0)
+    wanted = received.record_count, received.checksum
+    assert store.item_numbers(*wanted) == {"a": [0, 4], "b": [0, 3]}
+    assert store.item_numbers(received.record_count + 1, received.checksum) == {}
+    store.note_reader(*wanted, "a")
+    assert store.item_numbers(*wanted) == {"b": [0, 3]}
+
+
+def _store_of_the_first_release(path: Path) -> None:
+    """Its rows had no checksum, and no item numbers."""
+    with sqlite3.connect(path) as first:
         first.executescript(files("storage").joinpath("schema", "0001_missions.sql").read_text())
         first.execute("PRAGMA user_version = 1")
         first.execute("INSERT INTO missions VALUES (1, 2.5, 'udp', 'ACCEPTED', 'ok', 0, 0, 0, 0, 'VERIFIED', '', 3.5)")
         first.execute("INSERT INTO mission_contents VALUES (1, '[]', '[]', '[]', '{}', x'', ?)", (crc32(b"[][][]{}"),))
     first.close()
+
+
+def test_a_store_of_the_first_release_is_migrated(tmp_path: Path) -> None:
+    _store_of_the_first_release(tmp_path / "missions.db")
     opened = open_store(tmp_path / "missions.db", 0.0)
     with opened.store as store:
         assert opened.set_aside is None
         assert [(line.source, line.outcome) for line in store.list(9)] == [("udp", "VERIFIED")]
         assert store.get(1) is not None
+
+
+def test_a_damaged_store_of_the_first_release_is_salvaged(tmp_path: Path) -> None:
+    path = tmp_path / "missions.db"
+    _store_of_the_first_release(path)
+    with sqlite3.connect(path) as database:
+        (page,) = database.execute("SELECT rootpage FROM sqlite_schema WHERE name = 'missions_verified'").fetchone()
+        (size,) = database.execute("PRAGMA page_size").fetchone()
+    database.close()
+    with path.open("r+b") as file:
+        file.seek((page - 1) * size)
+        file.write(b"\xff" * size)
+    opened = open_store(path, 0.0)
+    with opened.store as store:
+        assert (opened.set_aside is None, opened.salvaged) == (False, 1)
+        assert [line.number for line in store.list(9)] == [1]

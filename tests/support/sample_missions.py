@@ -21,4 +21,5 @@ def mission(tag: int, items: int = 3) -> ReceivedMission:
         record_count=items,
         checksum=zlib.crc32(records),
         roi_commands={tag: 201},
+        sent_seqs=[*range(items)],
     )

@@ -30,12 +30,13 @@ from bridge.gcs.ground import FrameListener
 from bridge.gcs.guard import LinkAccess
 from bridge.gcs.routes import MAX_DATAGRAM_SIZE
 from bridge.gcs.station import Peer
-from bridge.line.conversation import Conclude, FindPending, Recall, Save, StoreEffect
+from bridge.line.conversation import Conclude, FindPending, NoteReader, Recall, Save, StoreEffect
 from bridge.model.events import Level
-from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission
+from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission, RecalledMission
+from bridge.model.verdict import SentSeqs
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MAGIC_V1, MavlinkSplitter
-from protocols.mission_record import identify
+from protocols.mission_record import ListIdentity, identify
 from protocols.msp.command_line import is_clean
 from protocols.msp.frame import MspParser
 from protocols.msp.mission import WpRecord, unpack_records
@@ -65,6 +66,7 @@ class MemoryStore:
 
     def __init__(self) -> None:
         self.missions: list[tuple[ArrivedMission, Conclude | None]] = []
+        self.readers: set[tuple[ListIdentity, str]] = set()
         self.delay_s = 0.0
         self.failing = False
 
@@ -84,7 +86,9 @@ class MemoryStore:
                 for mission, ended in reversed(self.missions):
                     verified = ended is not None and ended.outcome is Outcome.VERIFIED
                     if verified and identify(mission.verdict.records) == identity:
-                        return mission.verdict.sent_as
+                        return RecalledMission(mission.verdict.sent_as, self._sent_seqs(identity))
+            case NoteReader(identity, reader):
+                self.readers.add((identity, reader))
             case FindPending():
                 return [
                     PendingMission(number, identify(mission.verdict.records))
@@ -92,6 +96,15 @@ class MemoryStore:
                     if ended is None
                 ]
         return None
+
+    def _sent_seqs(self, identity: ListIdentity) -> dict[str, SentSeqs]:
+        """As storage.mission_store.MissionStore.item_numbers, but a reading counts for later uploads, too."""
+        return {
+            mission.sender: mission.verdict.sent_seqs
+            for mission, ended in self.missions
+            if ended is not None and ended.outcome is Outcome.VERIFIED and mission.sender
+            if identify(mission.verdict.records) == identity and (identity, mission.sender) not in self.readers
+        }
 
     def outcomes(self) -> list[Outcome | None]:
         return [conclusion.outcome if conclusion else None for _, conclusion in self.missions]

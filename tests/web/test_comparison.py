@@ -41,7 +41,7 @@ COMPARED = ("p1", "p2", "p3", "p4", "lat_e7", "lon_e7", "alt_m")
 @given(lists)
 def test_every_difference_has_a_reason(sent: list[MissionItem]) -> None:
     verdict = check_list(sent, RULES)
-    rows = [row.to_json() for row in sent_and_stored(sent, verdict.items, verdict.findings)]
+    rows = [row.to_json() for row in sent_and_stored(sent, verdict.items, verdict.findings, verdict.sent_seqs)]
     assert [row["left"]["command"] for row in rows] == [item.command for item in sent]
     if verdict.result is not Result.ACCEPTED:
         assert all(row["right"] is None for row in rows)
@@ -101,7 +101,7 @@ def test_a_list_of_thousands_is_truncated_with_a_note() -> None:
     long = [asdict(replace(HOME, seq=seq)) for seq in range(5000)]
     received = {
         "received_at": 0.0, "source": "", "verdict": "REJECTED", "ack": "", "checksum": "",
-        "items": long, "stored_items": [], "findings": [],
+        "items": long, "stored_items": [], "findings": [], "sent_seqs": [],
     }  # fmt: skip
     shown = stored_mission({"number": 1, "received": received, "outcome": "REJECTED", "detail": ""})
     assert (len(shown["rows"]), shown["rows_left_out"]) == (MAX_ROWS, 5000 - MAX_ROWS)

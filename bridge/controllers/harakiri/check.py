@@ -109,6 +109,7 @@ class HarakiriCheck(ListCheck):
             tuple(items_from_records(self._records, self._roi_commands)),
             findings,
             self._roi_commands,
+            tuple(item.seq for item, _ in self._kept),
         )
 
     def _refuse(self, item: MissionItem, rule: CommandRule | None) -> RejectingFinding | None:

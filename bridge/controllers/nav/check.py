@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from bridge.controllers.nav.flown_path import flown_size, jump_within_jump, lands_after_rth
-from bridge.controllers.nav.items import GROUND_SPEED, home_item, items_from_records, leg_speed
+from bridge.controllers.nav.items import GROUND_SPEED, home_item, items_from_records, leg_speed, sent_seqs
 from bridge.controllers.nav.jumps import Jumps
 from bridge.controllers.nav.landing import placed_landing
 from bridge.controllers.nav.leg_limits import limited_legs
@@ -283,7 +283,8 @@ class NavCheck(ListCheck):
             why = f"Mission of {len(mission)} records does not fit next to it: erased, {copy} is kept on the Pi"
             self._findings.append(Finding(None, "count", len(mission), 0, why, news=News.WARNING))
         findings = tuple(sorted(self._findings, key=lambda finding: finding.seq or 0))
-        return Verdict(Result.ACCEPTED, MissionResult.ACCEPTED, records, items, findings, self._sent_as)
+        seqs = sent_seqs(records, [item.seq for item in self._sent], self._speed.changed_at)
+        return Verdict(Result.ACCEPTED, MissionResult.ACCEPTED, records, items, findings, self._sent_as, seqs)
 
     def _keep(self, item: MissionItem, record: NavRecord) -> None:
         if record.action in LEGS:

@@ -10,6 +10,7 @@ from itertools import accumulate
 from types import MappingProxyType
 
 from bridge.controllers.nav.rules import ENDLESS_S, LEAST_SPEED_CMS
+from bridge.model.verdict import SentSeqs
 from protocols.mission_item import ROI_COMMANDS, Command, Frame, MissionItem
 from protocols.msp.nav import NavAction, NavRecord
 
@@ -53,6 +54,24 @@ def items_from_records(
 def item_seqs(records: Sequence[NavRecord]) -> list[int]:
     speeds = _shown_speeds(records)
     return list(accumulate(2 if place in speeds else 1 for place in range(len(records))))
+
+
+def sent_seqs(records: Sequence[NavRecord], record_seqs: Iterable[int], speed_seqs: Iterable[int]) -> SentSeqs:
+    """The numbers as sent of the items that these records are read back as.
+
+    `record_seqs`: of the item that each record was made from; `speed_seqs`: of the changes of speed, ascending.
+    """
+    home_seq = 0
+    sent: list[int | None] = [home_seq]
+    speeds = list(speed_seqs)
+    for seq, record_seq in zip(item_seqs(records), record_seqs, strict=True):
+        before = [speed for speed in speeds if speed < record_seq]
+        if seq > len(sent):
+            # A leg's speed is that of the last change before it, unless that is shown with an earlier leg.
+            sent.append(before[-1] if before else None)
+            speeds = speeds[len(before) :]
+        sent.append(record_seq)
+    return tuple(sent)
 
 
 def _shown_speeds(records: Sequence[NavRecord]) -> dict[int, int]:
