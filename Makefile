@@ -19,6 +19,7 @@
 #   make message-table  regenerate protocols/mavlink/message_table.py from pymavlink's definitions
 #   make cli-page       regenerate docs/cli.md
 #   make rules-page     regenerate the table of docs/mission-rules.md from the rules
+#   make rights-page    regenerate the tables of docs/rights.md from protocols/rights/
 #   make inav-page      regenerate the table of docs/inav.md
 #   make config-sample  regenerate systemd/config.toml and the keys of docs/configuration.md
 #   make zenoh-schemas  regenerate service/zenoh_link/schemas/ from the payload types
@@ -32,7 +33,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .NOTPARALLEL:
-.PHONY: rules-page demo test lint bench pictures real-board soak fuzz deb deb-trial image-check lock message-table config-sample cli-page inav-page zenoh-schemas clean
+.PHONY: rules-page rights-page demo test lint bench pictures real-board soak fuzz deb deb-trial image-check lock message-table config-sample cli-page inav-page zenoh-schemas clean
 
 # Installed if missing and if run as root, like the compilers of firmware/; systemd checks its own unit.
 BROWSER_PACKAGES := chromium chromium-driver
@@ -148,6 +149,13 @@ rules-page: $(VENV)/.test-ready
 	sed -i -e '/begin: make rules-page/,/end: make rules-page/{/make rules-page -->/!d}' \
 	    -e '/begin: make rules-page/r docs/rules.table' docs/mission-rules.md
 	rm docs/rules.table
+
+# The table of the effect of each request.
+rights-page: $(VENV)/.test-ready
+	$(BIN)/python -m generators.rights_page > docs/rights.table
+	sed -i -e '/begin: make rights-page/,/end: make rights-page/{/make rights-page -->/!d}' \
+	    -e '/begin: make rights-page/r docs/rights.table' docs/rights.md
+	rm docs/rights.table
 
 # The sample file of all settings, and their reference page.
 config-sample: $(VENV)/.test-ready

@@ -11,10 +11,14 @@ from bridge.model.airframe import airframe
 from bridge.model.flight_mode import FAILSAFE_BOX
 from bridge.model.refusal import Refusal
 from protocols.mission_item import MissionResult
+from protocols.rights.msp import Firmware
 
 #: IDENT's capability bit of all descendants of baseflight; MultiWii's own boards have 8 bits.
 _32_BIT = 1 << 31
+#: IDENT's capability bit of baseflight. Cleanflight 1 sets it, too, but has a variant.
+_BASEFLIGHT = 1 << 30
 _BETAFLIGHT = "BTFL"
+_FIRMWARE = {_BETAFLIGHT: Firmware.BETAFLIGHT, "CLFL": Firmware.CLEANFLIGHT, "INAV": Firmware.INAV}
 #: Betaflight's permanent box ids (msp_box.c) of the modes that make a flight mode.
 _BETAFLIGHT_BOXES = {
     0: "ARM", 1: "ANGLE", 2: "HORIZON", 3: "ALT HOLD", 11: "POS HOLD", 27: FAILSAFE_BOX, 46: "GPS RESCUE",
@@ -26,9 +30,14 @@ def _recognise(board: Interview) -> Conversation[FlightController | None]:
     ident = yield from board.ident()
     if ident is not None:
         boxes = yield from board.box_names()
-        name = (yield from board.variant()) or f"MultiWii {ident.version}"
-        profile = OTHER_MSP if ident.capability & _32_BIT else OLD_MULTIWII
-        return FlightController(profile, name, airframe(ident.mixer), boxes, version=ident.release)
+        variant = yield from board.variant()
+        name = variant or f"MultiWii {ident.version}"
+        profile, firmware = OTHER_MSP, _FIRMWARE.get(name, Firmware.UNKNOWN)
+        if not ident.capability & _32_BIT:
+            profile, firmware = OLD_MULTIWII, Firmware.MULTIWII
+        elif variant is None and ident.capability & _BASEFLIGHT:
+            firmware = Firmware.BASEFLIGHT
+        return FlightController(profile, name, airframe(ident.mixer), boxes, version=ident.release, firmware=firmware)
     name = (yield from board.variant()) or "unknown"
     version = None
     if name == _BETAFLIGHT:
@@ -36,7 +45,8 @@ def _recognise(board: Interview) -> Conversation[FlightController | None]:
         boxes = yield from board.boxes_by_id(_BETAFLIGHT_BOXES)
     else:
         boxes = yield from board.box_names()
-    return FlightController(OTHER_MSP, name, boxes=boxes, version=version)
+    firmware = _FIRMWARE.get(name, Firmware.UNKNOWN)
+    return FlightController(OTHER_MSP, name, boxes=boxes, version=version, firmware=firmware)
 
 
 OTHER_MSP = Profile("another MSP flight controller", "other", recognise=_recognise, silence_s=SILENCE_WITH_H7_S)

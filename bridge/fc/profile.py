@@ -20,6 +20,7 @@ from bridge.model.refusal import Refusal
 from bridge.model.vehicle import Vehicle
 from protocols.mission_item import MissionResult
 from protocols.msp.mission import Info
+from protocols.rights.msp import Firmware
 
 
 class Spoken(Enum):
@@ -100,7 +101,7 @@ class FlightController:
     """The board on the line. `boxes` are in the order of the status flags; "" is a flag without a meaning here.
 
     airframe: None if unknown. info: Harakiri's mission extension. capacity: mission records, if the board reported it.
-    version: the firmware's major, minor and patch level.
+    version: the firmware's major, minor and patch level. firmware: the one whose rights apply to MSP requests.
     """
 
     profile: Profile
@@ -110,6 +111,7 @@ class FlightController:
     info: Info | None = None
     capacity: int = 0
     version: tuple[int, int, int] | None = None
+    firmware: Firmware = Firmware.UNKNOWN
 
     @property
     def arm_bit(self) -> int | None:

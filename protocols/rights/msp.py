@@ -55,7 +55,8 @@ def msp_right(firmware: Firmware, command: int, payload: bytes) -> MspRight:
     """The right of a request; UNKNOWN for what no handler is known to take."""
     right = MSP_RIGHTS[firmware].get(command)
     if right is None or not right.permits(payload):
-        return MspRight(right.name if right else f"command {command}", Effect.UNKNOWN)
+        names = (rights[command].name for rights in MSP_RIGHTS.values() if command in rights)
+        return MspRight(next(names, f"command {command}"), Effect.UNKNOWN)
     return right
 
 

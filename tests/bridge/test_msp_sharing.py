@@ -10,6 +10,7 @@ from tests.support.fake_inav import FakeInav
 from tests.support.world import World
 
 BOXNAMES, DATAFLASH_READ, SERVO_MIXER, SAFEHOME, SET_SAFEHOME = 116, 71, 0x2020, 0x2038, 0x2039
+PAYLOADS = {DATAFLASH_READ: bytes(6)}
 SETTING_INFO, SET_PID, SET_WP = 0x1007, 202, 209
 
 
@@ -21,7 +22,7 @@ def test_a_long_reply_is_forwarded_and_the_link_continues(command: int, size: in
     world.wait_ready(5)
     found: list[MspFrame] = []
     for _ in range(3):
-        frame = MspFrame(Direction.REQUEST, command, is_v2=True)
+        frame = MspFrame(Direction.REQUEST, command, PAYLOADS.get(command, b""), is_v2=True)
         assert world.bridge.sharing.request(frame, found.append, world.now, may_write=False) == ""
         world.receive_from_fc(b"")  # sends it
         world.run(1.0)
@@ -44,7 +45,7 @@ def test_a_lost_reply_does_not_lose_the_link(command: int, is_damaged: bool) -> 
     world = World(speeds=(115200,), peer=board)
     world.wait_ready(5)
     for _ in range(5):
-        request = MspFrame(Direction.REQUEST, command)
+        request = MspFrame(Direction.REQUEST, command, PAYLOADS.get(command, b""))
         assert world.bridge.sharing.request(request, lambda _: None, world.now, may_write=False) == ""
         world.receive_from_fc(b"")  # sends it
         if is_damaged:

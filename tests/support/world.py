@@ -2,7 +2,7 @@
 """A world in simulated time: the bridge, a simulated Naze on a wire, a store, and ground stations on a radio link.
 
 Nothing here sleeps, opens a socket or reads a clock. Every step asserts invariants: complete frames without hazard
-bytes to the flight controller, deadlines in the future, a bounded queue of conversations.
+bytes to the flight controller, each with a right, deadlines in the future, a bounded queue of conversations.
 """
 
 import heapq
@@ -38,8 +38,10 @@ from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MAGIC_V1, MavlinkSplitter
 from protocols.mission_record import ListIdentity, identify
 from protocols.msp.command_line import is_clean
-from protocols.msp.frame import MspParser
+from protocols.msp.frame import MspFrame, MspParser
 from protocols.msp.mission import WpRecord, unpack_records
+from protocols.rights.effect import Effect
+from protocols.rights.msp import Firmware, msp_right
 from simulator.board.flash import ERASED, PAGE_SIZE, NorFlash
 from simulator.board.line import garble
 from simulator.board.options import Faults, SimOptions
@@ -319,9 +321,18 @@ class World:
                 f"not whole frames: {data.hex()}"
             )
             assert is_clean(data) or self.kind in (inav.PROFILE, multiwii.PROFILE), data.hex()
+            for frame in frames:
+                self._assert_has_right(frame)
         speed = self.bridge.session.state.speed
         self.written.append((self.now, speed, data))
         self.naze.receive(garble(data, speed, self.naze.baud) if speed else data, self.now)
+
+    def _assert_has_right(self, frame: MspFrame) -> None:
+        """A board is asked what its kind is only as far as that is known."""
+        controller = self.bridge.session.state.controller
+        boards = Firmware if controller is None else (controller.firmware,)
+        effects = {msp_right(firmware, frame.command, frame.payload).effect for firmware in boards}
+        assert effects & ({Effect.READ} if controller is None else {Effect.READ, Effect.CHANGE}), (boards, frame)
 
     def _carry_out(self, effect: StoreEffect) -> None:
         def answer() -> None:

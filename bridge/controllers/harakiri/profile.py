@@ -17,6 +17,7 @@ from bridge.model.airframe import airframe
 from bridge.model.refusal import ARMED, Refusal
 from protocols.mission_item import MissionResult
 from protocols.msp.mission import INFO_SIZE, MissionCommand, decode_info
+from protocols.rights.msp import Firmware
 
 _FAMILY = "Harakiri"
 _VERSION = 211
@@ -33,7 +34,7 @@ def _recognise_patched(board: Interview) -> Conversation[FlightController | None
     info = decode_info((yield from board.ask(MissionCommand.INFO, INFO_SIZE)).payload)
     if info is None:
         return None
-    return replace(harakiri, profile=PATCHED, name=PATCHED.name, info=info)
+    return replace(harakiri, profile=PATCHED, name=PATCHED.name, info=info, firmware=Firmware.HARAKIRI_MISSIONS)
 
 
 def _recognise_unpatched(board: Interview) -> Conversation[FlightController | None]:
@@ -43,7 +44,9 @@ def _recognise_unpatched(board: Interview) -> Conversation[FlightController | No
     boxes = yield from board.box_names()
     if _OWN_BOX not in boxes:
         return None
-    return FlightController(UNPATCHED, UNPATCHED.name, airframe(ident.mixer), boxes, version=ident.release)
+    return FlightController(
+        UNPATCHED, UNPATCHED.name, airframe(ident.mixer), boxes, version=ident.release, firmware=Firmware.HARAKIRI
+    )
 
 
 PATCHED = Profile(

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """INAV: its recognition and its profile."""
 
+from dataclasses import replace
+
 from bridge.controllers.inav.mission_store import InavMissions
 from bridge.controllers.inav.telemetry import INAV_DECODERS, INAV_POLLS
 from bridge.controllers.nav.check import NavRules
@@ -13,6 +15,7 @@ from bridge.model.airframe import Airframe
 from bridge.model.flight_mode import FAILSAFE_BOX
 from protocols.msp.inav import MIXER, MIXER_SIZE, decode_platform
 from protocols.msp.nav import INFO_SIZE, Nav, decode_info
+from protocols.rights.msp import Firmware
 
 _VARIANT = "INAV"
 #: The constant bytes of GETINFO.
@@ -37,7 +40,7 @@ def _recognise(board: Interview) -> Conversation[FlightController | None]:
     if (yield from board.ident()) is not None or (yield from board.variant()) != _VARIANT:
         return None
     boxes = yield from board.boxes_by_id(_BOXES)
-    controller = FlightController(PROFILE, PROFILE.name, boxes=boxes)
+    controller = FlightController(PROFILE, PROFILE.name, boxes=boxes, firmware=Firmware.INAV)
     # The pilot may load another mission at any time: only the capacity is constant.
     info = decode_info((yield from board.ask(Nav.GETINFO, INFO_SIZE, lasting=_LASTING_INFO)).payload)
     if info is None or not info.capacity or controller.arm_bit is None:
@@ -46,7 +49,7 @@ def _recognise(board: Interview) -> Conversation[FlightController | None]:
     platform = decode_platform((yield from board.ask(MIXER, MIXER_SIZE)).payload)
     airframe = _AIRFRAMES[platform] if platform is not None and platform < len(_AIRFRAMES) else None
     version = yield from board.version()
-    return FlightController(PROFILE, PROFILE.name, airframe, boxes, capacity=info.capacity, version=version)
+    return replace(controller, airframe=airframe, capacity=info.capacity, version=version)
 
 
 PROFILE = Profile(

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """MultiWii 2.4 with navigation: its recognition and its profile."""
 
+from dataclasses import replace
+
 from bridge.controllers.multiwii.mission_store import MultiwiiMissions
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import MULTIWII_CAPACITY, multiwii_profile
@@ -10,6 +12,7 @@ from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import NAV_POLL, POLLS
 from bridge.model.airframe import airframe
 from protocols.msp.nav import NAV_CONFIG_SIZE, Nav, decode_nav_config
+from protocols.rights.msp import Firmware
 
 #: types.h: analog.amperage.
 CURRENTS_PER_A = 10
@@ -23,12 +26,15 @@ def _recognise(board: Interview) -> Conversation[FlightController | None]:
         return None
     boxes = yield from board.box_names()
     name = f"MultiWii {ident.version}"
-    if FlightController(PROFILE, name, boxes=boxes).arm_bit is None:
+    controller = FlightController(
+        PROFILE, name, airframe(ident.mixer), boxes, version=ident.release, firmware=Firmware.MULTIWII
+    )
+    if controller.arm_bit is None:
         return None
     capacity = decode_nav_config((yield from board.ask(Nav.NAV_CONFIG, NAV_CONFIG_SIZE)).payload)
     if not capacity:
         return None
-    return FlightController(PROFILE, name, airframe(ident.mixer), boxes, capacity=capacity, version=ident.release)
+    return replace(controller, capacity=capacity)
 
 
 PROFILE = Profile(
