@@ -106,10 +106,13 @@ _OLD_CHANGES = _changes(
 _OLD_MOVES = _moves(SET_RAW_RC=200, SET_RAW_GPS=201)
 
 #: WP with another number is answered with a header and no payload. BOX has two bytes a box, or four with 5 or 6 aux
-#: channels. 209 (SET_WP) has no handler.
+#: channels. 209 (SET_WP) has no handler, and MISSION_INFO only one in the extension, which is recognised by it.
 _HARAKIRI: Rights = {
     **_OLD_READS, **_OLD_MOVES, **_OLD_CHANGES,
-    **_reads(RC=(105, 20), RAW_GPS=(106, 14), ANALOG=(110, 5), BOX=(113, 60), MISC=(114, 2), BOXNAMES=(116, 120)),
+    **_reads(
+        RC=(105, 20), RAW_GPS=(106, 14), ANALOG=(110, 5), BOX=(113, 60), MISC=(114, 2), BOXNAMES=(116, 120),
+        MISSION_INFO=(190, 0),
+    ),
     **_changes(_BUFFER, SET_BOX=(203, 28, 30, 56, 60), SET_MISC=(207, *range(_BUFFER + 1))),
     118: MspRight("WP", Effect.READ, (1,), 12, frozenset((b"\x00", b"\x10"))),
 }  # fmt: skip

@@ -62,7 +62,7 @@ READS: list[tuple[Iterable[Firmware], bytes]] = [
     (INAV, SELECTED_REQUEST),
     ((Firmware.MULTIWII,), request(Nav.NAV_CONFIG)),
     *((NAV, encode_read_wp(number)) for number in range(256)),
-    (MISSIONS, INFO_REQUEST),
+    (HARAKIRI, INFO_REQUEST),
     (MISSIONS, encode_read(0, 15)),
 ]
 CHANGES: list[tuple[Iterable[Firmware], bytes]] = [
