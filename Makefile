@@ -152,10 +152,8 @@ rules-page: $(VENV)/.test-ready
 
 # The table of the effect of each request.
 rights-page: $(VENV)/.test-ready
-	$(BIN)/python -m generators.rights_page > docs/rights.table
-	sed -i -e '/begin: make rights-page/,/end: make rights-page/{/make rights-page -->/!d}' \
-	    -e '/begin: make rights-page/r docs/rights.table' docs/rights.md
-	rm docs/rights.table
+	$(BIN)/python -m generators.rights_page > docs/rights.new
+	mv docs/rights.new docs/rights.md
 
 # The sample file of all settings, and their reference page.
 config-sample: $(VENV)/.test-ready

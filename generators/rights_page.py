@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tables of docs/rights.md, from protocols/rights/ (`make rights-page`)."""
+"""The tables of docs/rights.md, from protocols/rights/ and bridge/gcs/guard.py (`make rights-page`)."""
 
 import sys
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
+from pathlib import Path
 
+from bridge.gcs.guard import RIGHTS
+from protocols.mavlink.command import command_name
+from protocols.mavlink.dialect import messages
 from protocols.rights.effect import Effect
+from protocols.rights.mavlink import COMMANDS, MESSAGES, FieldRule
 from protocols.rights.msp import MSP_RIGHTS, Firmware, MspRight
 
 _FIRMWARE = tuple(Firmware)
@@ -53,5 +58,38 @@ def _line(cells: Collection[str]) -> str:
     return f"| {' | '.join(cells)} |"
 
 
+def standing_table() -> str:
+    """A row for each standing of a ground station."""
+    heads = ("ground station", *next(iter(RIGHTS.values()))._fields)
+    lines = [_line(heads), _line(["---"] * len(heads))]
+    for standing, rights in RIGHTS.items():
+        lines.append(_line([standing.value, *(", ".join(effects) or "nothing" for effects in rights)]))
+    return "\n".join(lines) + "\n"
+
+
+def mavlink_table() -> str:
+    """A row for each message, then for each command."""
+    return _effects("message", {messages.mavlink_map[msgid].msgname: row for msgid, row in MESSAGES.items()})
+
+
+def command_table() -> str:
+    """A row for each command that is not a move."""
+    return _effects("command", {command_name(number): row for number, row in COMMANDS.items()})
+
+
+def filled(page: str) -> str:
+    """The page with its tables up to date."""
+    for table in (msp_table, standing_table, mavlink_table, command_table):
+        begin, end = (f"<!-- {word}: make rights-page: {table.__name__} -->\n" for word in ("begin", "end"))
+        page = page.partition(begin)[0] + begin + table() + end + page.partition(end)[2]
+    return page
+
+
+def _effects(head: str, rows: Mapping[str, Effect | FieldRule]) -> str:
+    lines = [_line((head, "effect")), _line(("---", "---"))]
+    lines += [_line((name, row.rule if isinstance(row, FieldRule) else row)) for name, row in sorted(rows.items())]
+    return "\n".join(lines) + "\n"
+
+
 if __name__ == "__main__":
-    sys.stdout.write(msp_table())
+    sys.stdout.write(filled(Path("docs/rights.md").read_text()))

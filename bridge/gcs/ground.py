@@ -219,9 +219,9 @@ class Ground:
         """Count work that a ground station causes; False if that exceeds its limit."""
         return self.budgets.allows(cost, station.peer, self.now)
 
-    def to_as(self, sysid: int, compid: int, station: Station, message: Message) -> None:
+    def to_as(self, ids: tuple[int, int], station: Station, message: Message) -> None:
         """Send a message to one ground station under the ids that it addressed."""
-        self._send(station.peer, FrameWriter(sysid, compid, self._signers.get(station.peer.link)), message)
+        self._send(station.peer, FrameWriter(*ids, self._signers.get(station.peer.link)), message)
 
     def greet(self, peer: Peer, heartbeat: Message) -> None:
         """Send the heartbeat to a newcomer at once: Mission Planner waits for two before it continues."""

@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Access control: the one place that every frame from a ground station passes first. Sans-IO.
 
-Every peer that reaches a link may read. Everything else may change what the aircraft does, even a message that does
-not exist yet: so the lists here name the messages allowed without proof, not those that need it.
+`RIGHTS` is the whole policy; protocols/rights/mavlink.py has the effect of each message.
 """
 
-import struct
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from functools import partial
@@ -22,80 +20,8 @@ from protocols.mavlink.frame import MavlinkFrame
 from protocols.mavlink.ftp import refuse
 from protocols.mavlink.signing import Check, Signing
 from protocols.mission_item import MissionResult
-
-#: Messages that only report or ask. They include everything that Mission Planner sends before it knows that a key is
-#: needed: heartbeats, three STATUSTEXTs (one signed with an empty key) and requests.
-_READS = frozenset(
-    {
-        m.MAVLINK_MSG_ID_HEARTBEAT,
-        m.MAVLINK_MSG_ID_PING,
-        m.MAVLINK_MSG_ID_TIMESYNC,
-        m.MAVLINK_MSG_ID_STATUSTEXT,
-        m.MAVLINK_MSG_ID_AUTOPILOT_VERSION_REQUEST,
-        m.MAVLINK_MSG_ID_PARAM_REQUEST_LIST,
-        m.MAVLINK_MSG_ID_PARAM_REQUEST_READ,
-        m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST,
-        m.MAVLINK_MSG_ID_MISSION_REQUEST_PARTIAL_LIST,
-        m.MAVLINK_MSG_ID_MISSION_REQUEST,
-        m.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
-    }
-)
-_COMMANDS = frozenset({m.MAVLINK_MSG_ID_COMMAND_LONG, m.MAVLINK_MSG_ID_COMMAND_INT})
-#: Commands that only ask for messages.
-_QUESTIONS = frozenset(
-    {
-        m.MAV_CMD_REQUEST_MESSAGE,
-        m.MAV_CMD_GET_MESSAGE_INTERVAL,
-        m.MAV_CMD_GET_HOME_POSITION,
-        m.MAV_CMD_REQUEST_PROTOCOL_VERSION,
-        m.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES,
-        m.MAV_CMD_REQUEST_CAMERA_INFORMATION,
-        m.MAV_CMD_DO_SEND_BANNER,
-    }
-)
-#: Further messages that pass over an open link to an autopilot that speaks MAVLink itself: none of them arms, disarms,
-#: steers or restarts it. Unknown messages do not pass.
-_PASSES_OPEN = _READS | {
-    m.MAVLINK_MSG_ID_RADIO,
-    m.MAVLINK_MSG_ID_RADIO_STATUS,
-    m.MAVLINK_MSG_ID_SYSTEM_TIME,
-    m.MAVLINK_MSG_ID_COMMAND_ACK,
-    m.MAVLINK_MSG_ID_MISSION_ACK,
-    m.MAVLINK_MSG_ID_MISSION_COUNT,
-    m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL,
-    m.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST,
-    m.MAVLINK_MSG_ID_PARAM_SET,
-    m.MAVLINK_MSG_ID_PARAM_EXT_REQUEST_LIST,
-    m.MAVLINK_MSG_ID_PARAM_EXT_REQUEST_READ,
-    m.MAVLINK_MSG_ID_PARAM_EXT_SET,
-    m.MAVLINK_MSG_ID_FENCE_FETCH_POINT,
-    m.MAVLINK_MSG_ID_FENCE_POINT,
-    m.MAVLINK_MSG_ID_RALLY_FETCH_POINT,
-    m.MAVLINK_MSG_ID_RALLY_POINT,
-    m.MAVLINK_MSG_ID_LOG_REQUEST_LIST,
-    m.MAVLINK_MSG_ID_LOG_REQUEST_DATA,
-    m.MAVLINK_MSG_ID_LOG_REQUEST_END,
-}
-_ITEMS = frozenset({m.MAVLINK_MSG_ID_MISSION_ITEM, m.MAVLINK_MSG_ID_MISSION_ITEM_INT})
-_SET_RATE = int(m.MAV_CMD_SET_MESSAGE_INTERVAL)
-_REQUEST_STREAM = int(m.MAVLINK_MSG_ID_REQUEST_DATA_STREAM)
-#: FTP: opcodes that read or end a session (https://mavlink.io/en/services/ftp.html); others write files.
-_FTP_READS = frozenset({0, 1, 2, 3, 4, 5, 14, 15, 128, 129})
-
-_FLOAT = struct.Struct("<f")
-#: Offset of the command number in the payload of both command messages.
-_COMMAND_AT = slice(28, 30)
-#: Offset of the result in a MISSION_ACK.
-_RESULT_AT = 2
-#: Offset of `current` in both item messages; 2 and 3 are "fly to here" and "change altitude", not part of a list.
-_CURRENT_AT = 35
-#: Offset of the opcode in FILE_TRANSFER_PROTOCOL: three bytes of target, then the FTP header.
-_OPCODE_AT = 6
-
-#: Offsets of SET_MESSAGE_INTERVAL's param2, and of REQUEST_DATA_STREAM's rate and start_stop.
-_INTERVAL_AT, _STREAM_RATE_AT, _STREAM_STARTS_AT = 4, slice(0, 2), 5
-#: The longest interval that a station may set over an open link, us: like a stream's lowest rate.
-_SLOWEST_US = 1e6
+from protocols.rights.effect import Effect
+from protocols.rights.mavlink import effect_of
 
 _SETUP = "set the key in naze-bridge's settings"
 _ADDRESS = "this address may only read"
@@ -113,6 +39,26 @@ class Standing(Enum):
     LISTENER = "may only read"
     OPEN = "its link requires nothing"
     PROVEN = "has the key or the address that its link requires"
+
+
+class Rights(NamedTuple):
+    """The effects that a peer may have on the bridge's own vehicle, a passed-through autopilot, and other stations."""
+
+    own: Collection[Effect]
+    autopilot: Collection[Effect]
+    stations: Collection[Effect]
+
+
+_ALL = tuple(effect for effect in Effect if effect is not Effect.KEY)
+_NO_COMMANDS = Effect.READ, Effect.DIALOGUE, Effect.RATE, Effect.CHANGE
+#: The own vehicle itself refuses to arm, to move and to restart; other stations hear what concerns only themselves.
+RIGHTS: Mapping[Standing, Rights] = {
+    Standing.LISTENER: Rights((Effect.READ, Effect.DIALOGUE), (Effect.READ,), ()),
+    Standing.OPEN: Rights(_ALL, _NO_COMMANDS, (*_NO_COMMANDS, Effect.REPORT)),
+    Standing.PROVEN: Rights(_ALL, _ALL, _ALL),
+}
+#: Ground stations repeat these, so their refusal is not reported.
+_ROUTINE = Effect.RATE, Effect.SILENCE
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,27 +130,32 @@ class Guard:
         check = Check.VALID if access.signing is None else access.signing.check(frame)
         if access.signing is not None and check is Check.VALID:
             self._signed.add(peer)
-        if frame.msgid == m.MAVLINK_MSG_ID_SETUP_SIGNING:
-            return self._refuse(peer, frame, _SETUP)
-        if check is not Check.VALID and peer in self._signed:
+        elif peer in self._signed:
             # A duplicate made by the network, or another sender posing as this peer.
             return self._refuse(peer, frame, str(check.value), is_forged=True)
-        if only_reads(frame):
+        effect = effect_of(frame)
+        if effect in RIGHTS[self.standing(peer)].own:
             return None
-        if check is not Check.VALID:
-            return self._refuse(peer, frame, str(check.value))
-        if access.may_write is not None and not access.may_write(peer):
-            return self._refuse(peer, frame, _ADDRESS)
-        return None
+        if effect is Effect.KEY:
+            return self._refuse(peer, frame, _SETUP)
+        return self._refuse(peer, frame, _ADDRESS if check is Check.VALID else str(check.value))
 
-    def command_refusal(self, peer: Peer, frame: MavlinkFrame) -> GuardRefusal | None:
-        """The reason for not passing a frame to an autopilot that might arm, disarm, steer or restart on it.
-
-        For frames that `refusal` accepted. A link without a key or addresses proves nothing.
-        """
-        if self._passes_everything or self.standing(peer) is Standing.PROVEN or not may_command(frame):
+    def passing_refusal(self, peer: Peer, frame: MavlinkFrame) -> GuardRefusal | None:
+        """The reason for not passing a frame that `refusal` accepted to an autopilot that speaks MAVLink itself."""
+        if effect_of(frame) in self._rights_beyond(peer).autopilot:
             return None
+        if self.standing(peer) is Standing.LISTENER:
+            return GuardRefusal(_ADDRESS, is_first=False, is_forged=False)
         return self._refuse(peer, frame, _NOT_OVER_OPEN_LINK)
+
+    def may_reach_stations(self, peer: Peer, frame: MavlinkFrame) -> bool:
+        """True if a frame that `refusal` accepted may be sent on to other ground stations: a vehicle may be there."""
+        return effect_of(frame) in self._rights_beyond(peer).stations
+
+    def _rights_beyond(self, peer: Peer) -> Rights:
+        standing = self.standing(peer)
+        is_trusted = self._passes_everything and standing is Standing.OPEN
+        return RIGHTS[Standing.PROVEN if is_trusted else standing]
 
     def forget(self, peer: Peer) -> None:
         self._signed.discard(peer)
@@ -213,58 +164,12 @@ class Guard:
     def _refuse(self, peer: Peer, frame: MavlinkFrame, why: str, *, is_forged: bool = False) -> GuardRefusal:
         self.refused[peer.link, why] += 1
         logged = self._logged.setdefault(peer, set())
-        is_first = why not in logged and not _asks_for_rates(frame)
+        is_first = why not in logged and effect_of(frame) not in _ROUTINE
         if is_first:
             logged.add(why)
             station = Station(peer, frame.sysid, frame.compid)
             self._log_event("warning", "gcs.refused", station=str(station), message=_name(frame), why=why)
         return GuardRefusal(why, is_first, is_forged)
-
-
-def only_reads(frame: MavlinkFrame) -> bool:
-    """True if a frame changes nothing."""
-    msgid = frame.msgid
-    if msgid in _COMMANDS:
-        return _command(frame) in _QUESTIONS
-    if msgid == m.MAVLINK_MSG_ID_MISSION_ACK:
-        # ACCEPTED ends a download; any other result would cancel a station's transfer.
-        return not any(frame.payload[_RESULT_AT : _RESULT_AT + 1])
-    return msgid in _READS
-
-
-def may_command(frame: MavlinkFrame) -> bool:
-    """True if a frame might arm, disarm, steer or restart an autopilot that obeys it."""
-    msgid, payload = frame.msgid, frame.payload
-    if _asks_for_rates(frame):
-        # An autopilot's rates apply to all ground stations: one may ask for more, but not silence the vehicle.
-        return _silences(frame)
-    if msgid in _COMMANDS:
-        return _command(frame) not in _QUESTIONS
-    if msgid in _ITEMS:
-        return payload[_CURRENT_AT : _CURRENT_AT + 1] > b"\1"
-    if msgid == m.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL:
-        return int.from_bytes(payload[_OPCODE_AT : _OPCODE_AT + 1]) not in _FTP_READS
-    return msgid not in _PASSES_OPEN
-
-
-def _asks_for_rates(frame: MavlinkFrame) -> bool:
-    if frame.msgid in _COMMANDS:
-        return _command(frame) == _SET_RATE
-    return frame.msgid == _REQUEST_STREAM
-
-
-def _silences(frame: MavlinkFrame) -> bool:
-    """True if a rate request stops a message or nearly so: an interval below 0 or above 1 s, a stream's end."""
-    payload = frame.payload.ljust(_CURRENT_AT, b"\0")
-    if frame.msgid in _COMMANDS:
-        (interval_us,) = _FLOAT.unpack_from(payload, _INTERVAL_AT)
-        return not 0 <= interval_us <= _SLOWEST_US  # NaN, too
-    return not (any(payload[_STREAM_RATE_AT]) and payload[_STREAM_STARTS_AT])
-
-
-def _command(frame: MavlinkFrame) -> int:
-    # MAVLink 2 omits trailing zeros.
-    return int.from_bytes(frame.payload[_COMMAND_AT], "little")
 
 
 def denial(message: Message, station: Station) -> Message | None:

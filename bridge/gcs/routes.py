@@ -6,7 +6,7 @@ but its sender; one with a target only to where that system (and component) was 
 not heard yet go to the autopilot.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from itertools import takewhile
 
 from bridge.gcs.cost import Cost
@@ -26,18 +26,6 @@ _MAX_KINDS = 1024
 #: Carries a signing key in the clear. The guard refuses it from ground stations.
 _NEVER_FORWARDED = messages.MAVLINK_MSG_ID_SETUP_SIGNING
 _HEARTBEAT = messages.MAVLINK_MSG_ID_HEARTBEAT
-#: Not passed on for a peer that may only read. It may use the pilot's ids: then its heartbeats would hide the loss of
-#: the pilot's station (ArduPilot's GCS failsafe), and its mission requests would end the pilot's upload.
-_ONLY_FROM_WRITERS = frozenset(
-    {
-        _HEARTBEAT,
-        messages.MAVLINK_MSG_ID_MISSION_REQUEST_LIST,
-        messages.MAVLINK_MSG_ID_MISSION_REQUEST_PARTIAL_LIST,
-        messages.MAVLINK_MSG_ID_MISSION_REQUEST,
-        messages.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
-        messages.MAVLINK_MSG_ID_MISSION_ACK,
-    }
-)
 
 
 class Routes:
@@ -60,38 +48,32 @@ class Routes:
         for frame in frames:
             self._send_alone(frame)
 
-    def addressed(self, system: int) -> int | None:
-        """The system on the autopilot's side that a frame for `system` is meant for (0: any); None: none."""
-        return next((sysid for sysid, _ in self._aboard if system in (0, sysid)), None)
+    def addressed(self, system: int, component: int = 0) -> tuple[int, int] | None:
+        """The ids on the autopilot's side of the component that a frame is for, or of its system; None: of neither."""
+        there = (ids for ids in self._aboard if system in (0, ids[0]))
+        return min(there, key=lambda ids: (ids[1] != component, ids), default=None)
 
-    def from_station(self, station: Station, frame: MavlinkFrame, *, to_stations: bool = True) -> bool:
+    def is_echo(self, frame: MavlinkFrame) -> bool:
+        """True for the autopilot's own frame, returned by a router that floods."""
+        return frame.sender in self._aboard
+
+    def from_station(self, station: Station, frame: MavlinkFrame, *, to_stations: bool) -> bool:
         """Send a frame that the guard accepted on to other stations; True if it is for the autopilot, too.
 
-        `to_stations` False: its sender may only read, and reaches no other station.
+        `to_stations` False: it reaches no other station, and its sender is not found by its ids.
         """
-        speaker = frame.sender
-        if speaker in self._aboard:
-            # The autopilot's own frame, returned by a router that floods.
-            return False
         system, component = target_of(frame)
-        if not to_stations:
-            return frame.msgid not in _ONLY_FROM_WRITERS and (system == 0 or self.addressed(system) is not None)
-        behind = self._heard.setdefault(station.peer, set())
-        if len(behind) < _MAX_SPEAKERS:
-            behind.add(speaker)
-        if system == 0:
-            self._copy(frame, station, self._ground.everyone())
-            return True
-        others = [other for other in self._peers_of(system, component) if other != station.peer]
-        self._copy(frame, station, others)
-        return self.addressed(system) is not None or not others
+        there = self._ground.everyone() if system == 0 else self._peers_of(system, component)
+        others = [peer for peer in there if peer != station.peer]
+        if to_stations:
+            behind = self._heard.setdefault(station.peer, set())
+            if len(behind) < _MAX_SPEAKERS:
+                behind.add(frame.sender)
+            self._ground.forward([frame.raw], takewhile(lambda _: self._ground.allows(station, Cost.COPIED), others))
+        return system == 0 or self.addressed(system) is not None or not others
 
     def forget(self, peer: Peer) -> None:
         self._heard.pop(peer, None)
-
-    def _copy(self, frame: MavlinkFrame, station: Station, peers: Iterable[Peer]) -> None:
-        others = (peer for peer in peers if peer != station.peer)
-        self._ground.forward([frame.raw], takewhile(lambda _: self._ground.allows(station, Cost.COPIED), others))
 
     def _peers_of(self, system: int, component: int) -> list[Peer]:
         def is_there(peer: Peer) -> bool:

@@ -7,7 +7,7 @@ from math import inf
 
 from bridge.gcs.cost import Cost
 from bridge.gcs.ground import Ground
-from bridge.gcs.guard import Guard, GuardRefusal, Standing, denial
+from bridge.gcs.guard import Guard, GuardRefusal, denial
 from bridge.gcs.routes import Routes
 from bridge.gcs.station import Peer, Severity, Station
 from bridge.vehicle.commands import CommandService
@@ -26,7 +26,6 @@ from protocols.mission_item import MissionItem, MissionResult
 
 #: MISSION_ITEM.current of items outside a list: Mission Planner's "Fly to here" and "Change altitude".
 _GUIDED = (2, 3)
-_AUTOPILOT = m.MAV_COMP_ID_AUTOPILOT1
 
 #: Messages of a mission transfer: hundreds a second over a fast link. All others are rare.
 _OF_A_TRANSFER = frozenset(
@@ -213,26 +212,29 @@ class Incoming:
         peer = station.peer
         if not self._ground.budgets.allows(Cost.PASSED, peer, now):
             return
-        may_speak_to_others = self._guard.standing(peer) is not Standing.LISTENER
-        if not routes.from_station(station, frame, to_stations=may_speak_to_others):
-            self._ground.record(peer, frame, now)
+        if routes.is_echo(frame):
             return
-        refused = self._guard.command_refusal(peer, frame)
-        if refused is None:
-            self._ground.record(peer, frame, now)
+        to_stations = self._guard.may_reach_stations(peer, frame)
+        is_for_autopilot = routes.from_station(station, frame, to_stations=to_stations)
+        if is_for_autopilot or not to_stations:
+            refused = self._guard.passing_refusal(peer, frame)
+            if refused is not None:
+                self._answer_refused(refused, station, frame)
+                return
+        self._ground.record(peer, frame, now)
+        if is_for_autopilot:
             self._send_to_autopilot(frame.raw)
-        else:
-            self._answer_refused(refused, station, frame)
 
     def _answer_refused(self, refused: GuardRefusal, station: Station, frame: MavlinkFrame) -> None:
         """Answer a refused frame under the ids that it addressed, if these are the vehicle's."""
         system, component = target_of(frame)
-        if self.routes is None:
-            answers, is_vehicle = partial(self._ground.to, station), self._is_ours(system, component)
-        else:
-            asked = self.routes.addressed(system)
-            answers = partial(self._ground.to_as, asked or system, component or _AUTOPILOT, station)
+        answers = partial(self._ground.to, station)
+        is_vehicle = self._is_ours(system, component)
+        if self.routes is not None:
+            asked = self.routes.addressed(system, component)
             is_vehicle = asked is not None
+            if asked is not None:
+                answers = partial(self._ground.to_as, asked, station)
         if not (is_vehicle and self._ground.allows(station, Cost.ANSWER)):
             return
         message = self._decoder.decode(frame)

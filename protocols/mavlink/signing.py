@@ -83,12 +83,15 @@ class Signing:
         self._timestamps = timestamps
         self._refused_until = refused_until
         self._heard: set[Stream] = set()
-        #: The last timestamp of each stream. Those of an earlier run may be added before the first frame.
+        #: The last timestamp of each stream, ours included. Those of an earlier run may be added before any frame.
         self.streams: dict[Stream, int] = {}
 
     def signature(self, frame: bytes, link_id: int) -> bytes:
         """Return the 13 signature bytes of a MAVLink 2 frame whose flags mark it as signed."""
-        stamp = bytes((link_id,)) + self._timestamps.take().to_bytes(_TIMESTAMP_SIZE, "little")
+        timestamp = self._timestamps.take()
+        # Sent back by a stranger, the frame must not prove the key.
+        self.streams[frame[5], frame[6], link_id] = timestamp
+        stamp = bytes((link_id,)) + timestamp.to_bytes(_TIMESTAMP_SIZE, "little")
         return stamp + self._digest(frame + stamp)
 
     def check(self, frame: MavlinkFrame) -> Check:

@@ -5,7 +5,10 @@ from enum import StrEnum
 
 
 class Effect(StrEnum):
-    """From harmless to unknown. A mission's upload is a CHANGE; its start is a MOVE."""
+    """The first four are of MSP and MAVLink, the others of MAVLink only.
+
+    A mission's upload is a CHANGE; its start is a MOVE.
+    """
 
     #: The flight controller replies and is otherwise as before.
     READ = "read"
@@ -15,3 +18,15 @@ class Effect(StrEnum):
     MOVE = "move"
     #: No firmware's handler is known for it.
     UNKNOWN = "unknown"
+
+    #: Part of a ground station's own dialogue. An autopilot knows the station only by its ids: with those of the pilot,
+    #: a heartbeat hides the loss of the pilot's station, and a mission request ends the pilot's upload.
+    DIALOGUE = "dialogue"
+    #: Asks for message rates, which an autopilot applies to all ground stations.
+    RATE = "rate"
+    #: Ends or slows telemetry for all ground stations.
+    SILENCE = "silence"
+    #: Sets the signing key, which the message carries in the clear.
+    KEY = "key"
+    #: Not listed, and without a target: another vehicle's or a companion's telemetry.
+    REPORT = "report"

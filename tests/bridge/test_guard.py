@@ -48,14 +48,13 @@ WRITES: Sequence[tuple[Message, str | None]] = (
     (mavlink.MAVLink_mission_set_current_message(1, 1, 2), None),
     (mavlink.MAVLink_mission_ack_message(1, 1, mavlink.MAV_MISSION_OPERATION_CANCELLED), None),
     (mavlink.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", 300, 9), "PARAM_VALUE"),
-    (mavlink.MAVLink_radio_status_message(0, 0, 0, 0, 0, 0, 0), None),
     (mavlink.MAVLink_set_mode_message(1, 1, 3), None),
     (mavlink.MAVLink_rc_channels_override_message(1, 1, *[1500] * 8), None),
     (mavlink.MAVLink_manual_control_message(1, 0, 0, 0, 0, 0), None),
     (mavlink.MAVLink_set_position_target_local_ned_message(0, 1, 1, 1, 0, *[0] * 11), None),
     (mavlink.MAVLink_serial_control_message(10, 0, 0, 0, 1, [13] * 70), None),
     (mavlink.MAVLink_gps_inject_data_message(1, 1, 1, [0] * 110), None),
-    (mavlink.MAVLink_file_transfer_protocol_message(0, 1, 1, [0] * 251), "FILE_TRANSFER_PROTOCOL"),
+    (mavlink.MAVLink_file_transfer_protocol_message(0, 1, 1, [0, 0, 0, 6, *[0] * 247]), "FILE_TRANSFER_PROTOCOL"),
 )
 READS: tuple[Message, ...] = (
     mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3),
@@ -67,6 +66,8 @@ READS: tuple[Message, ...] = (
     mavlink.MAVLink_param_request_read_message(1, 1, b"WPNAV_RADIUS", -1),
     mavlink.MAVLink_mission_request_list_message(1, 1),
     mavlink.MAVLink_mission_ack_message(1, 1, mavlink.MAV_MISSION_ACCEPTED),
+    mavlink.MAVLink_file_transfer_protocol_message(0, 1, 1, [0, 0, 0, 3, *[0] * 247]),
+    mavlink.MAVLink_log_request_list_message(1, 1, 0, 0),
     mavlink.MAVLink_command_long_message(1, 1, mavlink.MAV_CMD_REQUEST_MESSAGE, 0, 148, 0, 0, 0, 0, 0, 0),
     mavlink.MAVLink_command_long_message(1, 1, mavlink.MAV_CMD_DO_SEND_BANNER, 0, 0, 0, 0, 0, 0, 0, 0),
 )
@@ -162,6 +163,12 @@ def test_every_message_not_known_to_be_harmless_must_be_signed() -> None:
         mavlink.MAVLINK_MSG_ID_MISSION_REQUEST,
         mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
         mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_PARTIAL_LIST,
+        mavlink.MAVLINK_MSG_ID_PARAM_EXT_REQUEST_READ,
+        mavlink.MAVLINK_MSG_ID_PARAM_EXT_REQUEST_LIST,
+        mavlink.MAVLINK_MSG_ID_FENCE_FETCH_POINT,
+        mavlink.MAVLINK_MSG_ID_RALLY_FETCH_POINT,
+        mavlink.MAVLINK_MSG_ID_LOG_REQUEST_DATA,
+        mavlink.MAVLINK_MSG_ID_LOG_REQUEST_END,
     }
     for msgid in CRC_EXTRA:
         world.receive_from(station, FrameWriter(255, 190).frame(Packed(msgid, b"", b"\0"), 2))
@@ -228,13 +235,14 @@ def test_a_refusal_is_logged_once_for_each_peer_and_counted_each_time() -> None:
 
 
 def test_a_refused_request_for_rates_gets_no_text() -> None:
-    """Every ground station sends some when it connects."""
+    """Every ground station sends some when it connects, and every radio its status."""
     world = keyed()
     station = GroundStation(world)
+    station.send(mavlink.MAVLink_radio_status_message(0, 0, 0, 0, 0, 0, 0))
     station.send(mavlink.MAVLink_request_data_stream_message(1, 1, 0, 4, 1))
     station.send(mavlink.MAVLink_command_long_message(1, 1, 511, 0, 30, 100_000, 0, 0, 0, 0, 0))
     world.run(0.1)
-    assert refusals(world) == {"not signed": 2}
+    assert refusals(world) == {"not signed": 3}
     assert station.texts() == []
     assert world.events("gcs.refused") == []
 

@@ -146,9 +146,9 @@ def test_an_addressed_frame_goes_only_to_its_target() -> None:
 
 def test_ground_stations_reach_each_other() -> None:
     world, autopilot, (one, other) = passing()
-    one.send(mavlink.MAVLink_command_long_message(254, 190, 400, 0, 1, 0, 0, 0, 0, 0, 0))
+    one.send(mavlink.MAVLink_param_set_message(254, 190, b"STATION", 1, 9))
     world.run(0.1)
-    assert [message.get_type() for message in other.messages("COMMAND_LONG")] == ["COMMAND_LONG"]
+    assert [message.get_type() for message in other.messages("PARAM_SET")] == ["PARAM_SET"]
     assert bytes(autopilot.received) == b""
 
 
