@@ -6,7 +6,9 @@ nor deleted: it is renamed so that `sqlite3` can still open it, and a new one ta
 page structures, but not a changed byte in a value: so every row has a checksum.
 """
 
+import re
 import sqlite3
+import stat
 import struct
 import zlib
 from collections.abc import Iterable
@@ -34,8 +36,12 @@ _COMPANIONS = (_LOG, "-shm", "-journal")
 _LOG_HEADER = struct.Struct(">8I")
 _LOG_MAGIC = {0x377F0682: "<6I", 0x377F0683: ">6I"}
 
+_READER_TIMEOUT_S = 2.0
+#: Bytes; 65,535 items are 10 MB of text.
+_LARGEST_VALUE = 64 << 20
 #: Damaged files kept, the newest: each may be as large as the store.
 _MOST_KEPT = 3
+_ASIDE = re.compile(r"\.corrupt-[0-9]{8}-[0-9]{6}(-[0-9]+)?\Z")
 # SQLITE_ERROR is "table already exists" and such: the file does not have its claimed schema.
 _DAMAGE = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR)
 
@@ -68,10 +74,22 @@ def open_database(path: Path, now: float) -> tuple[sqlite3.Connection, Path | No
 
 
 def read_database(path: Path) -> sqlite3.Connection:
-    """Open the database read-only, with or without a running daemon; StoreError if that fails."""
-    with explained(f"cannot read the mission store {path}"):
+    """Open the database read-only, with or without a running daemon; StoreError if that fails.
+
+    The reader may be root, and the file from a service that was taken over.
+    """
+    failure = f"cannot read the mission store {path}"
+    try:
+        if not stat.S_ISREG(path.lstat().st_mode):
+            raise StoreError(f"{failure}: it is not a regular file")
+    except OSError as error:
+        raise StoreError(f"{failure}: {reason(error)}") from error
+    with explained(failure):
         # Neither created nor changed: the file may be another user's.
-        return configured(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=0.5))
+        connection = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=_READER_TIMEOUT_S)
+        connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LARGEST_VALUE)
+        connection.execute("PRAGMA trusted_schema = OFF")
+        return configured(connection)
 
 
 def memory_database() -> sqlite3.Connection:
@@ -184,9 +202,14 @@ def _keep_aside(path: Path, now: float) -> Path:
     return aside
 
 
+def kept_aside(path: Path) -> list[Path]:
+    """The damaged files that were renamed, in the order of their names."""
+    return sorted(file for file in path.parent.glob(f"{path.name}.corrupt-*") if _ASIDE.search(file.name))
+
+
 def _forget_oldest(path: Path, newest: Path) -> None:
     """Delete the oldest damaged files. Their missions that could be read are in the store."""
-    kept = [file for file in path.parent.glob(f"{path.name}.corrupt-*[0-9]") if file != newest]
+    kept = [file for file in kept_aside(path) if file != newest]
     kept.sort(key=lambda file: (file.stat().st_ctime_ns, file.name))
     for file in kept[: -(_MOST_KEPT - 1)]:
         for suffix in ("", *_COMPANIONS):

@@ -179,20 +179,23 @@ class MissionStore:
             row = self._connection.execute(question, (number,)).fetchone()
         if row is None or contents_crc32(row[column] for column in CONTENTS) != row["crc32"]:
             raise self._damaged(number)
-        received = ReceivedMission(
-            received_at=summary.received_at,
-            source=summary.source,
-            items=json.loads(row["items"]),
-            verdict=summary.verdict,
-            ack=summary.ack,
-            findings=json.loads(row["findings"]),
-            stored_items=json.loads(row["stored_items"]),
-            records=row["records"],
-            record_count=summary.record_count,
-            checksum=summary.checksum,
-            roi_commands={int(seq): command for seq, command in json.loads(row["roi_commands"]).items()},
-            sent_seqs=json.loads(row["sent_seqs"] or "[]"),
-        )
+        try:
+            received = ReceivedMission(
+                received_at=summary.received_at,
+                source=summary.source,
+                items=json.loads(row["items"]),
+                verdict=summary.verdict,
+                ack=summary.ack,
+                findings=json.loads(row["findings"]),
+                stored_items=json.loads(row["stored_items"]),
+                records=row["records"],
+                record_count=summary.record_count,
+                checksum=summary.checksum,
+                roi_commands={int(seq): command for seq, command in json.loads(row["roi_commands"]).items()},
+                sent_seqs=json.loads(row["sent_seqs"] or "[]"),
+            )
+        except (ValueError, TypeError, AttributeError, RecursionError) as error:
+            raise self._damaged(number) from error
         return StoredMission(number, received, summary.outcome, summary.detail, summary.concluded_at)
 
     def latest_verified(self, count: int, checksum: int) -> StoredMission | None:

@@ -325,3 +325,22 @@ def test_a_damaged_store_is_a_problem(tmp_path: Path) -> None:
     none, aside = check_database(tmp_path)
     assert_ok(none, "none stored yet")
     assert_note(aside, "corrupt-20261121-120000")
+
+
+def test_a_store_of_a_service_that_was_taken_over_does_no_harm(tmp_path: Path) -> None:
+    """Its file names are part of a command for root, its contents of texts on root's terminal."""
+    (tmp_path / "missions.db.corrupt-$(reboot)1").touch()
+    assert_ok(check_database(tmp_path), "none stored yet")
+    path = tmp_path / "missions.db"
+    os.mkfifo(path)
+    assert_problem(check_database(tmp_path), "not a regular file", "move it away")
+    path.unlink()
+    path.symlink_to("/etc/passwd")
+    assert_problem(check_database(tmp_path), "not a regular file", "move it away")
+    path.unlink()
+    with closing(sqlite3.connect(path)) as database:
+        database.execute('CREATE TABLE "a\x1b[2J" (a NOT NULL)')
+        database.execute('CREATE VIEW missions AS SELECT 1 FROM "b\x1b[2J"')
+    (found,) = check_database(tmp_path)
+    assert_problem(found, "is damaged: ", "restart the bridge")
+    assert found.found.isprintable()

@@ -4,6 +4,7 @@
 import math
 import sqlite3
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -14,6 +15,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from storage.database import CONTENTS, contents_crc32
 from storage.mission_store import MissionStore, ReceivedMission, open_store
 from storage.store_error import StoreError
 from tests.support.sample_missions import mission
@@ -82,6 +84,20 @@ def test_a_file_name_that_is_not_utf8_is_stored(store: MissionStore) -> None:
     stored = store.get(number)
     assert stored is not None
     assert stored.received.source == r"file caf\udce9.plan"
+
+
+@pytest.mark.parametrize("items", ["[" * 100_000, "no JSON"])
+def test_contents_that_are_no_mission_are_damage(store: MissionStore, tmp_path: Path, items: str) -> None:
+    """The checksum is right: a service that was taken over can make it, and root reads the store."""
+    number = store.add(mission(1))
+    with closing(sqlite3.connect(tmp_path / "missions.db")) as database:
+        database.row_factory = sqlite3.Row
+        database.execute("UPDATE mission_contents SET items = ?", (items,))
+        row = database.execute("SELECT * FROM mission_contents").fetchone()
+        database.execute("UPDATE mission_contents SET crc32 = ?", (contents_crc32(row[name] for name in CONTENTS),))
+        database.commit()
+    with pytest.raises(StoreError, match="was damaged"):
+        store.get(number)
 
 
 def test_the_list_shows_the_newest_first(store: MissionStore) -> None:

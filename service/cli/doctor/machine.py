@@ -10,10 +10,13 @@ from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
 
+from protocols.plain_text import plain_text
 from service.cli.doctor.checked import Checked, note, ok, problem
 from service.daemon.store_worker import DATABASE_NAME
 from service.machine.host import Host
 from service.machine.package import version
+from storage.database import kept_aside, read_database
+from storage.store_error import StoreError
 
 _SYNCED = "/run/systemd/timesync/synchronized"
 _TIME_PROGRAMS = ("chronyd", "ntpd", "gpsd")
@@ -83,7 +86,7 @@ def check_database(state_dir: Path) -> list[Checked]:
     found = []
     try:
         exists = path.exists()
-        aside = sorted(state_dir.glob(f"{DATABASE_NAME}.corrupt-*[0-9]"))
+        aside = kept_aside(path)
     except PermissionError:
         return [note("missions", f"no permission to read {path}", "run doctor with sudo")]
     if not exists:
@@ -99,11 +102,14 @@ def check_database(state_dir: Path) -> list[Checked]:
 def _look_into(path: Path) -> Checked:
     try:
         # Read-only: a daemon may be using it.
-        with closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True, timeout=2)) as database:
+        with closing(read_database(path)) as database:
             (finding,) = database.execute("PRAGMA quick_check(1)").fetchone()
             (count,) = database.execute("SELECT count(*) FROM missions").fetchone()
+    except StoreError as error:
+        return problem("missions", str(error), "move it away, and restart the bridge")
     except sqlite3.Error as error:
         finding = str(error)
+    finding = plain_text(finding)  # it may quote names in the file
     if finding == "ok":
         return ok("missions", f"{count} stored in {path}, intact")
     remedy = "restart the bridge: it sets the file aside and begins a new one (sudo systemctl restart naze-bridge)"

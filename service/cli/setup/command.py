@@ -13,13 +13,12 @@ from service.cli.doctor.command import diagnose
 from service.cli.options import PATH
 from service.cli.sentences import fail
 from service.cli.setup.change import Machine, SetupError, Step, is_root
+from service.cli.setup.state_folder import page_token
 from service.cli.setup.steps import GCS_PORT, PAGE_PORT, SetupChoices, missing_steps
 from service.daemon.client import STATUS, ControlError, ask_daemon
 from service.machine.host import Host
 from service.machine.raspberry_pi import pi_model
 from service.settings.addresses import AddressError, parse_fc
-from service.settings.load import SERVICE_STATE
-from service.web.token import DEFAULT_NAME
 from storage.os_error import reason
 
 _LEAST_PASSWORD, _MOST_PASSWORD, _MOST_SSID = 8, 63, 32
@@ -152,8 +151,7 @@ def _print_addresses(host: Host, answers: SetupChoices) -> None:
         return
     url = f"http://{(addresses or local or ['localhost'])[0]}:{PAGE_PORT}/"
     click.echo(f"Status page: {url}")
-    token = host.read(f"{SERVICE_STATE}/{DEFAULT_NAME}").strip()
-    if token:
+    if token := page_token(host):
         click.echo(f"Its token, for changes: {token}")
     import segno  # imported here: no other command needs it
 

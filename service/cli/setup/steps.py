@@ -10,10 +10,9 @@ from pathlib import Path
 from xml.sax.saxutils import escape
 
 from service.cli.setup.change import Change, Run, Step, WriteFile
-from service.links.port_memory import PORTS_FILE
+from service.cli.setup.state_folder import other_devices
 from service.machine.host import Host
 from service.machine.raspberry_pi import boot_file, pi_model
-from service.settings.load import SERVICE_STATE
 
 SETTINGS_FILE = "/etc/naze-bridge/conf.d/setup.toml"
 KEY_FILE = "/etc/naze-bridge/gcs.key"
@@ -157,16 +156,10 @@ def _settings(host: Host, answers: SetupChoices) -> Iterator[Step]:
 
 def _others(host: Host, answers: SetupChoices) -> Iterator[Step]:
     """Keep the name /dev/naze from USB devices that proved not to be a flight controller."""
-    try:
-        others = json.loads(host.read(f"{SERVICE_STATE}/{PORTS_FILE}") or "{}").get("others", {})
-        keys = [re.fullmatch(r"usb (\S+) (\w{4}):(\w{4}).*", key) for key in others]
-    except (ValueError, AttributeError):
-        return
     rules = [
-        f'SUBSYSTEM=="tty", KERNELS=="{key[1]}", ATTRS{{idVendor}}=="{key[2]}", ATTRS{{idProduct}}=="{key[3]}",'
+        f'SUBSYSTEM=="tty", KERNELS=="{socket}", ATTRS{{idVendor}}=="{vendor}", ATTRS{{idProduct}}=="{product}",'
         ' ENV{NAZE_BRIDGE_OTHER}="1"\n'
-        for key in keys
-        if key
+        for socket, vendor, product in other_devices(host)
     ]
     text = "# Written by `naze-bridge setup`: not flight controllers, so not /dev/naze.\n" + "".join(rules)
     if rules and host.read(_OTHERS_FILE) != text:
