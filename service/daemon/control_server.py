@@ -71,7 +71,8 @@ class ControlServer:
         """Stop listening, and tell waiting clients that they get no reply."""
         if self._server is not None:
             self._server.close()
-            self._path.unlink(missing_ok=True)
+            with suppress(OSError):  # in a folder that became read-only it stays, and the next start replaces it
+                self._path.unlink()
         if self._clients:
             # Finished replies are still sent.
             await asyncio.wait(self._clients, timeout=_LAST_ANSWERS_S)

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Floods of the disk and the control socket, and a disk that is missing or hangs."""
 
+import ctypes
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -10,12 +12,14 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from protocols.mavlink.frame import MavlinkSplitter
 from tests.support.attack_pilot import HELLO, Attack, Stranger, Watch, assert_uploads, m
 from tests.support.benches import Starter
 from tests.support.plain_station import udp_station
 from tests.support.plan import plain_plan
-from tests.support.programs import REPOSITORY, Daemon, free_port, happens, until
+from tests.support.programs import NAZE_BRIDGE, REPOSITORY, Daemon, free_port, happens, until
 from tests.support.web_bench import WebBench
 
 
@@ -117,6 +121,56 @@ def test_the_daemon_works_and_stops_while_the_disk_hangs(start: Starter, stack: 
         assert_uploads(pilot, board, plain_plan(20))
     assert daemon.end() == 0
     assert "store.hangs" in daemon.printed
+
+
+_PR_CAPBSET_DROP, _CAP_DAC_OVERRIDE = 24, 1
+_SAVED_NOTHING = {
+    "read-only": ("signing.json", "Permission denied"),
+    "removed": ("signing.json", "No such file or directory", "missions.db was removed while the bridge ran"),
+    "a file": ("signing.json", "Not a directory", "missions.db was removed while the bridge ran"),
+}
+
+
+def _obey_modes() -> None:
+    """Root, too, shall be unable to write to a read-only folder."""
+    if os.geteuid() == 0:
+        assert ctypes.CDLL(None).prctl(_PR_CAPBSET_DROP, _CAP_DAC_OVERRIDE, 0, 0, 0) == 0
+
+
+class DaemonThatObeysModes(Daemon):
+    """Runs in a new interpreter without root's right to ignore the modes of files."""
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        with self._output.open("ab") as output:
+            return subprocess.Popen(
+                [*NAZE_BRIDGE, *self._arguments], cwd=REPOSITORY, stdout=output, stderr=output, preexec_fn=_obey_modes
+            )
+
+
+@pytest.mark.parametrize("becomes", _SAVED_NOTHING)
+def test_the_daemon_stops_cleanly_after_its_state_folder_was_lost(
+    start: Starter, stack: ExitStack, becomes: str
+) -> None:
+    """What could not be saved is logged once."""
+    key_file, config = start.directory / "gcs.key", start.directory / "naze-bridge.toml"
+    key_file.write_text("loop the loop\n")
+    key_file.chmod(0o600)
+    link = f"udpin:127.0.0.1:{free_port()}"
+    config.write_text(f'gcs = [{{address = "{link}", key_file = "{key_file}"}}]\n')
+    daemon = DaemonThatObeysModes(start.directory, "sim:", [link], options=("--config", str(config)))
+    stack.callback(daemon.end, signal.SIGKILL)
+    daemon.wait()
+    if becomes == "read-only":
+        daemon.state_dir.chmod(0o555)
+        stack.callback(daemon.state_dir.chmod, 0o755)
+    else:
+        shutil.rmtree(daemon.state_dir)
+        if becomes == "a file":
+            daemon.state_dir.touch()
+    assert daemon.end() == 0, daemon.printed
+    assert "Traceback" not in daemon.printed
+    ending = daemon.printed[daemon.printed.index("daemon.stopping") :]
+    assert [ending.count(words) for words in _SAVED_NOTHING[becomes]] == [1] * len(_SAVED_NOTHING[becomes]), ending
 
 
 #: Sockets that a client opens for each request: far above every limit.
