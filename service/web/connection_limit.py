@@ -9,9 +9,12 @@ a connection waits for its turn: a page that is loaded twice in a second must no
 import asyncio
 from collections import Counter, deque
 
+import h11
 from uvicorn.config import Config
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.server import ServerState
+
+from service.machine.log_setup import warn_once
 
 #: Responses are a few kilobytes and quick to make.
 LIFETIME_S = 15.0
@@ -33,6 +36,8 @@ class ConnectionLimit:
         self.transports: set[asyncio.Transport] = set()
         self._inside: Counter[str] = Counter()
         self._lately: deque[tuple[float, str]] = deque(maxlen=MAX_IN_A_SECOND)
+        self._malformed = 0
+        self._warned: set[str] = set()
 
     def admit(self, address: str) -> bool:
         """True if there is room for a connection. Each admitted one must `leave`."""
@@ -55,6 +60,10 @@ class ConnectionLimit:
         self._inside[address] -= 1
         if not self._inside[address]:
             del self._inside[address]
+
+    def count_malformed(self, address: str) -> None:
+        self._malformed += 1
+        warn_once(self._warned, "web.malformed", peer=address, count=self._malformed)
 
     def close(self) -> None:
         for transport in list(self.transports):
@@ -93,6 +102,17 @@ class BoundedConnection(H11Protocol):
         self._is_served = True
         super().connection_made(transport)
         transport.resume_reading()
+
+    def send_400_response(self, msg: str) -> None:
+        """Refuse a request that is not HTTP. Its head may have been: then its handler already runs, or has answered."""
+        self._limit.count_malformed(self._address)
+        if self.cycle is not None:
+            self.cycle.disconnected = True
+            self.cycle.message_event.set()
+        if self.conn.our_state in (h11.IDLE, h11.SEND_RESPONSE):
+            super().send_400_response(msg)
+        else:
+            self.transport.close()
 
     def connection_lost(self, exc: Exception | None) -> None:
         for timer in self._end, self._turn:

@@ -162,6 +162,21 @@ def test_bad_bytes_end_only_their_connection(lasting_web: WebBench, name: str) -
     assert "Traceback" not in lasting_web.daemon.printed
 
 
+@pytest.mark.parametrize("in_pieces", [False, True])
+@pytest.mark.parametrize("method", [b"GET /api/state", b"POST /api/check", b"POST /api/missions/1/restore"])
+def test_malformed_chunks_are_counted_without_a_traceback(web: WebBench, method: bytes, in_pieces: bool) -> None:
+    head = b"%b HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n" % method
+    bodies = (b"zz\r\n", b"-1\r\n\r\n", b"1\r\nabc\r\n", b"f" * 40, b"1;" + b"a" * 70_000, b"0\r\n\xff\r\n\r\n")
+    for body in bodies:
+        raw(web, *([head, body] if in_pieces else [head + body]))
+        raw(web, *([head + b"1\r\na\r\n", body] if in_pieces else [head + b"1\r\na\r\n" + body]))
+    assert web.ask("/api/state").status == 200
+    assert "Traceback" not in web.daemon.printed
+    assert "exc_info" not in web.daemon.printed
+    assert len([line for line in web.daemon.printed.splitlines() if "web.malformed" in line]) == 1
+    assert "web.failed" not in web.daemon.printed
+
+
 @pytest.mark.parametrize("head", [b"Content-Length: 1000000000000", b"Transfer-Encoding: chunked"])
 def test_a_huge_body_is_refused_unread(lasting_web: WebBench, head: bytes) -> None:
     before = resident_kb(lasting_web.daemon.process.pid)
