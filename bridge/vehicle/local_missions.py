@@ -15,6 +15,7 @@ from bridge.model.mission_log import ArrivedMission
 from bridge.model.refusal import Refusal
 from bridge.model.verdict import Result, Verdict
 from protocols.mission_item import MissionItem, MissionResult
+from protocols.plain_text import plain_text
 
 _WOULD_ERASE = Refusal(MissionResult.DENIED, "No item can be stored: this would erase the current mission")
 
@@ -42,6 +43,7 @@ class LocalMissions:
 
         `may_erase` False: a list without a storable item is refused.
         """
+        source = plain_text(source)
         owner = object()
         incident = f"push-{next(self._incidents)}"
         arrived: list[ArrivedMission] = []

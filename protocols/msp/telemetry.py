@@ -8,6 +8,8 @@ import struct
 from enum import IntFlag
 from typing import NamedTuple
 
+from protocols.plain_text import plain_text
+
 _IDENT = struct.Struct("<BBBI")
 _STATUS = struct.Struct("<HHHIB")
 STATUS_SIZE = _STATUS.size
@@ -192,7 +194,12 @@ def decode_home(payload: bytes) -> HomePoint | None:
 
 def decode_box_names(payload: bytes) -> tuple[str, ...]:
     """Read MSP_BOXNAMES: names in the order of the status bits."""
-    return tuple(payload.decode("ascii", "replace").rstrip(";").split(";")) if payload else ()
+    return tuple(msp_text(payload).rstrip(";").split(";")) if payload else ()
+
+
+def msp_text(payload: bytes) -> str:
+    """The text of a reply; firmware sends ASCII."""
+    return plain_text(payload.decode("ascii", "replace"))
 
 
 def decode_box_activation(payload: bytes, boxes: int) -> tuple[int, ...] | None:

@@ -18,7 +18,7 @@ from bridge.model.verdict import Result, Verdict
 from protocols.mission_file import MissionFileError
 from protocols.mission_item import MissionItem, MissionResult, degrees_to_e7, is_on_earth
 from protocols.mission_record import identify
-from service.cli.mission_source import load_mission
+from service.cli.mission_source import load_mission, shown_path
 from service.cli.mission_table import mission_table
 from service.cli.options import PATH
 from service.cli.printing import print_json, print_table
@@ -120,7 +120,7 @@ def check(
 
 
 def _check_file(path: Path, rules: MissionRules, home: tuple[int, int] | None, strict: bool, as_json: bool) -> ExitCode:
-    name = click.format_filename(path)
+    name = shown_path(path)
     try:
         sent = load_mission(path)
     except MissionFileError as error:

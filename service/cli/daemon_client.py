@@ -13,7 +13,7 @@ import click
 from service.cli.options import PATH
 from service.cli.sentences import INTERRUPTED, complain, fail
 from service.daemon.client import ControlError, Interrupted, NoDaemonError, ask_daemon
-from service.daemon.mission_data import Json
+from service.daemon.mission_data import Json, plain
 from service.settings import SettingsError, default_state_dir
 from service.settings.addresses import AddressError, parse_fc
 from service.settings.load import SERVICE_STATE
@@ -121,4 +121,6 @@ def _read_store(state_dir: Path | None, request: Json) -> Json:
     if path is None:
         raise ControlError(f"no missions are stored in {' or '.join(map(str, folders))}: use --state-dir")
     with read_store(path) as store:
-        return listed(store, request["limit"]) if request["do"] == "missions" else shown(store, request["number"])
+        is_list = request["do"] == "missions"
+        answer: Json = plain(listed(store, request["limit"]) if is_list else shown(store, request["number"]))
+        return answer

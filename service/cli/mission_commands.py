@@ -9,7 +9,7 @@ import click
 
 from protocols.mission_file import MissionFileError, write_mission_file, write_qgc_wpl
 from service.cli.daemon_client import ask, ask_with_progress, bridge_options
-from service.cli.mission_source import load_mission, save_mission
+from service.cli.mission_source import load_mission, save_mission, shown_path
 from service.cli.mission_table import mission_table
 from service.cli.options import PATH
 from service.cli.printing import print_json, print_table
@@ -91,7 +91,7 @@ def _show_held(held: Json, file: Path | None, *, is_quiet: bool) -> str:
             save_mission(file, write_mission_file(items, file.name))
         except MissionFileError as error:
             fail(str(error))
-        summary += f", written to {click.format_filename(file)}"
+        summary += f", written to {shown_path(file)}"
     elif items and not is_quiet:
         print_table(mission_table(items, items, ()))
     return summary

@@ -5,10 +5,9 @@ import errno
 import os
 from pathlib import Path
 
-import click
-
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
+from protocols.plain_text import plain_text
 from service.cli.sentences import complain
 from storage.bounded_file import read_bounded
 from storage.os_error import reason
@@ -16,9 +15,14 @@ from storage.os_error import reason
 MAX_BYTES = 8 * 2**20  # 65,535 items, the most that MAVLink can count, are about 5 MB of text
 
 
+def shown_path(path: Path) -> str:
+    """The path in messages: any program may have made the file's name."""
+    return plain_text(str(path))
+
+
 def load_mission(path: Path) -> list[MissionItem]:
     """Read the mission file at `path`; MissionFileError also if the disk fails. Notes go to standard error."""
-    name = click.format_filename(path)
+    name = shown_path(path)
 
     def note(text: str) -> None:
         complain(f"{name}, {text}")
@@ -42,7 +46,7 @@ def save_mission(path: Path, text: str) -> None:
     try:
         target = Path(os.path.realpath(path))  # still a link if it leads to itself
         if target.is_symlink() or (target.exists() and not target.is_file()):
-            name = click.format_filename(path)
+            name = shown_path(path)
             raise MissionFileError(name, "", "it is not a regular file", "name a file for the mission")
         draft = target.with_name(f".naze-bridge-{os.getpid()}")
         with draft.open("x", encoding="utf-8") as file:  # "x": an existing file, above all a link, is not ours
@@ -60,4 +64,4 @@ def save_mission(path: Path, text: str) -> None:
 def _failed(path: Path, error: OSError | ValueError) -> MissionFileError:
     is_full = isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
     remedy = "delete other files there" if is_full else "check the path and its permissions"
-    return MissionFileError(click.format_filename(path), "", reason(error), remedy)
+    return MissionFileError(shown_path(path), "", reason(error), remedy)

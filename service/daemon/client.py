@@ -13,12 +13,13 @@ from pathlib import Path
 from tempfile import gettempdir
 from zlib import crc32
 
-from service.daemon.mission_data import Json, to_json
+from service.daemon.mission_data import Json, plain, to_json
 from service.settings import SettingsError, default_state_dir
 
 #: The request for the bridge's status.
 STATUS = {"do": "status"}
 SOCKET_NAME = "control.sock"
+_ANSWERS = {"progress", "result", "error"}
 #: The unit's RuntimeDirectory=. A service's state directory is closed to other users (DynamicUser=).
 _SERVICE_FOLDER = "/run/naze-bridge"
 
@@ -39,7 +40,10 @@ def ask_daemon(state_dir: Path | None, request: Json, progress: Callable[[int], 
     """Ask the daemon that runs on `state_dir` (None: see find_socket); ControlError if there is none or it refuses."""
     path = find_socket(state_dir)
     line = to_json(request).encode() + b"\n"  # before connecting: the daemon waits only 5 s for the request
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection, connection.makefile() as answers:
+    with (
+        socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection,
+        connection.makefile(errors="replace") as answers,
+    ):
         try:
             connection.connect(str(path))
         except PermissionError as error:
@@ -52,7 +56,7 @@ def ask_daemon(state_dir: Path | None, request: Json, progress: Callable[[int], 
             # A refusal may arrive in the middle of a long request: read it.
             connection.sendall(line)
         with suppress(ConnectionError):
-            for answer in map(json.loads, answers):
+            for answer in map(_answer, answers):
                 if "progress" in answer:
                     progress(answer["progress"])
                 elif "error" in answer:
@@ -61,6 +65,16 @@ def ask_daemon(state_dir: Path | None, request: Json, progress: Callable[[int], 
                     result: Json = answer["result"]
                     return result
     raise ControlError("the daemon ended before it answered")
+
+
+def _answer(line: str) -> Json:
+    try:
+        answer: Json = plain(json.loads(line))
+        if _ANSWERS & answer.keys():
+            return answer
+    except (ValueError, AttributeError, RecursionError):
+        pass
+    raise ControlError("the daemon's answer cannot be read: is it of another release?")
 
 
 def socket_of_daemon(state_dir: Path) -> Path:

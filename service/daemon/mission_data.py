@@ -10,6 +10,7 @@ from bridge.model.finding import Finding, News
 from bridge.model.verdict import Verdict
 from protocols.mission_item import MissionItem
 from protocols.mission_record import identify
+from protocols.plain_text import plain_text
 
 Json = dict[str, Any]
 
@@ -36,6 +37,15 @@ def strict(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None if math.isnan(value) else str(value)
     return value
+
+
+def plain(value: Any) -> Any:
+    """Make the texts in plain data safe to print: a daemon or store that was taken over may hold anything."""
+    if isinstance(value, dict):
+        return {key: plain(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [plain(each) for each in value]
+    return plain_text(value) if isinstance(value, str) else value
 
 
 def mission_items(data: object) -> list[MissionItem]:

@@ -3,6 +3,7 @@
 
 from dataclasses import dataclass
 
+from protocols.plain_text import plain_text
 from service.machine.host import Host
 from service.machine.raspberry_pi import pi_model
 
@@ -65,6 +66,6 @@ def _usb_port(host: Host, name: str) -> SerialPort | None:
 def _read(path: object) -> str:
     try:
         with open(str(path), errors="replace") as file:
-            return file.read().strip()
+            return plain_text(file.read().strip())
     except OSError:
         return ""

@@ -9,11 +9,12 @@ from enum import Enum
 from pathlib import Path
 
 from bridge.model.vehicle_groups import Group
+from protocols.plain_text import plain_text
 
 #: The value that allows commands without authentication.
 I_KNOW = "I know"
 DEFAULT_PREFIX = "fleet"
-_FORBIDDEN = re.compile(r"[*$?#/\s\x00-\x1f\x7f]")
+_FORBIDDEN = re.compile(r"[*$?#/\s]")
 _MAX_NAME = 64
 
 
@@ -42,7 +43,7 @@ _MAX_RATE_HZ = 50.0
 
 def host_name() -> str:
     """The machine's name as a vehicle name: characters that a key cannot hold become dashes."""
-    return _FORBIDDEN.sub("-", socket.gethostname()).lstrip("@")[:_MAX_NAME] or "vehicle"
+    return _FORBIDDEN.sub("-", plain_text(socket.gethostname())).lstrip("@")[:_MAX_NAME] or "vehicle"
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +87,8 @@ def check_name(what: str, name: str) -> str:
         wrong = "empty"
     elif bad is not None:
         wrong = f"{name!r}, with {bad.group()!r} in it"
+    elif plain_text(name) != name:
+        wrong = f"{name!a}, with characters that cannot be shown"
     elif name.startswith("@"):
         wrong = f"{name!r}, with @ in front"
     elif len(name) > _MAX_NAME:

@@ -6,6 +6,7 @@ import json
 import math
 import os
 import pty
+import socket
 import stat
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import pytest
@@ -20,9 +22,11 @@ import pytest
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import Command
 from service.cli.mission_source import save_mission
+from storage.mission_store import open_store
 from tests.support.benches import Starter
 from tests.support.plan import HOME, PlanRow, judge, plain_plan, plan_text, records_of, waypoint
 from tests.support.programs import Daemon, run_naze_bridge
+from tests.support.sample_missions import mission as sample_mission
 
 
 @pytest.fixture(scope="module")
@@ -272,6 +276,49 @@ def test_stored_missions_are_read_without_a_daemon(start_in: Starter, tmp_path: 
     restored = ask(daemon, "missions", "restore", "1", "--fc", "sim")
     assert restored.stdout.endswith("ACCEPTED: Mission verified: 5 records\n"), restored
     assert_one_sentence(run_naze_bridge("missions", "list", "--state-dir", tmp_path), 1, "no missions are stored")
+
+
+def test_a_file_name_cannot_act_on_the_terminal(daemon: Daemon, tmp_path: Path) -> None:
+    file = write_plan(tmp_path / "Süd\x1b[2J\x9b2J\u202e\nwest", plain_plan(3))
+    assert ask(daemon, "push", file, "--json").returncode == 0
+    number = strict(ask(daemon, "missions", "list", "--json").stdout)[0]["number"]
+    for words in (("list",), ("show", str(number))):
+        shown = ask(daemon, "missions", *words).stdout
+        assert "push of Süd[2J2J west" in " ".join(shown.split())
+        assert shown.replace("\n", "").isprintable()
+    file.write_text("no plan")
+    refused = ask(daemon, "push", file)
+    assert refused.stderr.rstrip("\n").isprintable()
+
+
+def test_a_store_of_a_service_that_was_taken_over_cannot_act_on_the_terminal(tmp_path: Path) -> None:
+    with open_store(tmp_path / "missions.db", 0.0).store as store:
+        number = store.add(replace(sample_mission(1), source="\x1b[2J\x9b2Jpush"))
+        store.conclude(number, "VERIFIED\x1b[2J", "\u202edetail", 0.0)
+    for words in (("list",), ("show", str(number))):
+        shown = run_naze_bridge("missions", *words, "--state-dir", tmp_path)
+        assert shown.stdout.replace("\n", "").isprintable(), shown
+
+
+def test_a_daemon_that_was_taken_over_cannot_act_on_the_terminal(tmp_path: Path) -> None:
+    answers = [b'{"error": "\\u001b[2J\\u009b2J"}', b"[" * 100_000, b"[]", b"\xff", b"{}"]
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind(str(tmp_path / "control.sock"))
+        listening.listen()
+
+        def answer_all() -> None:
+            for answer in answers:
+                with listening.accept()[0] as client:
+                    client.recv(4096)
+                    client.sendall(answer + b"\n")
+
+        answering = Thread(target=answer_all)
+        answering.start()
+        for _ in answers:
+            ended = run_naze_bridge("status", "--state-dir", tmp_path)
+            assert_one_sentence(ended, 1)
+            assert ended.stderr.rstrip("\n").isprintable()
+        answering.join()
 
 
 def test_status_shows_the_flight_controller_and_the_address(daemon: Daemon) -> None:

@@ -68,3 +68,7 @@ def test_the_current_is_read_if_present() -> None:
 @pytest.mark.parametrize(("sent", "kept"), [(4, 4), (8, 8), (10, 10), (18, 18), (34, 18)])
 def test_no_more_channels_are_read_than_mavlink_has(sent: int, kept: int) -> None:
     assert t.decode_channels(struct.pack(f"<{sent}H", *range(1000, 1000 + sent))) == tuple(range(1000, 1000 + kept))
+
+
+def test_names_from_the_line_are_printable() -> None:
+    assert t.decode_box_names(b"ARM;AN\x1b[2JGLE;\x9b\n;") == ("ARM", "AN[2JGLE", "\ufffd ")

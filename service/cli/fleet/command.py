@@ -25,7 +25,7 @@ from service.cli.fleet.roll_call import alive, chosen, roll_call
 from service.cli.fleet.tables import complaints, fleet_table
 from service.cli.fleet.watch import watching
 from service.cli.fleet.watch_screen import print_changes, show_screen
-from service.cli.mission_source import save_mission
+from service.cli.mission_source import save_mission, shown_path
 from service.cli.options import PATH
 from service.cli.printing import print_json, print_table
 from service.cli.sentences import INTERRUPTED, fail
@@ -172,7 +172,7 @@ def _save(held: Held, path: Path, *, is_file: bool) -> None:
     except MissionFileError as error:
         fail(str(error))
     except OSError as error:
-        fail(f"{click.format_filename(path)} is not a writable folder: {reason(error)}")
+        fail(f"{shown_path(path)} is not a writable folder: {reason(error)}")
 
 
 def _show(held: Held, *, with_items: bool, to_error: bool) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import cbor2
 import zenoh
 
+from protocols.plain_text import plain_text
 from service.daemon.mission_data import Json
 from service.zenoh_link.payload import decoded
 
@@ -31,9 +32,8 @@ def part(data: Json, *path: str) -> Any:
 
 
 def text(data: Json, *path: str) -> str | None:
-    """The text without control characters, which could act on a terminal."""
     value = part(data, *path)
-    return "".join(each if each.isprintable() else "?" for each in value) if isinstance(value, str) else None
+    return plain_text(value) if isinstance(value, str) else None
 
 
 def number(data: Json, *path: str) -> float | None:

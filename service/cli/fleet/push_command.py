@@ -31,7 +31,7 @@ from service.cli.fleet.tables import (
 )
 from service.cli.fleet.trial import Trial, try_mission
 from service.cli.fleet.vehicle import BridgeId
-from service.cli.mission_source import mission_bytes
+from service.cli.mission_source import mission_bytes, shown_path
 from service.cli.options import PATH
 from service.cli.printing import print_json, print_table
 from service.cli.sentences import INTERRUPTED, complain
@@ -121,7 +121,7 @@ def _read(file: Path, names: tuple[str, ...], to_all: bool) -> tuple[bytes, int]
         raise click.UsageError("specify the vehicles: --vehicle NAME, or --all")
     try:
         mission = mission_bytes(file)
-        return mission, len(read_mission_file(mission, click.format_filename(file)))
+        return mission, len(read_mission_file(mission, shown_path(file)))
     except MissionFileError as error:
         complain(error)
         raise SystemExit(_UNREADABLE) from error
