@@ -11,6 +11,7 @@ An autopilot that speaks MAVLink itself is not represented but passed through, b
     FcSession <-> Routes <-> Ground
 """
 
+from dataclasses import replace
 from itertools import count
 from math import inf
 
@@ -56,7 +57,11 @@ class Bridge:
         self._config = config
         self._log_event = log_event
         self._was_armed = False
+        #: The armed craft, for the BridgeConfig of a restarted bridge; it changes rarely. None: it is not armed.
+        self.flight = config.flight
         self._announcer = LinkAnnouncer()
+        if self.flight is not None:
+            self._announcer.lost(now)
         incidents = count(1)
 
         self.guard = Guard(config.links, log_event, passes_everything=config.passes_everything)
@@ -79,6 +84,7 @@ class Bridge:
             self._controller_changed,
             self._mavlink_received,
             config.autopilot,
+            config.flight,
         )
         self.missions = MissionService(self.session.vehicle, self.runner, on_ending)
         self.local = LocalMissions(self.missions, self.ground, log_event, incidents)
@@ -223,6 +229,14 @@ class Bridge:
             self._vehicle.heard(news, now)
         if FlightState in news:
             self._follow_arming(now)
+            self._remember_flight(now)
+
+    def _remember_flight(self, now: float) -> None:
+        if self.session.vehicle.armed is None or self.is_passing_through:
+            return
+        before, memory = self.flight, self.session.flight_memory(now)
+        if before is None or memory is None or replace(memory, made_at=before.made_at, mode=before.mode) != before:
+            self.flight = memory
 
     def _follow_arming(self, now: float) -> None:
         armed = self.session.vehicle.armed

@@ -9,6 +9,7 @@ from bridge.controllers.table import PROFILES
 from bridge.fc.profile import Profile, RuleSettings
 from bridge.gcs.guard import LinkAccess
 from bridge.model.autopilot import Autopilot
+from bridge.model.flight_memory import FlightMemory
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +18,8 @@ class BridgeConfig:
 
     `version`: of the bridge itself. `unix_time_s`: the time of day at a monotonic time, None if unknown.
     `links`: access rules by link name; every station may write over other links. `passes_everything`: an autopilot
-    that speaks MAVLink itself gets commands over those other links, too.
+    that speaks MAVLink itself gets commands over those other links, too. `flight`: of the craft that a former bridge
+    left armed.
     """
 
     speeds: Sequence[int | None]
@@ -30,3 +32,4 @@ class BridgeConfig:
     version: str = ""
     unix_time_s: Callable[[float], float | None] = lambda _now: None
     passes_everything: bool = False
+    flight: FlightMemory | None = None

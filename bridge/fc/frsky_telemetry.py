@@ -5,13 +5,13 @@ Climb and velocity follow from successive reports. A report that jumps counts as
 its fix, Harakiri keeps sending the last position without saying so: a position counts only while it moves.
 """
 
+from bridge.model.flight_memory import Home
 from bridge.model.ground_track import north_east_m
 from bridge.model.vehicle import (
     STALE_S,
     GlobalPosition,
     Health,
     Height,
-    Home,
     Orientation,
     Power,
     Source,

@@ -144,7 +144,14 @@ class MavlinkTelemetry:
 
     def _harakiri_mode(self) -> FlightMode:
         """Its heartbeat says only whether it levels itself; the rest follows from the pilot's switches."""
-        switches, sticks = self._vehicle.last(Switches), self._vehicle.last(Sticks)
+        switches, sticks, state = (
+            self._vehicle.last(Switches),
+            self._vehicle.last(Sticks),
+            self._vehicle.last(FlightState),
+        )
+        if switches is not None and sticks is None and state is not None and isinstance(state.mode, FlightMode):
+            # Just after a restart of the bridge in flight.
+            return state.mode
         if switches is not None and sticks is not None:
             flags = active_boxes(switches.activation, sticks.channels_us[_STICKS:])
             mode = flight_mode(names_of_active(flags, switches.boxes))
@@ -156,6 +163,8 @@ class MavlinkTelemetry:
         roll, pitch, yaw = map(math.degrees, (message.roll, message.pitch, message.yaw))
         if not (math.isfinite(roll) and math.isfinite(pitch) and math.isfinite(yaw)):
             return
+        if self._is_harakiri:
+            self._vehicle.hear_uptime(now, message.time_boot_ms / 1000)
         health = self._vehicle.last(Health)
         is_north_known = not self._is_harakiri or (health is not None and Sensor.COMPASS in health.sensors)
         rates = None

@@ -17,6 +17,7 @@ from bridge.fc.states.searching import Searching
 from bridge.line.runner import Runner
 from bridge.model.autopilot import Autopilot
 from bridge.model.events import EventLog, Level
+from bridge.model.flight_memory import FlightMemory
 from protocols.mavlink.frame import MavlinkFrame
 
 _Next = Mapping[type[Event] | Spoken, type[State]]
@@ -40,7 +41,8 @@ class FcSession:
     """Runs the state machine of one port.
 
     `on_change` is called with each flight controller that is found, and with None when it is lost or cannot be used.
-    `on_mavlink` gets its MAVLink frames. `incidents`: numbers for the ids of related log lines.
+    `on_mavlink` gets its MAVLink frames. `incidents`: numbers for the ids of related log lines. `flight`: of the craft
+    that a former bridge left armed.
     """
 
     def __init__(
@@ -53,6 +55,7 @@ class FcSession:
         on_change: Callable[[FlightController | None, float], None],
         on_mavlink: Callable[[list[MavlinkFrame]], None],
         autopilot: Autopilot,
+        flight: FlightMemory | None,
     ) -> None:
         self._port = Port(speeds, autopilot, profiles, runner, on_mavlink)
         #: The flight controller's readings, kept when it is lost.
@@ -63,8 +66,16 @@ class FcSession:
         #: From the port's opening or a loss until a flight controller is found.
         self._incident = ""
         self._on_change = on_change
+        if flight is not None:
+            self._port.family = flight.family
+            self.vehicle.resume(flight)
         #: The current state, with the flight controller, the MSP link, and the speed that the port must have.
         self.state: State = Closed(self._port, PortClosed(None), 0.0)
+
+    def flight_memory(self, now: float) -> FlightMemory | None:
+        """What a restarted bridge must know about the craft; None unless it is armed."""
+        family = self._port.family
+        return None if family is None else self.vehicle.memory(family, now)
 
     def opened(self, now: float) -> None:
         # Another board may have been connected.

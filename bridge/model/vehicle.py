@@ -13,6 +13,7 @@ from typing import TypeVar
 
 from bridge.model.airframe import Airframe
 from bridge.model.battery import LEAST_V, least_cells, remaining_percent
+from bridge.model.flight_memory import FlightMemory, Home
 from bridge.model.flight_mode import FlightMode
 from bridge.model.ground_track import GroundTrack, distance_m
 from protocols.mission_item import is_on_earth
@@ -23,6 +24,8 @@ from protocols.msp.telemetry import Sensor
 STALE_S = 1.4
 #: Before the first arming, home follows the craft's position. Smaller moves than this are the receiver's noise.
 _STANDING_M = 10.0
+#: A message is never delivered later than this.
+_LATE_S = 5.0
 #: After a longer silence on the ground the battery may be another one.
 _SWAP_S = 10.0
 #: 2020: no GPS reports an earlier time.
@@ -211,15 +214,6 @@ class GpsTime(Reading):
     unix_s: float
 
 
-@dataclass(frozen=True, slots=True)
-class Home:
-    """Degrees * 1e7; altitude_m above mean sea level."""
-
-    lat_e7: int
-    lon_e7: int
-    altitude_m: float | None = None
-
-
 ReadingT = TypeVar("ReadingT", bound=Reading)
 
 
@@ -244,6 +238,41 @@ class Vehicle:
         self._cells = 1
         #: False before the first arming, while home is only the place of the craft.
         self.is_home_settled = False
+        #: When it was armed, or first heard armed; None unless armed.
+        self.armed_at: float | None = None
+        #: True from `resume` until the craft is heard.
+        self._is_resumed = False
+
+    def memory(self, family: str, now: float) -> FlightMemory | None:
+        """What a restarted bridge must know about the craft; None unless it is armed."""
+        state, switches = self.last(FlightState), self.last(Switches)
+        if state is None or self.armed_at is None:
+            return None
+        mode = state.mode if isinstance(state.mode, FlightMode) else None
+        ranges = ((), ()) if switches is None else (switches.boxes, switches.activation)
+        home = self.home if self.is_home_settled else None
+        return FlightMemory(family, self.armed_at, now, mode, home, *ranges, self.airframe, self.version, self._cells)
+
+    def resume(self, memory: FlightMemory) -> None:
+        """Continue a flight that a former bridge has seen. Readings that contradict it undo this."""
+        self.airframe, self.version, self._cells = memory.airframe, memory.version, memory.cells
+        self.home, self.is_home_settled = memory.home, memory.home is not None
+        self.armed_at, self._is_resumed = memory.armed_at, True
+        self._readings[FlightState] = FlightState(memory.made_at, Source.MSP, True, memory.mode)
+        if memory.boxes:
+            self._readings[Switches] = Switches(memory.made_at, Source.MSP, memory.boxes, memory.activation)
+
+    def hear_uptime(self, now: float, uptime_s: float) -> None:
+        """Take the flight controller's time since its start: if it started after the arming, that flight is over."""
+        if self.armed_at is not None and now - uptime_s > self.armed_at + _LATE_S:
+            self._end_flight()
+
+    def _end_flight(self) -> None:
+        """Forget what was known from an earlier flight."""
+        self.home, self.is_home_settled, self.armed_at = None, False, None
+        self._is_resumed = False
+        self._readings.pop(Switches, None)
+        self._readings.pop(FlightState, None)
 
     @property
     def armed(self) -> bool | None:
@@ -254,6 +283,8 @@ class Vehicle:
     def hear(self, reading: Reading) -> None:
         """Store a reading in place of the previous one of its kind."""
         kind = type(reading)
+        if isinstance(reading, FlightState) and reading.armed is not None:
+            self._follow_arming(reading.armed, reading.heard_at)
         if isinstance(reading, Power):
             reading = self._estimated(reading)
         before = self._readings.get(kind)
@@ -269,6 +300,15 @@ class Vehicle:
         elif isinstance(reading, GpsFix) and reading.fix is Fix.NO_FIX:
             # What is sent with each position is sent without one, too: it has the height.
             self.news.add(GlobalPosition)
+
+    def _follow_arming(self, armed: bool, now: float) -> None:
+        if self._is_resumed and not armed:
+            self._end_flight()
+        self._is_resumed = False
+        if not armed:
+            self.armed_at = None
+        elif self.armed_at is None:
+            self.armed_at = now
 
     def _estimated(self, power: Power) -> Power:
         """Fill in cells and remaining charge if the flight controller does not report them."""

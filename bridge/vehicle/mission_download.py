@@ -7,8 +7,8 @@ from bridge.gcs.cost import Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.station import Station
 from bridge.missions.mission_service import HeldMission, MissionService
+from bridge.model.flight_memory import Home
 from bridge.model.refusal import Refusal
-from bridge.model.vehicle import Home
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.mission_messages import item_message
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult

@@ -15,9 +15,10 @@ from bridge.gcs.message_rates import MessageRates
 from bridge.gcs.station import Peer, Severity, Station
 from bridge.gcs.stations import PRECEDENCE
 from bridge.missions.mission_service import MissionService
+from bridge.model.flight_memory import Home
 from bridge.model.flight_mode import FlightMode
 from bridge.model.mission_progress import FlownMission, MissionProgress, Progress
-from bridge.model.vehicle import STALE_S, FlightState, Health, Home, MissionLeg, Readiness, Reading
+from bridge.model.vehicle import STALE_S, FlightState, Health, MissionLeg, Readiness, Reading
 from bridge.model.verdict import SentSeqs
 from bridge.vehicle import vehicle_messages as make
 from bridge.vehicle.link_announcer import LinkAnnouncer

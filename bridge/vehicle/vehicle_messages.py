@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple, TypeVar
 
 from bridge.model.airframe import Airframe
+from bridge.model.flight_memory import Home
 from bridge.model.flight_mode import FlightMode
 from bridge.model.ground_track import bearing_deg, distance_m, north_east_m
 from bridge.model.mission_progress import FlownMission, Progress
@@ -22,7 +23,6 @@ from bridge.model.vehicle import (
     GpsFix,
     Health,
     Height,
-    Home,
     ImuSample,
     Motors,
     Orientation,

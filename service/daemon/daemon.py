@@ -25,6 +25,7 @@ from bridge.model.mission_log import ArrivedMission
 from bridge.model.vehicle_groups import Group
 from protocols.msp.frame import MspFrame
 from service.daemon.fc_connection import FcConnection
+from service.daemon.flight_file import FlightFile
 from service.daemon.gcs_connections import GcsConnections
 from service.daemon.mission_data import Json
 from service.daemon.store_worker import StoreWorker
@@ -83,6 +84,8 @@ class Daemon:
         self._tlog: TlogRecorder | None = None
         if settings.tlog is not None and settings.state_dir is not None:
             self._tlog = TlogRecorder(settings.state_dir / TLOG_FOLDER, settings.tlog)
+        host = host or Host()
+        self._flight = FlightFile(settings.state_dir, str(settings.fc), host)
         self._signing = SigningState(settings.state_dir, settings.gcs, settings.access)
         self.bridge = Bridge(
             BridgeConfig(
@@ -94,6 +97,7 @@ class Daemon:
                 version=version(),
                 unix_time_s=lambda now: time.time() - self._loop.time() + now,
                 passes_everything=settings.pass_through is PassThroughRule.EVERYTHING,
+                flight=self._flight.load(self._loop.time()),
             ),
             self._log_event,
             self._loop.time(),
@@ -102,7 +106,7 @@ class Daemon:
         )
         #: Per link; the flight controller's port is named "fc".
         self.traffic: defaultdict[str, Traffic] = defaultdict(Traffic)
-        self.fc = FcConnection(settings, host or Host(), self.bridge, self.traffic["fc"], self.flush, self._forward)
+        self.fc = FcConnection(settings, host, self.bridge, self.traffic["fc"], self.flush, self._forward)
         self.gcs = GcsConnections(self.bridge, self.traffic, self.flush)
         #: Why missions are kept in memory only; empty if they are stored.
         self.store_trouble = ""
@@ -130,6 +134,7 @@ class Daemon:
         with ExitStack() as stack:
             if self._tlog is not None:
                 stack.callback(self._tlog.close)
+            stack.callback(lambda: self._flight.close(self._loop.time()))
             for part in (self._signing, self.store, self.gcs, self.fc):
                 stack.callback(part.close)
             stack.callback(self._stop_timer)
@@ -170,6 +175,7 @@ class Daemon:
         self.fc.carry_out()
         while bridge.runner.store_effects:
             self._carry_out(bridge.runner.store_effects.popleft())
+        self._flight.follow(bridge.flight)
         self._deadline = bridge.next_deadline()
         if self._timer is not None:
             if 0 <= self._deadline - self._timer.when() < _TOO_EARLY_S:

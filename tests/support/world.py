@@ -9,7 +9,7 @@ import heapq
 import itertools
 import random
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from pymavlink.dialects.v20 import all as every_message
@@ -159,11 +159,12 @@ class World:
         self.written: list[tuple[float, int | None, bytes]] = []
         self._events: list[tuple[float, int, Callable[[], None]]] = []
         self._numbers = itertools.count()
-        self._plugged = False
+        self._plugged = self._is_away = False
         self._late_s = late_s
         self._lateness_s = 0.0
-        config = BridgeConfig(speeds, links=links or {}, profiles=profiles, passes_everything=passes_everything)
-        self.bridge = Bridge(config, self._note, self.now, on_frames)
+        self._config = BridgeConfig(speeds, links=links or {}, profiles=profiles, passes_everything=passes_everything)
+        self._on_frames = on_frames
+        self.bridge = Bridge(self._config, self._note, self.now, on_frames)
         if powered:
             self.naze.power_on_booted(self.now)
         if plugged:
@@ -181,6 +182,17 @@ class World:
         self._plugged = False
         self.bridge.session.closed(self.now, "unplugged")
         self._flush()
+
+    def restart_bridge(self, away_s: float = 2.0, *, flight: bool = True) -> None:
+        """Kill the bridge, and start another one after `away_s`, with the flight that the former one left."""
+        left = self.bridge.flight if flight else None
+        self._plugged = False
+        self.bridge = Bridge(self._config, self._note, self.now, self._on_frames)
+        self._is_away = True
+        self.run(away_s)
+        self._is_away = False
+        self.bridge = Bridge(replace(self._config, flight=left), self._note, self.now, self._on_frames)
+        self.plug()
 
     def power_off(self) -> None:
         self.naze.power_off(self.now)
@@ -226,8 +238,9 @@ class World:
 
     def receive_from(self, station: "GroundStation", data: bytes, *, datagram: bool = True) -> None:
         """Let bytes from a ground station arrive at the bridge now."""
-        self.bridge.gcs_received(station.peer, data, self.now, datagram=datagram)
-        self._flush()
+        if not self._is_away:
+            self.bridge.gcs_received(station.peer, data, self.now, datagram=datagram)
+            self._flush()
 
     def push(self, items: Sequence[Any]) -> list[Any]:
         """Push like the command line; the returned list receives the outcome."""

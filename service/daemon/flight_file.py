@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Keeps the flight memory in the state directory, so that a daemon that restarts in flight continues without a seam."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from bridge.model.airframe import Airframe
+from bridge.model.flight_memory import FlightMemory, Home
+from bridge.model.flight_mode import FlightMode
+from service.machine.host import Host
+from service.machine.state_file import StateFile
+
+FLIGHT_FILE = "flight.json"
+#: Changes with each start of the computer, and with it the clock of the times.
+_BOOT_ID = "/proc/sys/kernel/random/boot_id"
+#: After a longer stop the craft may have been armed again elsewhere. systemd restarts a crashed daemon in seconds.
+_LONGEST_STOP_S = 60.0
+
+
+class FlightFile:
+    """Written when the memory changes: on arming, disarming and rarely in between. `port`: the flight controller's.
+
+    It counts only on the same port, since the same start of the computer, and 60 s after a stop. Without a `folder`
+    there is no memory.
+    """
+
+    def __init__(self, folder: Path | None, port: str, host: Host) -> None:
+        self._file = None if folder is None else StateFile(folder / FLIGHT_FILE, "a flight begins again")
+        self._key = {"port": port, "boot_id": host.read(_BOOT_ID).strip()}
+        self._saved: FlightMemory | None = None
+
+    def load(self, now: float) -> FlightMemory | None:
+        """The craft that the former daemon left armed, if it counts; `now`: monotonic seconds."""
+        if self._file is not None:
+            self._saved = self._file.load(lambda kept: self._read(kept, now))
+            if self._saved is not None:
+                # The next stop may be a crash, which leaves no time.
+                self._save(None)
+        return self._saved
+
+    def follow(self, flight: FlightMemory | None) -> None:
+        """Save the memory if it is another one than before."""
+        if flight is not self._saved:
+            self._saved = flight
+            self._save(None)
+
+    def close(self, now: float) -> None:
+        """Note the time of the stop, and finish writing."""
+        if self._file is not None:
+            if self._saved is not None:
+                self._save(now)
+            self._file.close()
+
+    def _save(self, stopped_at: float | None) -> None:
+        if self._file is not None:
+            flight = self._saved
+            plain = None if flight is None else asdict(flight) | {"mode": flight.mode and flight.mode.name}
+            self._file.save({**self._key, "stopped_at": stopped_at, "flight": plain})
+
+    def _read(self, kept: Any, now: float) -> FlightMemory | None:
+        flight, stopped_at = kept["flight"], kept["stopped_at"]
+        is_ours = all(self._key[name] and kept[name] == self._key[name] for name in self._key)
+        is_recent = stopped_at is None or 0 <= now - stopped_at <= _LONGEST_STOP_S
+        if flight is None or not is_ours or not is_recent:
+            return None
+        version = flight["version"]
+        return FlightMemory(
+            family=str(flight["family"]),
+            armed_at=float(flight["armed_at"]),
+            made_at=float(flight["made_at"]),
+            mode=None if flight["mode"] is None else FlightMode[flight["mode"]],
+            home=_home(flight["home"]),
+            boxes=tuple(map(str, flight["boxes"])),
+            activation=tuple(map(int, flight["activation"])),
+            airframe=Airframe(flight["airframe"]),
+            version=None if version is None else (int(version[0]), int(version[1]), int(version[2])),
+            cells=int(flight["cells"]),
+        )
+
+
+def _home(kept: Any) -> Home | None:
+    if kept is None:
+        return None
+    altitude_m = kept["altitude_m"]
+    return Home(int(kept["lat_e7"]), int(kept["lon_e7"]), None if altitude_m is None else float(altitude_m))
