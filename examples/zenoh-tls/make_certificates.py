@@ -4,6 +4,8 @@
 Needs `pip install trustme`. Makes in FOLDER: ca.pem, for every member, and ca.key, which stays here; router.pem and
 router.key for the router, which is reached as ROUTER_HOST (a name or an address); NAME.pem and NAME.key for each
 vehicle and each person. To add names, run it again with the same FOLDER: existing files are kept.
+
+A member's certificate names no host, so it cannot pass for the router's.
 """
 
 import sys
@@ -11,13 +13,19 @@ from pathlib import Path
 
 import trustme
 
+#: A certificate needs an identity that is not a host's.
+_MEMBER = "member@fleet.invalid"
+
 
 def main(folder: Path, hosts: list[str], names: list[str]) -> None:
+    for name in names:
+        if name.lower() in ("ca", "router") or "/" in name or name.startswith(".") or not name.isprintable():
+            sys.exit(f"{name!a} cannot be a member's name: NAME.pem and NAME.key are its files in {folder}")
     folder.mkdir(parents=True, exist_ok=True)
     authority = _authority(folder)
     _issue(authority, folder, "router", hosts)
     for name in names:
-        _issue(authority, folder, name, [name])
+        _issue(authority, folder, name, [_MEMBER])
 
 
 def _authority(folder: Path) -> trustme.CA:

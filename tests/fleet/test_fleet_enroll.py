@@ -110,6 +110,33 @@ def test_logins_are_secret_and_kept(enrolled: Enrolled) -> None:
     assert "--prefix is 'a/b'" in enrolled.enroll("crow", "--prefix", "a/b").stderr
 
 
+@pytest.mark.parametrize(
+    "name",
+    ["ca", "router", "Router", "../kite", "/kite", ".", ".kite", "-kite", "kite:x", "ki\x1bte", "ki\nte", ""],
+)
+def test_a_name_that_is_not_a_members_is_refused_and_changes_nothing(enrolled: Enrolled, name: str) -> None:
+    def files() -> dict[Path, bytes]:
+        return {
+            path: path.read_bytes()
+            for path in enrolled.folder.parent.rglob("*")
+            if path.is_file() and path.suffix != ".log"
+        }
+
+    before = files()
+    refused = enrolled.enroll("--role", "guest", "--", name)
+    assert refused.returncode in (1, 2), refused
+    assert sum("naze-bridge: " in line for line in refused.stderr.splitlines()) == 1
+    assert "\x1b" not in refused.stderr
+    assert files() == before
+
+
+def test_a_vehicle_with_any_name_has_a_rule_of_its_own(tmp_path: Path) -> None:
+    for name in ("asked", "answered", "everything"):
+        assert run_naze_bridge("fleet", "enroll", name, "--folder", tmp_path).returncode == 0
+    rules = [rule["id"] for rule in json.loads((tmp_path / "router.json5").read_text())["access_control"]["rules"]]
+    assert len(set(rules)) == len(rules)
+
+
 def test_a_wrong_and_a_missing_login_are_told_apart(enrolled: Enrolled, tmp_path: Path) -> None:
     config = json.loads((enrolled.folder / "pilot.json5").read_text())
     config["transport"]["auth"]["usrpwd"]["password"] += "?"

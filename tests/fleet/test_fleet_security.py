@@ -6,6 +6,7 @@ import json
 import shutil
 import socket
 import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -128,6 +129,18 @@ def test_a_stranger_with_a_certificate_may_do_nothing(tls: Fleet) -> None:
         assert replies(stranger, "fleet/naze-1/v1/state") == replies(stranger, "fleet/naze-1/@cmd/v1/status") == 0
 
 
+def make_certificates(folder: Path, name: str) -> None:
+    script = [sys.executable, str(folder / "make_certificates.py"), str(folder), "localhost,127.0.0.1", name]
+    subprocess.run(script, check=True, capture_output=True, text=True)
+
+
+def move(fleet: Fleet, folder: Path, endpoint: str) -> None:
+    """Let the configurations in a copy of the fleet's folder name the copy, and another endpoint."""
+    port, new_port = (each.rpartition(":")[2] for each in (fleet.endpoint, endpoint))
+    for path in folder.glob("*.json5"):
+        path.write_text(path.read_text().replace(str(fleet.folder), str(folder)).replace(f":{port}", f":{new_port}"))
+
+
 def refused(listed: subprocess.CompletedProcess[str]) -> str:
     assert (listed.returncode, listed.stdout) == (1, ""), listed
     (sentence,) = listed.stderr.splitlines()
@@ -163,6 +176,27 @@ def test_an_invalid_certificate_of_a_pilot_is_explained(tls: Fleet, name: str, i
     assert reason in refused(tls.fleet_list(tls.config("pilot", name)))
 
 
+def test_a_members_certificate_cannot_pass_for_the_routers(tls: Fleet, tmp_path: Path) -> None:
+    """Its member may have been named after the router's host."""
+    endpoint = f"tls/localhost:{free_port(socket.SOCK_STREAM)}"
+    shutil.copytree(tls.folder, tmp_path, dirs_exist_ok=True)
+    make_certificates(tmp_path, "localhost")
+    for kind in ("pem", "key"):
+        shutil.copy(tmp_path / f"localhost.{kind}", tmp_path / f"router.{kind}")
+    move(tls, tmp_path, endpoint)
+    with running_router(tmp_path, endpoint, tmp_path / "router.json5"):
+        refused(run_naze_bridge("fleet", "list", "--zenoh-config", tmp_path / "pilot.json5"))
+
+
+@pytest.mark.parametrize("name", ["ca", "router", "../kite", "ki\x1bte"])
+def test_no_certificate_is_made_for_a_name_of_the_folders_files(tls: Fleet, name: str) -> None:
+    before = sorted(tls.folder.parent.rglob("*.key"))
+    with pytest.raises(subprocess.CalledProcessError) as failed:
+        make_certificates(tls.folder, name)
+    assert "cannot be a member's name" in failed.value.stderr
+    assert sorted(tls.folder.parent.rglob("*.key")) == before
+
+
 def test_a_missing_certificate_is_named(tls: Fleet) -> None:
     config = tls.config("pilot", "nobody")
     assert f"there is no file {tls.folder / 'nobody.pem'}" in refused(tls.fleet_list(config))
@@ -184,8 +218,6 @@ def test_an_invalid_certificate_of_the_router_is_explained(
     shutil.copytree(tls.folder, tmp_path, dirs_exist_ok=True)
     own = trustme.CA.from_pem((tmp_path / "ca.pem").read_bytes(), (tmp_path / "ca.key").read_bytes())
     write(tmp_path, "router", issue(own, trustme.CA()))
-    port, new_port = (each.rpartition(":")[2] for each in (tls.endpoint, endpoint))
-    for path in tmp_path.glob("*.json5"):
-        path.write_text(path.read_text().replace(str(tls.folder), str(tmp_path)).replace(f":{port}", f":{new_port}"))
+    move(tls, tmp_path, endpoint)
     with running_router(tmp_path, endpoint, tmp_path / "router.json5"):
         assert reason in refused(run_naze_bridge("fleet", "list", "--zenoh-config", tmp_path / "pilot.json5"))

@@ -11,7 +11,7 @@ import click
 from protocols.mission_file import MissionFileError, write_qgc_wpl
 from service.cli.command_group import CommandGroup
 from service.cli.fleet.conditions import Condition, matching
-from service.cli.fleet.enroll_command import enroll
+from service.cli.fleet.enroll_command import enroll, expel
 from service.cli.fleet.options import (
     address_options,
     fleet_session,
@@ -40,7 +40,7 @@ def fleet() -> None:
     """Monitor and manage many vehicles at once, over Eclipse zenoh (docs/fleet.md)."""
 
 
-for _command in (push_mission, verify_mission, enroll):
+for _command in (push_mission, verify_mission, enroll, expel):
     fleet.add_command(_command)
 
 
