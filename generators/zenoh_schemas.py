@@ -162,8 +162,9 @@ def schemas() -> dict[str, Json]:
         },
         "logs_from_s": {
             "type": ["number", "null"],
-            "description": "the start of the oldest telemetry log that was read, newest first; null: none. Reading "
-            "stops after 5 s: if this is later than the start of the range, ask for a shorter one",
+            "description": "the time from which the telemetry logs were read, newest first; null: none was. Reading "
+            "stops after 5 s, or sooner if other queries wait: if this is later than the start of the range, ask for a "
+            "shorter one",
         },
     }
     made["mission_report"] = upload | {"source": {"type": "string", "description": "the sender"}}

@@ -14,7 +14,7 @@ from fastcrc.crc16 import mcrf4xx
 from protocols.mavlink.dialect import CRC_EXTRA, messages
 from protocols.mavlink.frame import MAGIC_V1, MAGIC_V2, MavlinkFrame, MavlinkSplitter
 
-_STAMP_SIZE = 8
+STAMP_SIZE = 8
 #: pymavlink uses the two lowest bits as a link number.
 _LINK_BITS = 0b11
 _CRC_SIZE = 2
@@ -45,7 +45,7 @@ def tlog_record(frame: bytes, at_us: int) -> bytes:
             return b""
         if frame[2] & _SIGNED:
             frame = _without_signature(frame)
-    return (at_us & ~_LINK_BITS).to_bytes(_STAMP_SIZE, "big") + frame
+    return (at_us & ~_LINK_BITS).to_bytes(STAMP_SIZE, "big") + frame
 
 
 def read_tlog(data: bytes, msgids: Container[int] | None = None) -> Iterator[TlogRecord]:
@@ -54,12 +54,12 @@ def read_tlog(data: bytes, msgids: Container[int] | None = None) -> Iterator[Tlo
     The checksums of other messages are not computed, which makes a search ten times as fast.
     """
     at = 0
-    while at < len(data) - _STAMP_SIZE:
-        start = at + _STAMP_SIZE
+    while at < len(data) - STAMP_SIZE:
+        start = at + STAMP_SIZE
         end = _frame_end(data, start)
         if end is None:
             at += 1
-        elif msgids is not None and _msgid(data, start) not in msgids and _begins(data, end + _STAMP_SIZE):
+        elif msgids is not None and _msgid(data, start) not in msgids and _begins(data, end + STAMP_SIZE):
             at = end
         elif (frame := _checked(data[start:end])) is None:
             at += 1
@@ -79,7 +79,7 @@ def heartbeat_type(frame: bytes) -> int | None:
 
 def first_stamp_us(records: bytes) -> int:
     """Return the time of the first record, in microseconds since the Unix epoch."""
-    return int.from_bytes(records[:_STAMP_SIZE], "big")
+    return int.from_bytes(records[:STAMP_SIZE], "big")
 
 
 def _frame_end(data: bytes, start: int) -> int | None:

@@ -14,7 +14,7 @@ from typing import TypeVar, TypeVarTuple
 
 import structlog
 
-#: Questions to a thread that hangs; more are refused at once. All clients together ask fewer: 48 of the page, 16 over
+#: Questions to a thread that hangs; more are refused at once. All clients together ask fewer: 48 of the page, 8 over
 #: zenoh, 16 on the control socket.
 MAX_WAITING = 100
 

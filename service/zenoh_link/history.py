@@ -3,21 +3,18 @@
 
 from collections import deque
 from collections.abc import Callable
-from contextlib import suppress
 from math import inf
 from pathlib import Path
 
 from service.daemon.api import DaemonApi
 from service.daemon.mission_data import Json
-from service.machine.threads import BackgroundThread
-from service.zenoh_link.logged_past import LoggedPast, log_stamps, read_logged_past
+from service.zenoh_link.log_reader import LogReader
+from service.zenoh_link.logged_past import LoggedPast
 from service.zenoh_link.time_range import parse_time_range
 
 #: About 150 bytes each; a busy day has some hundred.
 _MAX_EVENTS = 2000
 _MAX_MISSIONS = 200
-#: Reading takes up to 5 s (logged_past), and a zenoh query waits for 10 s.
-_TIMEOUT_S = 8.0
 _DEFAULT_RANGE = "[now(-1h)..]"
 
 
@@ -26,13 +23,8 @@ class History:
 
     def __init__(self, api: DaemonApi, logs: Path | None, clock: Callable[[], float]) -> None:
         self._api = api
-        self._logs = logs
+        self._logs = None if logs is None else LogReader(logs)
         self._clock = clock
-        self._earlier = frozenset[str]()
-        if logs is not None:
-            with suppress(OSError):  # a query reports it
-                self._earlier = log_stamps(logs)
-        self._disk = BackgroundThread("history", _TIMEOUT_S)
         self._events: deque[Json] = deque(maxlen=_MAX_EVENTS)
 
     def add(self, event: Json) -> None:
@@ -41,15 +33,14 @@ class History:
 
     async def answer(self, time_range: str | None, max_positions: int) -> Json:
         """The events, missions and positions of a time range; StoreError, OSError, or ValueError about the range."""
-        wanted = parse_time_range(time_range or _DEFAULT_RANGE, self._clock())
+        time_range = time_range or _DEFAULT_RANGE
+        wanted = parse_time_range(time_range, self._clock())
         found = await self._api.missions_between(wanted.start_s, wanted.end_s, _MAX_MISSIONS)
         # Not simply the first one's: the clock may have been set back since.
         kept_from_s = min((event["time_s"] for event in self._events), default=inf)
-        logs, logged = self._logs, LoggedPast()
-        if logs is not None:
-            logged = await self._disk.ask(
-                lambda: read_logged_past(logs, wanted, max_positions, self._earlier, kept_from_s)
-            )
+        logged = LoggedPast()
+        if self._logs is not None:
+            logged = await self._logs.search((time_range, max_positions), wanted, max_positions, kept_from_s)
         # Without a network a Pi's clock resumes at the last shutdown, so runs may overlap.
         events = sorted(
             (*logged.events, *(event for event in self._events if event["time_s"] in wanted)),

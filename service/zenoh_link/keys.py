@@ -26,6 +26,14 @@ class SampleDelivery(Enum):
     REPLY = "a reply to a query"
 
 
+class QueryKind(Enum):
+    """Queries of a kind share a limit. Guests send all but commands: a flood of theirs must not refuse a command."""
+
+    STATE = "answered from memory"
+    PAST = "answered from the disk"
+    COMMAND = "a command"
+
+
 @dataclass(frozen=True, slots=True)
 class ZenohKey:
     """One key. `schema`: file name below schemas/, without its suffix; None: the payload is raw MAVLink.
@@ -43,6 +51,12 @@ class ZenohKey:
     @property
     def is_published(self) -> bool:
         return self.delivery is not SampleDelivery.REPLY and self is not MAVLINK_IN
+
+    @property
+    def query_kind(self) -> QueryKind:
+        if self in COMMAND_KEYS:
+            return QueryKind.COMMAND
+        return QueryKind.PAST if self.delivery is SampleDelivery.REPLY else QueryKind.STATE
 
 
 TELEMETRY = {group: ZenohKey(f"{_V}/telemetry/{group.value}", group.value, SampleDelivery.DROP) for group in Group}

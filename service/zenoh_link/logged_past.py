@@ -7,7 +7,7 @@ Blocks for seconds: not for an event loop.
 import os
 import time
 from bisect import bisect_left
-from collections.abc import Container, Iterator
+from collections.abc import Callable, Container, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
@@ -17,7 +17,7 @@ from pathlib import Path
 
 from protocols.mavlink.codec import MavlinkDecoder
 from protocols.mavlink.dialect import Message, messages
-from protocols.tlog import read_tlog
+from protocols.tlog import STAMP_SIZE, read_tlog
 from service.daemon.mission_data import Json
 from service.recording.tlog_folder import is_log_name
 from service.zenoh_link.time_range import TimeRange
@@ -28,10 +28,12 @@ _SEARCHED = (
     messages.MAVLINK_MSG_ID_STATUSTEXT,
     messages.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
 )
-#: A caller waits 10 s by default. Later logs are read first.
-_MAX_READING_S = 5.0
 #: A record has at most 300 bytes.
 _STEP = 4096
+#: Bytes between two checks of the time: half a second on a Pi Zero 2 W.
+_PIECE = 1 << 18
+#: Bytes read before a piece, for a heartbeat that shows if the craft was armed where the piece begins.
+_LEAD = 1 << 15
 #: Long enough for a heartbeat, which shows if the craft was armed before the range.
 _BEFORE_S = 3.0
 #: A flight controller reports its position five times a second.
@@ -45,7 +47,7 @@ _NAME_FORMAT, _NAME_LENGTH = "%Y-%m-%d %H-%M-%S", 19
 
 @dataclass(slots=True)
 class LoggedPast:
-    """Both lists oldest first. `from_s`: the beginning of the oldest log that was read; None: none was."""
+    """Both lists oldest first. `from_s`: the time from which the logs were read; None: no log was."""
 
     events: list[Json] = field(default_factory=list)
     positions: list[Json] = field(default_factory=list)
@@ -58,30 +60,44 @@ def log_stamps(folder: Path) -> frozenset[str]:
 
 
 def read_logged_past(
-    folder: Path, wanted: TimeRange, max_positions: int, earlier: Container[str] = (), kept_from_s: float = inf
+    folder: Path,
+    wanted: TimeRange,
+    max_positions: int,
+    earlier: Container[str] = (),
+    kept_from_s: float = inf,
+    is_enough: Callable[[], bool] = lambda: False,
 ) -> LoggedPast:
-    """Search the logs of a time range. OSError if they cannot be read.
+    """Search the logs of a time range, the newest records first, until `is_enough`. OSError if they cannot be read.
 
     `earlier`: the logs of previous runs (log_stamps). The others yield only events before `kept_from_s`: the caller
     has the later ones.
     """
     past = LoggedPast()
-    deadline = time.monotonic() + _MAX_READING_S
+    for found in _newest_first(folder, wanted, max_positions, earlier, kept_from_s):
+        past.events[:0] = found.events
+        past.positions[:0] = found.positions
+        past.from_s = found.from_s
+        if is_enough():
+            break
+    past.positions = _thinned(past.positions, max_positions)
+    return past
+
+
+def _newest_first(
+    folder: Path, wanted: TimeRange, max_positions: int, earlier: Container[str], kept_from_s: float
+) -> Iterator[LoggedPast]:
+    """The logs in pieces."""
     for log in reversed(_logs(folder)):
         if log.begun_s > wanted.end_s or log.ended_s < wanted.start_s:
             continue
         is_own = log.path.name[:_NAME_LENGTH] not in earlier
         if is_own and not max_positions and wanted.start_s >= kept_from_s:
             continue
-        if time.monotonic() > deadline:
-            break
         with suppress(FileNotFoundError):  # already removed, or renamed because a flight began
-            found = _read(log, wanted, max_positions)
-            past.events[:0] = [event for event in found.events if not is_own or event["time_s"] < kept_from_s]
-            past.positions[:0] = found.positions
-            past.from_s = log.begun_s
-    past.positions = _thinned(past.positions, max_positions)
-    return past
+            for found in _pieces(log, wanted, max_positions):
+                if is_own:
+                    found.events = [event for event in found.events if event["time_s"] < kept_from_s]
+                yield found
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,15 +132,34 @@ def _begun_s(name: str) -> float | None:
         return None
 
 
-def _read(log: _Log, wanted: TimeRange, max_positions: int) -> LoggedPast:
+def _pieces(log: _Log, wanted: TimeRange, max_positions: int) -> Iterator[LoggedPast]:
+    """A log in pieces of whole records, from its end to about the start of the range."""
+    data = log.path.read_bytes()
+    before_s = wanted.start_s - _BEFORE_S
+    step = bisect_left(range(len(data) // _STEP), before_s, key=lambda step: _time_s(data, step * _STEP))
+    first, end = max(step - 1, 0) * _STEP, len(data)
+    for place in reversed(range(first, end, _PIECE)):
+        start, start_s = (first, log.begun_s) if place == first else _record_near(data, place)
+        if start_s < inf:
+            found = _read(log, data, slice(start, end), wanted, max_positions)
+            found.from_s = start_s
+            yield found
+            end = start
+
+
+def _read(log: _Log, data: bytes, piece: slice, wanted: TimeRange, max_positions: int) -> LoggedPast:
     found = LoggedPast()
+    lead = slice(max(piece.start - _LEAD, 0), piece.start)
     # Without a ground station a log begins with the arming.
-    armed = None if log.is_continued else False
+    armed = None if log.is_continued or lead.start else False
+    for _, message in _messages(data[lead]):
+        if message.get_type() == "HEARTBEAT":
+            armed = _is_armed(message)
     next_position_s = -inf
-    for time_s, message in _messages(log.path.read_bytes(), wanted.start_s - _BEFORE_S):
+    for time_s, message in _messages(data[piece]):
         is_wanted = time_s in wanted
         if message.get_type() == "HEARTBEAT":
-            was_armed, armed = armed, bool(message.base_mode & messages.MAV_MODE_FLAG_SAFETY_ARMED)
+            was_armed, armed = armed, _is_armed(message)
             if is_wanted and was_armed is not None and armed != was_armed:
                 found.events.append(_event(time_s, "info", "vehicle.armed" if armed else "vehicle.disarmed", {}))
         elif is_wanted and message.get_type() == "STATUSTEXT":
@@ -135,12 +170,15 @@ def _read(log: _Log, wanted: TimeRange, max_positions: int) -> LoggedPast:
     return found
 
 
-def _messages(log: bytes, start_s: float) -> Iterator[tuple[float, Message]]:
-    """The vehicle's messages from about `start_s` on, with pauses."""
+def _is_armed(heartbeat: Message) -> bool:
+    return bool(heartbeat.base_mode & messages.MAV_MODE_FLAG_SAFETY_ARMED)
+
+
+def _messages(records: bytes) -> Iterator[tuple[float, Message]]:
+    """The vehicle's messages, with pauses."""
     decoder = MavlinkDecoder()
-    first = bisect_left(range(len(log) // _STEP), start_s, key=lambda step: _time_s(log, step * _STEP))
     pause_at = time.monotonic() + _SLICE_S
-    for record in read_tlog(log[max(first - 1, 0) * _STEP :], _SEARCHED):
+    for record in read_tlog(records, _SEARCHED):
         if record.frame.compid == messages.MAV_COMP_ID_AUTOPILOT1 and (message := decoder.decode(record.frame)):
             yield record.at_us / 1e6, message
         if time.monotonic() > pause_at:
@@ -148,9 +186,19 @@ def _messages(log: bytes, start_s: float) -> Iterator[tuple[float, Message]]:
             pause_at = time.monotonic() + _SLICE_S
 
 
-def _time_s(log: bytes, place: int) -> float:
-    """The time of the first whole record near `place`; infinite in a damaged part, so that the search starts before."""
-    return next((record.at_us / 1e6 for record in read_tlog(log[place : place + _STEP])), inf)
+def _time_s(data: bytes, place: int) -> float:
+    return _record_near(data, place)[1]
+
+
+def _record_near(data: bytes, place: int) -> tuple[int, float]:
+    """The place and time of the first whole record from `place` on.
+
+    In a damaged part the time is infinite, so that a search starts before it.
+    """
+    record = next(read_tlog(data[place : place + _STEP]), None)
+    if record is None:
+        return place, inf
+    return data.index(record.frame.raw, place) - STAMP_SIZE, record.at_us / 1e6
 
 
 def _event(time_s: float, level: str, event: str, facts: Json) -> Json:

@@ -12,14 +12,14 @@ import zenoh
 from service.daemon.client import ControlError
 from service.daemon.mission_data import Json, to_json
 from service.machine.threads import post
-from service.zenoh_link.keys import UPLOAD, ZenohKey
+from service.zenoh_link.keys import UPLOAD, QueryKind, ZenohKey
 from service.zenoh_link.payload import Payloads
-from service.zenoh_link.session import SessionThread
+from service.zenoh_link.session import JobKind, SessionThread
 from storage.os_error import reason
 from storage.store_error import StoreError
 
-#: More at once are refused: each may hold a mission file.
-_MAX_AT_ONCE = 16
+#: Queries of each kind that are answered at once; more are refused. A command may hold a mission file.
+_MAX_AT_ONCE = {QueryKind.STATE: 16, QueryKind.PAST: 8, QueryKind.COMMAND: 16}
 _STOPPED = "the daemon stopped before it could reply; after a restart mission/current shows what is on board"
 
 _log = structlog.get_logger()
@@ -41,6 +41,7 @@ class Question:
         self._key = key
         self._payloads = payloads
         self._thread = thread
+        self._reply_kind = JobKind.COMMAND_REPLY if key.query_kind is QueryKind.COMMAND else JobKind.REPLY
         self.name = name
 
     @property
@@ -72,16 +73,16 @@ class Question:
         def reply() -> None:
             self._query.reply(self.name, data, encoding=encoding, timestamp=self._thread.timestamp())
 
-        self._thread.submit(reply, is_reply=True)
+        self._thread.submit(reply, self._reply_kind)
 
     def refuse(self, error: QueryRefused) -> None:
         body = {"error": str(error)} | ({} if error.result is None else {"result": error.result})
         answer = partial(self._query.reply_err, to_json(body).encode(), encoding=self._payloads.encoding(UPLOAD))
-        self._thread.submit(answer, is_reply=True)
+        self._thread.submit(answer, self._reply_kind)
 
     def end(self) -> None:
         """Mark the last reply as sent."""
-        self._thread.submit(self._query.drop, is_reply=True)
+        self._thread.submit(self._query.drop, self._reply_kind)
 
 
 #: Returns the last reply's body; QueryRefused, ControlError, StoreError, OSError and ValueError become an error reply.
@@ -89,24 +90,25 @@ Answerer = Callable[[Question], Awaitable[Json]]
 
 
 class Queries:
-    """Starts a task per query, up to a maximum."""
+    """Starts a task per query, up to a maximum for each kind of query."""
 
     def __init__(self, payloads: Payloads, thread: SessionThread) -> None:
         self._payloads = payloads
         self._thread = thread
         self._loop = asyncio.get_running_loop()
         self._tasks: set[asyncio.Task[None]] = set()
-        self._room = threading.Semaphore(_MAX_AT_ONCE)
+        self._places = {kind: threading.Semaphore(most) for kind, most in _MAX_AT_ONCE.items()}
 
     def declare(self, session: zenoh.Session, key: ZenohKey, name: str, answerer: Answerer) -> None:
         """Declare the queryable of one key; `name`: the full key. Called on the session's thread."""
+        places, most = self._places[key.query_kind], _MAX_AT_ONCE[key.query_kind]
 
         def asked(query: zenoh.Query) -> None:
             question = Question(query, key, name, self._payloads, self._thread)
-            if self._room.acquire(blocking=False):
-                post(self._loop, self._begin, question, answerer)
+            if places.acquire(blocking=False):
+                post(self._loop, self._begin, question, answerer, places)
             else:
-                question.refuse(QueryRefused(f"{_MAX_AT_ONCE} other queries are not answered yet: try again"))
+                question.refuse(QueryRefused(f"{most} queries of this kind are being answered already: try again"))
                 question.end()
 
         session.declare_queryable(name, zenoh.handlers.Callback(asked, indirect=False))
@@ -117,14 +119,11 @@ class Queries:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
-    def _begin(self, question: Question, answerer: Answerer) -> None:
+    def _begin(self, question: Question, answerer: Answerer, places: threading.Semaphore) -> None:
         task = self._loop.create_task(self._answer(question, answerer))
         self._tasks.add(task)
-        task.add_done_callback(self._ended)
-
-    def _ended(self, task: asyncio.Task[None]) -> None:
-        self._tasks.discard(task)
-        self._room.release()
+        task.add_done_callback(self._tasks.discard)
+        task.add_done_callback(lambda _: places.release())
 
     async def _answer(self, question: Question, answerer: Answerer) -> None:
         try:

@@ -7,6 +7,7 @@ zenoh connects and reconnects in its own threads. The event loop never waits for
 import threading
 from collections import deque
 from collections.abc import Callable
+from enum import Enum
 
 import structlog
 import zenoh
@@ -15,8 +16,18 @@ from service.settings.zenoh_config import in_short
 
 Job = Callable[[], None]
 
-#: Samples and replies that wait for a slow receiver; beyond this the oldest are dropped.
-_MAX_WAITING = 256
+
+class JobKind(Enum):
+    """The number of jobs that may wait before one of this kind.
+
+    A flood of guests' queries must displace neither commands' replies nor reports.
+    """
+
+    SAMPLE = 256
+    COMMAND_REPLY = 192
+    REPLY = 128
+
+
 _RETRY_S = 2.0
 #: A stalled receiver must not delay the daemon's end: then the session ends without closing.
 _CLOSE_TIMEOUT_S = 0.6
@@ -42,18 +53,14 @@ class SessionThread:
     def start(self) -> None:
         self._thread.start()
 
-    def submit(self, job: Job, *, is_reply: bool = False) -> None:
-        """Run a job on the thread; if too many are waiting, the oldest one is dropped.
-
-        A flood of queries must not displace reports: in that case replies are dropped first.
-        """
+    def submit(self, job: Job, kind: JobKind = JobKind.SAMPLE) -> None:
+        """Run a job on the thread; if too many are waiting, a reply is dropped, and a sample displaces the oldest."""
         with self._wake:
-            if is_reply and len(self._jobs) >= _MAX_WAITING // 2:
+            if len(self._jobs) >= kind.value:
                 self.dropped += 1
-                return
-            if len(self._jobs) >= _MAX_WAITING:
+                if kind is not JobKind.SAMPLE:
+                    return
                 self._jobs.popleft()
-                self.dropped += 1
             self._jobs.append(job)
             self._wake.notify()
 

@@ -15,7 +15,7 @@ from service.daemon.api import DaemonApi
 from service.daemon.store_worker import StoreWorker
 from service.web import telemetry_logs
 from service.web.telemetry_logs import TelemetryLogs
-from service.zenoh_link import history
+from service.zenoh_link import log_reader
 from service.zenoh_link.history import History
 from storage.store_error import StoreError
 
@@ -45,7 +45,7 @@ async def test_the_mission_store(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 async def test_the_logs_of_the_page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(telemetry_logs, "_TIMEOUT_S", 0.01)
+    monkeypatch.setattr(telemetry_logs, "_TIMEOUT_S", 0.5)  # the first request has begun by then
     logs = TelemetryLogs(tmp_path)
     with hung_file(tmp_path / LOG):
         with pytest.raises(TimeoutError, match=HANGS):
@@ -60,7 +60,7 @@ async def test_the_history_over_zenoh(monkeypatch: pytest.MonkeyPatch, tmp_path:
         async def missions_between(self, *_: Any) -> dict[str, Any]:
             return {"missions": []}
 
-    monkeypatch.setattr(history, "_TIMEOUT_S", 0.01)
+    monkeypatch.setattr(log_reader, "_TIMEOUT_S", 0.01)
     past = History(cast("DaemonApi", Api()), tmp_path, lambda: 0.0)
     with hung_file(tmp_path / LOG), pytest.raises(TimeoutError, match=HANGS):
         await past.answer("[..]", 0)

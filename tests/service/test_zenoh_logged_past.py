@@ -4,6 +4,7 @@
 import errno
 import os
 from datetime import UTC, datetime
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -99,6 +100,26 @@ def test_part_of_a_long_log_is_read(tmp_path: Path) -> None:
     ):
         past = read_logged_past(tmp_path, TimeRange(NOON_S + start, NOON_S + end), 0)
         assert [each["time_s"] - NOON_S for each in past.events] == expected
+
+
+def test_an_interrupted_search_has_all_events_of_the_time_that_it_covers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flight = [
+        (NOON_S + second, text(f"at {second}") if second % 2 else heartbeat(armed=100 <= second < 500))
+        for second in range(600)
+    ]
+    write(tmp_path, NOON_S, *flight)
+    whole = read_logged_past(tmp_path, EVER, 0)
+    assert len(whole.events) == 302
+    monkeypatch.setattr("service.zenoh_link.logged_past._PIECE", 1000)
+    assert read_logged_past(tmp_path, EVER, 0) == whole
+    for most in range(9):
+        looks = iter([*[False] * most, True])
+        part = read_logged_past(tmp_path, EVER, 0, is_enough=partial(next, looks))
+        assert part.from_s is not None
+        assert part.from_s > NOON_S
+        assert part.events == [event for event in whole.events if event["time_s"] >= part.from_s]
 
 
 @pytest.mark.parametrize("most", [1, 7, 100, 1000])

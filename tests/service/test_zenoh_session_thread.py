@@ -10,7 +10,7 @@ from structlog.testing import capture_logs
 from service.settings.zenoh import ZenohSettings
 from service.settings.zenoh_config import make_config
 from service.zenoh_link import session
-from service.zenoh_link.session import SessionThread
+from service.zenoh_link.session import JobKind, SessionThread
 from tests.support.programs import TIMEOUT_S, free_port
 
 
@@ -50,3 +50,20 @@ def test_a_failed_declaration_closes_its_session_and_is_repeated(monkeypatch: py
         thread.close()
     assert sessions[0].is_closed()
     assert [event["event"] for event in events] == ["zenoh.not_open", "zenoh.open"]
+
+
+def test_waiting_replies_to_guests_displace_neither_a_commands_reply_nor_a_report() -> None:
+    thread = SessionThread(make_config(ZenohSettings(listen=(f"tcp/127.0.0.1:{free_port()}",))), lambda _session: None)
+    ran: list[str] = []
+    done = threading.Event()
+    for _ in range(1000):
+        thread.submit(lambda: ran.append("reply"), JobKind.REPLY)
+    thread.submit(lambda: ran.append("result of a command"), JobKind.COMMAND_REPLY)
+    thread.submit(lambda: ran.append("report"))
+    thread.submit(done.set)
+    thread.start()
+    assert done.wait(TIMEOUT_S)
+    thread.close()
+    assert ran[-2:] == ["result of a command", "report"]
+    assert ran.count("reply") == 1000 - thread.dropped
+    assert thread.dropped
