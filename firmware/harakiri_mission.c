@@ -3,6 +3,7 @@
 #include "harakiri_mission.h"
 
 #include "board.h"
+#include "harakiri_guard.h"
 #include "mw.h"
 
 /* The slots are directly below the configuration. stm32_flash.ld refuses to link a program that reaches LINKED_BELOW. */
@@ -51,11 +52,10 @@ static uint32_t now_ms(void *self)
     return millis();
 }
 
-/* FEATURE_PASS never arms: there the throttle drives the motors directly. */
 static bool armed(void *self)
 {
     (void)self;
-    return f.ARMED || (feature(FEATURE_PASS) && rcData[THROTTLE] >= cfg.rc_minchk);
+    return MotorsMayRun();
 }
 
 static bool write_pending(void *self)
@@ -112,10 +112,18 @@ void MissionStore(void)
         (void)nm_store(&mission, cfg.FloppyDisk, cfg.FDUsedDatasets);
 }
 
+bool MissionUploaded(void)
+{
+    const nm_status_t status = nm_store(&mission, cfg.FloppyDisk, cfg.FDUsedDatasets);
+    return status == NM_OK || status == NM_SAME;
+}
+
 void MissionPoll(void)
 {
     nm_poll(&mission);
-    if (feature(FEATURE_PASS) && ScheduleEEPROMwriteMS && millis() >= ScheduleEEPROMwriteMS && !armed(NULL)) {
+    if (MotorsMayRun() && MissionEndUpload())
+        MissionLoad();
+    if (feature(FEATURE_PASS) && ScheduleEEPROMwriteMS && millis() >= ScheduleEEPROMwriteMS && !MotorsMayRun()) {
         writeParams(0);
         ScheduleEEPROMwriteMS = 0;
     }

@@ -24,7 +24,13 @@ void MissionLoad(void);
 void MissionStore(void);
 
 /*
- * Once per main loop. With FEATURE_PASS, whose main loop does not serve scheduled writes of the configuration, it writes them
+ * A MAVLink upload is complete in cfg: store it, before it is acknowledged. False if that failed; the list in flash is then
+ * the old one, and MissionLoad() takes it back.
+ */
+bool MissionUploaded(void);
+
+/*
+ * Once per main loop. Arming ends a MAVLink upload, and the stored list stays. With FEATURE_PASS, whose main loop does not serve scheduled writes of the configuration, it writes them
  * while the throttle is down.
  */
 void MissionPoll(void);

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * Tests of harakiri_mission.c: the list in cfg, the list in the flash slots and the copy in the configuration. This file
- * stands in for Harakiri: it makes the calls that the patches make.
+ * Tests of harakiri_guard.c, and of harakiri_mission.c: the list in cfg, the list in the flash slots and the copy in the
+ * configuration. This file stands in for Harakiri: it makes the calls that the patches make.
  */
+#include "harakiri_guard.c"
 #include "harakiri_mission.c"
 #include "reference.h"
 
@@ -127,13 +128,12 @@ static void new_chip(uint16_t count, uint8_t fill)
     power_up();
 }
 
-/* A MAVLink upload that has put `count` records into RAM so far; each one schedules a write. */
+/* A MAVLink upload that has put `count` records into RAM so far. */
 static void upload(uint16_t count, uint8_t fill)
 {
     upload_open = true;
     cfg.FDUsedDatasets = count;
     memset(cfg.FloppyDisk, fill, count * NM_RECORD_SIZE);
-    ScheduleEEPROMwriteMS = now + 1000;
 }
 
 static void serve_scheduled_write(void)
@@ -210,10 +210,61 @@ static void test_a_write_of_the_configuration_ends_an_upload(void)
     upload(2, 7);
     writeParams(1); /* a calibration by stick */
     CHECK(!upload_open && has(3, 9));
+}
+
+static void test_a_complete_upload_is_stored_without_a_configuration_write(void)
+{
+    for (uint16_t count = 0; count <= 2; count += 2) {
+        new_chip(3, 9);
+        config_writes = 0;
+        upload(count, 7);
+        CHECK(MissionUploaded() && has(count, 7));
+        CHECK(MissionUploaded()); /* its last item is repeated */
+        upload_open = false;
+        power_up();
+        CHECK(has(count, 7) && config_writes == 0);
+    }
+}
+
+static void test_arming_ends_an_upload(void)
+{
+    new_chip(3, 9);
     upload(2, 7);
-    upload_open = false; /* complete */
-    serve_scheduled_write();
-    CHECK(has(2, 7));
+    f.ARMED = 1;
+    MissionPoll();
+    CHECK(!upload_open && has(3, 9) && !MissionUploaded());
+}
+
+static void test_setters_need_their_exact_size(void)
+{
+    static const uint8_t setters[][2] = {{WP, 1}, {SET_RAW_RC, 16}, {SET_RAW_GPS, 14}, {SET_PID, 30}, {SET_BOX, 30},
+                                         {SET_RC_TUNING, 7}, {ACC_CALIBRATION, 0}, {MAG_CALIBRATION, 0}, {RESET_CONF, 0},
+                                         {EEPROM_WRITE, 0}};
+    new_chip(0, 0);
+    cfg.rc_auxch = 4;
+    for (unsigned i = 0; i < sizeof setters / sizeof *setters; i++)
+        for (unsigned size = 0; size < 256; size++)
+            CHECK(GuardAccepts(setters[i][0], (uint8_t)size) == (size == setters[i][1]));
+    cfg.rc_auxch = 6;
+    CHECK(GuardAccepts(SET_BOX, 60) && !GuardAccepts(SET_BOX, 30));
+    CHECK(!GuardAccepts(SET_MISC, 0) && GuardAccepts(SET_MISC, 22));
+}
+
+static void test_armed_nothing_calibrates_resets_or_writes(void)
+{
+    static const uint8_t grounded[] = {ACC_CALIBRATION, MAG_CALIBRATION, RESET_CONF, EEPROM_WRITE};
+    new_chip(0, 0);
+    for (unsigned size = 0; size < 256; size++)
+        for (unsigned i = 0; i < sizeof grounded; i++) {
+            f.ARMED = 1;
+            CHECK(!GuardAccepts(grounded[i], (uint8_t)size) && GuardAccepts(SET_PID, 3 * PIDITEMS));
+            f.ARMED = 0;
+        }
+    pass = true;
+    rcData[THROTTLE] = 1500;
+    CHECK(!GuardAccepts(EEPROM_WRITE, 0));
+    rcData[THROTTLE] = 1000;
+    CHECK(GuardAccepts(EEPROM_WRITE, 0));
 }
 
 static void test_the_slots_take_turns(void)
@@ -229,7 +280,8 @@ static void test_the_configurations_copy_follows_with_the_next_write(void)
 {
     const config_t *copy = (const config_t *)at(FLASH_WRITE_ADDR);
     new_chip(5, 9);
-    CHECK(push_one(2) == NM_OK && has(1, 1) && copy->FDUsedDatasets == 5 && config_writes);
+    config_writes = 0;
+    CHECK(push_one(2) == NM_OK && has(1, 1) && copy->FDUsedDatasets == 5 && !config_writes);
     CHECK(set_radius_to(300) == NM_OK);
     serve_scheduled_write();
     CHECK(has(1, 1) && copy->FDUsedDatasets == 1 && copy->FloppyDisk[0] == 1 && copy->gps_wp_radius == 300);
@@ -276,6 +328,10 @@ int main(void)
         test_an_invalid_configuration_has_no_list,
         test_an_interrupted_upload_keeps_the_stored_list,
         test_a_write_of_the_configuration_ends_an_upload,
+        test_a_complete_upload_is_stored_without_a_configuration_write,
+        test_arming_ends_an_upload,
+        test_setters_need_their_exact_size,
+        test_armed_nothing_calibrates_resets_or_writes,
         test_the_slots_take_turns,
         test_the_configurations_copy_follows_with_the_next_write,
         test_writing_waits_for_a_scheduled_write,

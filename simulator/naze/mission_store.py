@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Harakiri's own mission store and the MAVLink messages that fill it (baseflight_mavlink.c, floppy.c).
 
-The list in RAM is changed item by item. A second after the last item it is written to flash, even if the
-transfer is incomplete; an error before that reloads the list from flash.
+The list in RAM is changed item by item. Without the extension it is written to flash a second after the last item, even
+if the transfer is incomplete; an error before that reloads the list from flash. With it, the list is written before it
+is acknowledged.
 """
 
 from collections.abc import Callable
@@ -14,7 +15,7 @@ from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.mission_record import pack_records
 from protocols.msp.mission import WpCommand, WpRecord, unpack_records
-from simulator.board.flash import NorFlash
+from simulator.board.flash import FlashError, NorFlash
 from simulator.naze.mission_slots import MissionSlots
 from simulator.naze.missions import Board, Missions
 
@@ -56,6 +57,8 @@ class Floppy:
         self.load()
         self._receiving = self._sending = self._knows_roi = False
         self._total = self._expected = 0
+        #: With the extension, the last item of the upload that was accepted last; 0: none.
+        self._last_accepted = 0
         self._touched = 0.0
 
     @property
@@ -118,11 +121,26 @@ class Floppy:
         return not (busy or self._board.armed)
 
     def _ack(self, result: int) -> None:
+        if self._missions:
+            self._ack_stored(result)
+            return
         if self._board.config_write_due is not None and result != m.MAV_MISSION_ACCEPTED:
             self._board.config_write_due = None
             self.load()
-        elif self._missions and result != m.MAV_MISSION_ACCEPTED:
+        self._send(pack(m.MAVLink_mission_ack_message(*self._partner, result)))
+        self._reset()
+
+    def _ack_stored(self, result: int) -> None:
+        """With the extension: store the list before it is accepted (MissionUploaded)."""
+        assert self._missions is not None
+        if result == m.MAV_MISSION_ACCEPTED and self._receiving:
+            try:
+                self._missions.store(pack_records(self._list))
+            except FlashError:
+                result = m.MAV_MISSION_ERROR
+        if result != m.MAV_MISSION_ACCEPTED:
             self.load()
+        self._last_accepted = self._total - 1 if result == m.MAV_MISSION_ACCEPTED else 0
         self._send(pack(m.MAVLink_mission_ack_message(*self._partner, result)))
         self._reset()
 
@@ -131,6 +149,7 @@ class Floppy:
         self._send(pack(m.MAVLink_mission_request_message(*self._partner, self._expected)))
 
     def _begin(self, count: int, now: float) -> None:
+        self._last_accepted = 0
         if not self._is_free() or count < 2:
             self._ack(m.MAV_MISSION_ERROR)
         elif count > _CAPACITY:
@@ -142,6 +161,9 @@ class Floppy:
             self._request(now)
 
     def _item(self, message: Message, now: float) -> None:
+        if self._last_accepted and message.seq == self._last_accepted:
+            self._ack(m.MAV_MISSION_ACCEPTED)
+            return
         if self._board.armed or not self._receiving:
             self._ack(m.MAV_MISSION_ERROR)
             return
@@ -160,13 +182,15 @@ class Floppy:
             return
         record = self._record(message, command)
         self._expected += 1
-        self._board.config_write_due = now + _WRITE_DELAY_S
+        if not self._missions:
+            self._board.config_write_due = now + _WRITE_DELAY_S
         if record is not None:
             self._list.append(record)
         elif self._total == 2:
-            self._ack(m.MAV_MISSION_ACCEPTED)
             self._list.clear()
-            self._board.config_write_due = now
+            self._ack(m.MAV_MISSION_ACCEPTED)
+            if not self._missions:
+                self._board.config_write_due = now
             return
         if is_last:
             self._ack(m.MAV_MISSION_ACCEPTED)

@@ -19,7 +19,14 @@ import pytest
 
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 PATCHES = sorted((FIRMWARE / "patches").glob("*.patch"))
-CORE = ("naze_mission.h", "naze_mission.c", "harakiri_mission.h", "harakiri_mission.c")
+CORE = (
+    "naze_mission.h",
+    "naze_mission.c",
+    "harakiri_mission.h",
+    "harakiri_mission.c",
+    "harakiri_guard.h",
+    "harakiri_guard.c",
+)
 
 PATCH = """\
 The mission extension for a tree of our own, commit 0123abc, for tests.

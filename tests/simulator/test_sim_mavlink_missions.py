@@ -14,6 +14,26 @@ def test_an_upload_becomes_the_stored_list() -> None:
     page.an_upload_becomes_the_stored_list(Bench())
 
 
+def test_an_accepted_upload_survives_a_power_cut() -> None:
+    bench = Bench()
+    page.an_accepted_upload_survives_a_power_cut(bench, lambda: power_cycle(bench))
+
+
+def test_a_cleared_list_survives_a_power_cut() -> None:
+    bench = Bench()
+    page.a_cleared_list_survives_a_power_cut(bench, lambda: power_cycle(bench))
+
+
+def power_cycle(bench: Bench) -> None:
+    bench.naze.power_off(bench.now)
+    bench.naze.power_on(bench.now)
+    bench.run(BOOT_SECONDS + 0.1)
+
+
+def test_a_repeated_last_item_gets_the_same_ack() -> None:
+    page.a_repeated_last_item_gets_the_same_ack(Bench())
+
+
 def test_an_interrupted_upload_keeps_the_old_list() -> None:
     page.an_interrupted_upload_keeps_the_old_list(Bench())
 

@@ -1,18 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A ground station directly on a board's UART, for Harakiri's own MAVLink upload."""
 
+from collections.abc import Mapping
+
 from protocols.mavlink.codec import FrameWriter, MavlinkDecoder, pack
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkSplitter
 from tests.support.naze_bench import WireBench
 
+#: A command that the firmware does not store.
+UNKNOWN = m.MAV_CMD_DO_JUMP
 _BOARD = (1, 200)
 
 
-def item(seq: int) -> Message:
+def item(seq: int, command: int = m.MAV_CMD_NAV_WAYPOINT) -> Message:
     place = (45.3838 + seq / 1e4, 8.4733, 20.0 + seq)
-    frame, command = m.MAV_FRAME_GLOBAL_RELATIVE_ALT, m.MAV_CMD_NAV_WAYPOINT
+    frame = m.MAV_FRAME_GLOBAL_RELATIVE_ALT
     return m.MAVLink_mission_item_message(*_BOARD, seq, frame, command, 0, 1, 0.0, 3.0, 0.0, 0.0, *place)
 
 
@@ -37,8 +41,14 @@ class MavlinkGround:
                     return self._decoder.decode(frame)
         return None
 
-    def upload(self, count: int, stop_after: int | None = None) -> int | None:
-        """Upload waypoints; return the result of the ACK, None if the upload was broken off."""
+    def answer_to(self, message: Message) -> int | None:
+        """The result of the ACK to a message."""
+        self.send(message)
+        ack = self.wait(m.MAVLINK_MSG_ID_MISSION_ACK)
+        return None if ack is None else int(ack.type)
+
+    def upload(self, count: int, stop_after: int | None = None, replace: Mapping[int, int] | None = None) -> int | None:
+        """Upload waypoints, some replaced by other commands; return the ACK's result, None if it was broken off."""
         self.send(m.MAVLink_mission_count_message(*_BOARD, count))
         for _ in range(count + 1):
             reply = self.wait(m.MAVLINK_MSG_ID_MISSION_REQUEST, m.MAVLINK_MSG_ID_MISSION_ACK)
@@ -47,5 +57,5 @@ class MavlinkGround:
                 return int(reply.type)
             if reply.seq == stop_after:
                 return None
-            self.send(item(reply.seq))
+            self.send(item(reply.seq, (replace or {}).get(reply.seq, m.MAV_CMD_NAV_WAYPOINT)))
         raise AssertionError("no end")

@@ -35,6 +35,7 @@ typedef struct {
 typedef struct {
     uint16_t gps_wp_radius;
     uint16_t rc_minchk;
+    uint8_t rc_auxch;
     uint16_t FDUsedDatasets;
     uint8_t FloppyDisk[FDByteSize];
 } config_t;
@@ -44,6 +45,7 @@ typedef struct {
 } flags_t;
 
 enum { THROTTLE = 3 };
+enum { PIDITEMS = 10, CHECKBOXITEMS = 15 };
 enum { FEATURE_PASS = 1 << 9 };
 
 extern config_t cfg;
