@@ -59,9 +59,7 @@ class Bridge:
         self._was_armed = False
         #: The armed craft, for the BridgeConfig of a restarted bridge; it changes rarely. None: it is not armed.
         self.flight = config.flight
-        self._announcer = LinkAnnouncer()
-        if self.flight is not None:
-            self._announcer.lost(now)
+        self._announcer = LinkAnnouncer(now, was_found=self.flight is not None)
         incidents = count(1)
 
         self.guard = Guard(config.links, log_event, passes_everything=config.passes_everything)

@@ -57,6 +57,11 @@ class RuleSettings:
 OpenStore = Callable[["FlightController", Vehicle, RuleSettings], AnyFcMissionStore]
 
 
+def _none_known(_vehicle: Vehicle, _now: float) -> tuple[str, ...]:
+    """The reasons that prevent arming, on firmware that does not report them."""
+    return ()
+
+
 @dataclass(frozen=True, slots=True)
 class Profile:
     """One kind of flight controller, on one protocol.
@@ -73,6 +78,7 @@ class Profile:
     check_kind, rules: how `naze-bridge check --kind` calls it, and the rules it applies.
     mavlink_sender: MAVLink version, sysid and compid it sends with; None matches any.
     restarts_after_calibration: it reboots by itself when a calibration is done.
+    arming_blockers: the known reasons that prevent arming at a time; None: not heard yet.
     notice: a warning for the pilot while this profile is active.
     """
 
@@ -93,6 +99,7 @@ class Profile:
     rules: Callable[[RuleSettings], MissionRules] | None = None
     mavlink_sender: tuple[int, int, int] | None = None
     restarts_after_calibration: bool = False
+    arming_blockers: Callable[[Vehicle, float], tuple[str, ...] | None] = _none_known
     notice: str | None = None
 
 

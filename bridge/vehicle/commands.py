@@ -131,6 +131,9 @@ class CommandService:
                 name = "no flight controller" if controller is None else controller.name
                 self._ground.say(Severity.INFO, f"naze-bridge {self._version}: {name}", station)
                 return CommandResult.ACCEPTED
+            case messages.MAV_CMD_RUN_PREARM_CHECKS:
+                self._vehicle.arming_reasons.tell(station)
+                return CommandResult.ACCEPTED
         if command in _ASKS_FOR:
             return self._send_once(station, _ASKS_FOR[command])
         if command in _REFUSED:

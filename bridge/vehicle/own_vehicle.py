@@ -21,6 +21,7 @@ from bridge.model.mission_progress import FlownMission, MissionProgress, Progres
 from bridge.model.vehicle import STALE_S, FlightState, Health, MissionLeg, Readiness, Reading
 from bridge.model.verdict import SentSeqs
 from bridge.vehicle import vehicle_messages as make
+from bridge.vehicle.arming_reasons import ArmingReasons
 from bridge.vehicle.link_announcer import LinkAnnouncer
 from bridge.vehicle.telemetry_table import NO_STREAM, TELEMETRY, Row
 from bridge.vehicle.vehicle_messages import Moment
@@ -64,6 +65,7 @@ class OwnVehicle:
         self._missions = missions
         self._ground = ground
         self._announcer = announcer
+        self.arming_reasons = ArmingReasons(session, announcer, ground)
         self._unix_time_s = unix_time_s
         self._started_at = self._now = now
         #: The time of the next `tick`.
@@ -76,15 +78,14 @@ class OwnVehicle:
         #: True while a newcomer waits for home and the arming blockers.
         self._is_news_wanted = False
         self._repeated_at = -inf
-        self._told_blockers: tuple[str, ...] = ()
         self._also_wanted: Mapping[type[Reading], float] = {}
         self._stale_s: Mapping[type[Reading], float] = {}
         #: New ground stations, and the end of their faster heartbeats.
         self._newcomers: dict[Peer, float] = {}
         self._newcomers_due = inf
         self._polls_set_at, self._polls_due = -inf, inf
-        #: Armed, mode and failsafe as last announced.
-        self._announced: tuple[bool | None, FlightMode | str | None, bool] | None = None
+        #: Armed, mode, failsafe and lost as last announced.
+        self._announced: tuple[bool | None, FlightMode | str | None, bool, bool] | None = None
 
     def newcomer(self, peer: Peer) -> None:
         """Send a new ground station more heartbeats, so that it connects sooner, and HOME_POSITION within 5 s."""
@@ -112,6 +113,7 @@ class OwnVehicle:
         unwatched = () if self._session.vehicle.armed else self._ground.unheard()
         self._rates.keep(everyone, set(filter(self._ground.has_standing, everyone)), unwatched)
         self._set_polls(everyone)
+        self.arming_reasons.follow(now)
         heartbeat = self._heartbeat()
         self._ground.broadcast(heartbeat)
         self._ground.introduce(heartbeat)
@@ -121,7 +123,8 @@ class OwnVehicle:
             self._send_due((_SYS_STATUS,))
         if self._is_news_wanted and now >= self._repeated_at + _REPEAT_S:
             self._is_news_wanted, self._repeated_at = False, now
-            self._announced_home, self._told_blockers = None, ()
+            self._announced_home = None
+            self.arming_reasons.renew()
         self._announce_home()
 
     def _greet(self, now: float) -> None:
@@ -135,12 +138,12 @@ class OwnVehicle:
     def heard(self, news: Collection[type[Reading]], now: float) -> None:
         """Send the messages that new readings trigger, where due."""
         self._now = now
+        if Readiness in news or FlightState in news:
+            self.arming_reasons.follow(now)
         for reading in news:
             self._send_due(self._rows.get(reading, ()))
         if MissionLeg in news:
             self._follow_mission()
-        if Readiness in news:
-            self._tell_readiness()
         if FlightState in news:
             self._follow_state()
 
@@ -240,8 +243,17 @@ class OwnVehicle:
 
     def _moment(self, sent_seqs: SentSeqs = ()) -> Moment:
         boot_ms = int((self._now - self._started_at) * 1000) & 0xFFFFFFFF
-        mission = self._flown_mission
-        return Moment(self._session.vehicle, self._now, boot_ms, self._stale_s, mission, self._unix_time_s, sent_seqs)
+        return Moment(
+            self._session.vehicle,
+            self._now,
+            boot_ms,
+            self._stale_s,
+            self._flown_mission,
+            self._unix_time_s,
+            sent_seqs,
+            self._announcer.is_lost,
+            self.arming_reasons.current,
+        )
 
     def _flown_mission(self) -> FlownMission:
         held = self._missions.held
@@ -253,10 +265,12 @@ class OwnVehicle:
     def _follow_state(self) -> None:
         """Send a heartbeat as soon as something in it has changed; report the failsafe."""
         state = self._session.vehicle.last(FlightState)
-        if state is None or (state.armed, state.mode, state.is_failsafe) == self._announced:
+        if state is None:
             return
-        was_failsafe = self._announced is not None and self._announced[2]
-        self._announced = state.armed, state.mode, state.is_failsafe
+        announced, was_failsafe = self._announced, self._announced is not None and self._announced[2]
+        self._announced = state.armed, state.mode, state.is_failsafe, self._announcer.is_lost
+        if self._announced == announced:
+            return
         if state.is_failsafe and not was_failsafe:
             self._ground.say(Severity.CRITICAL, "Failsafe: the flight controller has taken over")
         elif was_failsafe and not state.is_failsafe and state.armed:
@@ -264,7 +278,7 @@ class OwnVehicle:
         self._ground.broadcast(self._heartbeat())
 
     def _heartbeat(self) -> Message:
-        return make.heartbeat(self._session.vehicle, is_lost=self._announcer.is_lost)
+        return make.heartbeat(self._moment())
 
     def _follow_mission(self) -> None:
         """Report a reached waypoint and the next one at once."""
@@ -301,15 +315,6 @@ class OwnVehicle:
             return ()
         known = (held.sent_seqs.get(station.identity) for station in self._ground.stations.at(peer))
         return next(filter(None, known), ())
-
-    def _tell_readiness(self) -> None:
-        """Report the arming blockers whenever they change, except in flight."""
-        readiness = self._session.vehicle.last(Readiness)
-        if readiness is None or readiness.blockers == self._told_blockers:
-            return
-        self._told_blockers = readiness.blockers
-        if readiness.blockers:
-            self._ground.say(Severity.NOTICE, f"Not ready to arm: {', '.join(readiness.blockers)}")
 
     def _announce_home(self) -> None:
         """Broadcast HOME_POSITION whenever it changes; it can also be requested at any time."""

@@ -28,7 +28,6 @@ from bridge.model.vehicle import (
     Orientation,
     Power,
     Pressure,
-    Readiness,
     Reading,
     ReadingT,
     Signal,
@@ -69,7 +68,8 @@ _SENSORS = {
     Sensor.SONAR: messages.MAV_SYS_STATUS_SENSOR_LASER_POSITION,
 }
 #: Without motor outputs Mission Planner shows a safety switch that is on.
-_ALWAYS_THERE = messages.MAV_SYS_STATUS_SENSOR_3D_GYRO | messages.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
+_MOTORS = messages.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
+_PREARM = messages.MAV_SYS_STATUS_PREARM_CHECK
 #: There is no fence, but without this bit MAVProxy reports "fence breach".
 _NEVER_ILL = messages.MAV_SYS_STATUS_GEOFENCE
 
@@ -114,7 +114,8 @@ class Moment:
     """The vehicle at one moment. now: monotonic s. stale_s: ages at which readings are unknown, if not STALE_S.
 
     unix_time_s: the Pi's clock at a monotonic time, None if it is not set. sent_seqs: the item numbers of the receiver,
-    if they are not those of the list as read back.
+    if they are not those of the list as read back. is_lost: the flight controller is silent, or was never found.
+    blockers: the known reasons that prevent arming.
     """
 
     vehicle: Vehicle
@@ -124,6 +125,8 @@ class Moment:
     mission: Callable[[], FlownMission] = FlownMission
     unix_time_s: Callable[[float], float | None] = lambda _now: None
     sent_seqs: SentSeqs = ()
+    is_lost: bool = False
+    blockers: tuple[str, ...] = ()
 
     def fresh(self, kind: type[ReadingT]) -> ReadingT | None:
         """The latest reading of a kind, unless it is stale."""
@@ -158,8 +161,12 @@ class Moment:
 Maker = Callable[[Moment], Message]
 
 
-def heartbeat(vehicle: Vehicle, *, is_lost: bool) -> Message:
-    """HEARTBEAT: an ArduPilot copter, plane or rover. A lost craft stays armed and in its mode, as last heard."""
+def heartbeat(at: Moment) -> Message:
+    """HEARTBEAT: an ArduPilot copter, plane or rover. A lost craft stays armed and in its mode, as last heard.
+
+    An armed craft on the ground is in STANDBY, as with ArduPilot: QGroundControl takes ACTIVE for flying.
+    """
+    vehicle = at.vehicle
     state = vehicle.last(FlightState)
     mode = state.mode if state is not None and isinstance(state.mode, FlightMode) else FlightMode.STABILIZE
     base_mode = messages.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED | messages.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
@@ -169,12 +176,13 @@ def heartbeat(vehicle: Vehicle, *, is_lost: bool) -> Message:
         base_mode |= messages.MAV_MODE_FLAG_GUIDED_ENABLED
     if vehicle.armed:
         base_mode |= messages.MAV_MODE_FLAG_SAFETY_ARMED
-    if is_lost or (state is not None and state.is_failsafe):
+    if at.is_lost or (state is not None and state.is_failsafe):
         status = messages.MAV_STATE_CRITICAL
     elif state is None:
         status = messages.MAV_STATE_UNINIT
     else:
-        status = messages.MAV_STATE_ACTIVE if vehicle.armed else messages.MAV_STATE_STANDBY
+        is_flying = vehicle.armed and _landed_state(at) != messages.MAV_LANDED_STATE_ON_GROUND
+        status = messages.MAV_STATE_ACTIVE if is_flying else messages.MAV_STATE_STANDBY
     return messages.MAVLink_heartbeat_message(
         vehicle.airframe, messages.MAV_AUTOPILOT_ARDUPILOTMEGA, base_mode, _custom_mode(vehicle, mode), status, 3
     )
@@ -319,37 +327,42 @@ def vfr_hud(at: Moment) -> Message:
 def sys_status(at: Moment) -> Message:
     """SYS_STATUS: mV, cA; errors_comm counts the failed I2C reads.
 
-    A silent sensor is not healthy, nor is a GPS without a 3D fix: MAVSDK takes its bit for a good position.
+    Only what is known is enabled: Mission Planner replaces the line on its HUD by the first enabled sensor that is not
+    healthy. A GPS without a 3D fix is not: MAVSDK takes its bit for a good position.
     """
-    health = known(at.vehicle.last(Health))
-    sensors = _ALWAYS_THERE
-    for sensor, bit in _SENSORS.items():
-        if sensor & health.sensors:
-            sensors |= bit
-    healthy = sensors if at.fresh(Health) is not None else 0
-    gps = at.vehicle.last(GpsFix)
-    if gps is not None and gps.fix is not Fix.THREE_D:
-        healthy &= ~messages.MAV_SYS_STATUS_SENSOR_GPS
+    health, fresh_health = at.vehicle.last(Health), at.fresh(Health)
+    present, unknown, bad = _MOTORS | _PREARM, 0, 0
+    if health is not None:
+        present |= messages.MAV_SYS_STATUS_SENSOR_3D_GYRO
+        present |= sum(bit for sensor, bit in _SENSORS.items() if sensor & health.sensors)
+    gps, sticks, signal = at.fresh(GpsFix), at.fresh(Sticks), at.vehicle.last(Signal)
+    if gps is None:
+        unknown |= messages.MAV_SYS_STATUS_SENSOR_GPS
+    elif gps.fix is not Fix.THREE_D:
+        bad |= messages.MAV_SYS_STATUS_SENSOR_GPS
     if at.vehicle.last(Sticks) is not None:
-        sensors |= messages.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
-        signal = at.vehicle.last(Signal)
-        if at.fresh(Sticks) is not None and (signal is None or signal.strength > 0):
-            healthy |= messages.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
-    readiness = at.fresh(Readiness)
-    if readiness is not None:
-        sensors |= messages.MAV_SYS_STATUS_PREARM_CHECK
-        healthy |= 0 if readiness.blockers else messages.MAV_SYS_STATUS_PREARM_CHECK
+        present |= messages.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
+        if sticks is None:
+            unknown |= messages.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
+        elif signal is not None and not signal.strength:
+            bad |= messages.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
+    enabled, healthy = present & ~unknown, present & ~unknown & ~bad
+    if fresh_health is None:
+        # Readiness is shown while disarmed only. Without the bit QGroundControl would keep its last answer.
+        enabled, healthy = _MOTORS | (0 if at.vehicle.armed else _PREARM), 0 if at.is_lost else _PREARM
+    if at.blockers:
+        healthy &= ~_PREARM
     voltage, current, remaining = _battery(at)
     return messages.MAVLink_sys_status_message(
-        sensors,
-        sensors,
+        present,
+        enabled,
         healthy | _NEVER_ILL,
-        round((health.cpu_load or 0.0) * 1000),
+        0 if health is None else round((health.cpu_load or 0.0) * 1000),
         voltage,
         current,
         remaining,
         0,
-        health.i2c_errors or 0,
+        0 if health is None else health.i2c_errors or 0,
         0,
         0,
         0,
@@ -472,15 +485,21 @@ def system_time(at: Moment) -> Message:
 
 def extended_sys_state(at: Moment) -> Message:
     """EXTENDED_SYS_STATE: on the ground while disarmed; armed it depends on height, climb and speed."""
-    landed = messages.MAV_LANDED_STATE_ON_GROUND
-    if known(at.need(FlightState).armed):
-        height, gps = at.fresh(Height), at.fresh(GpsFix)
-        speed = None if gps is None else gps.ground_speed_m_s
-        if height is None:
-            landed = messages.MAV_LANDED_STATE_UNDEFINED
-        elif abs(height.height_m) > _FLYING_M or abs(height.climb_m_s) > _FLYING_M_S or (speed or 0) > _FLYING_M_S:
-            landed = messages.MAV_LANDED_STATE_IN_AIR
-    return messages.MAVLink_extended_sys_state_message(messages.MAV_VTOL_STATE_UNDEFINED, landed)
+    known(at.need(FlightState).armed)
+    return messages.MAVLink_extended_sys_state_message(messages.MAV_VTOL_STATE_UNDEFINED, _landed_state(at))
+
+
+def _landed_state(at: Moment) -> int:
+    """MAV_LANDED_STATE; undefined while armed without a height."""
+    if not at.vehicle.armed:
+        return int(messages.MAV_LANDED_STATE_ON_GROUND)
+    height, gps = at.fresh(Height), at.fresh(GpsFix)
+    if height is None:
+        return int(messages.MAV_LANDED_STATE_UNDEFINED)
+    speed = None if gps is None else gps.ground_speed_m_s
+    if abs(height.height_m) > _FLYING_M or abs(height.climb_m_s) > _FLYING_M_S or (speed or 0) > _FLYING_M_S:
+        return int(messages.MAV_LANDED_STATE_IN_AIR)
+    return int(messages.MAV_LANDED_STATE_ON_GROUND)
 
 
 def cycle_time(at: Moment) -> Message:

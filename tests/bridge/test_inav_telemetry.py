@@ -115,11 +115,11 @@ def test_the_boards_time_is_known_once_its_gps_has_it(unix_s: float) -> None:
 def test_arming_blockers_are_reported_when_they_change() -> None:
     board, world, station = introduced(faults=Faults(boxes=0, arming_blockers=RC_LINK | NOT_LEVEL))
     assert station.messages("SYS_STATUS")[-1].onboard_control_sensors_health & PREARM == 0
-    assert [text for text in station.texts() if "arm" in text] == ["Not ready to arm: not level, no RC link"]
+    assert [text for text in station.texts() if "Arm" in text] == ["PreArm: not level, no RC link"]
     board.faults.arming_blockers = 0
     world.run(3)
     assert station.messages("SYS_STATUS")[-1].onboard_control_sensors_health & PREARM
-    assert len([text for text in station.texts() if "arm" in text]) == 1
+    assert [text for text in station.texts() if "Arm" in text][1:] == ["PreArm: ready"]
 
 
 def test_loading_a_mission_during_identification_does_not_hide_the_board() -> None:

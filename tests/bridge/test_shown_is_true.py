@@ -257,7 +257,7 @@ def test_values_from_before_a_lost_link_are_not_shown_as_current(board: str | Te
     assert not status.onboard_control_sensors_health & m.MAV_SYS_STATUS_SENSOR_GPS
     assert status.voltage_battery == 65535
     lost = [text for text in screen.station.texts() if "lost" in text]
-    assert lost == ["Flight controller lost: silent for 3 s", "Flight controller lost: silent for 13 s"]
+    assert lost == ["Flight controller lost: silent for 3 s", "Flight controller lost: silent for 12 s"]
     screen.world.faults.hang = False
     screen.fly(8, linked=False)
     assert is_found(screen.world)

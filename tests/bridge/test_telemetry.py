@@ -156,7 +156,7 @@ def test_no_ground_station_shows_a_false_alarm() -> None:
     assert health & present == present
     assert present & m.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
     assert health & m.MAV_SYS_STATUS_GEOFENCE
-    assert not present & (m.MAV_SYS_STATUS_GEOFENCE | m.MAV_SYS_STATUS_PREARM_CHECK)
+    assert not present & m.MAV_SYS_STATUS_GEOFENCE
     for bit in ("RC_RECEIVER", "3D_GYRO", "3D_ACCEL", "3D_MAG", "ABSOLUTE_PRESSURE", "GPS"):
         assert present & getattr(m, f"MAV_SYS_STATUS_SENSOR_{bit}")
     assert status.errors_count1 == status.errors_count2 == 0  # Mission Planner: "InternalError"

@@ -21,7 +21,10 @@ from tests.support.programs import REPOSITORY
 #: Quoted texts of other programs (Mission Planner, INAV Configurator), of code and of tables.
 NOT_OURS = {
     "No Heartbeat Packets Received",
-    "Bad GPS Health",
+    "Unhealthy GPS Signal",
+    "Bad Gyro Health",
+    "Not Ready to Arm",
+    "Ready To Fly",
     "please reduce the number of wp's",
     "rejected by the Mav, item had a bad option wp# N",
     "Upload MISSION failed ... DENIED",

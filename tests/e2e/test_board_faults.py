@@ -120,13 +120,13 @@ def test_a_board_left_in_its_command_line_is_reported(start: Starter) -> None:
         until(lambda: board.stats()["cli_entered"], "the command line")
     daemon = start.daemon(str(board.link))
     daemon.wait("command line")
-    trouble = "The flight controller is in its command line: type exit there, or unplug it"
+    trouble = "Board in its CLI: type exit, or unplug it"
     done = run_naze_bridge("status", "--state-dir", str(daemon.state_dir))
     assert trouble in done.stdout
     planner = MissionPlanner(daemon.address)
     with planner:
         planner.skip_connecting()
-        planner.wait_for_text("is in its command line: type")
+        planner.wait_for_text("in its CLI: type")
         assert_denied(lambda: planner.write(NEW))
         with board.link.open("r+b", buffering=0) as terminal:
             terminal.write(b"exit\r")

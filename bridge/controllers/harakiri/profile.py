@@ -6,6 +6,7 @@ Disarmed it speaks MSP. Armed, its setting tele_prot decides: MSP (0), FrSky tel
 
 from dataclasses import replace
 
+from bridge.controllers.harakiri.arming import arming_blockers
 from bridge.controllers.harakiri.check import harakiri_rules
 from bridge.controllers.harakiri.mavlink_missions import HarakiriMavlinkMissions
 from bridge.controllers.harakiri.mission_store import HarakiriMissions
@@ -58,6 +59,7 @@ PATCHED = Profile(
     check_kind="harakiri",
     rules=harakiri_rules,
     restarts_after_calibration=True,
+    arming_blockers=arming_blockers,
 )
 UNPATCHED = Profile(
     "Harakiri without the mission extension",
@@ -66,12 +68,14 @@ UNPATCHED = Profile(
     polls=(*POLLS, BOX_POLL),
     missions=Refusal(MissionResult.UNSUPPORTED, "This Harakiri lacks the mission patch"),
     restarts_after_calibration=True,
+    arming_blockers=arming_blockers,
 )
 MAVLINK = Profile(
     "Harakiri in MAVLink mode",
     _FAMILY,
     Spoken.MAVLINK,
     missions=HarakiriMavlinkMissions,
+    arming_blockers=arming_blockers,
     mavlink_sender=(1, 1, 200),  # baseflight_mavlink.c; other autopilots send as component 1
 )
 FRSKY = Profile(

@@ -4,7 +4,7 @@
 from dataclasses import replace
 
 from bridge.controllers.inav.mission_store import InavMissions
-from bridge.controllers.inav.telemetry import INAV_DECODERS, INAV_POLLS
+from bridge.controllers.inav.telemetry import INAV_DECODERS, INAV_POLLS, arming_blockers
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import INAV_CAPACITY, inav_profile
 from bridge.fc.interview import Interview
@@ -58,6 +58,7 @@ PROFILE = Profile(
     recognise=_recognise,
     polls=(*POLLS, NAV_POLL, *INAV_POLLS),
     decoders=INAV_DECODERS,
+    arming_blockers=arming_blockers,
     has_2d_fix=True,
     has_gyro_deg_s=True,
     accepts_any_byte=True,

@@ -44,6 +44,12 @@ def _inav_status(vehicle: Vehicle, payload: bytes, controller: FlightController,
         hear_box_flags(vehicle, reply.box_flags, controller, now, known=_BOX_FLAGS)
 
 
+def arming_blockers(vehicle: Vehicle, now: float) -> tuple[str, ...] | None:
+    """The reasons that prevent arming, as last reported; None before the first report."""
+    readiness = vehicle.fresh(Readiness, now)
+    return None if readiness is None else readiness.blockers
+
+
 def _inav_analog(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
     """INAV_ANALOG. Without a battery the cell count is 0 and the percentage meaningless."""
     reply = decode_inav_analog(payload)

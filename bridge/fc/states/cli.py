@@ -21,7 +21,7 @@ class Cli(State):
     """
 
     name = "command line"
-    trouble = "The flight controller is in its command line: type exit there, or unplug it"
+    trouble = "Board in its CLI: type exit, or unplug it"
 
     def __init__(self, port: Port, event: Found, now: float) -> None:
         super().__init__(port, event, now)

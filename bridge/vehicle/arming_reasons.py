@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The reasons not to arm, as ground stations expect them: texts that begin with `PreArm:`, while disarmed. Sans-IO.
+
+While SYS_STATUS has an unhealthy PREARM_CHECK, Mission Planner keeps the last such text on its HUD. QGroundControl
+removes it after 35 s, and reads each out loud.
+"""
+
+from math import inf
+
+from bridge.fc.session import FcSession
+from bridge.gcs.ground import Ground
+from bridge.gcs.station import Severity, Station
+from bridge.model.vehicle import Health
+from bridge.vehicle.link_announcer import LinkAnnouncer
+
+_RENEWED_S = 30.0
+#: A longer text would be split, and Mission Planner shows only the last piece.
+_LINE_LENGTH = 50
+_PREFIX = "PreArm: "
+
+
+class ArmingReasons:
+    """Knows the reasons, and tells them when they change, to newcomers, and every 30 s while they hold."""
+
+    def __init__(self, session: FcSession, announcer: LinkAnnouncer, ground: Ground) -> None:
+        self._session = session
+        self._announcer = announcer
+        self._ground = ground
+        self.current: tuple[str, ...] = ()
+        self._told: list[str] = []
+        self._told_at = -inf
+
+    def follow(self, now: float) -> None:
+        """Find the present reasons, before SYS_STATUS is made of them, and tell them if they are news."""
+        self.current = self._find(now)
+        # A text would be too early during the first search.
+        is_searching = self._announcer.why_unknown and not self._announcer.is_lost
+        lines = [] if is_searching else prearm_lines(self.current)
+        if lines == self._told and now < self._told_at + _RENEWED_S:
+            return
+        if self._told and not lines:
+            # Otherwise the former reason would stand for 10 s in Mission Planner, for 35 s in QGroundControl.
+            self._ground.say(Severity.INFO, _PREFIX + "ready")
+        self._told, self._told_at = lines, now
+        for line in lines:
+            self._ground.say(Severity.WARNING, line)
+
+    def renew(self) -> None:
+        """Tell them again: there is a newcomer."""
+        self._told_at = -inf
+
+    def tell(self, station: Station) -> None:
+        """Answer MAV_CMD_RUN_PREARM_CHECKS."""
+        for line in prearm_lines(self.current):
+            self._ground.say(Severity.WARNING, line, station)
+
+    def _find(self, now: float) -> tuple[str, ...]:
+        vehicle, state = self._session.vehicle, self._session.state
+        if vehicle.armed:
+            return ()
+        if self._announcer.why_unknown:
+            return (state.trouble or self._announcer.why_unknown,)
+        if state.controller is None or vehicle.fresh(Health, now) is None:
+            # Silent for a moment, perhaps because it is arming and switches protocol.
+            return self.current
+        known = state.controller.profile.arming_blockers(vehicle, now)
+        return self.current if known is None else known
+
+
+def prearm_lines(reasons: tuple[str, ...]) -> list[str]:
+    """The reasons in as few texts of at most 50 characters as possible."""
+    lines: list[str] = []
+    for reason in reasons:
+        if lines and len(lines[-1]) + 2 + len(reason) <= _LINE_LENGTH:
+            lines[-1] += f", {reason}"
+        else:
+            lines.append(_PREFIX + reason)
+    return lines

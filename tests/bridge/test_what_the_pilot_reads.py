@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the pilot reads in Mission Planner and QGroundControl, 1, 9 and 30 s after each event."""
+
+from typing import Any
+
+import pytest
+
+from bridge.controllers.harakiri.arming import arming_blockers
+from bridge.model.vehicle import Source, Sticks, Vehicle
+from protocols.mavlink.dialect import Message
+from protocols.mavlink.dialect import messages as m
+from simulator.board.msp_options import MspOptions
+from simulator.board.options import Faults, SimOptions, TelemetryProtocol
+from simulator.commands.fc_kinds import make_board
+from tests.support.screens import Glance, Screens
+from tests.support.world import GroundStation, World
+
+#: Harakiri's boxes.
+ANGLE, BARO = 1 << 0, 1 << 2
+#: INAV's arming flags.
+NOT_LEVEL, RC_LINK = 1 << 8, 1 << 18
+NOT_FOUND = "No flight controller found: check power, wiring"
+LOST, LOST_ON_GROUND = "Flight controller lost: silent for", "PreArm: flight controller lost"
+
+
+def connected(world: World, seconds: float = 15.0) -> tuple[GroundStation, Screens]:
+    """A station on a world that has run for a while: what came before is no longer on the screens."""
+    station = GroundStation(world)
+    screens = Screens(station)
+    world.run(seconds)
+    return station, screens
+
+
+def on_the_ground(**options: Any) -> tuple[World, GroundStation, Screens]:
+    world = World(SimOptions(**options), speeds=(115200,))
+    world.wait_ready()
+    return world, *connected(world)
+
+
+def inav(blockers: int = 0) -> tuple[World, GroundStation, Screens]:
+    faults = Faults(boxes=0, arming_blockers=blockers)
+    world = World(speeds=(115200,), peer=make_board("inav", MspOptions(), faults))
+    world.faults = faults
+    return world, *connected(world)
+
+
+def ask(station: GroundStation, message: Message) -> None:
+    station.send(message)
+    station.world.run(0.5)
+
+
+def command(number: int, param1: float = 0.0) -> Message:
+    return m.MAVLink_command_long_message(1, 1, number, 0, param1, 0, 0, 0, 0, 0, 0)
+
+
+def is_quiet(glance: Glance) -> bool:
+    """Nothing on the HUD, ready, and no trouble."""
+    return glance.hud in ("", "PreArm: ready") and glance.ready_to_arm and not (glance.failsafe or glance.safe)
+
+
+class TestConnecting:
+    def test_a_healthy_craft_shows_nothing(self) -> None:
+        world = World(speeds=(115200,))
+        world.wait_ready()
+        _, screens = connected(world, 0)
+        for glance in screens.look():
+            assert is_quiet(glance), glance
+            assert glance.qgc == "Ready To Fly"
+        assert screens.mission_planner.heard() == []
+
+    def test_a_board_that_is_never_found_is_no_ready_vehicle(self) -> None:
+        world = World(speeds=(115200,), powered=False)
+        _, screens = connected(world, 0)
+        first, ninth, last = screens.look()
+        assert [glance.ready_to_arm for glance in (first, ninth, last)] == [False] * 3
+        assert [glance.qgc for glance in (first, ninth, last)] == ["Not Ready"] * 3
+        assert not first.failsafe
+        for glance in (last, *screens.look()):
+            assert glance.hud in ("PreArm: no flight controller: check power, wiring", NOT_FOUND)
+            assert glance.failsafe
+            assert glance.qgc_reason.startswith("PreArm: no flight controller")
+        assert screens.mission_planner.heard() == [NOT_FOUND]
+        assert screens.mission_planner.line.longest_gap_s(12, world.now) < 1.1
+
+    def test_no_receiver_is_missing_before_its_channels_are_read(self) -> None:
+        """Mission Planner's "NO RC Receiver" also stood while nothing asked the board for its channels."""
+        world, station, screens = on_the_ground()
+        for msgid in (m.MAVLINK_MSG_ID_RC_CHANNELS, m.MAVLINK_MSG_ID_RC_CHANNELS_RAW):
+            ask(station, m.MAVLink_command_long_message(1, 1, 511, 0, msgid, -1, 0, 0, 0, 0, 0))
+        world.run(10)
+        assert all(is_quiet(glance) for glance in screens.look())
+
+
+class TestLostFlightController:
+    def test_on_the_ground_it_stands_until_the_board_is_back(self) -> None:
+        world, _, screens = on_the_ground()
+        world.power_off()
+        world.run(4.5)
+        began = world.now
+        for glance in screens.look():
+            assert glance.hud.startswith((LOST, LOST_ON_GROUND))
+            assert glance.failsafe
+            assert not glance.safe
+            assert (glance.ready_to_arm, glance.qgc, glance.qgc_reason) == (False, "Not Ready", LOST_ON_GROUND)
+        assert screens.mission_planner.line.longest_gap_s(began, world.now) == 0
+        assert screens.mission_planner.heard(began - 2)[0] == f"{LOST} 3 s"
+        world.power_on()
+        world.wait_ready()
+        for glance in screens.look():
+            assert is_quiet(glance), glance
+            assert glance.qgc == "Ready To Fly"
+            assert glance.qgc_reason in ("PreArm: ready", "")
+
+    def test_in_flight_it_stands_and_nothing_else_does(self) -> None:
+        world, _, screens = on_the_ground()
+        world.faults.armed = True
+        world.run(20)
+        world.faults.hang = True
+        world.run(3.5)
+        began = world.now
+        for glance in screens.look():
+            assert glance.hud.startswith(LOST)
+            assert glance.failsafe
+            assert glance.armed
+            assert not glance.safe
+        assert screens.mission_planner.line.longest_gap_s(began, world.now) == 0
+        lines = screens.mission_planner.line.values(began - 3)
+        assert all(line.startswith(LOST) for line in lines), lines
+        world.faults.hang = False
+        world.wait_ready()
+        assert [glance.hud.split(" after")[0] for glance in screens.look()] == ["Flight controller back"] * 2 + [""]
+
+    @pytest.mark.parametrize("protocol", TelemetryProtocol)
+    def test_a_change_of_protocol_on_arming_is_no_loss(self, protocol: TelemetryProtocol) -> None:
+        world = World(SimOptions(tele_prot=protocol))
+        world.wait_ready()
+        _, screens = connected(world)
+        began = world.now
+        world.faults.armed = True
+        world.run(3)
+        for glance in screens.look():
+            assert glance.armed
+            assert not glance.safe
+            assert not glance.failsafe
+        # FrSky telemetry has neither attitude nor mode, which the pilot must know.
+        assert set(screens.mission_planner.line.values(began)) <= {"FrSky while armed: no attitude, mode or RC"}
+
+
+class TestArming:
+    def test_reasons_not_to_arm_stand_while_they_hold(self) -> None:
+        world, _, screens = inav(NOT_LEVEL | RC_LINK)
+        began = world.now
+        for glance in screens.look():
+            assert glance.hud == glance.qgc_reason == "PreArm: not level, no RC link"
+            assert (glance.ready_to_arm, glance.qgc) == (False, "Not Ready")
+        assert screens.mission_planner.line.longest_gap_s(began, world.now) < 1.1
+        assert screens.mission_planner.heard() == []
+        world.faults.arming_blockers = NOT_LEVEL
+        world.run(5)
+        assert [glance.hud for glance in screens.look()] == ["PreArm: not level"] * 3
+        world.faults.arming_blockers = 0
+        world.run(1.5)
+        for glance in screens.look():
+            assert is_quiet(glance)
+            assert glance.qgc == "Ready To Fly"
+
+    def test_the_prearm_window_is_answered(self) -> None:
+        world, station, screens = inav(NOT_LEVEL)
+        screens.mission_planner.asked_for_prearm_checks(world.now)
+        world.run(0.01)
+        ask(station, command(m.MAV_CMD_RUN_PREARM_CHECKS))
+        world.run(1)
+        assert station.messages("COMMAND_ACK")[-1].result == m.MAV_RESULT_ACCEPTED
+        assert screens.mission_planner.prearm_window(world.now) == ["PreArm: not level"]
+
+    def test_many_reasons_take_several_whole_lines(self) -> None:
+        _, _, screens = inav(sum(1 << bit for bit in (8, 9, 10, 11, 12, 13, 14, 15, 16, 18, 19)))
+        texts = [text for text in screens.mission_planner.texts() if text.startswith("PreArm: ")]
+        assert max(map(len, texts)) <= 50
+        assert " ".join(texts).count("accelerometer not calibrated") == len(screens.mission_planner.texts()) // len(
+            texts
+        )
+
+    def test_a_harakiri_does_not_arm_with_the_barometers_switch_on(self) -> None:
+        world, _, screens = on_the_ground()
+        world.faults.boxes = ANGLE | BARO
+        world.run(1)
+        assert [glance.hud for glance in screens.look()] == ["PreArm: switch BARO off"] * 3
+
+    def test_a_harakiri_does_not_arm_with_a_raised_throttle(self) -> None:
+        for throttle_us, blockers in ((1250, ("throttle not low",)), (1249, ()), (1000, ())):
+            vehicle = Vehicle()
+            vehicle.hear(Sticks(0.0, Source.MSP, (1500, 1500, throttle_us, 1500)))
+            assert arming_blockers(vehicle, 0.5) == blockers
+
+    def test_armed_and_disarmed(self) -> None:
+        world, _, screens = on_the_ground()
+        world.faults.armed = True
+        for glance in screens.look():
+            assert (glance.armed, glance.hud, glance.safe, glance.failsafe) == (True, "", False, False)
+            assert glance.qgc == "Flying"
+        world.faults.armed = False
+        for glance in screens.look():
+            assert is_quiet(glance)
+            assert (glance.armed, glance.qgc) == (False, "Ready To Fly")
