@@ -100,15 +100,18 @@ class FleetFolder:
             present = [each for each, role in sorted(members.items()) if role is not Role.EXPELLED]
             raise EnrolmentError(f"{name} is not a member; there are: {', '.join(present) or 'none'}")
         self._write_members(members | {name: Role.EXPELLED})
-        self._write(_ROUTER, self._without(name), 0o644)
         passwords = self._passwords()
         if passwords.pop(name, None) is not None:
             self._write_passwords(passwords)
         if name not in _RESERVED:
             (self.path / f"{name}.json5").unlink(missing_ok=True)
+        self._write(_ROUTER, self._without(name), 0o644)
 
     def _without(self, name: str) -> Json:
         """The router's configuration without a member. The rest stays: it may have been edited."""
+        by_hand = (
+            f"{self.path / _ROUTER} is not as `fleet enroll` writes it: remove {name} from its access_control by hand"
+        )
         try:
             config: Json = json.loads(self._read(_ROUTER))
             control = config["access_control"]
@@ -116,8 +119,9 @@ class FleetFolder:
             control["policies"] = [each for each in control["policies"] if each["subjects"] != [name]]
             control["rules"] = [each for each in control["rules"] if each["id"] != _own_rule(name)]
         except (ValueError, LookupError, TypeError) as error:
-            by_hand = f"remove {name} from its access_control by hand"
-            raise EnrolmentError(f"{self.path / _ROUTER} is not as `fleet enroll` writes it: {by_hand}") from error
+            raise EnrolmentError(by_hand) from error
+        if json.dumps(name) in json.dumps([control["subjects"], control["policies"]]):
+            raise EnrolmentError(by_hand)
         return config
 
     def _router_config(self, members: Mapping[str, Role], router: FleetRouter) -> Json:
