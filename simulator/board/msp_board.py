@@ -179,10 +179,13 @@ class MspBoard(SimulatedBoard):
             is_frames = self._receiver.in_frame or byte == ord("$")
             request = self._receiver.push(byte)
             if request:
-                answer = firmware.answer(*request, at)
+                command, payload = request
+                answer = firmware.answer(
+                    command, self._receiver.buffer if firmware.habits.reads_buffer else payload, at
+                )
                 self._busy = firmware.take_busy_seconds()
                 if answer is not None:
-                    self._ring.write(answer, at + (self._busy if request[0] in firmware.habits.writes_first else 0.0))
+                    self._ring.write(answer, at + (self._busy if command in firmware.habits.writes_first else 0.0))
                 return
             if not is_frames and not firmware.armed:
                 self._hear_letter(firmware, chr(byte))

@@ -22,7 +22,8 @@ class PortHabits:
 
     `buffer_size`: the largest payload. `cli_guard_s`: the silence after a '#' that opens the CLI; None without a CLI.
     `obeys_r`: an 'R' restarts it into its bootloader. `writes_first`: commands whose replies wait until
-    the EEPROM is written. `speaks_v2`: it also understands MSP v2.
+    the EEPROM is written. `speaks_v2`: it also understands MSP v2. `reads_buffer`: its handlers get the whole receive
+    buffer, and what earlier requests left in it, because they read without regard to the payload's size.
     """
 
     buffer_size: int
@@ -30,6 +31,7 @@ class PortHabits:
     obeys_r: bool = False
     writes_first: frozenset[int] = frozenset()
     speaks_v2: bool = False
+    reads_buffer: bool = False
 
 
 @dataclass(frozen=True, slots=True)

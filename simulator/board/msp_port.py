@@ -25,7 +25,6 @@ _BOXES = (
 #: Roll and pitch, whose P the firmware divides by.
 _CLAMPED_PIDS = (0, 3)
 _PIDS = ("ROLL", "PITCH", "YAW", "ALT", "Pos", "PosR", "NavR", "LEVEL", "MAG", "VEL")
-_HOME, _HOLD = 0, 16
 _MALFORMED_WP_SIZE = 12
 _GPS_WITHOUT_COURSE = 14
 
@@ -42,7 +41,6 @@ _ACKNOWLEDGED = frozenset(
         MspCommand.ACC_CALIBRATION,
         MspCommand.MAG_CALIBRATION,
         MspCommand.SET_MISC,
-        MspCommand.RESET_CONF,
         MspCommand.EEPROM_WRITE,
     )
 )
@@ -73,8 +71,8 @@ class MspReceiver:
         return self._state > 2
 
     @property
-    def leftover(self) -> bytes:
-        """The buffer's content from earlier frames, which the firmware reads if a payload is missing."""
+    def buffer(self) -> bytes:
+        """The payload of the last request, and behind it what earlier ones left."""
         return bytes(self._buffer)
 
     def overwrite(self, data: bytes) -> None:
@@ -118,22 +116,32 @@ class MspAnswers:
         self._unknown_e7 = 0 if tree is Tree.TESTCODE3 else 1_900_000_000
         boxes = [box for box in _BOXES if box != "PASSTHRU" or tree is Tree.TESTCODE3]
         self._sensors = SensorReplies(dict(enumerate(boxes)), _CYCLE_TIME_US)
-        self._settings = {
+        self._defaults = {
             MspCommand.RC_TUNING: bytes((90, 65, 0, 0, 0, 50, 0)),
             MspCommand.PID: bytes((40, 30, 23)) * len(_PIDS),
             MspCommand.BOX: box_activation(len(boxes)),
         }
+        self._settings = dict(self._defaults)
 
-    def answer(self, command: int, payload: bytes) -> bytes:
-        """The whole reply frame. The caller handles WP without a payload."""
+    @property
+    def arm_switches(self) -> int:
+        """The switch positions that arm."""
+        word: int = struct.unpack_from("<H", self._settings[MspCommand.BOX], 2 * _ARM_BIT)[0]
+        return word
+
+    def answer(self, command: int, buffer: bytes) -> bytes:
+        """The whole reply frame. `buffer`: the receive buffer, which the handlers read without regard to the size."""
         if command == MspCommand.WP:
-            return self._waypoint(payload)
+            return self._waypoint(buffer[0])
         if command in _SETTERS:
             setting = _SETTERS[MspCommand(command)]
-            if len(payload) == len(self._settings[setting]):
-                if command == MspCommand.SET_PID:
-                    payload = bytes(max(byte, 1) if at in _CLAMPED_PIDS else byte for at, byte in enumerate(payload))
-                self._settings[setting] = payload
+            values = buffer[: len(self._settings[setting])]
+            if command == MspCommand.SET_PID:
+                values = bytes(max(byte, 1) if at in _CLAMPED_PIDS else byte for at, byte in enumerate(values))
+            self._settings[setting] = values
+            return reply(command)
+        if command == MspCommand.RESET_CONF:
+            self._settings = dict(self._defaults)
             return reply(command)
         if command in _ACKNOWLEDGED:
             return reply(command)
@@ -171,13 +179,13 @@ class MspAnswers:
                 return None
         return usual
 
-    def _waypoint(self, payload: bytes) -> bytes:
+    def _waypoint(self, number: int) -> bytes:
         craft = self._craft()
-        match payload[0]:
+        match number:
             case 0:
-                number, (lat, lon) = _HOME, craft.home or (self._unknown_e7, self._unknown_e7)
+                lat, lon = craft.home or (self._unknown_e7, self._unknown_e7)
             case 16:
-                number, lat, lon = _HOLD, craft.flight.lat_e7, craft.flight.lon_e7
+                lat, lon = craft.flight.lat_e7, craft.flight.lon_e7
             case _:
                 # The firmware announces 12 bytes, sends none, and closes with the checksum.
                 return b"$M>" + bytes((_MALFORMED_WP_SIZE, MspCommand.WP, _MALFORMED_WP_SIZE ^ MspCommand.WP))

@@ -7,6 +7,7 @@ MSP_BOX has one word per box, with three bits per aux channel: low (below 1300 u
 import struct
 
 _LOW, _MIDDLE, _HIGH = 1000, 1500, 2000
+_POSITIONS = {_LOW: 0b001, _MIDDLE: 0b010, _HIGH: 0b100}
 #: The bit offsets of aux 1..4.
 _AUX1, _AUX2, _AUX3, _AUX4 = 0, 3, 6, 9
 _AT_MIDDLE, _AT_HIGH = 0b010, 0b100
@@ -34,3 +35,9 @@ def channels_us(armed: bool, boxes: int) -> tuple[int, ...]:
     for middle, high in ((0, 1), (2, 7), (6, 8)):
         aux.append(_HIGH if boxes >> high & 1 else _MIDDLE if boxes >> middle & 1 else _LOW)
     return (_MIDDLE, _MIDDLE, _MIDDLE, 1450 if armed else _LOW, *aux)
+
+
+def switch_positions(armed: bool, boxes: int) -> int:
+    """The positions of aux 1..4, as in a word of MSP_BOX."""
+    aux = channels_us(armed, boxes)[4:]
+    return sum(_POSITIONS[value] << 3 * number for number, value in enumerate(aux))

@@ -27,6 +27,7 @@ _WIND_CMS = 250  # from ahead
 _CELLS, _BATTERY_PERCENT = 3, 88
 _API_VERSION = bytes((0, 2, 5))
 _HDOP_E2 = 130
+_LONGEST_NAME = 16
 _MISSION_SETTING = b"nav_wp_multi_mission_index\0"
 _FIELD_ALTITUDE_CM = round(FIELD_ALTITUDE_M * 100)
 #: The sticks that load the saved missions have to be held for 20 ticks, each of the first receiver frame after 20 ms:
@@ -42,6 +43,8 @@ class InavCommand(IntEnum):
     FC_VARIANT = 2
     FC_VERSION = 3
     BOARD_INFO = 4
+    NAME = 10
+    SET_NAME = 11
     WP_MISSION_LOAD = 18
     WP_MISSION_SAVE = 19
     WP_GETINFO = 20
@@ -82,6 +85,7 @@ class InavFirmware(MspFirmware):
         self._craft = WaypointCraft()
         self._navigation = InavNavigation(self._mission, self._craft)
         self._booted_at = boot.now
+        self._name = b"INAV"
         self._stick_loads = boot.faults.stick_loads
         self._load_at: float | None = None
         self._sticks_released_at = boot.now
@@ -152,6 +156,10 @@ class InavFirmware(MspFirmware):
                 return self._set_waypoint(payload)
             case MspCommand.WP:
                 return reply(command, self._waypoint(payload))
+            case InavCommand.SET_NAME:
+                # Any length up to the longest, also an empty one.
+                self._name = payload if len(payload) <= _LONGEST_NAME else self._name
+                return reply(command) if payload == self._name else error(command)
             case InavCommand.SETTING:
                 is_known = payload == _MISSION_SETTING
                 return reply(command, bytes((self._mission.selected,))) if is_known else error(command)
@@ -210,6 +218,8 @@ class InavFirmware(MspFirmware):
                 return _API_VERSION
             case InavCommand.FC_VARIANT:
                 return b"INAV"
+            case InavCommand.NAME:
+                return self._name
             case InavCommand.FC_VERSION:
                 return bytes(self._version)
             case InavCommand.BOARD_INFO:

@@ -10,6 +10,7 @@ from simulator.board.msp_port import error, reply
 from simulator.board.msp_sensors import MspCommand, SensorReplies
 from simulator.board.nav_status import Error, Mode, State
 from simulator.board.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
+from simulator.board.transmitter import switch_positions
 from simulator.board.waypoint_craft import WaypointCraft
 from simulator.multiwii.mission import MultiWiiMission
 from simulator.multiwii.navigation import HIGHEST_M, SAFE_DISTANCE_M, WP_RADIUS_M, MultiWiiNavigation
@@ -26,19 +27,33 @@ _ARM, _RETURN, _MISSION = _BOXES.index(0), _BOXES.index(10), _BOXES.index(20)
 _FLAG_CRC_ERROR, _FLAG_HOME, _FLAG_HOLD, _FLAG_IN_PROGRESS = 0xFE, 0x01, 0x02, 0xFF
 _HOME, _HOLD = 0, 255
 _ACKNOWLEDGED = frozenset((MspCommand.ACC_CALIBRATION, MspCommand.MAG_CALIBRATION, MspCommand.EEPROM_WRITE))
+_SETTERS = {
+    MspCommand.SET_PID: MspCommand.PID,
+    MspCommand.SET_BOX: MspCommand.BOX,
+    MspCommand.SET_RC_TUNING: MspCommand.RC_TUNING,
+    MspCommand.SET_MISC: MspCommand.MISC,
+}
+#: ARM is on aux 1 high.
+_SETTINGS = {
+    MspCommand.PID: bytes((33, 30, 23)) * 10,
+    MspCommand.BOX: b"\x04" + bytes(2 * len(_BOXES) - 1),
+    MspCommand.RC_TUNING: bytes((90, 65, 0, 0, 0, 50, 0)),
+    MspCommand.MISC: bytes(22),
+}
 _SENSORS = SensorReplies(_BOX_NAMES, 2800, currents_ca=(0, 0))
 
 
 class MultiWiiFirmware(MspFirmware):
     """Its EEPROM is the mission: each waypoint is written as it arrives."""
 
-    habits = PortHabits(buffer_size=64, writes_first=frozenset((MspCommand.SET_WP,)))
+    habits = PortHabits(buffer_size=64, writes_first=frozenset((MspCommand.SET_WP,)), reads_buffer=True)
 
     def __init__(self, boot: Boot) -> None:
         super().__init__(boot)
         self._mission = MultiWiiMission(boot.eeprom, boot.options.capacity)
         self._craft = WaypointCraft()
         self._navigation = MultiWiiNavigation(self._mission, self._craft)
+        self._settings = dict(_SETTINGS)
 
     @property
     def stored(self) -> list[bytes]:
@@ -46,14 +61,18 @@ class MultiWiiFirmware(MspFirmware):
 
     def follow_pilot(self, now: float) -> None:
         self._fly_until(now)
-        if self._faults.armed == self.armed:
+        if self._is_arm_on() == self.armed:
             return
-        self.armed = self._faults.armed
+        self.armed = not self.armed
         if self.armed:
             self._home = self._navigation.home = self._craft.position
         else:
             self._navigation.end(Error.DISARMED)
             self._craft.rest()
+
+    def _is_arm_on(self) -> bool:
+        """The switches other than ARM only select modes here, which `faults.boxes` has."""
+        return bool(self._settings[MspCommand.BOX][0] & switch_positions(self._faults.armed, 0))
 
     def _state(self) -> FlightState:
         return self._craft.state()
@@ -72,10 +91,13 @@ class MultiWiiFirmware(MspFirmware):
         self._fly_until(now)
         match command:
             case MspCommand.SET_WP:
-                return self._set_waypoint(payload.ljust(WAYPOINT_SIZE, b"\0")[:WAYPOINT_SIZE])
+                return self._set_waypoint(payload[:WAYPOINT_SIZE])
             case MspCommand.WP:
-                return reply(command, self._waypoint(payload[0] if payload else _HOME))
-        if command in _ACKNOWLEDGED:
+                return reply(command, self._waypoint(payload[0]))
+        if command in _SETTERS:
+            setting = _SETTERS[MspCommand(command)]
+            self._settings[setting] = payload[: len(self._settings[setting])]
+        if command in _SETTERS or command in _ACKNOWLEDGED:
             return reply(command)
         answer = self._read(command)
         return error(command) if answer is None else reply(command, answer)
@@ -119,4 +141,6 @@ class MultiWiiFirmware(MspFirmware):
                 speeds = (100 * WP_RADIUS_M, SAFE_DISTANCE_M, HIGHEST_M, 400, 100)
                 limits = (40, 3000, 20, 100, 600)
                 return struct.pack("<BB5HBHHBHBB", 0x83, 3, *speeds, *limits, self._options.capacity, 0)
+            case MspCommand.PID | MspCommand.BOX | MspCommand.RC_TUNING | MspCommand.MISC:
+                return self._settings[MspCommand(command)]
         return _SENSORS.payload(command, self.craft_at(self._clock))

@@ -16,6 +16,7 @@ from simulator.board.flight import Craft, FlightState, fly
 from simulator.board.msp_port import MspAnswers, MspReceiver, reply
 from simulator.board.msp_sensors import MspCommand
 from simulator.board.options import Counters, Faults, SimOptions, TelemetryProtocol
+from simulator.board.transmitter import switch_positions
 from simulator.board.traps import Trap, TrapCounters
 from simulator.naze import frsky
 from simulator.naze.cli import BANNER, PROMPT, CliRequest, CommandLine
@@ -156,7 +157,9 @@ class Firmware:
 
     def _pilot_is_obeyed(self) -> bool:
         """Arming is refused while a configuration write is scheduled."""
-        return self._faults.armed != self.armed and (self.armed or self._board.config_write_due is None)
+        switches = switch_positions(self._faults.armed, self._faults.boxes)
+        arm_is_on = bool(self._answers.arm_switches & switches)
+        return arm_is_on != self.armed and (self.armed or self._board.config_write_due is None)
 
     def _follow_pilot(self) -> None:
         """Arm or disarm; the UART's speed follows (initFRSKYTelemetry, initMinimOSDTelemetry)."""
@@ -298,7 +301,7 @@ class Firmware:
             elif command in _CALIBRATIONS:
                 seconds = getattr(self._options, _CALIBRATIONS[command]) / 1000
                 self._resets_at = self._clock + seconds
-            frame = self._answers.answer(command, payload or self._msp.leftover)
+            frame = self._answers.answer(command, self._msp.buffer)
         self._stall()
         self._uart.write(frame, self._clock)
 

@@ -12,6 +12,7 @@ from tests.support.world import World
 BOXNAMES, DATAFLASH_READ, SERVO_MIXER, SAFEHOME, SET_SAFEHOME = 116, 71, 0x2020, 0x2038, 0x2039
 PAYLOADS = {DATAFLASH_READ: bytes(6)}
 SETTING_INFO, SET_PID, SET_WP = 0x1007, 202, 209
+NAME, SET_NAME, PID, SET_BOX, BOX, WP = 10, 11, 112, 203, 113, 118
 
 
 @pytest.mark.parametrize(("command", "size"), [(BOXNAMES, 700), (SERVO_MIXER, 700), (DATAFLASH_READ, MAX_REPLY)])
@@ -97,3 +98,33 @@ def test_a_record_that_crashes_an_inav_is_refused() -> None:
         world.run(1)
     assert refusals == ["", "record 2 jumps to 0, which is never forwarded"]
     assert world.naze.counters.crashes == 0
+
+
+@pytest.mark.parametrize(
+    ("kind", "poison", "setters", "settings"),
+    [("multiwii", b"\xff" * 58, (SET_PID, SET_BOX), (PID, BOX)), ("inav", b"\0", (SET_NAME,), (NAME,))],
+)
+def test_an_empty_setter_is_no_read(
+    kind: str, poison: bytes, setters: tuple[int, ...], settings: tuple[int, ...]
+) -> None:
+    """MultiWii executes it with what the request before it left in the receive buffer; INAV erases its name."""
+    world = World(speeds=(115200,), peer=make_board(kind))
+    world.wait_ready(20)
+    before = [asked(world, command) for command in settings]
+    assert all(before)
+    for setter in setters:
+        asked(world, WP, poison)
+        asked(world, setter)
+    assert [asked(world, command) for command in settings] == before
+    assert not world.naze.armed
+
+
+def asked(world: World, command: int, payload: bytes = b"") -> bytes | None:
+    """The payload of the reply to a request of a client that may only read; None if it is refused."""
+    found: list[MspFrame] = []
+    world.bridge.sharing.request(
+        MspFrame(Direction.REQUEST, command, payload), found.append, world.now, may_write=False
+    )
+    world.receive_from_fc(b"")  # sends it
+    world.run(0.5)
+    return found[0].payload if found else None

@@ -23,6 +23,10 @@ _ASKED_AGAIN_S = 2.0
 IDENT, SET_PID, REBOOT, SET_MOTOR, EEPROM_WRITE = 100, 202, 68, 214, 250
 DATAFLASH_ERASE, V2_FRAME, SET_AUX_RC = 72, 255, 0x2230
 SET_RAW_GPS, MSP2_SENSOR_GPS = 201, 0x1F03
+STATUS, WP = 101, 118
+#: PIDs, rates, and the switches, among them ARM: the command that reads them, and the one that sets them.
+SETTERS = {112: 202, 111: 204, 113: 203}
+ARMED = 1 << 5
 
 
 class Program:
@@ -208,3 +212,17 @@ async def test_noise_is_not_passed_on() -> None:
 def test_an_invalid_share_is_one_sentence(entry: object, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         parse_share(entry, Path())
+
+
+async def test_an_empty_setter_is_no_read() -> None:
+    """Harakiri executes it with what the request before it left in the receive buffer."""
+    async with shared() as (daemon, program):
+        for setting, setter in SETTERS.items():
+            (before,) = await program.ask(setting)
+            await program.ask(WP, b"\xff" * 58)
+            await program.ask(setter)
+            (after,) = await program.ask(setting)
+            assert after == before
+        (status,) = await program.ask(STATUS)
+        assert not int.from_bytes(status.payload[6:10], "little") & ARMED
+        assert daemon.bridge.session.vehicle.armed is False

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Arbitrary requests through a read-only share: no simulated board changes, and v2 is judged like v1."""
+
+import random
+from collections.abc import Callable
+from functools import partial
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from protocols.msp.frame import Direction, MspFrame
+from protocols.rights.msp import MSP_RIGHTS, Firmware
+from simulator.board.options import Faults
+from simulator.commands.fc_kinds import make_board
+from simulator.naze.board import SimulatedNaze
+from tests.support.world import World
+
+BOARDS: dict[str, Callable[[], object]] = {
+    "patched Harakiri": SimulatedNaze,
+    "Harakiri": lambda: SimulatedNaze(faults=Faults(extension=False)),
+    "INAV": partial(make_board, "inav"),
+    "MultiWii": partial(make_board, "multiwii"),
+}
+COMMANDS = sorted({command for rights in MSP_RIGHTS.values() for command in rights} | set(range(256)))
+#: What each board has of its settings, and some waypoints.
+SETTINGS = [(command, b"") for command in (10, 111, 112, 113, 114, 122)] + [(118, bytes((at,))) for at in (0, 1, 16)]
+AT_ONCE = 60
+
+
+@pytest.mark.parametrize("name", BOARDS)
+@settings(max_examples=4, deadline=None)
+@given(seed=st.integers(0, (1 << 64) - 1))
+def test_no_request_changes_a_board(name: str, seed: int) -> None:
+    board = BOARDS[name]()
+    world = World(speeds=(115200,), peer=board)
+    world.wait_until(lambda w: w.bridge.session.vehicle.armed is False and not w.bridge.runner.is_busy, 30)
+    before, stored = [answer(world, *setting) for setting in SETTINGS], world.naze.stored_records
+    assert any(before)
+    draw = random.Random(seed)
+    for _ in range(AT_ONCE):
+        answer(world, draw.choice(COMMANDS), fill(draw), is_v2=draw.random() < 0.3)
+    assert [answer(world, *setting) for setting in SETTINGS] == before
+    assert world.naze.stored_records == stored
+    assert not world.naze.armed
+    assert not world.naze.counters.resets
+
+
+def fill(draw: random.Random) -> bytes:
+    size = draw.choice((0, 0, 1, 2, 5, 7, draw.randrange(256)))
+    return draw.choice((b"\0", b"\xff", draw.randbytes(1))) * size
+
+
+def answer(world: World, command: int, payload: bytes, *, is_v2: bool = False) -> bytes | None:
+    """The payload of the reply; None if the request is refused."""
+    found: list[MspFrame] = []
+    frame = MspFrame(Direction.REQUEST, command, payload, is_v2=is_v2)
+    other = MspFrame(Direction.REQUEST, command, payload, is_v2=not is_v2)
+    sharing = world.bridge.sharing
+    refusal = sharing.request(frame, found.append, world.now, may_write=False)
+    world.receive_from_fc(b"")  # sends it
+    world.run(0.05 if refusal else 0.3)
+    assert sharing.request(other, lambda _: None, world.now, may_write=False) == refusal
+    world.receive_from_fc(b"")
+    world.run(0.05 if refusal else 0.3)
+    return found[0].payload if found else None
+
+
+@given(command=st.sampled_from(COMMANDS), payload=st.binary(max_size=255))
+def test_a_read_is_one_on_every_firmware_that_may_be_on_the_line(command: int, payload: bytes) -> None:
+    """Only what is known of the firmware adds to the rights of an unknown one."""
+    unknown = MSP_RIGHTS[Firmware.UNKNOWN].get(command)
+    if unknown is not None and unknown.permits(payload):
+        known = [rights[command] for rights in MSP_RIGHTS.values() if command in rights]
+        assert {right.effect for right in known} == {unknown.effect}
+        assert all(right.permits(payload) for right in known)
