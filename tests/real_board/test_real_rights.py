@@ -136,15 +136,17 @@ def test_no_read_of_the_table_changes_anything(image: Image, flash: bytes, is_ar
     bench.arm(is_armed)
     watch = Watch(bench.naze, image)
     reads = [
-        request(command, payload)
+        (request(command, payload), right.reply)
         for command, right in MSP_RIGHTS[firmware].items()
         if right.effect is Effect.READ
         for payload in right.only or {bytes((fill,)) * size for size in right.lengths for fill in _FILLS}
     ]
     found: dict[tuple[str, str], str] = {}
-    for first, second in product(reads, repeat=2):
+    for (first, _), (second, largest) in product(reads, repeat=2):
         bench.ask(first)
-        bench.ask(second)
+        answer = bench.ask(second)
+        assert answer is not None
+        assert len(answer.payload) <= largest
         found[first.hex(), second.hex()] = watch.changes()
     bench.run(_SETTLED_S)
     found["in", "the end"] = watch.changes()

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from protocols.msp.frame import Direction, MspFrame
-from protocols.rights.msp import MSP_RIGHTS, Firmware
+from protocols.rights.msp import MSP_RIGHTS, Firmware, msp_right
 from simulator.board.options import Faults
 from simulator.commands.fc_kinds import make_board
 from simulator.naze.board import SimulatedNaze
@@ -53,6 +53,8 @@ def fill(draw: random.Random) -> bytes:
 
 def answer(world: World, command: int, payload: bytes, *, is_v2: bool = False) -> bytes | None:
     """The payload of the reply; None if the request is refused."""
+    controller = world.bridge.session.state.controller
+    assert controller is not None
     found: list[MspFrame] = []
     frame = MspFrame(Direction.REQUEST, command, payload, is_v2=is_v2)
     other = MspFrame(Direction.REQUEST, command, payload, is_v2=not is_v2)
@@ -63,7 +65,10 @@ def answer(world: World, command: int, payload: bytes, *, is_v2: bool = False) -
     assert sharing.request(other, lambda _: None, world.now, may_write=False) == refusal
     world.receive_from_fc(b"")
     world.run(0.05 if refusal else 0.3)
-    return found[0].payload if found else None
+    if not found:
+        return None
+    assert len(found[0].payload) <= msp_right(controller.firmware, command, payload).reply
+    return found[0].payload
 
 
 @given(command=st.sampled_from(COMMANDS), payload=st.binary(max_size=255))
