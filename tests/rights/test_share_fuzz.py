@@ -56,15 +56,14 @@ def answer(world: World, command: int, payload: bytes, *, is_v2: bool = False) -
     controller = world.bridge.session.state.controller
     assert controller is not None
     found: list[MspFrame] = []
-    frame = MspFrame(Direction.REQUEST, command, payload, is_v2=is_v2)
-    other = MspFrame(Direction.REQUEST, command, payload, is_v2=not is_v2)
-    sharing = world.bridge.sharing
-    refusal = sharing.request(frame, found.append, world.now, may_write=False)
-    world.receive_from_fc(b"")  # sends it
-    world.run(0.05 if refusal else 0.3)
-    assert sharing.request(other, lambda _: None, world.now, may_write=False) == refusal
-    world.receive_from_fc(b"")
-    world.run(0.05 if refusal else 0.3)
+    refusals = []
+    for answered, version in ((found.append, is_v2), (lambda _: None, not is_v2)):
+        world.run_until(lambda w: not w.bridge.runner.needs_line, 5)
+        frame = MspFrame(Direction.REQUEST, command, payload, is_v2=version)
+        refusals.append(world.bridge.sharing.request(frame, answered, world.now, may_write=False))
+        world.receive_from_fc(b"")  # sends it
+        world.run(0.05 if refusals[-1] else 0.3)
+    assert refusals[0] == refusals[1]
     if not found:
         return None
     assert len(found[0].payload) <= msp_right(controller.firmware, command, payload).reply
