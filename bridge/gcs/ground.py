@@ -223,11 +223,6 @@ class Ground:
         """Send a message to one ground station under the ids that it addressed."""
         self._send(station.peer, FrameWriter(*ids, self._signers.get(station.peer.link)), message)
 
-    def greet(self, peer: Peer, heartbeat: Message) -> None:
-        """Send the heartbeat to a newcomer at once: Mission Planner waits for two before it continues."""
-        self._send(peer, self._writer(peer), heartbeat)
-        self._introduce(peer, heartbeat)
-
     def _send(self, peer: Peer, writer: FrameWriter, *together: Message) -> None:
         frames = [writer.frame(pack(message), self._version(peer)) for message in together]
         self._datagrams.append((peer, b"".join(frames)))
@@ -253,21 +248,26 @@ class Ground:
         if frame is not None and is_logged:
             self.on_frames([frame])
 
-    def introduce(self, heartbeat: Message) -> None:
-        """Send the heartbeat in the other MAVLink version too, to peers whose version is unknown.
+    def beat(self, heartbeat: Message, peers: Iterable[Peer]) -> None:
+        """Send the heartbeat in MAVLink 2, then in MAVLink 1 too, to peers that have not sent MAVLink 2.
 
-        A ground station that knows only MAVLink 1 would not see the vehicle otherwise. Mission Planner sends MAVLink 1
-        until it has seen MAVLink 2, which it can always read; so signed links need no MAVLink 1.
+        QGroundControl talks to the vehicle in the version of the first frame that it gets, and a ground station that
+        knows only MAVLink 1 would not see the vehicle otherwise. Signed links need no MAVLink 1.
         """
-        for peer in self.everyone():
-            self._introduce(peer, heartbeat)
+        packed = pack(heartbeat)
+        logged: bytes | None = None
+        for peer in peers:
+            writer = self._writer(peer)
+            frames = [writer.frame(packed, version) for version in ((2,) if self._has_sent_v2(peer) else (2, 1))]
+            logged = logged or frames[0]
+            if peer is not RECORDER:
+                self._datagrams += [(peer, frame) for frame in frames]
+        if logged is not None:
+            self.on_frames([logged])
 
-    def _introduce(self, peer: Peer, heartbeat: Message) -> None:
-        if peer.link in self._signers or peer is RECORDER:
-            return
-        other = 1 if self.stations.is_unknown(peer) else 2
-        if self.stations.version(peer) != other:
-            self._datagrams.append((peer, self._writer(peer).frame(pack(heartbeat), other)))
+    def _has_sent_v2(self, peer: Peer) -> bool:
+        is_certain = peer is RECORDER or peer.link in self._signers
+        return is_certain or not (self.stations.is_unknown(peer) or self.stations.version(peer) == 1)
 
     def say(self, severity: Severity, text: str, to: Station | None = None) -> None:
         """Show a text on one ground station or on all."""

@@ -94,7 +94,7 @@ class OwnVehicle:
             self._newcomers[peer] = self._ground.now + _NEWCOMER_S
         self._newcomers_due = min(self._newcomers_due, self._ground.now + _NEWCOMER_INTERVAL_S)
         self.due = min(self.due, self._newcomers_due)
-        self._ground.greet(peer, self._heartbeat())
+        self._ground.beat(self._heartbeat(), [peer])
         self._follow_requests()
 
     def tick(self, now: float) -> None:
@@ -114,9 +114,7 @@ class OwnVehicle:
         self._rates.keep(everyone, set(filter(self._ground.has_standing, everyone)), unwatched)
         self._set_polls(everyone)
         self.arming_reasons.follow(now)
-        heartbeat = self._heartbeat()
-        self._ground.broadcast(heartbeat)
-        self._ground.introduce(heartbeat)
+        self._ground.beat(self._heartbeat(), everyone)
         self._send_due(self._rows.get(None, ()))
         if self._session.vehicle.fresh(Health, now, _SILENT_S) is None:
             # No reading triggers it now: the flight controller is lost, or sends FrSky telemetry.
@@ -130,10 +128,8 @@ class OwnVehicle:
     def _greet(self, now: float) -> None:
         self._newcomers = {peer: until for peer, until in self._newcomers.items() if now < until}
         self._newcomers_due = now + _NEWCOMER_INTERVAL_S if self._newcomers else inf
-        heartbeat = self._heartbeat()
-        for peer in self._ground.everyone():
-            if peer in self._newcomers:
-                self._ground.greet(peer, heartbeat)
+        newcomers = [peer for peer in self._ground.everyone() if peer in self._newcomers]
+        self._ground.beat(self._heartbeat(), newcomers)
 
     def heard(self, news: Collection[type[Reading]], now: float) -> None:
         """Send the messages that new readings trigger, where due."""

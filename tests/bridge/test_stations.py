@@ -49,6 +49,18 @@ def test_each_station_is_answered_in_its_own_version(version: int) -> None:
     assert versions(station) == ({1, 2} if version == 1 else {2})
 
 
+@pytest.mark.parametrize("first", ["heartbeat", "request"])
+def test_the_first_frame_to_a_newcomer_is_mavlink_2(first: str) -> None:
+    """QGroundControl begins in MAVLink 1, and stays in the version of the first frame that it gets."""
+    world = ready_world()
+    station = GroundStation(world, version=1)
+    station.send(gcs_heartbeat() if first == "heartbeat" else m.MAVLink_param_request_list_message(1, 1))
+    world.run(3)
+    assert station.frames[0][0] == 0xFD
+    # One that knows only MAVLink 1 finds the vehicle, too.
+    assert [frame[5] for frame in station.frames if frame[0] == 0xFE].count(m.MAVLINK_MSG_ID_HEARTBEAT) > 10
+
+
 def test_a_station_that_switches_to_mavlink_2_is_answered_in_it() -> None:
     world = ready_world()
     station = GroundStation(world, version=1)
