@@ -43,6 +43,14 @@ _ENDS_DOWNLOAD = frozenset(
     {m.MAVLINK_MSG_ID_MISSION_COUNT, m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL, m.MAVLINK_MSG_ID_MISSION_ACK}
 )
 
+_READS = frozenset(
+    {
+        m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST,
+        m.MAVLINK_MSG_ID_MISSION_REQUEST,
+        m.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
+    }
+)
+
 _Handler = Callable[[Station, Message, float], object]
 
 
@@ -112,7 +120,11 @@ class MessageRouter:
             return
         mission_type = getattr(message, "mission_type", m.MAV_MISSION_TYPE_MISSION)
         clears_all = msgid == m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL and mission_type == m.MAV_MISSION_TYPE_ALL
+        if msgid in _READS or msgid in _ENDS_DOWNLOAD:
+            self._uploads.answers.went_on(station)
         if mission_type == m.MAV_MISSION_TYPE_MISSION or clears_all:
+            if msgid in _READS:
+                self._uploads.reads(station, now)
             if msgid in _ENDS_DOWNLOAD:
                 self._downloads.forget(station)
             self._handlers[msgid](station, message, now)

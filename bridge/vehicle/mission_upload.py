@@ -51,6 +51,9 @@ _MISSION = int(messages.MAV_MISSION_TYPE_MISSION)
 _TOO_MANY_UPLOADS = Refusal(MissionResult.DENIED, "Too many uploads: wait a few seconds")
 #: The maximum number of simultaneous uploads: one for each peer of a link.
 _MOST_UPLOADS = MAX_PEERS
+#: A ground station that reads has given up an upload of which nothing was heard for this long.
+_SILENT_S = 1.0
+_AGAIN = "the station started again"
 #: The minimum interval between asking the flight controller if it can take a list; one reply serves all that wait.
 _ASK_INTERVAL_S = 0.2
 
@@ -88,6 +91,8 @@ class MissionUploads:
     def count(self, station: Station, count: int, now: float) -> None:
         """MISSION_COUNT: an upload is announced."""
         present = self._find(station, now)
+        if present is not None:
+            present.heard_at = now
         if present is None and not count and self.answers.repeat_cancelled(station, now):
             return
         if present is None or not self._is_for(present, count, now):
@@ -97,7 +102,7 @@ class MissionUploads:
         """MISSION_CLEAR_ALL. `mission_type`: of the answer, MISSION or ALL."""
         present = self._find(station, now)
         if present is not None and not isinstance(present.state, Delivering):
-            self._supersede(present, now)
+            self._supersede(present, _AGAIN, now)
         elif present is not None and present.count == 0:
             return
         self._begin(station, 0, now, mission_type)
@@ -108,7 +113,7 @@ class MissionUploads:
         if upload is None:
             self.answers.late_item(station, item.seq, now, is_lost=not self._uploads)
             return
-        state = upload.state
+        upload.heard_at, state = now, upload.state
         if not isinstance(state, Receiving):
             # The next request or the final ack will follow anyway.
             if isinstance(state, Complete | Delivering):
@@ -120,7 +125,7 @@ class MissionUploads:
             return
         if state.is_of_another_list(item):
             # Two lists must never be mixed: the previous one is discarded.
-            self._supersede(upload, now)
+            self._supersede(upload, _AGAIN, now)
             self._begin(station, upload.count, now, is_next=True)
             return
         if state.is_doubtful(item, now):
@@ -144,6 +149,16 @@ class MissionUploads:
         else:
             upload.state.close(now)
             self._uploads.schedule(upload)
+
+    def reads(self, station: Station, now: float) -> None:
+        """The ground station reads the mission: its silent upload ends without an ack, which it would misunderstand."""
+        for upload in [upload for upload in self._uploads if upload.station == station]:
+            if now < upload.heard_at + _SILENT_S:
+                continue
+            if isinstance(upload.state, Delivering):
+                upload.is_superseded, upload.reminder_at = True, inf
+            else:
+                self._supersede(upload, "the station reads the mission", now)
 
     # From the rest of the bridge.
 
@@ -169,7 +184,7 @@ class MissionUploads:
                 if now >= state.deadline:
                     self._end([upload], state.timeout, now)
                 elif isinstance(state, Receiving) and now >= state.request.due:
-                    state.request.lost()
+                    state.request.lost(now)
                     self._request(upload, now)
                 elif now >= upload.reminder_at:
                     upload.remind_later(now)
@@ -210,7 +225,7 @@ class MissionUploads:
             self.answers.end(station, _TOO_MANY_UPLOADS.ack, count, now, mission_type)
             return
         incident = f"upload-{next(self._incidents)}"
-        upload = Upload(station, count, incident, Waiting(Announced(), now), mission_type, is_next)
+        upload = Upload(station, count, incident, Waiting(Announced(), now), mission_type, now, is_next)
         self._uploads.add(upload)
         armed = self._missions.armed_refusal()
         if armed is not None:
@@ -271,10 +286,10 @@ class MissionUploads:
         self._uploads.remove(upload, now)
         self._missions.release(upload)
 
-    def _supersede(self, upload: Upload, now: float) -> None:
-        """Drop an upload without an answer: its station would attribute it to the list that it announces now."""
+    def _supersede(self, upload: Upload, why: str, now: float) -> None:
+        """Drop an upload without an answer: its station would attribute it to the transfer that it begins now."""
         ack = MissionResult.OPERATION_CANCELLED
-        self._note("mission.refused", upload, "warning", ack=ack.name, why="superseded: the station started again")
+        self._note("mission.refused", upload, "warning", ack=ack.name, why=f"superseded: {why}")
         self._forget(upload, now)
 
     def _is_for(self, upload: Upload, count: int, now: float) -> bool:
@@ -293,7 +308,7 @@ class MissionUploads:
             upload.count, upload.mission_type = count, _MISSION
             return True
         if count != upload.count or isinstance(state, Complete):
-            self._supersede(upload, now)
+            self._supersede(upload, _AGAIN, now)
             return False
         if isinstance(state, Receiving):
             state.doubt()
@@ -395,10 +410,19 @@ class MissionUploads:
 
     def _answer(self, upload: Upload, ack: MissionResult, now: float) -> None:
         if upload.is_superseded:
-            # The station would attribute this ack to the list that it has announced since.
+            # The station would attribute this ack to the transfer that it has begun since.
             return
+        has_items = upload.count > 0 and (isinstance(upload.state, Delivering) or bool(upload.state.received))
         for where in (upload.station, *self._elsewhere(upload, now)):
-            self.answers.end(where, ack, upload.count, now, upload.mission_type, is_cancelled=upload.is_cancelled)
+            self.answers.end(
+                where,
+                ack,
+                upload.count,
+                now,
+                upload.mission_type,
+                is_cancelled=upload.is_cancelled,
+                is_repeated=has_items and not upload.is_cancelled,
+            )
 
     def _note(self, event: str, upload: Upload, level: Level = "info", **facts: object) -> None:
         self._log_event(level, event, **{"station": str(upload.station)} | facts, incident=upload.incident)

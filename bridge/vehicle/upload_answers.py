@@ -22,6 +22,8 @@ _CANCEL_S = 3.0
 _MOST = 64
 #: Mission Planner has reported "Write Fast" as a success to its user, so a failure is shown three times, 2 s apart.
 _REMINDERS_S = (2.0, 4.0)
+#: QGroundControl waits 1.5 s for the final ack, and MAVSDK 2.5 s; neither asks for it again. So it is sent three times.
+_ACK_AGAIN_S = (0.4, 0.9)
 _NOT_WHOLE = Refusal(MissionResult.UNSUPPORTED, "A mission can only be written as a whole")
 _UNKNOWN_UPLOAD = Refusal(MissionResult.OPERATION_CANCELLED, "Unknown upload: write it again")
 
@@ -49,8 +51,9 @@ class UploadAnswers:
     def __init__(self, ground: Ground) -> None:
         self._ground = ground
         self._answers: dict[Station, _Answer] = {}  # oldest first
-        self._reminders: list[tuple[float, Station, str]] = []
-        #: The time of the next `tick`; infinity without reminders.
+        #: To be sent later: the reason for a refusal, or the final ack again.
+        self._later: list[tuple[float, Station, str | None]] = []
+        #: The time of the next `tick`; infinity if nothing is to be sent later.
         self.due = inf
 
     # At the end of an upload.
@@ -64,14 +67,20 @@ class UploadAnswers:
         mission_type: int = 0,
         *,
         is_cancelled: bool = False,
+        is_repeated: bool = False,
     ) -> None:
-        """Send the final MISSION_ACK; `is_cancelled`: the station had cancelled the upload of `count` items."""
+        """Send the final MISSION_ACK; `is_cancelled`: the station had cancelled the upload of `count` items.
+
+        `is_repeated`: send it again until the station sends another mission message.
+        """
         self._forget_old(now)
         self._answers.pop(station, None)
         self._answers[station] = _Answer(ack, count, now + _MEMORY_S, now + _CANCEL_S if is_cancelled else now)
         if len(self._answers) >= 2 * _MOST:
             self._forget_strangers()
         self._ground.mission_ack(station, ack, mission_type)
+        if is_repeated:
+            self._set_later([*self._later, *((now + later_s, station, None) for later_s in _ACK_AGAIN_S)])
 
     def report(self, station: Station, verdict: Verdict[Any], delivery: DeliveryResult) -> None:
         """Report everything to the sender, and the change on the aircraft to other ground stations."""
@@ -90,18 +99,27 @@ class UploadAnswers:
 
     def remind(self, station: Station, text: str, now: float) -> None:
         """Repeat the reason for a refusal that the station may not have noticed."""
-        self._remind([*self._reminders, *((now + later_s, station, text) for later_s in _REMINDERS_S)])
+        self._set_later([*self._later, *((now + later_s, station, text) for later_s in _REMINDERS_S)])
+
+    def went_on(self, station: Station) -> None:
+        """The station has sent another mission message: it has the final ack, or does not wait for it."""
+        if self._later:
+            self._set_later([later for later in self._later if later[1:] != (station, None)])
 
     def tick(self, now: float) -> None:
-        """Send the reminders that are due."""
-        for due, station, text in self._reminders:
-            if now >= due:
+        """Send what is due."""
+        for due, station, text in self._later:
+            if now < due:
+                continue
+            if text is not None:
                 self._ground.say(Severity.ERROR, text, station)
-        self._remind([reminder for reminder in self._reminders if now < reminder[0]])
+            elif station in self._answers:
+                self._ground.mission_ack(station, self._answers[station].ack)
+        self._set_later([later for later in self._later if now < later[0]])
 
-    def _remind(self, reminders: list[tuple[float, Station, str]]) -> None:
-        self._reminders = reminders
-        self.due = min((due for due, _, _ in reminders), default=inf)
+    def _set_later(self, later: list[tuple[float, Station, str | None]]) -> None:
+        self._later = later
+        self.due = min((due for due, _, _ in later), default=inf)
 
     # After the end.
 
@@ -136,7 +154,7 @@ class UploadAnswers:
 
     def forget(self, station: Station) -> bool:
         """The ground station has begun a new upload. True if the answer to its former one was remembered."""
-        self._remind([reminder for reminder in self._reminders if reminder[1] != station])
+        self._set_later([later for later in self._later if later[1] != station])
         return self._answers.pop(station, None) is not None
 
     def was_said_to(self, station: Station, now: float) -> bool:

@@ -19,22 +19,24 @@ from protocols.mission_item import MissionItem, MissionResult
 _LAST_ITEMS_S = 0.3
 #: After a station's next MISSION_COUNT, items of its former list may still arrive for this long.
 _FORMER_ITEMS_S = 2.0
-#: The timeout of an item request.
+#: The timeout of an item request: 1.5 times the round trip, within these limits.
 _FIRST_TIMEOUT_S = 0.25
-_MAX_TIMEOUT_S = 1.5
-#: Of one item's timeouts, this many are equal; then each is twice the previous one.
-_EQUAL_TIMEOUTS = 3
+_MAX_TIMEOUT_S = 0.75
+#: QGroundControl gives up 1.5 s after the last request that it received, so a lost one is repeated several times until
+#: then. Later ones are rarer: Mission Planner gives up after ten that it received.
+_OFTEN_S = 1.5
+_SELDOM_S = 0.7
 #: A message repeated within this time was duplicated by the network. Answering each copy would double every message
 #: that follows, and MAVSDK gives up after five repeats; a ground station that missed our request repeats it later.
 _REPEAT_AFTER_S = 0.1
-#: An answer arrives within this time, or within a round trip. Mission Planner repeats an item after 0.45 s.
+#: An answer arrives within this time, or within two round trips. Mission Planner repeats an item after 0.45 s.
 _ANSWER_S = 0.4
-#: After a pause of this length, and its usual time for an item, a ground station may have given up its list and begun
-#: another: QGroundControl after 1.5 s, and then its user must act; MAVSDK after 2.5 s.
-_ABANDONED_S = 2.5
+#: After a pause of this length, and its shortest time for an item, a ground station may have given up its list and
+#: begun another: QGroundControl after 1.5 s, and then its user must act; MAVSDK after 2.5 s.
+_ABANDONED_S = 2.0
 #: QGroundControl reports a failed write 1.5 s after its last item, unless that is requested again; MAVSDK after 2.5 s.
-#: Writing 120 records to an INAV takes 2.4 s.
-_NO_ANSWER_S = 1.0
+#: Writing 120 records to an INAV takes 2.4 s. Twice in that time, in case one request is lost.
+_NO_ANSWER_S = 0.6
 
 
 class Event:
@@ -137,33 +139,38 @@ class ItemRequest:
     _asked_at: float = 0.0
     #: When another item was requested last.
     _other_asked_at: float = -inf
-    _repeats: int = 0
+    #: The first timeout of an item, and the present one.
     _timeout_s: float = _FIRST_TIMEOUT_S
+    _present_s: float = _FIRST_TIMEOUT_S
     _round_trip_s: float | None = None
+    #: The item that arrived last although requested twice, and the time from the first request.
+    _late: tuple[int | None, float] = None, 0.0
     #: The number of answers still to come, by item.
     _unanswered: Counter[int] = field(default_factory=Counter)
 
     def asked(self, seq: int, now: float) -> None:
         self.is_repeated = seq == self._seq
         if not self.is_repeated:
-            self._seq, self._first_at, self._repeats = seq, now, 0
+            self._seq, self._first_at, self._present_s = seq, now, self._timeout_s
             self._other_asked_at = self._asked_at
         self._asked_at = now
         self._unanswered[seq] += 1
-        self.due = now + self._timeout_s
+        self.due = now + self._present_s
 
-    def lost(self) -> None:
-        """No answer before `due`. The timeout grows while the round trip time is unknown or several copies are lost.
-
-        MAVSDK gives up 2.5 s after its last new request, and on a lossy link a longer timeout leaves too few repeats.
-        """
-        self._repeats += 1
-        if self._round_trip_s is None or self._repeats >= _EQUAL_TIMEOUTS:
-            self._timeout_s = min(self._timeout_s * 2, _MAX_TIMEOUT_S)
+    def lost(self, now: float) -> None:
+        """No answer before `due`. The timeout grows if nothing was answered yet, or if many copies are lost."""
+        if self._round_trip_s is None:
+            self._present_s = min(self._present_s * 2, _SELDOM_S)
+        else:
+            often_s = max(self._round_trip_s / 2, _FIRST_TIMEOUT_S)
+            self._present_s = often_s if now < self._first_at + _OFTEN_S else _SELDOM_S
 
     def explains_repeat(self, seq: int, now: float) -> bool:
         """True if a repeated item was requested as often, or is a copy made by the network: it needs no answer."""
         self._unanswered[seq] -= 1
+        if self._unanswered[seq] == 0 and self._late[0] == seq:
+            # Every request was answered, so the first answer belonged to the first one.
+            self._set_round_trip(max(self._late[1], self._round_trip_s or 0.0))
         return self._unanswered[seq] >= 0 or now < self._asked_at + _REPEAT_AFTER_S
 
     def is_unrequested(self, seq: int, first_at: float, now: float) -> bool:
@@ -171,24 +178,24 @@ class ItemRequest:
         self._unanswered[seq] -= 1
         asked_at = self._asked_at if seq == self._seq else self._other_asked_at
         round_trip_s = self._round_trip_s or 0.0
-        is_late = now >= asked_at + max(_ANSWER_S, round_trip_s)
-        return (is_late or self._unanswered[seq] < 0) and now >= first_at + round_trip_s / 2
+        is_late = now >= asked_at + max(_ANSWER_S, 2 * round_trip_s)
+        return (is_late or self._unanswered[seq] < 0) and now >= first_at + _ANSWER_S
 
     def answered(self, seq: int, now: float) -> None:
         """Update the timeout when an item arrives for the first time."""
         self._unanswered[seq] -= 1
         if seq != self._seq:
             return
-        elapsed_s, known_s = now - self._asked_at, self._round_trip_s
-        round_trip_s = known_s or 0.0
-        if not self.is_repeated:
-            self._round_trip_s = round_trip_s = elapsed_s if known_s is None else known_s * 7 / 8 + elapsed_s / 8
-        elif known_s is None:
-            # At most this long, until one request is answered alone.
-            round_trip_s = now - self._first_at
-        elif elapsed_s < known_s / 2:
-            # Too early for an answer to the last copy: the round trip has become longer than the timeout.
-            self._round_trip_s = round_trip_s = min(now - self._first_at, _MAX_TIMEOUT_S)
+        known_s, elapsed_s = self._round_trip_s, now - self._first_at
+        if self.is_repeated:
+            # Either copy may have been lost.
+            self._late = seq, elapsed_s
+            self._set_round_trip(now - self._asked_at if known_s is None else known_s)
+        else:
+            self._set_round_trip(elapsed_s if known_s is None else known_s * 7 / 8 + elapsed_s / 8)
+
+    def _set_round_trip(self, round_trip_s: float) -> None:
+        self._round_trip_s = round_trip_s
         self._timeout_s = min(max(1.5 * round_trip_s, _FIRST_TIMEOUT_S), _MAX_TIMEOUT_S)
 
 
@@ -206,7 +213,7 @@ class Receiving(UploadState):
         self.request = ItemRequest()
         self._in_order_until = now + _FORMER_ITEMS_S if event.is_next else now
         self._progress_at = now
-        self._longest_pause_s = 0.0
+        self._shortest_pause_s = inf
         #: Perhaps the ground station has begun another list of this length. The next items show it.
         self._is_in_doubt = False
         self._was_in_doubt = False
@@ -261,7 +268,7 @@ class Receiving(UploadState):
             if item.seq > self._judged and now < self._in_order_until:
                 return True
             pause_s = now - self._progress_at
-            if pause_s >= self._longest_pause_s + _ABANDONED_S:
+            if pause_s >= self._shortest_pause_s + _ABANDONED_S:
                 self.doubt()
             if self._is_in_doubt:
                 is_unrequested = self.request.is_unrequested(item.seq, self._doubtful_at, now)
@@ -281,7 +288,7 @@ class Receiving(UploadState):
             return not self.request.explains_repeat(item.seq, now)
         self.request.answered(item.seq, now)
         self.items[item.seq] = item
-        self._longest_pause_s = max(self._longest_pause_s, now - self._progress_at)
+        self._shortest_pause_s = min(self._shortest_pause_s, now - self._progress_at)
         self._progress_at = now
         self.deadline = max(self.deadline, now + (_LAST_ITEMS_S if self.is_closed else self.seconds))
         while self._judged in self.items:
@@ -332,9 +339,11 @@ class Upload:
     state: UploadState
     #: MAV_MISSION_TYPE of the final MISSION_ACK.
     mission_type: int
+    #: When its ground station last sent a message of this upload.
+    heard_at: float
     #: Its ground station has sent another list just before.
     is_next: bool = False
-    #: Its ground station has announced another list while this one was written.
+    #: Its ground station has announced another list, or begun to read, while this one was written.
     is_superseded: bool = False
     #: Its ground station has sent a MISSION_COUNT of 0.
     is_cancelled: bool = False

@@ -20,6 +20,7 @@ from tests.support.conversations import (
     Upload,
     ack_message,
     count_message,
+    item_message,
     list_message,
     records_of,
     request_message,
@@ -362,6 +363,37 @@ def test_a_download_continues_during_another_stations_upload() -> None:
     upload = Upload(writer, waypoints(60, 4))
     world.run(0.3)
     assert [item.lat_e7 for item in Download(reader).run()] == [item.lat_e7 for item in OLD]
+    assert upload.run() is A.ACCEPTED
+
+
+@pytest.mark.parametrize("sent", [0, 7, 20])
+def test_a_download_ends_the_stations_own_silent_upload_without_an_ack(sent: int) -> None:
+    """QGroundControl gives up an upload after 1.5 s of silence; an ack would be an error of its download."""
+    world, station = holding()
+    new = waypoints(20, 4)
+    station.send(count_message(20))
+    world.run(0.1)
+    if sent == 20:
+        world.store.delay_s = 2.5
+    for item in new[:sent]:
+        station.send(item_message(item.seq, item))
+    world.run(1.6)
+    station.take()
+    items = Download(station).run()
+    assert [item.lat_e7 for item in items] == [item.lat_e7 for item in (new if sent == 20 else OLD)]
+    world.run(7)
+    assert station.messages("MISSION_ACK") == []
+    assert not any("silent" in text for text in station.texts())
+
+
+def test_a_delayed_list_request_does_not_end_an_upload() -> None:
+    """The network may deliver the list request of an earlier Read again."""
+    world, station = holding()
+    items = waypoints(30, 4)
+    station.radio = Radio(delay_s=0.02)
+    upload = Upload(station, items)
+    for later_s in (0.05, 0.2, 0.5):
+        world.after(later_s, lambda: station.send(list_message()))
     assert upload.run() is A.ACCEPTED
 
 

@@ -222,7 +222,7 @@ def test_of_too_many_uploads_the_oldest_without_standing_ends() -> None:
     pilot, *strangers = (Station(Peer("udp", (f"10.0.0.{number}", 14550)), 255, 190) for number in range(4))
     uploads = UploadList()
     for at, station in enumerate((pilot, *strangers)):
-        uploads.add(upload_states.Upload(station, 9, "", upload_states.Waiting(upload_states.Announced(), at), 0))
+        uploads.add(upload_states.Upload(station, 9, "", upload_states.Waiting(upload_states.Announced(), at), 0, at))
     assert uploads.least_worth(lambda peer: peer == pilot.peer).station == strangers[0]
 
 
