@@ -412,7 +412,7 @@ class MissionUploads:
         if upload.is_superseded:
             # The station would attribute this ack to the transfer that it has begun since.
             return
-        has_items = upload.count > 0 and (isinstance(upload.state, Delivering) or bool(upload.state.received))
+        is_repeated = isinstance(upload.state, Delivering) and upload.count > 0
         for where in (upload.station, *self._elsewhere(upload, now)):
             self.answers.end(
                 where,
@@ -421,7 +421,7 @@ class MissionUploads:
                 now,
                 upload.mission_type,
                 is_cancelled=upload.is_cancelled,
-                is_repeated=has_items and not upload.is_cancelled,
+                is_repeated=is_repeated,
             )
 
     def _note(self, event: str, upload: Upload, level: Level = "info", **facts: object) -> None:
