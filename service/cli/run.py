@@ -7,8 +7,10 @@ from pathlib import Path
 import click
 
 from service.cli.options import PATH
+from service.cli.sentences import complain
 from service.settings import DEFAULT_GCS, SettingsError, load_settings
 from service.settings.load import CONFIG_VARIABLE
+from service.settings.passphrase import STRONGER
 
 
 @click.command()
@@ -41,6 +43,9 @@ def run(
         raise click.UsageError(str(error)) from error
     if check_config:
         click.echo("The settings are valid.")
+        for link, access in settings.access.items():
+            if access.weak_key is not None:
+                complain(f"warning: {link}: {access.weak_key}; {STRONGER}")
         return
     from service.cli.serve import serve  # the whole daemon: --help does without
 

@@ -16,6 +16,7 @@ from pathlib import Path
 from bridge.gcs.station import Peer
 from protocols.mavlink.signing import key_from_passphrase
 from service.settings.addresses import AddressError, GcsAddress, parse_gcs, parse_table
+from service.settings.passphrase import weakness
 from storage.os_error import reason
 
 Network = IPv4Network | IPv6Network
@@ -25,10 +26,14 @@ _MAX_PASSPHRASE = 4096
 
 @dataclass(frozen=True, slots=True)
 class WriteAccess:
-    """`key` None: no signature needed. `writers` None: any address may write; empty: none may."""
+    """`key` None: no signature needed. `writers` None: any address may write; empty: none may.
+
+    `weak_key`: a sentence if the key can be guessed.
+    """
 
     key: bytes | None = field(default=None, repr=False)
     writers: tuple[Network, ...] | None = None
+    weak_key: str | None = None
 
     @property
     def is_open(self) -> bool:
@@ -54,14 +59,18 @@ def parse_link(entry: object, folder: Path) -> tuple[GcsAddress, WriteAccess]:
         raise AddressError(f"gcs {address}: key_file must be the name of a file that holds the passphrase")
     if writers is not None and not isinstance(writers, list):
         raise AddressError(f'gcs {address}: writers must be a list of networks like ["192.168.4.0/24"]')
+    networks = None if writers is None else tuple(_network(address, writer) for writer in writers)
+    if key_file is None:
+        return address, WriteAccess(writers=networks)
+    passphrase = read_passphrase(folder / key_file)
+    weak = weakness(passphrase)
     return address, WriteAccess(
-        None if key_file is None else read_key(folder / key_file),
-        None if writers is None else tuple(_network(address, writer) for writer in writers),
+        key_from_passphrase(passphrase), networks, None if weak is None else f"the key in {folder / key_file} {weak}"
     )
 
 
-def read_key(path: Path) -> bytes:
-    """The key made from a passphrase: the only line of a file that other users cannot read."""
+def read_passphrase(path: Path) -> str:
+    """The only line of a file that other users cannot read."""
     try:
         # Not blocking: a FIFO without a writer would hang the daemon.
         with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
@@ -79,7 +88,7 @@ def read_key(path: Path) -> bytes:
     passphrase = passphrase.removesuffix("\n").removesuffix("\r")
     if not passphrase or "\n" in passphrase or len(passphrase) > _MAX_PASSPHRASE:
         raise AddressError(f"key_file {path} must hold the passphrase on one line, and nothing else")
-    return key_from_passphrase(passphrase)
+    return passphrase
 
 
 def _network(address: GcsAddress, text: object) -> Network:

@@ -21,7 +21,7 @@ from service.cli.doctor.port import check_console, check_holder, check_modem_man
 from service.cli.doctor.zenoh import check_zenoh
 from service.daemon.client import ControlError
 from service.daemon.mission_data import Json
-from service.settings import Settings
+from service.settings import Settings, load_settings
 from service.settings.addresses import AutoFc, SerialFc, parse_gcs
 from service.settings.zenoh import ZenohSettings
 from storage.mission_store import open_store
@@ -65,6 +65,21 @@ def assert_ok(found: Checked | Iterable[Checked] | None, named: str) -> None:
     checked = one(found)
     assert (checked.grade, checked.remedy) == (Grade.OK, "")
     assert named in checked.found
+
+
+@pytest.mark.parametrize(("passphrase", "is_weak"), [("q", True), ("k7mq2-x9tvb-3hndc-pw4ea", False)])
+def test_a_key_that_can_be_guessed(pi: FaultyMachine, tmp_path: Path, passphrase: str, is_weak: bool) -> None:
+    key, config = tmp_path / "gcs.key", tmp_path / "config.toml"
+    key.write_text(passphrase)
+    key.chmod(0o600)
+    config.write_text(f'gcs = [{{address = "{GCS[0]}", key_file = "{key}"}}]')
+    settings = load_settings(config, None, (), tmp_path)
+    (found,) = (each for each in examine(pi, settings, no_answer, lambda: STATUS) if each.check == "key")
+    if is_weak:
+        assert_note(found, f"the key in {key} is weak")
+        assert "setup --new-key" in found.remedy
+    else:
+        assert_ok(found, "required")
 
 
 def no_answer() -> dict[str, object]:
@@ -225,7 +240,7 @@ def test_a_silent_flight_controller_is_a_problem() -> None:
 
 def test_a_flight_controller_in_its_command_line_is_recognised() -> None:
     (_, found) = check_flight_controller(PORT, STATUS | {"flight_controller": None, "state": Cli.name}, None)
-    assert_problem(found, "in its command line: type exit there, or unplug it", "naze-bridge doctor` again")
+    assert_problem(found, Cli.trouble, "naze-bridge doctor` again")
 
     def listened() -> Json:
         raise ControlError(Cli.trouble)

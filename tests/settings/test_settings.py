@@ -9,6 +9,7 @@ import pytest
 
 from generators.config_sample import page, sample
 from service.settings import Settings, SettingsError, load_settings
+from service.settings.passphrase import new_passphrase
 from service.settings.table import KEYS
 from tests.support.programs import run_naze_bridge
 
@@ -234,6 +235,20 @@ def test_check_config_reports_success_or_errors(folder: Path) -> None:
     assert f"{config}:2: sysid is 0" in ended.stderr
     assert f"{config}:3: tlog_days is 0" in ended.stderr
     assert not (folder / "missions.db").exists()
+
+
+def test_check_config_warns_of_a_weak_key_and_does_not_quote_it(folder: Path) -> None:
+    config, key = folder / "naze.toml", folder / "gcs.key"
+    config.write_text('fc = "sim:"\ngcs = [{address = "udpin:0.0.0.0:14550", key_file = "gcs.key"}]\n')
+    key.write_text("q\n")
+    key.chmod(0o600)
+    ended = run_naze_bridge("run", "--check-config", "--config", config)
+    assert (ended.returncode, ended.stdout) == (0, "The settings are valid.\n")
+    (warning,) = ended.stderr.splitlines()
+    assert f"udpin:0.0.0.0:14550: the key in {key} is weak" in warning
+    assert "setup --new-key" in warning
+    key.write_text(f"{new_passphrase()}\n")
+    assert run_naze_bridge("run", "--check-config", "--config", config).stderr == ""
 
 
 def test_the_sample_is_up_to_date_and_has_the_defaults(folder: Path) -> None:

@@ -10,7 +10,7 @@ from bridge.gcs.station import Peer
 from protocols.mavlink.signing import key_from_passphrase
 from service.settings import SettingsError, load_settings
 from service.settings.addresses import AddressError
-from service.settings.write_access import WriteAccess, read_key
+from service.settings.write_access import WriteAccess, read_passphrase
 
 WORDS = "correct horse"
 LINK = "udpin:0.0.0.0:14550"
@@ -116,7 +116,7 @@ def test_an_invalid_table_is_one_sentence(tmp_path: Path, entry: str, reason: st
 def test_a_key_file_readable_by_others_is_refused(key_file: Path, mode: int) -> None:
     key_file.chmod(mode)
     with pytest.raises(AddressError, match="is readable by other users: run chmod 600"):
-        read_key(key_file)
+        read_passphrase(key_file)
 
 
 @pytest.mark.parametrize(
@@ -125,20 +125,20 @@ def test_a_key_file_readable_by_others_is_refused(key_file: Path, mode: int) -> 
 )
 def test_the_passphrase_is_the_line_without_its_end(key_file: Path, content: bytes, passphrase: str) -> None:
     key_file.write_bytes(content)
-    assert read_key(key_file) == key_from_passphrase(passphrase)
+    assert read_passphrase(key_file) == passphrase
 
 
 @pytest.mark.parametrize("content", [b"", b"\n", b"two\nlines\n", b"x" * 5000])
 def test_a_passphrase_is_one_line_of_text(key_file: Path, content: bytes) -> None:
     key_file.write_bytes(content)
     with pytest.raises(AddressError, match="must hold the passphrase on one line"):
-        read_key(key_file)
+        read_passphrase(key_file)
 
 
 def test_a_binary_key_file_is_refused(key_file: Path) -> None:
     key_file.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(AddressError, match="holds no text") as caught:
-        read_key(key_file)
+        read_passphrase(key_file)
     assert caught.value.__cause__ is None
 
 
@@ -146,4 +146,4 @@ def test_a_fifo_does_not_block(tmp_path: Path) -> None:
     fifo = tmp_path / "fifo"
     os.mkfifo(fifo, 0o600)
     with pytest.raises(AddressError, match="is not a file"):
-        read_key(fifo)
+        read_passphrase(fifo)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from service.cli.doctor.checked import Checked, Grade
 from service.cli.doctor.flight_controller import check_flight_controller
+from service.cli.doctor.keys import check_keys
 from service.cli.doctor.machine import check_clock, check_database, check_disk, check_versions
 from service.cli.doctor.network import check_ports, check_wifi
 from service.cli.doctor.port import (
@@ -52,6 +53,7 @@ def examine(
     yield from check_flight_controller(fc, running, ask_port if is_free else None)
     yield from check_wifi(host, settings.gcs)
     yield from check_ports(host, settings.gcs)
+    yield from check_keys(settings.access)
     yield check_zenoh(settings.zenoh)
     yield check_clock(host, datetime.fromtimestamp(time.time(), UTC))
     state_dir = settings.state_dir or Path()

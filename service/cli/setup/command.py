@@ -11,14 +11,15 @@ import click
 
 from service.cli.doctor.command import diagnose
 from service.cli.options import PATH
-from service.cli.sentences import fail
+from service.cli.sentences import complain, fail
 from service.cli.setup.change import Machine, SetupError, Step, is_root
 from service.cli.setup.state_folder import page_token
-from service.cli.setup.steps import GCS_PORT, PAGE_PORT, SetupChoices, missing_steps
+from service.cli.setup.steps import GCS_PORT, PAGE_PORT, SetupChoices, current_key, missing_steps
 from service.daemon.client import STATUS, ControlError, ask_daemon
 from service.machine.host import Host
 from service.machine.raspberry_pi import pi_model
 from service.settings.addresses import AddressError, parse_fc
+from service.settings.passphrase import STRONGER, new_passphrase, weakness
 from storage.os_error import reason
 
 _LEAST_PASSWORD, _MOST_PASSWORD, _MOST_SSID = 8, 63, 32
@@ -36,7 +37,8 @@ _ADDRESS_OF_HOTSPOT = "10.42.0.1"
 @click.option("--country", metavar="CC", help="Wi-Fi country, such as DE: the radio stays off without one.")
 @click.option("--name", metavar="HOST", help="Name of this machine on the network: HOST.local.")
 @click.option("--no-page", is_flag=True, help="Do not serve the status page.")
-@click.option("--key-file", type=PATH, help="File with a MAVLink signing passphrase.")
+@click.option("--key-file", type=PATH, help="File with a MAVLink signing passphrase: required for changes.")
+@click.option("--new-key", is_flag=True, help="Make such a passphrase and show it; it replaces the present one.")
 @click.option("--yes", is_flag=True, help="Ask no questions: use the options and their defaults.")
 @click.option("--dry-run", is_flag=True, help="Show the changes without making them.")
 @click.option("--root", type=PATH, default="/", hidden=True)
@@ -48,6 +50,7 @@ def setup(
     name: str | None,
     no_page: bool,
     key_file: Path | None,
+    new_key: bool,
     yes: bool,
     dry_run: bool,
     root: Path,
@@ -65,12 +68,17 @@ def setup(
         raise click.UsageError(str(error)) from error
     click.echo(f"This is a {model.name}." if (model := pi_model(host)) else "This is not a known Raspberry Pi model.")
     password = None if password_file is None else _line_of(password_file)
+    key = None if key_file is None else _line_of(key_file)
+    if key is not None and new_key:
+        raise click.UsageError("give either --key-file or --new-key")
     page = not no_page
     if not yes and not dry_run:
         if hotspot is None and click.confirm("Open a Wi-Fi hotspot, for the field? (no: keep the current network)"):
             hotspot = click.prompt("Its name", default=socket.gethostname())
             country = country or click.prompt("Your country, two letters")
         page = page and click.confirm("Serve the status page to browsers on the network?", default=True)
+        if key is None and not new_key and not current_key(host):
+            new_key = click.confirm("Make a key, without which nobody on the network can change missions or settings?")
     if hotspot is not None and password is None:
         if yes or dry_run:
             raise click.UsageError("a hotspot needs a password: --password-file FILE")
@@ -86,8 +94,11 @@ def setup(
         hotspot=None if hotspot is None or password is None else (hotspot, password),
         country=None if country is None else country.upper(),
         name=name,
-        key=None if key_file is None else _line_of(key_file),
+        key=new_passphrase() if new_key else key,
     )
+    used = answers.key or current_key(host)
+    if used and (weak := weakness(used)) is not None:
+        complain(f"warning: the key {weak}; {STRONGER}")
     steps = missing_steps(host, answers)
     _show(steps)
     if dry_run:
@@ -99,6 +110,10 @@ def setup(
             raise click.Abort
         _carry_out(steps, Machine(host))
     _print_addresses(host, answers)
+    if new_key:
+        click.echo(f"\nThe key, for ground stations that may change something: {answers.key}")
+        click.echo("In Mission Planner: Setup, Advanced, MAVLink Signing, Add")
+        _print_code(str(answers.key))
     if any(step.needs_reboot for step in steps):
         click.echo("\nReboot once for the UART: sudo reboot. After that: naze-bridge doctor")
     elif host.path("/run/systemd/system").exists():
@@ -153,9 +168,14 @@ def _print_addresses(host: Host, answers: SetupChoices) -> None:
     click.echo(f"Status page: {url}")
     if token := page_token(host):
         click.echo(f"Its token, for changes: {token}")
+    _print_code(url)
+
+
+def _print_code(text: str) -> None:
+    """Show a QR code."""
     import segno  # imported here: no other command needs it
 
-    segno.make(url, error="l").terminal(compact=True)
+    segno.make(text, error="l").terminal(compact=True)
 
 
 def _check_wifi(ssid: str | None, password: str | None) -> None:

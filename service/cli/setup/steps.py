@@ -13,6 +13,7 @@ from service.cli.setup.change import Change, Run, Step, WriteFile
 from service.cli.setup.state_folder import other_devices
 from service.machine.host import Host
 from service.machine.raspberry_pi import boot_file, pi_model
+from storage.bounded_file import read_untrusted
 
 SETTINGS_FILE = "/etc/naze-bridge/conf.d/setup.toml"
 KEY_FILE = "/etc/naze-bridge/gcs.key"
@@ -23,6 +24,7 @@ _HOTSPOT_FILE = "/etc/NetworkManager/system-connections/naze-bridge-hotspot.nmco
 _NM_DEVICES = "/run/NetworkManager/devices"
 _AVAHI_FILE = "/etc/avahi/services/naze-bridge.service"
 _OTHERS_FILE = "/etc/udev/rules.d/59-naze-bridge-others.rules"
+_MAX_KEY_FILE = 4096
 _WANTED_BY = "/etc/systemd/system/multi-user.target.wants/naze-bridge.service"
 
 
@@ -128,9 +130,20 @@ def _name(host: Host, answers: SetupChoices) -> Iterator[Step]:
 
 
 def _key(host: Host, answers: SetupChoices) -> Iterator[Step]:
-    if answers.key is not None and host.read(KEY_FILE).strip() != answers.key:
-        owner = Run(("chown", "naze-bridge:", KEY_FILE))
-        yield Step("set the key that is required for writing", [WriteFile(KEY_FILE, f"{answers.key}\n", True), owner])
+    if answers.key is None or current_key(host) == answers.key:
+        return
+    changes: list[Change] = [WriteFile(KEY_FILE, f"{answers.key}\n", True), Run(("chown", "naze-bridge:", KEY_FILE))]
+    if host.path(KEY_FILE).exists():
+        changes += _restart(host)  # the settings, which name it, do not change
+    yield Step("set the key that is required for writing", changes)
+
+
+def current_key(host: Host) -> str:
+    """The passphrase in the service's key file, which the service could have replaced; empty if there is none."""
+    try:
+        return read_untrusted(host.path(KEY_FILE), _MAX_KEY_FILE).decode().strip()
+    except (OSError, ValueError):
+        return ""
 
 
 def settings_text(host: Host, answers: SetupChoices) -> str:
@@ -148,10 +161,7 @@ def _settings(host: Host, answers: SetupChoices) -> Iterator[Step]:
     text = settings_text(host, answers)
     if host.read(SETTINGS_FILE) != text:
         what = f"fc = {answers.fc}, status page {'on' if answers.page else 'off'}"
-        changes: list[Change] = [WriteFile(SETTINGS_FILE, text)]
-        if _now(host) and host.path(_WANTED_BY).is_symlink():
-            changes.append(Run(("systemctl", "restart", "naze-bridge.service")))
-        yield Step(f"save the settings: {what}", changes)
+        yield Step(f"save the settings: {what}", [WriteFile(SETTINGS_FILE, text), *_restart(host)])
 
 
 def _others(host: Host, answers: SetupChoices) -> Iterator[Step]:
@@ -217,6 +227,12 @@ def _keyfile(text: str) -> str:
     """A value in the syntax of NetworkManager's key files (GKeyFile)."""
     escaped = text.replace("\\", "\\\\")
     return escaped.replace(" ", "\\s", 1) if escaped.startswith(" ") else escaped
+
+
+def _restart(host: Host) -> list[Change]:
+    """Restart the service if it is in use."""
+    is_in_use = _now(host) and host.path(_WANTED_BY).is_symlink()
+    return [Run(("systemctl", "restart", "naze-bridge.service"))] if is_in_use else []
 
 
 def _now(host: Host) -> tuple[str, ...]:
