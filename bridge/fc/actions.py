@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Commands that run only on the ground: calibrations, and writing the settings to flash.
+"""Commands that run only on the ground: calibrations.
 
 The firmware checks neither whether it is flying nor whether a command is repeated (serial.c): a calibration stalls it
 for seconds, a flash write for 0.1 s. So STATUS is read twice right before, and the command is sent once.
@@ -32,7 +32,6 @@ class FcAction:
 
 CALIBRATE_ACCELEROMETER = FcAction(MspAction.ACC_CALIBRATION, Sensor.ACCELEROMETER, freezes=True)
 CALIBRATE_COMPASS = FcAction(MspAction.MAG_CALIBRATION, Sensor.COMPASS, freezes=True)
-SAVE_SETTINGS = FcAction(MspAction.EEPROM_WRITE, Sensor(0), freezes=False)
 
 
 class ActionResult(Enum):

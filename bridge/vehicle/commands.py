@@ -11,7 +11,6 @@ from bridge.fc.actions import (
     CALIBRATE_ACCELEROMETER,
     CALIBRATE_COMPASS,
     NOT_DONE,
-    SAVE_SETTINGS,
     ActionResult,
     FcAction,
     FcActions,
@@ -34,7 +33,7 @@ _ASKS_FOR = {
 }
 
 _FLY = "It is flown with the transmitter"
-_MOTORS = "Motors and servos cannot be driven from here"
+_OUTPUTS = "Motors, servos and relays cannot be driven here"
 #: Commands that would act on the aircraft: command number -> text for the pilot.
 _REFUSED = {
     messages.MAV_CMD_COMPONENT_ARM_DISARM: "Arm and disarm with the transmitter sticks",
@@ -57,10 +56,14 @@ _REFUSED = {
     messages.MAV_CMD_GUIDED_CHANGE_SPEED: _FLY,
     messages.MAV_CMD_GUIDED_CHANGE_ALTITUDE: _FLY,
     messages.MAV_CMD_GUIDED_CHANGE_HEADING: _FLY,
-    messages.MAV_CMD_DO_FLIGHTTERMINATION: _MOTORS,
-    messages.MAV_CMD_DO_MOTOR_TEST: _MOTORS,
-    messages.MAV_CMD_DO_SET_SERVO: _MOTORS,
-    messages.MAV_CMD_DO_REPEAT_SERVO: _MOTORS,
+    messages.MAV_CMD_DO_FLIGHTTERMINATION: _OUTPUTS,
+    messages.MAV_CMD_DO_MOTOR_TEST: _OUTPUTS,
+    messages.MAV_CMD_DO_SET_SERVO: _OUTPUTS,
+    messages.MAV_CMD_DO_REPEAT_SERVO: _OUTPUTS,
+    messages.MAV_CMD_DO_SET_RELAY: _OUTPUTS,
+    messages.MAV_CMD_DO_REPEAT_RELAY: _OUTPUTS,
+    messages.MAV_CMD_DO_JUMP_TAG: "The current waypoint cannot be set",
+    messages.MAV_CMD_DO_FENCE_ENABLE: "There is no fence",
 }
 _OUTCOMES = {
     ActionResult.DONE: CommandResult.ACCEPTED,
@@ -131,6 +134,9 @@ class CommandService:
                 name = "no flight controller" if controller is None else controller.name
                 self._ground.say(Severity.INFO, f"naze-bridge {self._version}: {name}", station)
                 return CommandResult.ACCEPTED
+            case messages.MAV_CMD_PREFLIGHT_STORAGE if params[0] == 1:
+                # Mission Planner sends it 10 s after any PARAM_SET, also in flight. Every change is written at once.
+                return CommandResult.ACCEPTED
             case messages.MAV_CMD_RUN_PREARM_CHECKS:
                 self._vehicle.arming_reasons.tell(station)
                 return CommandResult.ACCEPTED
@@ -180,13 +186,11 @@ def _action(command: int, params: Sequence[float]) -> FcAction | None:
     """The flight controller action for a command; None if there is none.
 
     MAV_CMD_PREFLIGHT_CALIBRATION: one sensor at a time; param2 for the compass, param5 for the accelerometers (1, or 4
-    for "simple"). MAV_CMD_PREFLIGHT_STORAGE: param1 = 1 writes.
+    for "simple").
     """
     asked = {number: param for number, param in enumerate(params, 1) if param and not math.isnan(param)}
     if command == messages.MAV_CMD_PREFLIGHT_CALIBRATION:
         if asked in ({5: 1}, {5: 4}):
             return CALIBRATE_ACCELEROMETER
         return CALIBRATE_COMPASS if asked == {2: 1} else None
-    if command == messages.MAV_CMD_PREFLIGHT_STORAGE and params[0] == 1:
-        return SAVE_SETTINGS
     return None

@@ -52,7 +52,10 @@ class Parameters:
         if isinstance(fc_store, Refusal) or radius_cm is None:
             refusal = f"{WP_RADIUS} cannot be set on this flight controller now"
         elif not 0 <= wanted_cm <= MAX_RADIUS_CM:
-            refusal = f"{WP_RADIUS} must be 0..{MAX_RADIUS_CM} cm"
+            # No error: after each Write, Mission Planner sends its default of 30 m if its plan screen was open first.
+            self._ground.say(Severity.NOTICE, f"{WP_RADIUS} stays {radius_cm:.0f}: 0..{MAX_RADIUS_CM} cm", station)
+            self._send(station, name)
+            return
         elif self._is_setting:
             # A change is pending; a station that requested another value repeats its request.
             return

@@ -129,6 +129,9 @@ def test_all_command_numbers_are_acknowledged(flying: tuple[World, GroundStation
         (21, "transmitter"),
         (20, "transmitter"),
         (224, "waypoint cannot be set"),
+        (601, "waypoint cannot be set"),  # jump tag
+        (181, "cannot be driven"),  # relay
+        (207, "no fence"),
     ],
 )
 def test_commands_that_act_on_the_aircraft_are_denied_with_a_reason(
@@ -331,7 +334,7 @@ def test_the_radius_is_set_on_the_flight_controller() -> None:
     assert values(answers((world, station), m.MAVLink_param_request_list_message(1, 1)))[1][1] == 350.0
 
 
-@pytest.mark.parametrize("value", [200.0, 200.4, 199.99998])
+@pytest.mark.parametrize("value", [200.0, 200.4, 199.949, 199.99998])
 def test_an_unchanged_value_is_not_written(value: float) -> None:
     world, station = radius_world()
     before, operations = len(world.written), world.naze.flash_operations
@@ -347,7 +350,7 @@ def test_a_value_out_of_range_is_refused_with_a_text(value: float) -> None:
     world, station = radius_world()
     received = answers((world, station), param_set(b"WPNAV_RADIUS", value))
     assert values(received) == [("WPNAV_RADIUS", 200.0, 1, 2)]
-    assert station.texts() == ["WPNAV_RADIUS must be 0..2000 cm"]
+    assert station.texts() == ["WPNAV_RADIUS stays 200: 0..2000 cm"]
 
 
 @pytest.mark.parametrize("value", [0.0, 1.0, 13.0, 35.0, 82.0, 209.99998, 2000.0])

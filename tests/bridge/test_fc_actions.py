@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Calibration and storage run once, only on the ground, and are acknowledged with the result."""
+"""Calibrations run once, only on the ground, and are acknowledged with the result."""
 
 import math
 from collections.abc import Callable
@@ -19,12 +19,12 @@ from tests.support.world import GroundStation, World
 m = messages
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED, IN_PROGRESS = range(6)
 CALIBRATION, STORAGE = 241, 245
+#: Calibrations and EEPROM_WRITE.
 ACTIONS = {205, 206, 250}
 ACCELEROMETER = (CALIBRATION, (0, 0, 0, 0, 1, 0, 0), 205)
 SIMPLE_ACCELEROMETER = (CALIBRATION, (0, 0, 0, 0, 4, 0, 0), 205)
 COMPASS = (CALIBRATION, (0, 1, 0, 0, 0, 0, 0), 206)
-SAVE = (STORAGE, (1, 0, 0, 0, 0, 0, 0), 250)
-ALL = (ACCELEROMETER, SIMPLE_ACCELEROMETER, COMPASS, SAVE)
+ALL = (ACCELEROMETER, SIMPLE_ACCELEROMETER, COMPASS)
 
 
 def a_world(options: SimOptions | None = None, faults: Faults | None = None) -> tuple[World, GroundStation]:
@@ -68,7 +68,7 @@ def test_an_action_is_done_once_on_the_ground(
     assert results(station) == [ACCEPTED]
     assert done(world) == [action]
     (text,) = station.texts()
-    assert text == (ActionResult.DONE if command == STORAGE else ActionResult.FREEZES).value
+    assert text == ActionResult.FREEZES.value
     world.run(20)
     # The board restarts after a calibration and is found again.
     assert world.naze.counters.resets == (action == 205)
@@ -76,15 +76,20 @@ def test_an_action_is_done_once_on_the_ground(
     assert done(world) == [action]
 
 
-def test_storing_is_acknowledged_only_once_done() -> None:
-    world, station = a_world(SimOptions(config_write_ms=150.0))
+@pytest.mark.parametrize("armed", [False, True])
+def test_storing_is_acknowledged_silently(armed: bool) -> None:
+    """Mission Planner asks for it by itself, 10 s after any PARAM_SET. Nothing is unsaved then."""
+    world, station = a_world()
+    world.faults.armed = armed
+    world.run(1)
+    station.take()
     operations = world.naze.flash_operations
-    station.send(long(*SAVE[:2]))
-    world.run(0.1)
-    assert results(station) == []
-    assert world.naze.flash_operations > operations
-    world.run(0.2)
+    station.send(long(STORAGE, (1, 0, 0, 0, 0, 0, 0)))
+    world.run(1)
     assert results(station) == [ACCEPTED]
+    assert station.texts() == []
+    assert done(world) == []
+    assert world.naze.flash_operations == operations
 
 
 @pytest.mark.parametrize(("command", "params", "action"), ALL)
@@ -106,7 +111,7 @@ def test_nothing_is_done_unless_the_arming_state_can_be_read(tele_prot: Telemetr
     for seconds in (0.02, 0.3, 4.0):
         world.run(seconds)
         station.take()
-        station.send(long(*SAVE[:2]))
+        station.send(long(*COMPASS[:2]))
         world.run(3)
         assert len(results(station)) == 1
         assert results(station)[0] in (DENIED, FAILED)
@@ -151,7 +156,7 @@ def test_despite_lost_bytes_an_action_is_done_at_most_once() -> None:
     for seed in range(12):
         world, station = a_world(SimOptions(seed=seed))
         world.faults.lost_byte_rate = 0.02
-        station.send(long(*SAVE[:2]))
+        station.send(long(*COMPASS[:2]))
         world.run(4)
         assert len(done(world)) <= 1
         assert results(station) in ([ACCEPTED], [FAILED])
@@ -160,39 +165,23 @@ def test_despite_lost_bytes_an_action_is_done_at_most_once() -> None:
 def test_a_repeated_command_is_answered_in_progress() -> None:
     world, station = a_world()
     for _ in range(3):
-        station.send(long(*SAVE[:2]))
-    world.run(0.01)
-    assert results(station) == [IN_PROGRESS, IN_PROGRESS]
+        station.send(long(*ACCELEROMETER[:2]))
     station.send(long(*COMPASS[:2]))
     world.run(0.6)
     assert results(station) == [IN_PROGRESS, IN_PROGRESS, TEMPORARILY_REJECTED, ACCEPTED]
-    assert done(world) == [250]
+    assert done(world) == [205]
 
 
 def test_no_action_runs_during_a_mission_transfer() -> None:
     world, station = a_world()
     outcome = world.push(waypoints(100))
-    station.send(long(*SAVE[:2]))
+    station.send(long(*COMPASS[:2]))
     world.run(0.05)
     assert results(station) == [TEMPORARILY_REJECTED]
     assert station.texts() == [ActionResult.OCCUPIED.value]
     world.wait_until(lambda _: bool(outcome), 5)
     assert outcome[0][0].text.startswith("Mission verified")
     assert done(world) == []
-
-
-def test_a_mission_transfer_waits_for_the_action_to_end() -> None:
-    world, station = a_world()
-    station.send(long(*SAVE[:2]))
-    world.run(0.03)
-    station.send(m.MAVLink_mission_count_message(1, 1, 5, 0))
-    world.run(0.02)
-    assert results(station) == []
-    assert station.messages("MISSION_REQUEST") == []
-    world.run(1)
-    assert results(station) == [ACCEPTED]
-    assert station.messages("MISSION_REQUEST")[0].seq == 0
-    assert station.messages("MISSION_ACK") == []
 
 
 def test_calibrating_a_missing_sensor_is_denied(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -132,7 +132,7 @@ def test_a_command_that_the_board_did_not_execute_is_not_counted() -> None:
     pilot = GroundStation(world)
     world.faults.armed = True
     for message in (
-        m.MAVLink_command_long_message(1, 1, m.MAV_CMD_PREFLIGHT_STORAGE, 0, 1, *[0] * 6),
+        m.MAVLink_command_long_message(1, 1, m.MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 1, *[0] * 5),
         m.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", 500, 9),
     ):
         # Before the bridge has noticed that it is armed.
