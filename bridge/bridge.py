@@ -89,7 +89,7 @@ class Bridge:
         self.sharing = MspSharing(self.session, self.runner)
         self._vehicle = OwnVehicle(self.session, self.missions, self.ground, self._announcer, config.unix_time_s, now)
         self.report = VehicleReporter(self.session, self.missions, self.ground, self._vehicle.also_want)
-        self._uploads = MissionUploads(self.missions, self.ground, log_event, incidents)
+        self._uploads = MissionUploads(self.missions, self.ground, log_event, incidents, self._vehicle.let_read)
         self._watch = MissionWatch(self.missions, self.ground, log_event)
         downloads = MissionDownloads(self.missions, self.ground)
         parameters = Parameters(self.missions, self.ground, config.sysid)

@@ -117,10 +117,13 @@ class ListCheck(ABC):
                 self._note(item, name, value, 0, UNUSED.why, news)
 
     def _note_home(self, item: MissionItem) -> None:
-        """Item 0 is home. MAVSDK's `mission` plugin sends none, so its first waypoint becomes home."""
+        """Item 0 is home. MAVSDK's `mission` plugin sends none, so its first waypoint becomes home.
+
+        Mission Planner's "Write Fast" sends home in frame 3, so that frame is no warning.
+        """
         if item.frame in RELATIVE_FRAMES:
-            why = "first item became home, not flown to"
-            self._note(item, "frame", item.frame, int(Frame.GLOBAL), why, News.WARNING)
+            news = News.NOTICE if item.frame == Frame.GLOBAL_RELATIVE_ALT else News.WARNING
+            self._note(item, "frame", item.frame, int(Frame.GLOBAL), "first item became home, not flown to", news)
 
     def _now_relative(self, item: MissionItem) -> None:
         """Report that an altitude is now relative to a different level."""

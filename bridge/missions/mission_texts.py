@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The texts for the pilot about a written mission: a summary line, then the findings with equal ones merged."""
+"""The texts for the pilot about a written mission: the findings with equal ones merged, and a summary line."""
 
 from collections import Counter
 from collections.abc import Iterable
@@ -10,6 +10,8 @@ from bridge.model.finding import DROPPED, Finding, News, without_defaults
 from bridge.model.verdict import Verdict
 
 _MOST_LINES = 10
+#: A longer text would be split, and Mission Planner's HUD shows only the last piece.
+_LINE_LENGTH = 50
 
 
 def summary(sent: int, verdict: Verdict[Any]) -> str | None:
@@ -26,12 +28,16 @@ def summary(sent: int, verdict: Verdict[Any]) -> str | None:
     home = sum(finding.seq == 0 for finding in kept)
     differing = len(kept) - relative - raised - home
     counts = {"dropped": dropped, "Alt now relative": relative, "Alt raised": raised, "flown differently": differing}
-    news = [f"{count} {what}" for what, count in counts.items() if count]
-    return f"{len(verdict.items)} of {sent} stored: {', '.join(news) or 'check home'}"
+    news = [f"{count} {what}" for what, count in counts.items() if count] or ["check home"]
+    stored = f"{len(verdict.items)} of {sent} stored: "
+    text = stored + ", ".join(news)
+    while len(text) > _LINE_LENGTH:
+        text = stored + ", ".join([*(news := news[:-1]), "more"])
+    return text
 
 
 def finding_lines(findings: Iterable[Finding]) -> list[tuple[News, str]]:
-    """The lines after the summary: warnings first, at most ten."""
+    """The lines before the summary: warnings first, at most ten."""
     first: dict[Finding, Finding] = {}
     counts: Counter[Finding] = Counter()
     for finding in without_defaults(findings):

@@ -6,7 +6,7 @@ they are received in parallel and written one at a time. Mission Planner loses s
 MISSION_COUNT as "continue"; most special cases below respond to a behaviour listed in docs/ground-stations.md.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from math import inf
 from typing import Any
@@ -59,16 +59,24 @@ _ASK_INTERVAL_S = 0.2
 
 
 class MissionUploads:
-    """All ground stations' uploads and clears."""
+    """All ground stations' uploads and clears. `let_read` is called after a text that the pilot must read."""
 
-    def __init__(self, missions: MissionService, ground: Ground, log_event: EventLog, incidents: Iterator[int]) -> None:
+    def __init__(
+        self,
+        missions: MissionService,
+        ground: Ground,
+        log_event: EventLog,
+        incidents: Iterator[int],
+        let_read: Callable[[Peer], None],
+    ) -> None:
         self._missions = missions
         self._ground = ground
         self._log_event = log_event
         self._incidents = incidents
         self._flash = ground.flash
         self._uploads = UploadList()
-        self.answers = UploadAnswers(ground)
+        self._let_read = let_read
+        self.answers = UploadAnswers(ground, let_read)
         #: False while nothing is due: no upload runs, and no reminder waits.
         self.is_active = False
         self._is_asking = False
@@ -382,6 +390,7 @@ class MissionUploads:
             if state.is_closed:
                 self.answers.remind(upload.station, refusal.text, now)
         self._ground.say(Severity.ERROR, refusal.text, upload.station)
+        self._let_read(upload.station.peer)
         self._answer(upload, refusal.ack, now)
         self._note("mission.refused", upload, "warning", ack=refusal.ack.name, why=refusal.text)
 

@@ -42,6 +42,8 @@ _REPEAT_S = 5.0
 _SILENT_S = 3.0
 #: Longer than MAVSDK waits for a changed MISSION_CURRENT (2.5 s), and Mission Planner between two tries (2 s).
 _NO_CURRENT_S = 4.0
+#: Mission Planner shows a text for this time.
+_SHOWN_S = 10.0
 #: The shortest interval that a ground station may request.
 _FASTEST_S = 0.01
 _ALL_STREAMS = messages.MAV_DATA_STREAM_ALL
@@ -196,6 +198,14 @@ class OwnVehicle:
         Mission Planner takes any for success. MAVSDK repeats its request at each that has another number, without end.
         """
         self._rates.withhold(peer, messages.MAVLINK_MSG_ID_MISSION_CURRENT, now + _NO_CURRENT_S)
+
+    def let_read(self, peer: Peer) -> None:
+        """Withhold SYS_STATUS from a ground station for as long as Mission Planner shows a text, while disarmed.
+
+        An unhealthy sensor, indoors always the GPS, would replace the text after half a second.
+        """
+        if not self._session.vehicle.armed:
+            self._rates.withhold(peer, messages.MAVLINK_MSG_ID_SYS_STATUS, self._ground.now + _SHOWN_S)
 
     def set_stream(self, peer: Peer, stream: int, interval_s: float) -> None:
         """Set the interval of all messages of one of ArduPilot's streams."""

@@ -2,12 +2,13 @@
 """The answers that end uploads: sent, reported as texts, and remembered for repeated items. Sans-IO."""
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
 from typing import Any
 
 from bridge.gcs.ground import Ground
-from bridge.gcs.station import Severity, Station
+from bridge.gcs.station import Peer, Severity, Station
 from bridge.missions.mission_service import DeliveryResult
 from bridge.missions.mission_texts import finding_lines
 from bridge.model.finding import News
@@ -45,11 +46,13 @@ class _Answer:
 class UploadAnswers:
     """Answers ground stations, and remembers each one's last answer for 10 s.
 
-    In a flood, those to peers with standing (bridge.gcs.budget) are forgotten last.
+    In a flood, those to peers with standing (bridge.gcs.budget) are forgotten last. `let_read` is called after a text
+    that the pilot must read.
     """
 
-    def __init__(self, ground: Ground) -> None:
+    def __init__(self, ground: Ground, let_read: Callable[[Peer], None]) -> None:
         self._ground = ground
+        self._let_read = let_read
         self._answers: dict[Station, _Answer] = {}  # oldest first
         #: To be sent later: the reason for a refusal, or the final ack again.
         self._later: list[tuple[float, Station, str | None]] = []
@@ -83,16 +86,22 @@ class UploadAnswers:
             self._set_later([*self._later, *((now + later_s, station, None) for later_s in _ACK_AGAIN_S)])
 
     def report(self, station: Station, verdict: Verdict[Any], delivery: DeliveryResult) -> None:
-        """Report everything to the sender, and the change on the aircraft to other ground stations."""
-        if delivery.ack is not MissionResult.ACCEPTED:
-            self._ground.say(Severity.ERROR, delivery.text, station)
-        else:
-            self._ground.say(Severity.WARNING if delivery.is_lossy else Severity.INFO, delivery.text, station)
-            for news, line in finding_lines(verdict.findings):
-                if line != delivery.text:
-                    self._ground.say(Severity.WARNING if news is News.WARNING else Severity.NOTICE, line, station)
+        """Report everything to the sender, and the change on the aircraft to other ground stations.
+
+        The summary is last, and the only warning: Mission Planner shows the last one, and its voice says the first.
+        """
+        accepted = delivery.ack is MissionResult.ACCEPTED
+        for news, line in finding_lines(verdict.findings) if accepted else ():
+            if line != delivery.text:
+                self._ground.say(Severity.NOTICE if news is News.WARNING else Severity.INFO, line, station)
         if delivery.number is None:
             self._ground.say(Severity.WARNING, "The mission could not be stored on the Pi", station)
+        severity = Severity.INFO if accepted else Severity.ERROR
+        if accepted and delivery.is_lossy:
+            severity = Severity.WARNING
+        self._ground.say(severity, delivery.text, station)
+        if severity is not Severity.INFO:
+            self._let_read(station.peer)
         if delivery.change:
             severity = Severity.WARNING if verdict.result is Result.CLEARED else Severity.INFO
             self._ground.say_to_others(severity, f"{delivery.change}, by {station.peer}", station)

@@ -2,14 +2,12 @@
 """Long-term limits on a ground station's requests, in simulated time."""
 
 from collections import Counter
-from functools import partial
 
 from bridge.gcs.budget import Budgets
 from bridge.gcs.cost import LIMITS, Cost
 from bridge.gcs.station import Peer
 from protocols.mavlink.dialect import messages as m
 from protocols.msp.frame import MspParser
-from protocols.msp.mission import MissionCommand
 from tests.support.world import GroundStation, ready_world
 
 
@@ -21,18 +19,6 @@ def test_texts_are_limited() -> None:
         world.after(number / 100, lambda: station.send(banner))
     world.run(10)
     assert 200 < len(station.texts()) <= 200 + 5 * 10 + 5
-
-
-def test_flash_writes_are_limited() -> None:
-    """A flash page endures 10,000 erases."""
-    world = ready_world()
-    station = GroundStation(world)
-    for number in range(300):
-        change = m.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", 300 + number, 9)
-        world.after(number / 2, partial(station.send, change))
-    world.run(150)
-    frames = [frame for _, _, data in world.written for frame in MspParser().feed(data)]
-    assert 255 < len({frame.payload for frame in frames if frame.command == MissionCommand.RADIUS}) <= 258
 
 
 def test_new_peers_share_a_limit_per_host_and_a_total() -> None:

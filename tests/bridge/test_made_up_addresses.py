@@ -148,7 +148,7 @@ def test_an_answer_to_a_peer_with_standing_is_kept(*, ids_of_one: bool) -> None:
     others = (Peer("udp", (f"10.1.{number // 250}.{number % 250}", 14550)) for number in range(2000))
     for station in (pilot, rival, *(Station(Peer("udp", (f"10.0.1.{each}", 1)), 9, 9) for each in range(14))):
         ground.stations.heard(station, 2, 0.0)
-    answers = UploadAnswers(ground)
+    answers = UploadAnswers(ground, lambda _peer: None)
     answers.end(pilot, MissionResult.DENIED, 9, 0.0)
     for number, other in enumerate(others):
         peer = rival.peer if ids_of_one else other

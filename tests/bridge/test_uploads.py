@@ -1159,7 +1159,7 @@ def test_a_list_with_every_item_dropped_clears_and_says_so() -> None:
     assert any("erased" in text for text in station.texts())
 
 
-def test_the_summary_comes_first_and_goes_only_to_the_writer() -> None:
+def test_the_summary_comes_last_and_goes_only_to_the_writer() -> None:
     world, station = holding()
     other = GroundStation(world, "other", sysid=254)
     other.send(ack_message(A.ACCEPTED))
@@ -1171,9 +1171,9 @@ def test_the_summary_comes_first_and_goes_only_to_the_writer() -> None:
     world.run(0.1)
     texts = [(text.severity, text.text) for text in station.messages("STATUSTEXT") if "naze" not in text.text]
     assert texts == [
+        (5, "20 items: DO_CHANGE_SPEED dropped, not supported"),
+        (5, "WP 30: Alt flown above home, not above sea level"),
         (4, "20 of 40 stored: 20 dropped, 1 Alt now relative"),
-        (4, "20 items: DO_CHANGE_SPEED dropped, not supported"),
-        (4, "WP 30: Alt flown above home, not above sea level"),
     ]
     assert [text.text for text in other.messages("STATUSTEXT")] == ["New mission, 20 items, by udp gcs"]
 

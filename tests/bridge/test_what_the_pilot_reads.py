@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the pilot reads in Mission Planner and QGroundControl, 1, 9 and 30 s after each event."""
 
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import pytest
@@ -9,9 +11,13 @@ from bridge.controllers.harakiri.arming import arming_blockers
 from bridge.model.vehicle import Source, Sticks, Vehicle
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
+from protocols.mission_item import Frame, MissionResult
 from simulator.board.msp_options import MspOptions
+from simulator.board.msp_sensors import SensorReplies
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from simulator.commands.fc_kinds import make_board
+from simulator.inav.boxes import BOXES as INAV_BOXES
+from tests.support.conversations import Upload, clear_message, waypoints
 from tests.support.screens import Glance, Screens
 from tests.support.world import GroundStation, World
 
@@ -19,7 +25,10 @@ from tests.support.world import GroundStation, World
 ANGLE, BARO = 1 << 0, 1 << 2
 #: INAV's arming flags.
 NOT_LEVEL, RC_LINK = 1 << 8, 1 << 18
+#: INAV's permanent number of the box.
+FAILSAFE = 27
 NOT_FOUND = "No flight controller found: check power, wiring"
+Indoors = tuple[World, GroundStation, Screens]
 LOST, LOST_ON_GROUND = "Flight controller lost: silent for", "PreArm: flight controller lost"
 
 
@@ -203,3 +212,110 @@ class TestArming:
         for glance in screens.look():
             assert is_quiet(glance)
             assert (glance.armed, glance.qgc) == (False, "Ready To Fly")
+
+
+class TestWritingMissions:
+    """Indoors: the GPS has no fix, so "Unhealthy GPS Signal" would replace every text."""
+
+    @pytest.fixture
+    def indoors(self, monkeypatch: pytest.MonkeyPatch) -> tuple[World, GroundStation, Screens]:
+        monkeypatch.setattr("simulator.board.msp_port.SensorReplies", partial(SensorReplies, fix_3d=0))
+        world, station, screens = on_the_ground()
+        assert screens.glance().hud == "Unhealthy GPS Signal"
+        return world, station, screens
+
+    def test_a_verified_mission_is_no_warning(self) -> None:
+        _, station, screens = on_the_ground()
+        assert Upload(station, waypoints(9)).run() is MissionResult.ACCEPTED
+        assert all(is_quiet(glance) for glance in screens.look())
+        assert screens.mission_planner.texts()[-1] == "Mission verified: 9 records"
+
+    def test_the_summary_of_a_lossy_write_stands_and_is_spoken(self, indoors: Indoors) -> None:
+        world, station, screens = indoors
+        items = waypoints(9)
+        items[3], items[4] = replace(items[3], command=178), replace(items[4], frame=Frame.GLOBAL)
+        assert Upload(station, items).run() is MissionResult.ACCEPTED
+        began, summary = world.now, "8 of 9 stored: 1 dropped, 1 Alt now relative"
+        first, ninth, last = screens.look()
+        assert first.hud == ninth.hud == summary
+        assert last.hud in ("Unhealthy GPS Signal", "")
+        assert screens.mission_planner.heard(began - 1)[0] == summary
+        assert screens.mission_planner.texts(began - 1)[-1] == summary
+
+    def test_an_erased_mission_stands(self, indoors: Indoors) -> None:
+        _, station, screens = indoors
+        assert Upload(station, waypoints(9)).run() is MissionResult.ACCEPTED
+        items = waypoints(2)
+        items[1] = replace(items[1], command=178)
+        assert Upload(station, items).run() is MissionResult.ACCEPTED
+        huds = [glance.hud for glance in screens.look(1, 9)]
+        assert huds == ["Mission erased: no command left"] * 2
+
+    def test_a_cleared_mission_stands(self, indoors: Indoors) -> None:
+        _, station, screens = indoors
+        assert Upload(station, waypoints(9)).run() is MissionResult.ACCEPTED
+        ask(station, clear_message())
+        assert [glance.hud for glance in screens.look(1, 9)] == ["Mission on the flight controller cleared"] * 2
+
+    def test_the_reason_for_a_refusal_stands(self, indoors: Indoors) -> None:
+        _, station, screens = indoors
+        items = waypoints(9)
+        items[4] = replace(items[4], lat_e7=950_000_000)
+        assert Upload(station, items).run() is MissionResult.INVALID_PARAM5_X
+        assert [glance.hud for glance in screens.look(1, 9)] == ["Rejected, WP 4: latitude beyond 90 deg"] * 2
+
+    def test_write_fast_does_not_warn_of_home(self) -> None:
+        """It sends home in frame 3."""
+        _, station, screens = on_the_ground()
+        items = waypoints(9)
+        items[0] = replace(items[0], frame=Frame.GLOBAL_RELATIVE_ALT)
+        assert Upload(station, items).run() is MissionResult.ACCEPTED
+        assert all(is_quiet(glance) for glance in screens.look())
+
+    @pytest.mark.parametrize("radius_cm", [3000.0, 199.949])
+    def test_what_follows_a_write_raises_no_error(self, radius_cm: float) -> None:
+        """Its default radius of 30 m, or 6.56 ft for 2 m; 10 s later PREFLIGHT_STORAGE, perhaps in flight."""
+        world, station, screens = on_the_ground()
+        assert Upload(station, waypoints(9)).run() is MissionResult.ACCEPTED
+        ask(station, m.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", radius_cm, 9))
+        assert station.messages("PARAM_VALUE")[-1].param_value == 200
+        world.faults.armed = True
+        world.run(10)
+        ask(station, command(m.MAV_CMD_PREFLIGHT_STORAGE, 1))
+        assert station.messages("COMMAND_ACK")[-1].result == m.MAV_RESULT_ACCEPTED
+        assert [glance.hud for glance in screens.look()] == [""] * 3
+        assert screens.qgc.dialogs == []
+
+    def test_a_long_summary_is_one_line(self) -> None:
+        _, station, screens = on_the_ground()
+        items = waypoints(146)
+        for seq in range(10, 120):
+            items[seq] = replace(items[seq], command=178)
+        for seq in range(120, 146):
+            items[seq] = replace(items[seq], frame=Frame.GLOBAL, alt_m=0.0)
+        assert Upload(station, items).run() is MissionResult.ACCEPTED
+        assert screens.look(1)[0].hud.startswith("36 of 146 stored: 110 dropped, ")
+
+
+class TestRestart:
+    def test_a_board_that_restarts_is_lost_and_back(self) -> None:
+        world, _, screens = on_the_ground()
+        world.power_off()
+        world.power_on()
+        seen = {glance.hud.split(":")[0] for glance in screens.look(*range(4, 8))}
+        assert seen <= {"Flight controller lost", "PreArm", "Flight controller back after 7 s"}
+        world.wait_ready()
+        assert all(is_quiet(glance) for glance in screens.look())
+
+    def test_a_failsafe_in_flight_is_read_and_ends(self) -> None:
+        world, _, screens = inav()
+        world.faults.armed = True
+        world.run(5)
+        world.faults.boxes = 1 << INAV_BOXES["9.1.0"].index(FAILSAFE)
+        world.run(1)
+        first, ninth, last = screens.look()
+        assert first.hud == ninth.hud == "Failsafe: the flight controller has taken over"
+        assert (first.failsafe, ninth.failsafe, last.failsafe) == (True, True, True)
+        world.faults.boxes = 0
+        world.run(1)
+        assert not any(glance.failsafe for glance in screens.look())
