@@ -129,6 +129,11 @@ class MspAnswers:
         word: int = struct.unpack_from("<H", self._settings[MspCommand.BOX], 2 * _ARM_BIT)[0]
         return word
 
+    @property
+    def box_size(self) -> int:
+        """The payload of MSP_BOX and MSP_SET_BOX, bytes."""
+        return len(self._settings[MspCommand.BOX])
+
     def answer(self, command: int, buffer: bytes) -> bytes:
         """The whole reply frame. `buffer`: the receive buffer, which the handlers read without regard to the size."""
         if command == MspCommand.WP:

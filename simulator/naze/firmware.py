@@ -13,13 +13,14 @@ from protocols.mavlink.frame import MavlinkSplitter
 from protocols.msp.mission import RECORD_SIZE, MissionCommand
 from simulator.board.flash import FlashError, NorFlash
 from simulator.board.flight import Craft, FlightState, fly
-from simulator.board.msp_port import MspAnswers, MspReceiver, reply
+from simulator.board.msp_port import MspAnswers, MspReceiver, error, reply
 from simulator.board.msp_sensors import MspCommand
 from simulator.board.options import Counters, Faults, SimOptions, TelemetryProtocol
 from simulator.board.transmitter import switch_positions
 from simulator.board.traps import Trap, TrapCounters
 from simulator.naze import frsky
 from simulator.naze.cli import BANNER, PROMPT, CliRequest, CommandLine
+from simulator.naze.guard import accepts
 from simulator.naze.mavlink_port import MavlinkSchedule, MavlinkSender
 from simulator.naze.mission_slots import StoredConfig
 from simulator.naze.mission_store import Floppy
@@ -295,6 +296,8 @@ class Firmware:
             if command == MissionCommand.COMMIT:
                 self._floppy.load()
             self._counters.flash_writes = self._missions.writes
+        elif self._missions and not accepts(command, len(payload), box_size=self._answers.box_size, armed=self.armed):
+            frame = error(command)
         else:
             if command == MspCommand.EEPROM_WRITE:
                 self._write_config()

@@ -22,7 +22,7 @@ LENGTHS = {
 
 @pytest.mark.parametrize(("command", "length"), LENGTHS.items())
 def test_lengths_are_harakiris(command: int, length: int) -> None:
-    answer = Bench().ask(request(command))
+    answer = Bench(faults=Faults(extension=False)).ask(request(command))
     assert answer is not None
     assert (answer.direction, answer.command, len(answer.payload)) == (Direction.REPLY, command, length)
 
@@ -215,7 +215,7 @@ def test_input_beyond_the_ring_is_lost_during_boot() -> None:
 
 
 def test_a_waypoint_request_without_a_payload_uses_old_buffer_contents() -> None:
-    bench = Bench()
+    bench = Bench(faults=Faults(extension=False))
     bench.payload(request(118, b"\x10"))
     assert bench.payload(request(118))[0] == 16
     bench.payload(request(118, b"\0"))
