@@ -57,7 +57,7 @@ RIGHTS: Mapping[Standing, Rights] = {
     Standing.OPEN: Rights(_ALL, _NO_COMMANDS, (*_NO_COMMANDS, Effect.REPORT)),
     Standing.PROVEN: Rights(_ALL, _ALL, _ALL),
 }
-#: Ground stations repeat these, so their refusal is not reported.
+#: Ground stations and radios repeat these.
 _ROUTINE = Effect.RATE, Effect.SILENCE
 
 
@@ -80,13 +80,14 @@ _OPEN = LinkAccess()
 class GuardRefusal(NamedTuple):
     """The reason for refusing a frame.
 
-    `is_first`: the first one of this peer for this reason. `is_forged`: the peer has the key, but this frame is not
-    signed with it, or is a copy. It gets no answer and has no effect, not even on the time the peer was last heard.
+    `is_routine`: ground stations repeat it, so it is not reported. `is_forged`: the peer has the key, but this frame
+    is not signed with it, or is a copy. It gets no answer and has no effect, not even on the time the peer was last
+    heard.
     """
 
     why: str
-    is_first: bool
-    is_forged: bool
+    is_routine: bool
+    is_forged: bool = False
 
 
 class Guard:
@@ -145,7 +146,7 @@ class Guard:
         if effect_of(frame) in self._rights_beyond(peer).autopilot:
             return None
         if self.standing(peer) is Standing.LISTENER:
-            return GuardRefusal(_ADDRESS, is_first=False, is_forged=False)
+            return GuardRefusal(_ADDRESS, is_routine=True)
         return self._refuse(peer, frame, _NOT_OVER_OPEN_LINK)
 
     def may_reach_stations(self, peer: Peer, frame: MavlinkFrame) -> bool:
@@ -161,15 +162,19 @@ class Guard:
         self._signed.discard(peer)
         self._logged.pop(peer, None)
 
+    def report(self, refused: GuardRefusal, peer: Peer, frame: MavlinkFrame) -> bool:
+        """Log a refusal of a connected peer, if it is the peer's first for this reason; True if so."""
+        logged = self._logged.setdefault(peer, set())
+        if refused.is_routine or refused.why in logged:
+            return False
+        logged.add(refused.why)
+        station = Station(peer, frame.sysid, frame.compid)
+        self._log_event("warning", "gcs.refused", station=str(station), message=_name(frame), why=refused.why)
+        return True
+
     def _refuse(self, peer: Peer, frame: MavlinkFrame, why: str, *, is_forged: bool = False) -> GuardRefusal:
         self.refused[peer.link, why] += 1
-        logged = self._logged.setdefault(peer, set())
-        is_first = why not in logged and effect_of(frame) not in _ROUTINE
-        if is_first:
-            logged.add(why)
-            station = Station(peer, frame.sysid, frame.compid)
-            self._log_event("warning", "gcs.refused", station=str(station), message=_name(frame), why=why)
-        return GuardRefusal(why, is_first, is_forged)
+        return GuardRefusal(why, effect_of(frame) in _ROUTINE, is_forged)
 
 
 def denial(message: Message, station: Station) -> Message | None:

@@ -196,6 +196,7 @@ class Incoming:
         for frame in self._ground.received(peer, data, now, datagram=datagram):
             refused = self._guard.refusal(peer, frame)
             if refused is not None and refused.is_forged:
+                self._guard.report(refused, peer, frame)
                 continue
             if not self._ground.admits(peer, now):
                 self._guard.forget(peer)
@@ -239,6 +240,7 @@ class Incoming:
 
     def _answer_refused(self, refused: GuardRefusal, station: Station, frame: MavlinkFrame) -> None:
         """Answer a refused frame under the ids that it addressed, if these are the vehicle's."""
+        is_first = self._guard.report(refused, station.peer, frame)
         system, component = target_of(frame)
         answers = partial(self._ground.to, station)
         is_vehicle = self._is_ours(system, component)
@@ -256,7 +258,7 @@ class Incoming:
         elif message is not None and frame.msgid == m.MAVLINK_MSG_ID_PARAM_SET and self.routes is None:
             # The protocol's answer is the current value.
             self._parameters.send_one(station, message.param_id, -1)
-        if refused.is_first:
+        if is_first:
             answers(m.MAVLink_statustext_message(Severity.WARNING, f"Refused: {refused.why}".encode()))
 
     def _is_ours(self, system: int, component: int) -> bool:

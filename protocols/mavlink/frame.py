@@ -85,8 +85,7 @@ class MavlinkFrame:
 
 def is_plausible_heartbeat(frame: MavlinkFrame) -> bool:
     """True for a HEARTBEAT with legal length, type, autopilot, state and version (common.xml): evidence of MAVLink."""
-    payload = frame.payload
-    if frame.msgid != _HEARTBEAT or len(payload) != _HEARTBEAT_SIZE:
+    if frame.msgid != _HEARTBEAT or len(payload := frame.payload) != _HEARTBEAT_SIZE:
         return False
     vehicle_type, autopilot, _, state, version = payload[4:]
     return version == 3 and vehicle_type <= 45 and autopilot <= 20 and state <= 8 and frame.sysid != 0

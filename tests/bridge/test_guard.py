@@ -470,6 +470,20 @@ def test_a_refusal_has_the_autopilots_ids() -> None:
     assert refusals(world) == {"this address may only read": 2}
 
 
+def test_a_refusal_comes_from_the_component_that_was_addressed() -> None:
+    """From the autopilot if that component was never heard."""
+    world, autopilot = passing({"udp": LinkAccess(may_write=lambda _: False)}, sysid=42)
+    autopilot.mavlink.srcComponent = 7
+    autopilot.send(mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3))
+    autopilot.mavlink.srcComponent = 1
+    world.run(0.1)
+    station = GroundStation(world)
+    for component in (7, 1, 99, 0):
+        station.send(mavlink.MAVLink_command_long_message(42, component, 400, 0, 1, 0, 0, 0, 0, 0, 0))
+    world.run(0.01)
+    assert [ack.get_srcComponent() for ack in station.messages("COMMAND_ACK")] == [7, 1, 1, 1]
+
+
 def test_signed_frames_reach_the_autopilot_unchanged() -> None:
     world, autopilot = passing({"udp": LinkAccess(signing(), LINK_ID)})
     station = signing_station(world)

@@ -9,7 +9,9 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from bridge.controllers import other
+from bridge.gcs.guard import LinkAccess
 from bridge.gcs.station import Peer
+from protocols.mavlink.codec import FrameWriter, Packed
 from protocols.mavlink.frame import MavlinkSplitter
 from simulator.naze.board import SimulatedNaze
 from tests.support.fake_controllers import QuietLine
@@ -103,6 +105,23 @@ def test_a_heartbeat_whose_last_fields_are_0_is_passed_on() -> None:
     world, autopilot, (station, _) = passing(autopilot)
     world.run(5)
     assert station.frames == autopilot.sent != []
+
+
+@pytest.mark.parametrize("access", [LinkAccess(), LinkAccess(may_write=lambda _: False)], ids=["open", "listener"])
+def test_a_request_to_every_system_reaches_an_autopilot_that_was_heard_once(access: LinkAccess) -> None:
+    """The frame by which it was found is the only one so far, so its ids are not known as a target."""
+    autopilot = Autopilot()
+    world = World(peer=autopilot, links={"udp": access})
+    stations = [GroundStation(world, name) for name in ("one", "other")]
+    for station in stations:
+        station.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+    world.wait_until(lambda w: w.kind is other.OTHER_MAVLINK, 3)
+    autopilot.received.clear()
+    autopilot.sent.clear()
+    asked = stations[0].pack(mavlink.MAVLink_param_request_list_message(0, 0))
+    world.receive_from(stations[0], asked)
+    assert bytes(autopilot.received) == asked
+    assert autopilot.sent == []
 
 
 def test_the_bridge_sends_no_messages_of_its_own() -> None:
@@ -252,18 +271,22 @@ def test_a_false_header_in_a_slow_stream_delays_no_frame() -> None:
     assert len(autopilot.sent) >= 5
 
 
-def test_a_companion_with_the_autopilots_system_id_is_heard_but_echoes_are_not() -> None:
-    world, autopilot, (one, _) = passing()
-    companion = GroundStation(world, "companion", sysid=1, compid=191)
+@pytest.mark.parametrize("sysid", [1, 42], ids=["our own ids", "others"])
+def test_a_companion_with_the_autopilots_system_id_is_heard_but_echoes_are_not(sysid: int) -> None:
+    world, autopilot, (one, two) = passing(Autopilot(sysid))
+    world.run(1)
+    companion = GroundStation(world, "companion", sysid=sysid, compid=191)
     companion.send(mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3))
     world.run(0.1)
     assert bytes(autopilot.received)
     assert one.messages("HEARTBEAT")[-1].get_srcComponent() == 191
     autopilot.received.clear()
     world.run(2)
+    two.frames.clear()
     world.receive_from(one, autopilot.sent[-1])
     world.run(0.1)
     assert bytes(autopilot.received) == b""
+    assert two.frames == []
 
 
 def test_a_crowd_does_not_multiply_frames() -> None:
@@ -290,6 +313,19 @@ def test_a_crowd_does_not_multiply_frames() -> None:
     assert {peer for peer, _ in ground.take_datagrams()} == set(ground.stations.peers())
 
 
+def test_an_address_that_is_used_again_gets_nothing_for_its_former_ids() -> None:
+    world, autopilot, (one, _) = passing()
+    world.bridge.gcs_gone(one.peer, world.now)
+    successor = GroundStation(world, "gcs0", sysid=7)
+    assert successor.peer == one.peer
+    successor.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+    world.run(0.1)
+    autopilot.send(mavlink.MAVLink_mission_ack_message(255, 190, 0, 0))
+    autopilot.send(mavlink.MAVLink_mission_ack_message(7, 190, 0, 0))
+    world.run(0.1)
+    assert [ack.target_system for ack in successor.messages("MISSION_ACK")] == [7]
+
+
 def test_a_sender_with_all_ids_does_not_displace_others() -> None:
     """One address with 60,000 forged ids gets no more than its share."""
     world, autopilot, (one, _) = passing()
@@ -306,3 +342,17 @@ def test_a_sender_with_all_ids_does_not_displace_others() -> None:
     world.run(0.5)
     assert 0 < len(liar.messages("MISSION_ACK")) <= 64
     assert len(one.messages("MISSION_ACK")) == 1
+
+
+def test_an_autopilot_with_all_ids_does_not_fill_the_memory() -> None:
+    """A router on its side that carries a swarm; all frames are passed on anyway."""
+    world, autopilot, (station, _) = passing()
+    for sysid in range(1, 250):
+        for kind in (30, 33, 74, 1, 24):
+            autopilot.sent.append(FrameWriter(sysid, 1).frame(Packed(kind, b"", b"\1"), 2))
+            world.receive_from_fc(autopilot.sent[-1])
+    world.run(0.1)
+    assert station.frames == autopilot.sent
+    routes = world.bridge._incoming.routes
+    assert routes is not None
+    assert len(routes._for_all) <= 1024

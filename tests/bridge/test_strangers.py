@@ -61,8 +61,8 @@ def on_link(station: GroundStation, link: str) -> GroundStation:
     return station
 
 
-def passing(links: dict[str, LinkAccess]) -> tuple[World, Autopilot]:
-    autopilot = Autopilot()
+def passing(links: dict[str, LinkAccess], sysid: int = 1) -> tuple[World, Autopilot]:
+    autopilot = Autopilot(sysid)
     world = World(peer=autopilot, links=links)
     world.wait_until(lambda w: w.kind is other.OTHER_MAVLINK, 3)
     world.run(1.5)
@@ -138,6 +138,7 @@ def test_a_stranger_on_an_open_link_moves_and_silences_nothing(seed: int) -> Non
     assert [message for message in arrived if not is_harmless(message, may_write=True)] == []
     copied = [message for message in second.messages() if message.get_srcSystem() not in (1, SECOND_VEHICLE)]
     # Telemetry without a target may come from another vehicle.
+    assert {"ATTITUDE", "GLOBAL_POSITION_INT", "ODOMETRY"} <= {message.get_type() for message in copied}
     commands = [message for message in copied if hasattr(message, "target_system") or message.get_type() in MOVES]
     assert [message for message in commands if not is_harmless(message, may_write=True)] == []
     assert len({message.get_type() for message in commands}) > 10
@@ -185,15 +186,16 @@ def test_a_command_for_another_vehicle_needs_a_proven_station(kind: str) -> None
     assert len(second.messages(kind)) == passes_open + 1
 
 
-def test_our_own_signed_answers_prove_nothing() -> None:
+@pytest.mark.parametrize("sysid", [1, 42], ids=["our own ids", "others"])
+def test_our_own_signed_answers_prove_nothing(sysid: int) -> None:
     """A stranger collects what the bridge signed, also in the autopilot's name, and sends it back."""
     links = {"one": LinkAccess(signing(), 1)}
     links["two"] = LinkAccess(links["one"].signing, 2)
-    world, autopilot = passing(links)
+    world, autopilot = passing(links, sysid)
     stranger = on_link(GroundStation(world, "stranger", sysid=99), "one")
     stranger.send(HELLO)
     for component in (0, 1, 7):
-        stranger.send(m.MAVLink_command_long_message(1, component, 400, 0, 1, 0, 0, 0, 0, 0, 0))
+        stranger.send(m.MAVLink_command_long_message(sysid, component, 400, 0, 1, 0, 0, 0, 0, 0, 0))
     world.run(0.1)
     signed = [frame for frame in stranger.frames if frame[0] == 0xFD and frame[2] & 1]
     assert len(signed) >= 3
@@ -232,6 +234,16 @@ def test_recorded_frames_of_the_pilot_act_once() -> None:
     # The world reads by pieces: only whole frames of the pilot count.
     assert bytes(autopilot.received) == once
     assert {why for _, why in world.bridge.guard.refused} == {Check.REPLAYED.value}
+
+
+def test_made_up_addresses_cannot_flood_the_log() -> None:
+    world, _ = passing({"udp": LinkAccess(signing())})
+    frame = GroundStation(world).pack(m.MAVLink_mission_clear_all_message(1, 1))
+    for number in range(2000):
+        peer = Peer("udp", (f"10.0.{number >> 8}.{number & 255}", 14550))
+        world.bridge.gcs_received(peer, frame, world.now + number / 1000, datagram=True)
+    assert world.bridge.guard.refused["udp", "not signed"] == 2000
+    assert 0 < len(world.events("gcs.refused")) < 20
 
 
 @pytest.mark.parametrize("interval_us", [-1.0, -0.5, 1e6 + 1, 1e9, math.inf, -math.inf, math.nan])

@@ -5,6 +5,7 @@ import hashlib
 from pathlib import Path
 from typing import Any
 
+from fastcrc.crc16 import mcrf4xx
 from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink import mavutil
@@ -71,6 +72,15 @@ def test_a_signing_key_is_never_logged() -> None:
         frame = bytes(messages.MAVLink_setup_signing_message(1, 1, KEY, 1).pack(sender(signing=signing)))
         assert KEY in frame
         assert tlog_record(frame, NOON_US) == b""
+
+
+def test_a_frame_with_an_unknown_flag_or_a_wrong_checksum_is_no_record() -> None:
+    frame = bytes(messages.MAVLink_heartbeat_message(2, 3, 81, 0, 3, 3).pack(sender()))
+    flagged = frame[:2] + b"\x02" + frame[3:]
+    flagged = flagged[:-2] + mcrf4xx(flagged[1:-2] + b"\x32").to_bytes(2, "little")
+    damaged = frame[:-1] + bytes((frame[-1] ^ 1,))
+    log = b"".join(NOON_US.to_bytes(8, "big") + each for each in (flagged, damaged, frame))
+    assert [record.frame.raw for record in read_tlog(log)] == [frame]
 
 
 @given(st.data())

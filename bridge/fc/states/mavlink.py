@@ -11,9 +11,11 @@ from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter, is_autopilot_
 _SILENCE_S = 2.5
 #: An incomplete frame is dropped after this long without a byte.
 _LINE_SILENCE_S = 0.1
-#: Heartbeats of one sender, without any other sender's frame in between, that outweigh the one frame, perhaps
-#: damaged, by which the state was chosen. Cameras and gimbals beside an autopilot do not count.
-_STEADY_BEATS = 5
+#: Heartbeats of one autopilot, and of no other in between, that outweigh the one frame, perhaps damaged, by which the
+#: state was chosen. Those closer together than `_BEAT_S` count as one: every autopilot sends one a second.
+_STEADY_BEATS, _BEAT_S = 5, 0.7
+#: The size of a heartbeat's frame: MAVLink 1, MAVLink 2, and signed.
+_HEARTBEAT_SIZES = (17, 21, 34)
 
 
 class MavlinkLine(State):
@@ -30,7 +32,7 @@ class MavlinkLine(State):
         self._splitter = MavlinkSplitter()
         self._heard_at = self._last_byte_at = now
         self._look_at = now + _LINE_SILENCE_S
-        self._last_sender, self._beats = (0, 0), 0
+        self._beating, self._beats, self._beat_at = (0, 0), 0, now
 
     @property
     def bad_checksums(self) -> int | None:
@@ -70,16 +72,20 @@ class MavlinkLine(State):
             return None
         self._heard_at = now
         self.take(frames, now)
-        return self._revision(frames)
+        return self._revision(frames, now)
 
-    def _revision(self, frames: list[MavlinkFrame]) -> Found | None:
+    def _revision(self, frames: list[MavlinkFrame], now: float) -> Found | None:
         """The other state, if its flight controller is the only one heard."""
         for frame in frames:
-            if frame.sender != self._last_sender:
-                self._last_sender, self._beats = frame.sender, 0
-            if is_autopilot_heartbeat(frame):
-                self._beats += 1
-                spoken = self.port.mavlink_of(frame)
-                if self._beats >= _STEADY_BEATS and spoken is not self._spoken:
-                    return Found(spoken, self.speed, f"heard only its heartbeats, {self._beats} in a row", frame)
+            # Measured first: there may be thousands of frames a second.
+            if len(frame.raw) not in _HEARTBEAT_SIZES or not is_autopilot_heartbeat(frame):
+                continue
+            if frame.sender != self._beating:
+                self._beating, self._beats = frame.sender, 0
+            elif now < self._beat_at + _BEAT_S:
+                continue
+            self._beats, self._beat_at = self._beats + 1, now
+            spoken = self.port.mavlink_of(frame)
+            if self._beats >= _STEADY_BEATS and spoken is not self._spoken:
+                return Found(spoken, self.speed, f"heard only its heartbeats, {self._beats} in a row", frame)
         return None
