@@ -16,6 +16,8 @@ from bridge.missions.mission_service import MissionService
 from protocols.msp.commands import Msp, MspAction
 from protocols.msp.frame import Direction, request
 from protocols.msp.telemetry import STATUS_SIZE, Sensor
+from protocols.rights.effect import Effect
+from protocols.rights.msp import msp_right
 
 _STATUS_CHECKS = 2
 _ASKS_AFTER_ACTION = 12
@@ -71,6 +73,9 @@ class FcActions:
         if controller is None or controller.arm_bit is None:
             # Without an arm flag it is unknown whether the craft is flying.
             on_done(ActionResult.NO_LINK)
+            return
+        if msp_right(controller.firmware, action.command, b"").effect is not Effect.CHANGE:
+            on_done(ActionResult.REFUSED)
             return
         if self._session.vehicle.armed:
             on_done(ActionResult.ARMED)

@@ -14,6 +14,7 @@ from protocols.msp.frame import MspParser
 from simulator.board.msp_sensors import SensorReplies
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from tests.support.conversations import waypoints
+from tests.support.fake_controllers import HARAKIRI_CAPABILITY, MspFake, ident
 from tests.support.world import GroundStation, World
 
 m = messages
@@ -127,6 +128,19 @@ def test_without_a_flight_controller_an_action_is_denied() -> None:
     assert results(station) == [DENIED] * len(ALL)
     # The text of the refusal is not repeated.
     assert station.texts() == [ActionResult.NO_LINK.value]
+
+
+def test_on_unknown_firmware_an_action_is_unsupported() -> None:
+    """Its handlers are not known, so the numbers may mean something else."""
+    board = MspFake({100: ident(230, HARAKIRI_CAPABILITY), 101: bytes(11), 116: b"ANGLE;ARM;"})
+    world = World(speeds=(115200,), peer=board)
+    world.wait_until(lambda w: w.bridge.session.vehicle.armed is False, 5)
+    station = GroundStation(world)
+    for command, params, _ in ALL:
+        station.send(long(command, params))
+        world.run(0.1)
+    assert results(station) == [UNSUPPORTED] * len(ALL)
+    assert done(world) == []
 
 
 def test_an_action_on_a_board_that_falls_silent_fails_and_is_not_repeated() -> None:

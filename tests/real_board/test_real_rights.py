@@ -2,13 +2,11 @@
 """No request that a read-only share lets through changes anything on the image, whatever the one before it was.
 
 The firmware reads what is missing in a payload from the buffer that the previous request, or the extension's previous
-reply, filled: so requests are tried in pairs.
+reply, filled: so requests are tried in pairs. For an image without the patch: `make real-board ARGS="-k rights"`.
 """
 
 from collections.abc import Iterator
 from itertools import product
-
-import pytest
 
 from protocols.msp.frame import Direction, MspFrame, request
 from protocols.msp.mission import INFO_REQUEST, MissionCommand
@@ -24,15 +22,11 @@ _LENGTHS = (0, 1, 2, 7, 16, 58, 64, 243)
 #: The two waypoints that Harakiri has, and bits that would put ARM on every switch.
 _FILLS = (0x00, 0x10, 0xFF)
 _SWITCH_ON_US = 2000
+_BOOT_S = 20.0
 _STICKS_S = 5.0
 _ANSWERED_WITHIN_S = 2.0
 #: Time for a scheduled write of the configuration, and for what a request starts.
 _SETTLED_S = 3.0
-
-
-@pytest.fixture(params=[False, True], ids=["disarmed", "armed"])
-def is_armed(request: pytest.FixtureRequest) -> bool:
-    return bool(request.param)
 
 
 class Watch:
@@ -75,13 +69,18 @@ def set_switches(naze: EmulatedNaze) -> None:
     faults.aux1 = faults.aux2 = faults.aux3 = faults.aux4 = _SWITCH_ON_US
 
 
-def test_a_read_only_share_changes_nothing(image: Image, flash: bytes, is_armed: bool, figure: Figure) -> None:
+def test_a_read_only_share_changes_nothing(image: Image, flash: bytes, figure: Figure) -> None:
     world = World(speeds=(115200,), peer=EmulatedNaze(image, flash=memoryview(bytearray(flash))))
     set_switches(world.naze)
-    world.wait_ready()
-    if is_armed:
-        world.naze.faults.armed = True
-        world.wait_until(lambda w: w.naze.armed and w.bridge.session.vehicle.armed is True, _STICKS_S)
+    world.wait_until(lambda w: w.bridge.session.vehicle.armed is False and not w.bridge.runner.is_busy, _BOOT_S)
+    through_share(world, image, figure, "disarmed")
+    world.naze.faults.armed = True
+    world.wait_until(lambda w: w.naze.armed and w.bridge.session.vehicle.armed is True, _STICKS_S)
+    through_share(world, image, figure, "armed")
+
+
+def through_share(world: World, image: Image, figure: Figure, state: str) -> None:
+    """Send every request, then every one that is let through after each that fills the buffer."""
     watch = Watch(world.naze, image)
     requests = list(all_requests())
     let_through: list[MspFrame] = []
@@ -98,12 +97,10 @@ def test_a_read_only_share_changes_nothing(image: Image, flash: bytes, is_armed:
     world.run(_SETTLED_S)
     found["in the end"] = watch.changes()
     found = {pair: changed for pair, changed in found.items() if changed}
-    state = "armed" if is_armed else "disarmed"
     figure(f"read-only share, {state}", f"{len(let_through)} of {len(requests)} requests let through")
     figure(f"read-only share, {state}: with pairs", f"{sent} sent, {len(found)} changed something")
     assert not found, f"{len(found)}: {dict(list(found.items())[:20])}"
     assert world.is_found
-    assert world.naze.armed is is_armed
 
 
 def fills_buffer(frame: MspFrame) -> bool:
@@ -126,32 +123,33 @@ def name(frame: MspFrame) -> str:
     return f"{frame.command} with {len(frame.payload)} bytes {frame.payload[:1].hex()}"
 
 
-def test_no_read_of_the_table_changes_anything(image: Image, flash: bytes, is_armed: bool, figure: Figure) -> None:
-    """Sent to the board itself, in every order of pairs."""
+def test_no_read_of_the_table_changes_anything(image: Image, flash: bytes, figure: Figure) -> None:
+    """Sent to the board itself, in every order of pairs, disarmed and armed."""
     bench = RealBench(image, flash)
-    answer = bench.ask(INFO_REQUEST)
-    is_patched = answer is not None and answer.direction is Direction.REPLY
-    firmware = Firmware.HARAKIRI_MISSIONS if is_patched else Firmware.HARAKIRI
     set_switches(bench.naze)
-    bench.arm(is_armed)
-    watch = Watch(bench.naze, image)
+    info = bench.ask(INFO_REQUEST)
+    is_patched = info is not None and info.direction is Direction.REPLY
+    firmware = Firmware.HARAKIRI_MISSIONS if is_patched else Firmware.HARAKIRI
     reads = [
         (request(command, payload), right.reply)
         for command, right in MSP_RIGHTS[firmware].items()
         if right.effect is Effect.READ
         for payload in right.only or {bytes((fill,)) * size for size in right.lengths for fill in _FILLS}
     ]
-    found: dict[tuple[str, str], str] = {}
-    for (first, _), (second, largest) in product(reads, repeat=2):
-        bench.ask(first)
-        answer = bench.ask(second)
-        assert answer is not None
-        assert len(answer.payload) <= largest
-        found[first.hex(), second.hex()] = watch.changes()
-    bench.run(_SETTLED_S)
-    found["in", "the end"] = watch.changes()
-    found = {pair: changed for pair, changed in found.items() if changed}
-    state = "armed" if is_armed else "disarmed"
-    figure(f"pairs of {len(reads)} reads, {state}", f"{len(reads) ** 2} sent, {len(found)} changed something")
-    assert not found
+    for is_armed in (False, True):
+        bench.arm(is_armed)
+        watch = Watch(bench.naze, image)
+        found: dict[tuple[str, str], str] = {}
+        for (first, _), (second, largest) in product(reads, repeat=2):
+            bench.ask(first)
+            answer = bench.ask(second)
+            assert answer is not None
+            assert len(answer.payload) <= largest
+            found[first.hex(), second.hex()] = watch.changes()
+        bench.run(_SETTLED_S)
+        found["in", "the end"] = watch.changes()
+        found = {pair: changed for pair, changed in found.items() if changed}
+        state = "armed" if is_armed else "disarmed"
+        figure(f"pairs of {len(reads)} reads, {state}", f"{len(reads) ** 2} sent, {len(found)} changed something")
+        assert not found
     assert bench.ask(IDENT) is not None
