@@ -35,7 +35,8 @@ def _cell(right: MspRight | None, name: str) -> str:
     own_name = "" if right.name == name else f"{right.name}: "
     match right.effect:
         case Effect.READ:
-            return f"{own_name}read{_payload(right)}, reply {right.reply}"
+            others = "" if right.otherwise is Effect.UNKNOWN else f", else {right.otherwise.value}"
+            return f"{own_name}read{_payload(right)}{others}, reply {right.reply}"
         case Effect.CHANGE:
             return f"{own_name}change{_payload(right)}"
         case Effect.MOVE:

@@ -34,7 +34,7 @@ class Firmware(Enum):
 class MspRight:
     """The effect of a request. lengths: of its payload, bytes. reply: the largest payload of its reply.
 
-    only: the permitted payloads, if not every one of these lengths is.
+    only: the payloads with this effect, if not every one of these lengths has it. otherwise: the effect of the others.
     """
 
     name: str
@@ -42,9 +42,12 @@ class MspRight:
     lengths: Collection[int] = range(256)
     reply: int = 0
     only: frozenset[bytes] = frozenset()
+    otherwise: Effect = Effect.UNKNOWN
 
-    def permits(self, payload: bytes) -> bool:
-        return len(payload) in self.lengths and (not self.only or payload in self.only)
+    def effect_of(self, payload: bytes) -> Effect:
+        if len(payload) not in self.lengths:
+            return Effect.UNKNOWN
+        return self.effect if not self.only or payload in self.only else self.otherwise
 
 
 #: By command.
@@ -54,10 +57,11 @@ Rights = Mapping[int, MspRight]
 def msp_right(firmware: Firmware, command: int, payload: bytes) -> MspRight:
     """The right of a request; UNKNOWN for what no handler is known to take."""
     right = MSP_RIGHTS[firmware].get(command)
-    if right is None or not right.permits(payload):
+    if right is None:
         names = (rights[command].name for rights in MSP_RIGHTS.values() if command in rights)
         return MspRight(next(names, f"command {command}"), Effect.UNKNOWN)
-    return right
+    effect = right.effect_of(payload)
+    return right if effect is right.effect else replace(right, effect=effect)
 
 
 def _reads(**rows: tuple[int, ...]) -> Rights:
@@ -138,13 +142,14 @@ _BASEFLIGHT: Rights = {
     **_moves(REBOOT=68, SET_WP=209, SET_HEAD=211, SET_MOTOR=214),
     **_refused(GPSSVINFO=164),
 }  # fmt: skip
-#: With navigation. SET_WP of the numbers 0 and 255 moves home or the place that the craft holds.
+#: With navigation. A waypoint that is read stays in RAM, where it decides whether a return home lands; home (0) and the
+#: place that the craft holds (255) do not. SET_WP of these two numbers moves them.
 _MULTIWII: Rights = {
     **_OLD_READS, **_OLD_MOVES, **_OLD_CHANGES,
     **_reads(
-        WP=(118, 21, 1), BOXIDS=(119, 48), SERVO_CONF=(120, 56), NAV_STATUS=(121, 7), NAV_CONFIG=(122, 32),
-        ACC_TRIM=(240, 4),
+        BOXIDS=(119, 48), SERVO_CONF=(120, 56), NAV_STATUS=(121, 7), NAV_CONFIG=(122, 32), ACC_TRIM=(240, 4),
     ),
+    118: MspRight("WP", Effect.READ, (1,), 21, frozenset((b"\x00", b"\xff")), Effect.CHANGE),
     **_changes(_BUFFER, SET_WP=(209, 21), SELECT_SETTING=(210, 1), SET_SERVO_CONF=(212, 56), SET_NAV_CONFIG=(215, 22),
                SET_ACC_TRIM=(239, 4)),
     **_moves(SET_HEAD=211, SET_MOTOR=214, BIND=241),
@@ -283,7 +288,8 @@ def _agreed(command: int, tables: Collection[Rights]) -> MspRight | None:
     if len(rights) < _FEW or any(right.effect is not Effect.READ for right in rights):
         return None
     lengths = frozenset.intersection(*[frozenset(right.lengths) for right in rights])
-    only = frozenset[bytes]().union(*[right.only for right in rights])
+    limits = [right.only for right in rights if right.only]
+    only = frozenset.intersection(*limits) if limits else frozenset[bytes]()
     return MspRight(rights[0].name, Effect.READ, lengths, max(right.reply for right in rights), only)
 
 

@@ -119,6 +119,14 @@ def test_an_empty_setter_is_no_read(
     assert not world.naze.armed
 
 
+def test_a_waypoint_that_a_multiwii_would_keep_in_ram_is_no_read() -> None:
+    """The one read last decides whether a return home lands (Protocol.cpp, recallWP)."""
+    world = World(speeds=(115200,), peer=make_board("multiwii"))
+    world.wait_ready(20)
+    assert asked(world, WP, b"\1") is None
+    assert asked(world, WP, b"\0") is not None
+
+
 def asked(world: World, command: int, payload: bytes = b"") -> bytes | None:
     """The payload of the reply to a request of a client that may only read; None if it is refused."""
     found: list[MspFrame] = []

@@ -61,12 +61,14 @@ READS: list[tuple[Iterable[Firmware], bytes]] = [
     (INAV, request(Nav.GETINFO)),
     (INAV, SELECTED_REQUEST),
     ((Firmware.MULTIWII,), request(Nav.NAV_CONFIG)),
-    *((NAV, encode_read_wp(number)) for number in range(256)),
+    *((INAV, encode_read_wp(number)) for number in range(256)),
+    (NAV, encode_read_wp(0)),
     (HARAKIRI, INFO_REQUEST),
     (MISSIONS, encode_read(0, 15)),
 ]
 CHANGES: list[tuple[Iterable[Firmware], bytes]] = [
     *((set(EVERY) - {Firmware.UNKNOWN}, request(action)) for action in MspAction),
+    *(((Firmware.MULTIWII,), encode_read_wp(number)) for number in range(1, 255)),
     (INAV, LOAD_REQUEST),
     (INAV, SAVE_REQUEST),
     (NAV, encode_set_wp(1, NavRecord(NavAction.WAYPOINT, 1, 1))),
@@ -105,6 +107,11 @@ def test_a_frame_within_a_frame_has_no_row(firmware: Firmware) -> None:
 def test_v2_is_sent_only_to_boards_that_speak_it(firmware: Firmware) -> None:
     """Others take the letters of such a frame for typed ones."""
     assert max(MSP_RIGHTS[firmware]) < 255
+
+
+def test_of_waypoints_only_home_reads_everywhere() -> None:
+    effects = [msp_right(Firmware.UNKNOWN, Nav.WP, bytes((number,))).effect for number in range(256)]
+    assert effects == [Effect.READ] + [Effect.UNKNOWN] * 255
 
 
 def test_what_firmware_disagrees_on_is_refused_on_unknown_boards() -> None:
