@@ -5,6 +5,7 @@ import asyncio
 import socket
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,8 @@ from service.daemon.daemon import Daemon
 from service.settings import Settings
 from service.settings.addresses import SimulatedFc, parse_gcs
 from service.settings.share import ShareSettings, parse_share
+from simulator.board.options import Faults
+from simulator.naze.board import SimulatedNaze
 from tests.support.programs import TIMEOUT_S, free_port
 
 #: Repeat like configurators, because the bridge also gives up late replies.
@@ -214,8 +217,10 @@ def test_an_invalid_share_is_one_sentence(entry: object, words: str) -> None:
         parse_share(entry, Path())
 
 
-async def test_an_empty_setter_is_no_read() -> None:
-    """Harakiri executes it with what the request before it left in the receive buffer."""
+async def test_an_empty_setter_is_no_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A Harakiri without the patch executes it with what the request before it left in the receive buffer."""
+    unpatched = partial(SimulatedNaze, faults=Faults(extension=False))
+    monkeypatch.setattr("simulator.naze.board.SimulatedNaze", unpatched)
     async with shared() as (daemon, program):
         for setting, setter in SETTERS.items():
             (before,) = await program.ask(setting)
