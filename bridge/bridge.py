@@ -28,7 +28,7 @@ from bridge.line.runner import Runner
 from bridge.missions.mission_service import NO_LINK, EndingListener, MissionService, MissionTransfer
 from bridge.model.events import EventLog
 from bridge.model.refusal import ARMED, Refusal
-from bridge.model.vehicle import FlightState
+from bridge.model.vehicle import FlightState, MissionLeg
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.link_announcer import LinkAnnouncer
 from bridge.vehicle.local_missions import LocalMissions
@@ -197,14 +197,15 @@ class Bridge:
         self._incoming.routes = Routes(self.ground) if passes else None
         if controller is None:
             trouble = self.session.state.trouble
-            self.missions.use(Refusal(MissionResult.DENIED, trouble) if trouble else NO_LINK)
+            self.missions.use(Refusal(MissionResult.DENIED, trouble) if trouble else NO_LINK, now, is_same_board=True)
             if self._uploads.is_active:
                 self._uploads.link_lost(now)
             self._announcer.lost(now if vehicle.heard_at is None else vehicle.heard_at)
             return
         missions = controller.profile.missions
         store = missions if isinstance(missions, Refusal) else missions(controller, vehicle, self._config.rules)
-        self.missions.use(store)
+        # On a port that was opened since, an armed board may be another one.
+        self.missions.use(store, now, is_same_board=self.session.met_family == controller.profile.family)
         self._say(self._announcer.found(controller, now))
         if not isinstance(store, Refusal):
             # Read its list at once: MISSION_CURRENT reports the count, and the first Read needs no wait.
@@ -225,6 +226,8 @@ class Bridge:
             self.report.heard(news)
         if not self.is_passing_through:
             self._vehicle.heard(news, now)
+        if MissionLeg in news and (leg := self.session.vehicle.last(MissionLeg)) is not None:
+            self.missions.follow(leg.status)
         if FlightState in news:
             self._follow_arming(now)
             self._remember_flight(now)

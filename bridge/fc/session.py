@@ -72,6 +72,11 @@ class FcSession:
         #: The current state, with the flight controller, the MSP link, and the speed that the port must have.
         self.state: State = Closed(self._port, PortClosed(None), 0.0)
 
+    @property
+    def met_family(self) -> str | None:
+        """The family of the board that was last identified over MSP since the port was opened."""
+        return self._port.met_family
+
     def flight_memory(self, now: float) -> FlightMemory | None:
         """What a restarted bridge must know about the craft; None unless it is armed."""
         family = self._port.family

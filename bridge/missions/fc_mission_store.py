@@ -16,6 +16,7 @@ from bridge.missions.list_check import MissionRules
 from bridge.model.verdict import RecordT
 from protocols.mission_item import MissionItem
 from protocols.mission_record import ListIdentity
+from protocols.msp.nav import NavStatus
 
 
 class StoreState(Enum):
@@ -133,6 +134,10 @@ class FcMissionStore(ABC, Generic[RecordT]):
     def refreshed(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
         """Items read earlier, brought up to date: home may move on boards that do not store it in the list."""
         return items
+
+    def is_contradicted(self, records: Sequence[RecordT], status: NavStatus) -> bool:
+        """True if the craft flies a record that this list does not have; only for boards that are not read armed."""
+        return False
 
     def erased_by(self, records: Sequence[RecordT]) -> tuple[tuple[RecordT, ...], ...]:
         """The `others` that do not fit alongside a new list; writing it erases them."""

@@ -30,12 +30,15 @@ from bridge.model.vehicle import Vehicle
 from bridge.model.verdict import Result, SentSeqs, Verdict, is_renumbered
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.mission_record import ListIdentity, identify
+from protocols.msp.nav import NavStatus
 
 T = TypeVar("T")
 
 #: The timeout for a running flash write (docs/mission-rules.md).
 _BUSY_TIMEOUT_S = 1.0
 _BUSY_INTERVAL_S = 0.1
+#: A board that is lost because it has armed is found again, and heard armed, within this time.
+_ARMS_WITHIN_S = 15.0
 
 
 class TransferStep(Enum):
@@ -92,6 +95,7 @@ _NO_COPY = "Nothing written: a mission that does not fit next to it could not be
 NO_LINK = Refusal(MissionResult.DENIED, "No link to the flight controller")
 _BUSY = Refusal(MissionResult.DENIED, "Flight controller is busy writing: try again")
 STOPPING = Refusal(MissionResult.DENIED, "naze-bridge is stopping: try again later")
+_UNKNOWN = Refusal(MissionResult.DENIED, "Armed: the mission on board is not known, disarm to read it")
 OCCUPIED = Refusal(MissionResult.DENIED, "Another mission transfer is running")
 
 
@@ -117,8 +121,10 @@ class MissionService:
         #: Missions to compare with the list when it is next read.
         self.pending: list[PendingMission] = []
         self.held: HeldMission | None = None
-        #: Item 0 of the last known list: arming may change the protocol, and the list is unknown then.
-        self.former_home: MissionItem | None = None
+        #: The list as last verified before the link was lost: arming may change the protocol. Only of the same board.
+        self._former: HeldMission | None = None
+        #: The craft was armed by then if nothing can have changed that list.
+        self._former_until = -inf
         #: Set while records are written and verified.
         self.writing: MissionTransfer | None = None
 
@@ -134,10 +140,13 @@ class MissionService:
 
         self.runner.start(conversation, done, now)
 
-    def use(self, store: AnyFcMissionStore | Refusal) -> None:
-        """Switch to another flight controller."""
+    def use(self, store: AnyFcMissionStore | Refusal, now: float, *, is_same_board: bool) -> None:
+        """Switch to another flight controller, to none, or to another protocol of the same one."""
         self.fc_store = store
-        self.former_home = self.home_item()
+        if self.held is not None:
+            self._former, self._former_until = self.held, now + _ARMS_WITHIN_S
+        if not is_same_board:
+            self._former = None
         self.held, self.loading = None, Loading.NOT_NEEDED
         self.is_settled = False
 
@@ -153,7 +162,15 @@ class MissionService:
 
     def home_item(self) -> MissionItem | None:
         """Item 0 of the last known list."""
-        return self.held.items[0] if self.held is not None and self.held.items else self.former_home
+        known = self.held or self._former
+        return known.items[0] if known is not None and known.items else None
+
+    def _verified_before_arming(self) -> HeldMission | None:
+        """The list that the armed craft still has: no flight controller whose list cannot be read armed changes it."""
+        armed_at = self.vehicle.armed_at
+        if self.held is not None or armed_at is None or self.pending:
+            return self.held
+        return self._former if armed_at <= self._former_until else None
 
     @property
     def watch_s(self) -> float:
@@ -165,6 +182,13 @@ class MissionService:
         if isinstance(self.fc_store, Refusal) or self.held is None:
             return 0
         return self.fc_store.seq_of(self.held.records, number)
+
+    def follow(self, status: NavStatus) -> None:
+        """Forget a list that the craft does not fly: another client has changed it."""
+        if isinstance(self.fc_store, Refusal) or self.held is None:
+            return
+        if self.fc_store.is_contradicted(self.held.records, status):
+            self.held, self._former, self.is_settled = None, None, False
 
     def occupied(self) -> Refusal | None:
         """The reason that no list can be written now, if there is one."""
@@ -281,7 +305,7 @@ class MissionService:
     def _not_written(self, failure: PushFailure, mission: PendingMission) -> Conversation[DeliveryResult]:
         """Store the failure, unless only reading the list will show the outcome."""
         if failure in LIST_IS_GONE:
-            self.is_settled, self.held = False, None
+            self.is_settled, self.held, self._former = False, None, None
         if failure is PushFailure.UNCERTAIN:
             self.pending.append(mission)
             return DeliveryResult(MissionResult.DENIED, failure.value, mission.number)
@@ -336,6 +360,13 @@ class MissionService:
         if fc_store is self.fc_store:
             # By the time the store answers, another flight controller may be connected.
             self.held = held
+        return held
+
+    def shown(self) -> Conversation[HeldMission | Refusal]:
+        """The list for a reader; of an armed flight controller that cannot be read, as verified before arming."""
+        held = yield from self.read_back()
+        if isinstance(held, Refusal) and self.vehicle.armed:
+            return self._verified_before_arming() or (_UNKNOWN if held is ARMED else held)
         return held
 
     def _copy_erased(self, fc_store: AnyFcMissionStore, records: Sequence[Any]) -> Conversation[bool]:

@@ -82,7 +82,7 @@ class LocalMissions:
             done(refusal, now)
 
     def pull(self, on_done: Callable[[HeldMission | Refusal], None], now: float) -> None:
-        self._missions.run(self._missions.read_back(), lambda held, _at: on_done(held), now)
+        self._missions.run(self._missions.shown(), lambda held, _at: on_done(held), now)
 
     def check(
         self, items: Sequence[MissionItem], on_done: Callable[[Verdict[Any] | Refusal], None], now: float

@@ -22,7 +22,6 @@ _READING_S = 20.0
 _MAX_QUESTIONS = 32
 #: Mission Planner repeats a request after 2.5 s. A position arrives within that time if there is a GPS.
 _POSITION_WAIT_S = 2.0
-_ARMED = Refusal(MissionResult.DENIED, "Armed: disarm to read the mission")
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,24 +56,18 @@ class MissionDownloads:
         self._homeless: tuple[object, float] = None, 0.0
 
     def request_list(self, station: Station, now: float) -> None:
-        """MISSION_REQUEST_LIST."""
-        if self._vehicle.armed:
-            self._ground.refuse(station, _ARMED)
-        else:
-            self._ask(_Question(station, None, as_int=True), now)
+        """MISSION_REQUEST_LIST, armed or not."""
+        self._ask(_Question(station, None, as_int=True), now)
 
     def request(self, station: Station, seq: int, now: float, *, as_int: bool) -> None:
         """MISSION_REQUEST or MISSION_REQUEST_INT; item 0 is served at any time (Mission Planner asks on arming)."""
         question = _Question(station, seq, as_int)
         snapshot = self._snapshots.get(station)
-        if self._vehicle.armed:
-            if seq == 0:
-                self._send_home(question, now)
-            else:
-                self._ground.refuse(station, _ARMED)
-        elif snapshot is not None and now < snapshot.until and snapshot.fc_store is self._missions.fc_store:
+        if snapshot is not None and now < snapshot.until and snapshot.fc_store is self._missions.fc_store:
             snapshot.until = now + _READING_S
             self._answer(question, snapshot.items, now)
+        elif self._vehicle.armed and seq == 0:
+            self._send_home(question, now)
         else:
             self._ask(question, now)
 
@@ -94,7 +87,7 @@ class MissionDownloads:
             self._read(held, now)
         else:
             self._is_reading = True
-            self._missions.run(self._missions.read_back(), self._read, now)
+            self._missions.run(self._missions.shown(), self._read, now)
 
     def _read(self, held: HeldMission | Refusal, now: float) -> None:
         self._is_reading = False

@@ -5,14 +5,16 @@ from dataclasses import replace
 
 import pytest
 
-from bridge.controllers.harakiri import profile as harakiri
 from bridge.missions.mission_service import HeldMission
+from bridge.model.mission_log import PendingMission
 from bridge.model.refusal import Refusal
+from bridge.model.vehicle import MissionLeg, Source
 from protocols.mavlink.dialect import Message
-from protocols.mission_item import Command, MissionResult
+from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.mission_record import pack_records
 from protocols.msp.frame import MspParser
 from protocols.msp.mission import MissionCommand
+from protocols.msp.nav import NavAction, NavMode, NavStatus
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from simulator.commands.fc_kinds import make_board
 from tests.support.conversations import (
@@ -178,23 +180,17 @@ def test_another_mission_type_is_unsupported(mission_type: int) -> None:
         assert (ack.type, ack.mission_type) == (A.UNSUPPORTED, mission_type)
 
 
-def test_while_armed_the_list_is_refused_but_item_0_is_served() -> None:
+def test_item_0_alone_has_the_altitude_of_home_while_armed() -> None:
+    """Mission Planner requests it on arming, and takes its ground level from it."""
     world, station = holding()
     world.faults.armed = True
     world.run(1)
-    (ack,) = ask(station, list_message())
-    assert ack.type == A.DENIED
-    assert "Armed: disarm to read the mission" in station.texts()
-    (ack,) = ask(station, request_message(3))
-    assert ack.type == A.DENIED
+    home = world.bridge.session.vehicle.home
+    assert home is not None
     for as_int in (True, False):
         (item,) = ask(station, request_message(0, as_int=as_int))
-        assert item.seq == 0
+        assert (item.seq, item.z) == (0, home.altitude_m)
     assert item.x == pytest.approx((OLD[0].lat_e7 or 0) / 1e7)
-    # Reading item 0 does not allow reading the rest.
-    world.faults.armed = False
-    world.run(1)
-    assert len(Download(station).run()) == 20
 
 
 def test_item_0_is_served_while_armed_without_an_earlier_download() -> None:
@@ -297,22 +293,94 @@ def test_without_a_link_and_without_a_store_the_reason_is_reported() -> None:
     assert any("stores no missions" in text for text in station.texts())
 
 
-def test_only_home_is_served_while_armed_in_mavlink_mode() -> None:
-    world, station = holding(SimOptions(tele_prot=TelemetryProtocol.MAVLINK))
+BOARDS = [*TelemetryProtocol, "inav", "multiwii"]
+
+
+def disarmed(board: str | TelemetryProtocol) -> tuple[World, list[MissionItem]]:
+    """A craft on the ground, and the mission that it holds."""
+    items = [item if item.seq else replace(item, lat_e7=0, lon_e7=0) for item in waypoints(9)]
+    if isinstance(board, TelemetryProtocol):
+        items = OLD
+        world = World(SimOptions(tele_prot=board), flash=OLD_FLASH)
+    else:
+        faults = Faults(boxes=0)
+        world = World(peer=make_board(board, faults=faults), faults=faults)
+    world.wait_ready()
     world.run(6)
+    if not isinstance(board, TelemetryProtocol):
+        assert Upload(GroundStation(world, "planner"), items).run() is A.ACCEPTED
+    return world, items
+
+
+def arm(world: World) -> None:
     world.faults.armed = True
-    world.wait_until(lambda w: w.kind is harakiri.MAVLINK, 8)
-    world.run(1.5)
-    (item,) = ask(station, request_message(0))
-    home = world.bridge.session.vehicle.home
-    assert home is not None
-    assert (item.x, item.y, item.z) == (OLD[0].lat_e7, OLD[0].lon_e7, home.altitude_m)
-    texts = []
-    for message in (request_message(1), list_message()):
-        (ack,) = ask(station, message)
-        assert ack.type == A.DENIED
-        texts += station.texts()
-    assert "Armed: disarm to read the mission" in texts
+    world.wait_until(lambda w: bool(w.bridge.session.vehicle.armed) and w.is_found, 20)
+    world.run(3)
+
+
+def legs(items: list[MissionItem]) -> list[tuple[object, ...]]:
+    return [(item.seq, item.command, item.lat_e7, item.lon_e7, item.alt_m) for item in items[1:]]
+
+
+@pytest.mark.parametrize("board", BOARDS)
+def test_the_mission_is_readable_while_armed(board: str | TelemetryProtocol) -> None:
+    """QGroundControl reads it when it connects, also in flight."""
+    world, items = disarmed(board)
+    arm(world)
+    station = GroundStation(world, "new", sysid=254)
+    assert legs(Download(station).run(20)) == legs(items)
+    assert not any("Armed" in text for text in station.texts())
+
+
+@pytest.mark.parametrize("board", BOARDS)
+def test_a_mission_that_was_not_read_before_arming_is_read_or_refused(board: str | TelemetryProtocol) -> None:
+    """The bridge was started in flight: only boards whose list can be read armed have one."""
+    world = armed_before(board)
+    world.wait_until(lambda w: bool(w.bridge.session.vehicle.armed), 15)
+    world.run(5)
+    station = GroundStation(world)
+    download = Download(station)
+    download.run(5)
+    if board in (TelemetryProtocol.MSP, TelemetryProtocol.FRSKY_9600, "inav"):  # it answers MSP, too
+        assert download.result is None
+    else:
+        assert download.result is A.DENIED
+        assert "Armed: the mission on board is not known, disarm to read it" in " ".join(station.texts())
+
+
+def test_another_boards_mission_is_not_served() -> None:
+    """The port was opened again, and the board on it speaks no MSP."""
+    world, _ = disarmed(TelemetryProtocol.MAVLINK)
+    world.unplug()
+    world.faults.armed = True
+    world.run(3)
+    world.plug()
+    arm(world)
+    station = GroundStation(world)
+    download = Download(station)
+    download.run(5)
+    assert download.result is A.DENIED
+
+
+def test_a_mission_whose_write_was_interrupted_is_not_served() -> None:
+    world, _ = disarmed(TelemetryProtocol.MAVLINK)
+    world.bridge.missions.pending.append(PendingMission(None, None))
+    arm(world)
+    download = Download(GroundStation(world))
+    download.run(5)
+    assert download.result is A.DENIED
+
+
+def test_a_mission_that_another_client_changed_in_flight_is_not_served() -> None:
+    """A MultiWii cannot be read armed; the record that it flies shows the change."""
+    world, _ = disarmed("multiwii")
+    arm(world)
+    for number, action, count in ((3, NavAction.WAYPOINT, 9), (12, NavAction.WAYPOINT, 0)):
+        status = NavStatus(NavMode.MISSION, 0, action, number, 0, 0)
+        world.bridge.session.vehicle.hear(MissionLeg(world.now, Source.MSP, status))
+        world.run(0.1)
+        download = Download(GroundStation(world, f"after {number}"))
+        assert len(download.run(5)) == count
 
 
 def armed_before(board: str | TelemetryProtocol) -> World:
@@ -327,7 +395,7 @@ def armed_before(board: str | TelemetryProtocol) -> World:
     return world
 
 
-@pytest.mark.parametrize("board", [*TelemetryProtocol, "inav", "multiwii"])
+@pytest.mark.parametrize("board", BOARDS)
 def test_a_craft_that_is_armed_from_the_start_has_an_item_0(board: str | TelemetryProtocol) -> None:
     world = armed_before(board)
     world.wait_until(lambda w: bool(w.bridge.session.vehicle.armed), 15)

@@ -5,6 +5,7 @@ The record last read or written stays in RAM, and its p1 decides if a return hom
 lands there: after each conversation it is cleared, as after power-on.
 """
 
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -13,7 +14,16 @@ from bridge.controllers.nav.rules import LegLimits
 from bridge.line.conversation import Conversation, LinkLost, ask
 from bridge.missions.fc_mission_store import PushProgress, PushResult, StoreReport
 from protocols.msp.frame import request
-from protocols.msp.nav import LAST, NAV_CONFIG_SIZE, Nav, NavRecord, decode_nav_limits, encode_set_wp
+from protocols.msp.nav import (
+    LAST,
+    NAV_CONFIG_SIZE,
+    Nav,
+    NavMode,
+    NavRecord,
+    NavStatus,
+    decode_nav_limits,
+    encode_set_wp,
+)
 
 #: Flags of invalid records: a wrong checksum in EEPROM, and erased EEPROM.
 _NO_RECORD = (0xFE, 0xFF)
@@ -78,6 +88,11 @@ class MultiwiiMissions(NavMissions):
         is_same = yield from self._has_same_records(self._known or self._empty)
         yield from self._clear_step()
         return is_same
+
+    def is_contradicted(self, records: Sequence[NavRecord], status: NavStatus) -> bool:
+        if status.mode != NavMode.MISSION or not status.action or not 1 <= status.number <= self._profile.capacity:
+            return False
+        return status.number > len(records) or records[status.number - 1].action != status.action
 
     def _clear_step(self) -> Conversation[None]:
         """Clear the record in RAM, unless the craft is armed or may be: telemetry may not have noticed arming yet."""
