@@ -28,7 +28,7 @@ from bridge.line.runner import Runner
 from bridge.missions.mission_service import NO_LINK, EndingListener, MissionService, MissionTransfer
 from bridge.model.events import EventLog
 from bridge.model.refusal import ARMED, Refusal
-from bridge.model.vehicle import FlightState, MissionLeg
+from bridge.model.vehicle import FlightState, Health, MissionLeg, Readiness
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.link_announcer import LinkAnnouncer
 from bridge.vehicle.local_missions import LocalMissions
@@ -92,12 +92,12 @@ class Bridge:
         self._uploads = MissionUploads(self.missions, self.ground, log_event, incidents, self._vehicle.let_read)
         self._watch = MissionWatch(self.missions, self.ground, log_event)
         downloads = MissionDownloads(self.missions, self.ground)
-        parameters = Parameters(self.missions, self.ground, config.sysid)
+        self._parameters = Parameters(self.missions, self.ground, config.sysid)
         actions = FcActions(self.session, self.missions, self.runner)
         commands = CommandService(self.ground, self._vehicle, actions, self.session, config.version)
-        router = MessageRouter(self.ground, self._uploads, downloads, parameters, commands, self._vehicle)
+        router = MessageRouter(self.ground, self._uploads, downloads, self._parameters, commands, self._vehicle)
         self._incoming = Incoming(
-            self.guard, self.ground, router, parameters, self.session.send_mavlink, config.sysid, config.compid
+            self.guard, self.ground, router, self._parameters, self.session.send_mavlink, config.sysid, config.compid
         )
 
     # The flight controller's side.
@@ -226,6 +226,8 @@ class Bridge:
             self.report.heard(news)
         if not self.is_passing_through:
             self._vehicle.heard(news, now)
+            if Health in news or Readiness in news:
+                self._parameters.follow()
         if MissionLeg in news and (leg := self.session.vehicle.last(MissionLeg)) is not None:
             self.missions.follow(leg.status)
         if FlightState in news:

@@ -1,8 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The short list of parameters that ground stations need to see (https://mavlink.io/en/services/parameter.html)."""
+"""The short list of parameters that ground stations need to see (https://mavlink.io/en/services/parameter.html).
+
+QGroundControl reads those of receiver, compass and accelerometer once when it connects (APMRadioComponent.cc,
+APMSensorsComponent.cc): without them it shows two dialogs, opens Vehicle Setup, also in flight, and is "Not Ready" for
+ever. They say what is known here; docs/ground-stations.md lists them. Some names would switch on further requests and
+must not exist: FENCE_TOTAL, RALLY_TOTAL and COMPASS_PRIO1_ID (Mission Planner), FRAME_CLASS (QGroundControl).
+"""
 
 import math
+from collections.abc import Mapping
 
+from bridge.gcs.cost import Cost
 from bridge.gcs.flash_budget import TOO_MANY_WRITES
 from bridge.gcs.ground import Ground
 from bridge.gcs.station import Severity, Station
@@ -10,13 +18,24 @@ from bridge.line.conversation import LinkLost
 from bridge.missions.fc_mission_store import AnyFcMissionStore, PushFailure
 from bridge.missions.mission_service import MissionService
 from bridge.model.refusal import Refusal
-from protocols.mavlink.dialect import messages
+from bridge.model.vehicle import Health, Orientation, Readiness
+from protocols.mavlink.dialect import Message, messages
+from protocols.msp.inav import ARMING_BLOCKERS
 from protocols.msp.mission import MAX_RADIUS_CM
+from protocols.msp.telemetry import Sensor
 
 _REAL32 = 9
 #: Mission Planner's name for the radius in its plan screen; with this name it is in cm.
 WP_RADIUS = "WPNAV_RADIUS"
 SYSID = "SYSID_THISMAV"
+#: RC_CHANNELS has the sticks in this order on every board.
+_STICKS = ("ROLL", "PITCH", "THROTTLE", "YAW")
+#: The range of MSP's channels, us. ArduPilot's defaults (1100, 1900, 1500) would mean that nothing is calibrated.
+_CALIBRATION = {"MIN": 1000.0, "MAX": 2000.0, "TRIM": 1500.0}
+#: No board tells its sensors' offsets in ArduPilot's units, so a value other than 0 only means "calibrated".
+_ACCELEROMETER_OFFSET_M_S2, _COMPASS_OFFSET_MG = 0.001, 1.0
+#: INAV's reasons not to arm.
+_NO_ACCELEROMETER, _NO_COMPASS = ARMING_BLOCKERS[13], ARMING_BLOCKERS[12]
 
 
 class Parameters:
@@ -27,11 +46,23 @@ class Parameters:
         self._ground = ground
         self._sysid = sysid
         self._is_setting = False
+        #: The values that stations know, once one has read them.
+        self._told: dict[str, float] = {}
 
     def send_all(self, station: Station) -> None:
         """PARAM_REQUEST_LIST."""
-        for name in self._values():
-            self._send(station, name)
+        self._told = self._values()
+        for name in self._told:
+            if self._ground.allows(station, Cost.ANSWER):
+                self._ground.to(station, _message(self._told, name))
+
+    def follow(self) -> None:
+        """Send the values that have changed to all stations, which keep a copy, once any has read them."""
+        if self._told:
+            before, self._told = self._told, self._values()
+            for name, value in self._told.items():
+                if before.get(name) != value:
+                    self._ground.broadcast(_message(self._told, name))
 
     def send_one(self, station: Station, name: str, index: int) -> None:
         """PARAM_REQUEST_READ: by index, or by name where index is -1."""
@@ -47,6 +78,8 @@ class Parameters:
         wanted_cm = round(value) if math.isfinite(value) else -1
         if name != WP_RADIUS or wanted_cm == radius_cm:
             # An equal value is not written: that would erase and rewrite the board's whole configuration.
+            if name != WP_RADIUS and self._values().get(name, value) != value:
+                self._ground.say(Severity.ERROR, f"{name} is read-only", station)
             self._send(station, name)
             return
         if isinstance(fc_store, Refusal) or radius_cm is None:
@@ -84,19 +117,51 @@ class Parameters:
         self._missions.runner.start(fc_store.set_wp_radius(wanted_cm), done, now)
 
     def _values(self) -> dict[str, float]:
+        """Every parameter. The radius is last: it is only known of some boards, and the others keep their indexes."""
+        compass, accelerometer = self._sensors()
         values = {SYSID: float(self._sysid)}
+        for channel, stick in enumerate(_STICKS, 1):
+            values[f"RCMAP_{stick}"] = float(channel)
+            values |= {f"RC{channel}_{kind}": value for kind, value in _CALIBRATION.items()}
+        # Without an id QGroundControl makes no demands on the compass. No board needs it for arming.
+        values |= {f"COMPASS_DEV_ID{number}": 0.0 for number in ("", "2", "3")}
+        values |= {"COMPASS_USE": float(compass is not None), "COMPASS_USE2": 0.0, "COMPASS_USE3": 0.0}
+        offsets = {
+            "COMPASS_OFS": compass or 0.0,
+            "COMPASS_OFS2": 0.0,
+            "COMPASS_OFS3": 0.0,
+            "INS_ACCOFFS": accelerometer,
+        }
+        values |= {f"{name}_{axis}": value for name, value in offsets.items() for axis in "XYZ"}
         fc_store = self._missions.fc_store
         if not isinstance(fc_store, Refusal) and fc_store.wp_radius_cm is not None:
             values[WP_RADIUS] = float(fc_store.wp_radius_cm)
         return values
 
+    def _sensors(self) -> tuple[float | None, float]:
+        """The offsets of the compass, None without one, and of the accelerometer; 0: not calibrated."""
+        vehicle = self._missions.vehicle
+        health, readiness, orientation = vehicle.last(Health), vehicle.last(Readiness), vehicle.last(Orientation)
+        blockers = () if readiness is None else readiness.blockers
+        is_fitted = health is not None and Sensor.COMPASS in health.sensors
+        has_north = orientation is not None and orientation.is_north_known and _NO_COMPASS not in blockers
+        return (
+            _COMPASS_OFFSET_MG * has_north if is_fitted else None,
+            0.0 if _NO_ACCELEROMETER in blockers else _ACCELEROMETER_OFFSET_M_S2,
+        )
+
     def _send(self, station: Station | None, name: str) -> None:
         """Send PARAM_VALUE, if there is such a parameter; None: to all stations, which keep a copy."""
         values = self._values()
-        if name in values:
-            index = list(values).index(name)
-            message = messages.MAVLink_param_value_message(name.encode(), values[name], _REAL32, len(values), index)
-            if station is None:
-                self._ground.broadcast(message)
-            else:
-                self._ground.to(station, message)
+        if name not in values:
+            return
+        if station is None:
+            self._ground.broadcast(_message(values, name))
+            self._told |= {name: values[name]} if self._told else {}
+        else:
+            self._ground.to(station, _message(values, name))
+
+
+def _message(values: Mapping[str, float], name: str) -> Message:
+    index = list(values).index(name)
+    return messages.MAVLink_param_value_message(name.encode(), values[name], _REAL32, len(values), index)
