@@ -78,7 +78,7 @@ class Parameters:
         wanted_cm = round(value) if math.isfinite(value) else -1
         if name != WP_RADIUS or wanted_cm == radius_cm:
             # An equal value is not written: that would erase and rewrite the board's whole configuration.
-            if name != WP_RADIUS and self._values().get(name, value) != value:
+            if name != WP_RADIUS and not math.isclose(self._values().get(name, value), value, rel_tol=1e-6):
                 self._ground.say(Severity.ERROR, f"{name} is read-only", station)
             self._send(station, name)
             return

@@ -26,6 +26,7 @@ from tests.support.conversations import (
     waypoints,
 )
 from tests.support.fake_controllers import HARAKIRI_CAPABILITY, MspFake, ident
+from tests.support.screens import Screens
 from tests.support.world import GroundStation, Radio, World, flash_holding
 
 OLD = waypoints(20, seed=77)
@@ -1176,6 +1177,18 @@ def test_the_summary_comes_last_and_goes_only_to_the_writer() -> None:
         (4, "20 of 40 stored: 20 dropped, 1 Alt now relative"),
     ]
     assert [text.text for text in other.messages("STATUSTEXT")] == ["New mission, 20 items, by udp gcs"]
+
+
+def test_changes_that_cannot_matter_are_not_spoken() -> None:
+    """QGroundControl speaks NOTICE; its take-off has coordinates, and home a height of 0 without terrain data."""
+    world, station = holding()
+    home, first, *rest = waypoints(6)
+    items = [replace(home, alt_m=0.0), replace(first, command=Command.NAV_TAKEOFF, p2=0.0, alt_m=10.0), *rest]
+    screen = Screens(station).qgc
+    assert Upload(station, items).run() is A.ACCEPTED
+    world.run(0.1)
+    assert any("Home" in text for text in station.texts())
+    assert (screen.heard(), screen.dialogs) == ([], [])
 
 
 def test_a_reason_is_sent_once_per_attempt() -> None:
