@@ -38,6 +38,7 @@ from bridge.vehicle.mission_upload import STOPPED, MissionUploads
 from bridge.vehicle.mission_watch import MissionWatch
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.parameters import Parameters
+from bridge.vehicle.settings_seal import SettingsSeal
 from bridge.vehicle.vehicle_report import VehicleReporter
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.mission_item import MissionResult
@@ -88,7 +89,12 @@ class Bridge:
         self.local = LocalMissions(self.missions, self.ground, log_event, incidents)
         self.sharing = MspSharing(self.session, self.runner)
         self._vehicle = OwnVehicle(self.session, self.missions, self.ground, self._announcer, config.unix_time_s, now)
-        self.report = VehicleReporter(self.session, self.missions, self.ground, self._vehicle.also_want)
+        #: The seal of the flight controller's settings.
+        self.settings = SettingsSeal(
+            self.session, self.missions, self.ground, log_event, config.seals, lambda: self.transfer is not None
+        )
+        self.sharing.on_change = self.settings.changed_here
+        self.report = VehicleReporter(self.session, self.missions, self.ground, self.settings, self._vehicle.also_want)
         self._uploads = MissionUploads(self.missions, self.ground, log_event, incidents, self._vehicle.let_read)
         self._watch = MissionWatch(self.missions, self.ground, log_event)
         downloads = MissionDownloads(self.missions, self.ground)
@@ -157,6 +163,8 @@ class Bridge:
             self._uploads.tick(now)
         if now >= self._watch.due:
             self._watch.tick(now)
+        if now >= self.settings.due:
+            self.settings.tick(now)
         if now >= self.ground.stations.due:
             for peer in self.ground.expire(now):
                 self._incoming.forget(peer)
@@ -173,6 +181,7 @@ class Bridge:
             self.ground.stations.due,
             self._announcer.due,
             self._watch.due,
+            self.settings.due,
             inf if self.is_passing_through else self._vehicle.due,
         )
 
@@ -195,6 +204,7 @@ class Bridge:
         vehicle = self.session.vehicle
         passes = controller is not None and controller.profile.spoken is Spoken.OTHER_MAVLINK
         self._incoming.routes = Routes(self.ground) if passes else None
+        self.settings.found(controller, now)
         if controller is None:
             trouble = self.session.state.trouble
             self.missions.use(Refusal(MissionResult.DENIED, trouble) if trouble else NO_LINK, now, is_same_board=True)

@@ -10,6 +10,7 @@ from bridge.fc.profile import Profile, RuleSettings
 from bridge.gcs.guard import LinkAccess
 from bridge.model.autopilot import Autopilot
 from bridge.model.flight_memory import FlightMemory
+from bridge.model.settings import SealMemory, SealsOfThisRun
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +20,7 @@ class BridgeConfig:
     `version`: of the bridge itself. `unix_time_s`: the time of day at a monotonic time, None if unknown.
     `links`: access rules by link name; every station may write over other links. `passes_everything`: an autopilot
     that speaks MAVLink itself gets commands over those other links, too. `flight`: of the craft that a former bridge
-    left armed.
+    left armed. `seals`: of the settings of the boards seen before.
     """
 
     speeds: Sequence[int | None]
@@ -33,3 +34,4 @@ class BridgeConfig:
     unix_time_s: Callable[[float], float | None] = lambda _now: None
     passes_everything: bool = False
     flight: FlightMemory | None = None
+    seals: SealMemory = field(default_factory=SealsOfThisRun)

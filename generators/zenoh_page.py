@@ -33,6 +33,7 @@ _INNER = {
     "findings": "finding",
     "missions": "stored mission",
     "mission": "mission",
+    "settings": "settings",
     "positions": "logged position",
     "events": "event",
 }

@@ -28,6 +28,8 @@ class MspSharing:
         self._session = session
         self._runner = runner
         self._pending = 0
+        #: Called after a request that may have changed settings.
+        self.on_change: Callable[[float], None] = lambda _now: None
 
     def request(self, frame: MspFrame, answer: Callable[[MspFrame], None], now: float, *, may_write: bool) -> str:
         """Forward a request; `answer` gets the reply, or is not called if the flight controller does not reply."""
@@ -36,8 +38,12 @@ class MspSharing:
             return why
         self._pending += 1
 
-        def done(reply: MspFrame | LinkLost | None, _at: float) -> None:
+        is_change = self._right(frame).effect is Effect.CHANGE
+
+        def done(reply: MspFrame | LinkLost | None, at: float) -> None:
             self._pending -= 1
+            if is_change:
+                self.on_change(at)
             if isinstance(reply, MspFrame):
                 answer(reply)
 

@@ -123,6 +123,14 @@ class MissionIdentity:
 
 
 @dataclass(frozen=True, slots=True)
+class SettingsIdentity:
+    """The identity of the flight controller's PIDs, modes, rates and MISC."""
+
+    seal: Annotated[str, "CRC-32 over them, 8 hexadecimal digits"]
+    changed: Annotated[str | None, "the last change that did not come through the bridge, for people"]
+
+
+@dataclass(frozen=True, slots=True)
 class VehicleReport:
     """All groups together."""
 
@@ -134,3 +142,4 @@ class VehicleReport:
     status: Status
     link: Link
     mission: MissionIdentity | None
+    settings: SettingsIdentity | None

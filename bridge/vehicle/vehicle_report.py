@@ -33,9 +33,11 @@ from bridge.model.vehicle_groups import (
     MissionIdentity,
     Position,
     Rc,
+    SettingsIdentity,
     Status,
     VehicleReport,
 )
+from bridge.vehicle.settings_seal import SettingsSeal
 from protocols.msp.telemetry import Sensor
 
 #: The readings of each group, and their poll intervals while the group is watched, seconds. A group is published when
@@ -61,11 +63,13 @@ class VehicleReporter:
         session: FcSession,
         missions: MissionService,
         ground: Ground,
+        settings: SettingsSeal,
         want: Callable[[Mapping[type[Reading], float]], None],
     ) -> None:
         self._session = session
         self._missions = missions
         self._ground = ground
+        self._settings = settings
         self._want = want
         #: Ages count up to this time, monotonic s.
         self.now = 0.0
@@ -101,7 +105,10 @@ class VehicleReporter:
     def whole(self) -> VehicleReport:
         held = self._missions.held
         mission = None if held is None else MissionIdentity(held.identity.count, f"{held.identity.checksum:08x}")
-        return VehicleReport(**{group.value: self.group(group) for group in Group}, mission=mission)
+        settings = None
+        if (sealed := self._settings.state) is not None:
+            settings = SettingsIdentity(str(sealed.seal), None if sealed.change is None else sealed.change.text())
+        return VehicleReport(**{group.value: self.group(group) for group in Group}, mission=mission, settings=settings)
 
     def _last(self, kind: type[ReadingT]) -> ReadingT | None:
         return self._session.vehicle.last(kind)

@@ -10,6 +10,7 @@ class Msp(IntEnum):
     API_VERSION = 1
     FC_VARIANT = 2
     FC_VERSION = 3
+    MODE_RANGES = 34
     IDENT = 100
     STATUS = 101
     RAW_IMU = 102
@@ -19,15 +20,24 @@ class Msp(IntEnum):
     ATTITUDE = 108
     ALTITUDE = 109
     ANALOG = 110
+    RC_TUNING = 111
+    PID = 112
     BOX = 113
+    MISC = 114
     BOXNAMES = 116
+    PIDNAMES = 117
     WP = 118
     BOXIDS = 119
     NAV_STATUS = 121
+    UID = 160
     RTC = 246
     INAV_STATUS = 0x2000
     INAV_ANALOG = 0x2002
+    INAV_MISC = 0x2003
+    INAV_RATE_PROFILE = 0x2007
     INAV_AIR_SPEED = 0x2009
+    PID_V2 = 0x2030
+    INAV_EZ_TUNE = 0x2070
 
 
 class MspAction(IntEnum):

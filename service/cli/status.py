@@ -42,6 +42,7 @@ def status_lines(facts: Json, addresses: list[str]) -> Iterator[tuple[str, str]]
         yield "GPS", _gps(facts)
         yield "Battery", "unknown" if facts["battery_v"] is None else f"{facts['battery_v']:.1f} V"
         yield "Mission", _mission(facts)
+        yield "Settings", _settings(facts)
         if facts["round_trip_ms"] is not None:
             lost = f"{facts['requests_lost']} requests lost, {facts['bad_checksums']} bad checksums"
             yield "Serial line", f"round trip {facts['round_trip_ms']} ms, {lost}"
@@ -94,6 +95,14 @@ def _mission(facts: Json) -> str:
     if count is None:
         return "not read yet"
     return f"{count} records, checksum {facts['mission_checksum']}" if count else "none stored"
+
+
+def _settings(facts: Json) -> str:
+    if facts["settings_seal"] is None:
+        return "not read yet"
+    change = facts["settings_changed"]
+    told = "" if change is None else f"; {duration(facts['settings_changed_s'])} ago: {change}"
+    return f"seal {facts['settings_seal']}{told}"
 
 
 def _reachable(link: str, addresses: list[str]) -> str:

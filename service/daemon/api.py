@@ -91,6 +91,8 @@ class DaemonApi:
         daemon = self._daemon
         bridge, web = daemon.bridge, daemon.settings.web
         report = bridge.report.whole()
+        settings = bridge.settings.state
+        change = None if settings is None else settings.change
         link, mission, firmware = report.link, report.mission, bridge.session.vehicle.version
         return {
             "version": version(),
@@ -118,6 +120,9 @@ class DaemonApi:
             "store_trouble": daemon.store_trouble,
             "mission_records": None if mission is None else mission.count,
             "mission_checksum": None if mission is None else mission.checksum,
+            "settings_seal": None if settings is None else str(settings.seal),
+            "settings_changed": None if change is None else change.text(),
+            "settings_changed_s": None if change is None else round(self._loop.time() - change.at, 1),
             "round_trip_ms": link.round_trip_ms,
             "requests_lost": link.requests_lost,
             "bad_checksums": link.bad_checksums,

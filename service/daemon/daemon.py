@@ -28,6 +28,7 @@ from service.daemon.fc_connection import FcConnection
 from service.daemon.flight_file import FlightFile
 from service.daemon.gcs_connections import GcsConnections
 from service.daemon.mission_data import Json
+from service.daemon.seal_file import SealFile
 from service.daemon.store_worker import StoreWorker
 from service.links.msp_share import open_share
 from service.links.signing_state import SigningState
@@ -86,6 +87,7 @@ class Daemon:
             self._tlog = TlogRecorder(settings.state_dir / TLOG_FOLDER, settings.tlog)
         host = host or Host()
         self._flight = FlightFile(settings.state_dir, str(settings.fc), host)
+        self._seals = SealFile(settings.state_dir, lambda: self.fc.where)
         self._signing = SigningState(settings.state_dir, settings.gcs, settings.access)
         self.bridge = Bridge(
             BridgeConfig(
@@ -98,6 +100,7 @@ class Daemon:
                 unix_time_s=lambda now: time.time() - self._loop.time() + now,
                 passes_everything=settings.pass_through is PassThroughRule.EVERYTHING,
                 flight=self._flight.load(self._loop.time()),
+                seals=self._seals,
             ),
             self._log_event,
             self._loop.time(),
@@ -135,7 +138,7 @@ class Daemon:
             if self._tlog is not None:
                 stack.callback(self._tlog.close)
             stack.callback(lambda: self._flight.close(self._loop.time()))
-            for part in (self._signing, self.store, self.gcs, self.fc):
+            for part in (self._signing, self._seals, self.store, self.gcs, self.fc):
                 stack.callback(part.close)
             stack.callback(self._stop_timer)
             for address in self.settings.gcs:

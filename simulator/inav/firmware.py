@@ -16,6 +16,7 @@ from simulator.board.waypoint_craft import WaypointCraft
 from simulator.inav.boxes import ANGLE, ARM, BOXES, NAMES, NAV_ALTHOLD, NAV_RTH, NAV_WP, PLANE_BOXES
 from simulator.inav.mission import CAPACITY, FAKE, InavMission
 from simulator.inav.navigation import InavNavigation
+from simulator.inav.settings import InavSettings
 
 _PLANE = 1
 _SENSORS = 0b1000_1111  # accelerometer, barometer, compass, GPS, thermometer; bit 15 would be a failure
@@ -84,6 +85,7 @@ class InavFirmware(MspFirmware):
         self._mission = InavMission(boot.eeprom)
         self._craft = WaypointCraft()
         self._navigation = InavNavigation(self._mission, self._craft)
+        self._settings = InavSettings(has_ez_tune=self._version >= (7, 0, 0))
         self._booted_at = boot.now
         self._name = b"INAV"
         self._stick_loads = boot.faults.stick_loads
@@ -175,6 +177,8 @@ class InavFirmware(MspFirmware):
             case MspCommand.EEPROM_WRITE:
                 self._busy += 0.0 if self.armed else self._options.eeprom_write_ms / 1000
                 return self._when_disarmed(command, True)
+        if not self.armed and self._settings.write(command, payload):
+            return reply(command)
         answer = self._read(command)
         return error(command) if answer is None else reply(command, answer)
 
@@ -244,7 +248,7 @@ class InavFirmware(MspFirmware):
                 return struct.pack("<IH", int(unix_s), int(unix_s % 1 * 1000))
             case MspCommand.NAV_STATUS:
                 return self._navigation.status().pack()
-        usual = self._sensors.payload(command, craft)
+        usual = self._settings.read(command) or self._sensors.payload(command, craft)
         if command == MspCommand.RC and usual and self._clock < self._sticks_released_at:
             # Roll and pitch; the throttle is low.
             return struct.pack("<2H", _STICK_END_US, _STICK_END_US) + usual[4:]

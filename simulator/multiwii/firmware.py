@@ -143,4 +143,6 @@ class MultiWiiFirmware(MspFirmware):
                 return struct.pack("<BB5HBHHBHBB", 0x83, 3, *speeds, *limits, self._options.capacity, 0)
             case MspCommand.PID | MspCommand.BOX | MspCommand.RC_TUNING | MspCommand.MISC:
                 return self._settings[MspCommand(command)]
+            case MspCommand.PIDNAMES:
+                return b"ROLL;PITCH;YAW;ALT;Pos;PosR;NavR;LEVEL;MAG;VEL;"
         return _SENSORS.payload(command, self.craft_at(self._clock))

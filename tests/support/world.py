@@ -33,6 +33,7 @@ from bridge.gcs.station import Peer
 from bridge.line.conversation import Conclude, FindPending, NoteReader, Recall, Save, StoreEffect
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission, RecalledMission
+from bridge.model.settings import SealMemory, SealsOfThisRun
 from bridge.model.verdict import SentSeqs
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MAGIC_V1, MavlinkSplitter
@@ -145,6 +146,7 @@ class World:
         profiles: Sequence[Profile] = PROFILES,
         passes_everything: bool = False,
         on_frames: FrameListener | None = None,
+        seals: SealMemory | None = None,
     ) -> None:
         self.random = random.Random(seed)
         self.now = 0.0
@@ -162,7 +164,13 @@ class World:
         self._plugged = self._is_away = False
         self._late_s = late_s
         self._lateness_s = 0.0
-        self._config = BridgeConfig(speeds, links=links or {}, profiles=profiles, passes_everything=passes_everything)
+        self._config = BridgeConfig(
+            speeds,
+            links=links or {},
+            profiles=profiles,
+            passes_everything=passes_everything,
+            seals=seals or SealsOfThisRun(),
+        )
         self._on_frames = on_frames
         self.bridge = Bridge(self._config, self._note, self.now, on_frames)
         if powered:

@@ -36,6 +36,7 @@ export function showOverview(state) {
     ["Unanswered", known(state.link.requests_lost)],
     ["Damaged", known(state.link.bad_checksums)],
     ["Mission", state.mission === null ? "not read yet" : state.mission.count ? `${state.mission.count} records, ${state.mission.checksum}` : "none"],
+    ["Settings", state.settings === null ? "not read yet" : state.settings.changed ?? `seal ${state.settings.seal}`, state.settings?.changed ? "bad" : ""],
   ]);
   const refused = state.refused.map((text) => `refused: ${text}`);
   const links = [...rates].filter(([name]) => name !== "fc").map(([name, rate]) => `${name}: ${rate}`);

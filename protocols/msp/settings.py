@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The settings that MSP can read: PIDs, modes, rates and MISC, and the names of those in which two replies differ.
+
+Layouts: Harakiri's serial.c; MultiWii's Protocol.cpp; baseflight's serial.c; Cleanflight's and Betaflight's msp.c;
+INAV's fc_msp.c.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from protocols.msp.commands import Msp
+from protocols.rights.msp import Firmware
+
+
+class Part(Enum):
+    """A part of the settings, as named to the pilot."""
+
+    PIDS = "PIDs"
+    MODES = "modes"
+    RATES = "rates"
+    MISC = "MISC"
+
+
+#: (name, bytes) from the first byte on; "": it has no name. None: it counts by itself and is not a setting.
+Layout = Sequence[tuple[str | None, int]]
+
+
+@dataclass(frozen=True, slots=True)
+class SettingsRequest:
+    """A request for a part. `pid_size`: bytes for each PID; `layout`: of rates and MISC.
+
+    instead: a command that takes its place if the first byte of its reply is set.
+    """
+
+    part: Part
+    command: int
+    layout: Layout = ()
+    pid_size: int = 3
+    instead: int | None = None
+
+    def settings(self, payload: bytes) -> bytes:
+        """The payload with its counters as zeros."""
+        kept, at = bytearray(payload), 0
+        for name, size in self.layout:
+            if name is None:
+                kept[at : at + size] = bytes(len(kept[at : at + size]))
+            at += size
+        return bytes(kept)
+
+
+@dataclass(frozen=True, slots=True)
+class SettingNames:
+    """The flight controller's names: of the PIDs, of the boxes in the order of BOX, and by their permanent ids."""
+
+    pids: Sequence[str] = ()
+    boxes: Sequence[str] = ()
+    boxes_by_id: Mapping[int, str] | None = None
+
+
+_OLD_RATES: Layout = (
+    ("RC rate", 1), ("RC expo", 1), ("roll/pitch rate", 1), ("yaw rate", 1), ("throttle PID", 1), ("throttle mid", 1),
+    ("throttle expo", 1),
+)  # fmt: skip
+_NEW_RATES: Layout = (
+    ("RC rate", 1), ("RC expo", 1), ("roll rate", 1), ("pitch rate", 1), ("yaw rate", 1), ("throttle PID", 1),
+    ("throttle mid", 1), ("throttle expo", 1), ("TPA breakpoint", 2), ("yaw expo", 1), ("yaw RC rate", 1),
+    ("pitch RC rate", 1), ("pitch RC expo", 1),
+)  # fmt: skip
+_INAV_RATES: Layout = (
+    ("throttle mid", 1), ("throttle expo", 1), ("throttle PID", 1), ("TPA breakpoint", 2), ("RC expo", 1),
+    ("yaw expo", 1), ("roll rate", 1), ("pitch rate", 1), ("yaw rate", 1), ("manual expo", 1), ("manual yaw expo", 1),
+    ("manual roll rate", 1), ("manual pitch rate", 1), ("manual yaw rate", 1),
+)  # fmt: skip
+_THROTTLES: Layout = (("min throttle", 2), ("max throttle", 2), ("min command", 2), ("failsafe throttle", 2))
+#: plog.arm and plog.lifetime grow with each flight.
+_MULTIWII_MISC: Layout = (
+    ("power trigger", 2), *_THROTTLES, (None, 6), ("declination", 2), ("battery scale", 1), ("battery warning 1", 1),
+    ("battery warning 2", 1), ("battery critical", 1),
+)  # fmt: skip
+_NEW_MISC: Layout = (
+    ("middle", 2), *_THROTTLES, ("GPS type", 1), ("GPS speed", 1), ("SBAS", 1), ("current output", 1),
+    ("RSSI channel", 1), ("", 1), ("declination", 2), ("battery scale", 1), ("cell min", 1), ("cell max", 1),
+    ("cell warning", 1),
+)  # fmt: skip
+_INAV_MISC: Layout = (
+    ("middle", 2), *_THROTTLES, ("GPS type", 1), ("GPS speed", 1), ("SBAS", 1), ("RSSI channel", 1),
+    ("declination", 2), ("battery scale", 2), ("battery source", 1), ("cells", 1), ("cell detect", 2), ("cell min", 2),
+    ("cell max", 2), ("cell warning", 2), ("capacity", 4), ("capacity warning", 4), ("capacity critical", 4),
+    ("capacity unit", 1),
+)  # fmt: skip
+_PIDS = SettingsRequest(Part.PIDS, Msp.PID)
+#: In newer firmware 113 has the active boxes, which change in flight.
+_BOXES, _RANGES = SettingsRequest(Part.MODES, Msp.BOX), SettingsRequest(Part.MODES, Msp.MODE_RANGES)
+_RATES_7, _RATES = (SettingsRequest(Part.RATES, Msp.RC_TUNING, layout) for layout in (_OLD_RATES, _NEW_RATES))
+_MISC = SettingsRequest(Part.MISC, Msp.MISC)
+_MISC_22 = SettingsRequest(Part.MISC, Msp.MISC, _NEW_MISC)
+_NEW = (_PIDS, _RANGES, _RATES, _MISC_22)
+SETTINGS: Mapping[Firmware, tuple[SettingsRequest, ...]] = {
+    Firmware.HARAKIRI: (_PIDS, _BOXES, _RATES_7, _MISC),
+    Firmware.HARAKIRI_MISSIONS: (_PIDS, _BOXES, _RATES_7, _MISC),
+    Firmware.BASEFLIGHT: (_PIDS, _BOXES, _RATES_7, _MISC_22),
+    Firmware.MULTIWII: (_PIDS, _BOXES, _RATES_7, SettingsRequest(Part.MISC, Msp.MISC, _MULTIWII_MISC)),
+    Firmware.CLEANFLIGHT: _NEW,
+    Firmware.BETAFLIGHT: _NEW,
+    Firmware.INAV: (
+        # With EZ Tune on, each reading of the PIDs lets INAV compute them from EZ Tune's own values again.
+        SettingsRequest(Part.PIDS, Msp.PID_V2, pid_size=4, instead=Msp.INAV_EZ_TUNE),
+        _RANGES,
+        SettingsRequest(Part.RATES, Msp.INAV_RATE_PROFILE, _INAV_RATES),
+        SettingsRequest(Part.MISC, Msp.INAV_MISC, _INAV_MISC),
+    ),
+    # Its MISC may have counters, and its rates any layout.
+    Firmware.UNKNOWN: (_PIDS, _RANGES, SettingsRequest(Part.RATES, Msp.RC_TUNING)),
+}
+_RANGE_SIZE = 4
+
+
+def changed_names(request: SettingsRequest, before: bytes, after: bytes, names: SettingNames) -> tuple[str, ...]:
+    """The names of the settings in which two replies differ; none if only their sizes do, or no name is known."""
+    if len(before) != len(after):
+        return ()
+    match request.part:
+        case Part.PIDS:
+            found = _changed_items(before, after, request.pid_size, names.pids)
+        case Part.MODES if request.command == Msp.MODE_RANGES:
+            found = _changed_ranges(before, after, names.boxes_by_id or {})
+        case Part.MODES:
+            size = len(after) // len(names.boxes) if names.boxes else 0
+            found = _changed_items(before, after, size, names.boxes)
+        case Part.RATES | Part.MISC:
+            found = _changed_fields(before, after, request.layout)
+    return tuple(dict.fromkeys(name for name in found if name))
+
+
+def _changed_items(before: bytes, after: bytes, size: int, names: Sequence[str]) -> Iterator[str]:
+    for number, name in enumerate(names if size else ()):
+        place = slice(number * size, (number + 1) * size)
+        if before[place] != after[place]:
+            yield name
+
+
+def _changed_fields(before: bytes, after: bytes, layout: Layout) -> Iterator[str]:
+    at = 0
+    for name, size in layout:
+        if before[at : at + size] != after[at : at + size]:
+            yield name or ""
+        at += size
+
+
+def _changed_ranges(before: bytes, after: bytes, names: Mapping[int, str]) -> Iterator[str]:
+    """MODE_RANGES: permanent id, aux channel, first and last step of each range; it may stand at any place."""
+    first, second = (_ranges(payload) for payload in (before, after))
+    for number in sorted(first.keys() | second.keys()):
+        if first.get(number) != second.get(number):
+            yield names.get(number, f"mode {number}")
+
+
+def _ranges(payload: bytes) -> Mapping[int, list[bytes]]:
+    found: dict[int, list[bytes]] = {}
+    for at in range(0, len(payload) - _RANGE_SIZE + 1, _RANGE_SIZE):
+        number, channel, first, last = payload[at : at + _RANGE_SIZE]
+        if first < last:  # else it is unused
+            found.setdefault(number, []).append(bytes((channel, first, last)))
+    return {number: sorted(ranges) for number, ranges in found.items()}
