@@ -326,6 +326,7 @@ def test_status_shows_the_flight_controller_and_the_address(daemon: Daemon) -> N
     assert ", firmware 2.1.1, on sim:, MSP" in lines["Flight controller"]
     assert ", for " in lines["Flight controller"]
     assert "disarmed" in lines["Vehicle"]
+    assert lines["Settings"].strip() in ("not read yet", f"seal {(daemon.status() or {})['settings_seal']}")
     assert lines["Connect to"].strip() == f"UDP 127.0.0.1, port {daemon.port}"
 
 

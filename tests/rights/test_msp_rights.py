@@ -34,6 +34,7 @@ from protocols.msp.nav import (
     encode_read_wp,
     encode_set_wp,
 )
+from protocols.msp.settings import SETTINGS
 from protocols.rights.effect import Effect
 from protocols.rights.msp import MSP_RIGHTS, Firmware, msp_right
 
@@ -46,6 +47,8 @@ LIST = ListIdentity(2, 0x12345678)
 RECORDS = [WpRecord(453838000, 84733000, 20, 0, 0, 2, 0, 0)] * MAX_CHUNK_RECORDS
 
 #: Every frame that the bridge can send, with the firmware it sends it to.
+#: Their chip's number can be read.
+NUMBERED = (Firmware.BASEFLIGHT, Firmware.CLEANFLIGHT, Firmware.BETAFLIGHT, Firmware.INAV, Firmware.UNKNOWN)
 READS: list[tuple[Iterable[Firmware], bytes]] = [
     (EVERY, PROBE),
     (EVERY, RESYNC),
@@ -65,6 +68,10 @@ READS: list[tuple[Iterable[Firmware], bytes]] = [
     (NAV, encode_read_wp(0)),
     (HARAKIRI, INFO_REQUEST),
     (MISSIONS, encode_read(0, 15)),
+    *(((firmware,), request(wanted.command)) for firmware, parts in SETTINGS.items() for wanted in parts),
+    (INAV, request(Msp.INAV_EZ_TUNE)),
+    (EVERY, request(Msp.PIDNAMES)),
+    (NUMBERED, request(Msp.UID)),
 ]
 CHANGES: list[tuple[Iterable[Firmware], bytes]] = [
     *((set(EVERY) - {Firmware.UNKNOWN}, request(action)) for action in MspAction),
