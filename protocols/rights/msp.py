@@ -11,8 +11,8 @@ Betaflight; src/main/fc/fc_msp.c of INAV.
 """
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
 from enum import Enum
+from typing import NamedTuple
 
 from protocols.rights.effect import Effect
 
@@ -30,8 +30,7 @@ class Firmware(Enum):
     UNKNOWN = "any other"
 
 
-@dataclass(frozen=True, slots=True)
-class MspRight:
+class MspRight(NamedTuple):
     """The effect of a request. lengths: of its payload, bytes. reply: the largest payload of its reply.
 
     only: the payloads with this effect, if not every one of these lengths has it. otherwise: the effect of the others.
@@ -61,7 +60,7 @@ def msp_right(firmware: Firmware, command: int, payload: bytes) -> MspRight:
         names = (rights[command].name for rights in MSP_RIGHTS.values() if command in rights)
         return MspRight(next(names, f"command {command}"), Effect.UNKNOWN)
     effect = right.effect_of(payload)
-    return right if effect is right.effect else replace(right, effect=effect)
+    return right if effect is right.effect else right._replace(effect=effect)
 
 
 def _reads(**rows: tuple[int, ...]) -> Rights:
@@ -221,7 +220,7 @@ _BETAFLIGHT: Rights = {
 }  # fmt: skip
 #: Only later versions understand v2; the first ones have the buffer of MultiWii.
 _CLEANFLIGHT: Rights = {
-    command: replace(right, lengths=range(_BUFFER + 1)) if right.effect is Effect.CHANGE else right
+    command: right._replace(lengths=range(_BUFFER + 1)) if right.effect is Effect.CHANGE else right
     for command, right in _BETAFLIGHT.items()
     if command < 256
 }
