@@ -34,7 +34,7 @@ def test_load_list_save_and_clear_work(shared: Bench, tmp_path: Path, version: s
 def test_float_items_parameters_and_refusals_work(shared: Bench, tmp_path: Path) -> None:
     plan = mixed_plan(20)
     with MavProxy(tmp_path, shared.daemon.port) as mavproxy:
-        mavproxy.wait_for("Received 2 parameters")
+        mavproxy.wait_for("Received 36 parameters")
         mavproxy.type("set wp_use_mission_int False")
         mavproxy.load(plan)
         mavproxy.wait_for("TYPE_MISSION: ACCEPTED")
