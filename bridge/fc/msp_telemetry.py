@@ -62,6 +62,8 @@ POLL_FOR: Mapping[type[Reading], Msp] = {
 }
 _MAX_RSSI = 1020
 _STATUS_FLAGS = 32
+#: RAW_IMU's acceleration on Harakiri, INAV and MultiWii.
+_ONE_G = 512
 #: A craft may turn the other way by then.
 _RATES_STALE_S = 0.3
 
@@ -181,10 +183,11 @@ def _motor(vehicle: Vehicle, payload: bytes, _controller: FlightController, now:
         vehicle.hear(Motors(now, Source.MSP, outputs))
 
 
-def _raw_imu(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
+def _raw_imu(vehicle: Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
     imu = decode_raw_imu(payload)
     if imu is not None:
-        vehicle.hear(ImuSample(now, Source.MSP, imu.acc, imu.gyro, imu.mag))
+        forward, right, down = (round(sign * imu.acc[at] * 1000 / _ONE_G) for at, sign in controller.profile.acc_axes)
+        vehicle.hear(ImuSample(now, Source.MSP, (forward, right, down), imu.gyro, imu.mag))
 
 
 def _box(vehicle: Vehicle, payload: bytes, controller: FlightController, now: float) -> None:

@@ -26,7 +26,7 @@ FrameListener = Callable[[Sequence[bytes]], None]
 
 
 class Ground:
-    """All ground stations together. `on_newcomer` is called when a peer is heard for the first time.
+    """All ground stations together. `on_newcomer` is called for a peer that is new or returns after a silence.
 
     `standing`: a peer's rights (bridge.gcs.guard). One that may only read gets telemetry and answers, but no texts
     for everyone, and is not recorded.
@@ -156,10 +156,11 @@ class Ground:
         """Note a frame from a peer, which counts as connected from now on."""
         self.frames_received[peer.link, frame.msgid] += 1
         station = Station(peer, frame.sysid, frame.compid)
-        is_listener = self._standing(peer) is Standing.LISTENER
+        is_listener, is_unknown = self._standing(peer) is Standing.LISTENER, self.stations.is_unknown(peer)
         if self.stations.heard(station, frame.version, now, is_listener=is_listener):
             self._everyone = None
-            self._log_event("info", "gcs.found", station=str(station))
+            if is_unknown:
+                self._log_event("info", "gcs.found", station=str(station))
             self._on_newcomer(peer)
             if self.notice:
                 self.say(Severity.WARNING, self.notice, station)

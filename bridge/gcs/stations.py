@@ -15,6 +15,8 @@ from bridge.gcs.station import Peer, Station
 EXPIRY_S = 60.0
 #: The same for a peer whose ids have all moved to another address, as after Wi-Fi roaming.
 MOVED_S = 5.0
+#: After such a silence a station may have been restarted: all send a heartbeat each second.
+_RETURNS_S = 3.0
 #: The minimum interval between searches for silent peers.
 _EXPIRY_INTERVAL_S = 1.0
 #: Peers on one link: as many as a network has hosts whose addresses differ in the last byte.
@@ -160,9 +162,9 @@ class Stations:
         return has_come_before
 
     def heard(self, station: Station, version: int, now: float, *, is_listener: bool = False) -> bool:
-        """Note a frame from a station; True if its peer is new."""
+        """Note a frame from a station; True if its peer is new, or returns after a silence, perhaps restarted."""
         known = self._known.get(station.peer)
-        is_new = known is None
+        is_new = known is None or now >= known.heard_at + _RETURNS_S
         if known is None or known.places.is_listener != is_listener:
             known = self._add(station.peer, version, is_listener, now)
         known.heard_at = now

@@ -193,9 +193,9 @@ class Pressure(Reading):
 
 @dataclass(slots=True)
 class ImuSample(Reading):
-    """Accelerometer, gyro and compass in the firmware's own units: x, y, z each."""
+    """acc_mg: forward, right, down, 1/1000 g; at rest 0, 0, -1000. Gyro and compass: in the firmware's own units."""
 
-    acc: tuple[int, int, int]
+    acc_mg: tuple[int, int, int]
     gyro: tuple[int, int, int]
     mag: tuple[int, int, int]
 

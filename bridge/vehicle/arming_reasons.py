@@ -20,7 +20,7 @@ _PREFIX = "PreArm: "
 
 
 class ArmingReasons:
-    """Knows the reasons, and tells them when they change, to newcomers, and every 30 s while they hold."""
+    """Knows the reasons, and tells them when they change, and every 30 s while they hold."""
 
     def __init__(self, session: FcSession, announcer: LinkAnnouncer, ground: Ground) -> None:
         self._session = session
@@ -45,13 +45,9 @@ class ArmingReasons:
         for line in lines:
             self._ground.say(Severity.WARNING, line)
 
-    def renew(self) -> None:
-        """Tell them again: there is a newcomer."""
-        self._told_at = -inf
-
     def tell(self, station: Station) -> None:
-        """Answer MAV_CMD_RUN_PREARM_CHECKS."""
-        for line in prearm_lines(self.current):
+        """Tell them to a newcomer, or in answer to MAV_CMD_RUN_PREARM_CHECKS."""
+        for line in self._told:
             self._ground.say(Severity.WARNING, line, station)
 
     def _find(self, now: float) -> tuple[str, ...]:

@@ -133,6 +133,7 @@ class CommandService:
                 controller = self._session.state.controller
                 name = "no flight controller" if controller is None else controller.name
                 self._ground.say(Severity.INFO, f"naze-bridge {self._version}: {name}", station)
+                self._vehicle.send_once(station, messages.MAVLINK_MSG_ID_HOME_POSITION)
                 return CommandResult.ACCEPTED
             case messages.MAV_CMD_PREFLIGHT_STORAGE if params[0] == 1:
                 # Mission Planner sends it 10 s after any PARAM_SET, also in flight. Every change is written at once.

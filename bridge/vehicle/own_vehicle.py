@@ -36,8 +36,6 @@ _TICK_S = 1.0
 _POLLS_INTERVAL_S = 0.25
 #: Mission Planner needs two heartbeats to connect: a newcomer gets one every 0.2 s for 3 s.
 _NEWCOMER_S, _NEWCOMER_INTERVAL_S = 3.0, 0.2
-#: Home and arming blockers are repeated for newcomers at most this often, s.
-_REPEAT_S = 5.0
 #: Without a reading for this long, SYS_STATUS is sent anyway, to report that nothing is known.
 _SILENT_S = 3.0
 #: Longer than MAVSDK waits for a changed MISSION_CURRENT (2.5 s), and Mission Planner between two tries (2 s).
@@ -77,9 +75,8 @@ class OwnVehicle:
         self._rates = MessageRates({row.msgid: row.interval_s for row in TELEMETRY})
         self._progress = MissionProgress()
         self._announced_home: Home | None = None
-        #: True while a newcomer waits for home and the arming blockers.
-        self._is_news_wanted = False
-        self._repeated_at = -inf
+        #: Newcomers that wait for home and the reasons not to arm.
+        self._uninformed: dict[Peer, None] = {}
         self._also_wanted: Mapping[type[Reading], float] = {}
         self._stale_s: Mapping[type[Reading], float] = {}
         #: New ground stations, and the end of their faster heartbeats.
@@ -90,8 +87,8 @@ class OwnVehicle:
         self._announced: tuple[bool | None, FlightMode | str | None, bool, bool] | None = None
 
     def newcomer(self, peer: Peer) -> None:
-        """Send a new ground station more heartbeats, so that it connects sooner, and HOME_POSITION within 5 s."""
-        self._is_news_wanted = True
+        """Send a new ground station more heartbeats, so that it connects sooner, then home and why it cannot arm."""
+        self._uninformed[peer] = None
         if len(self._newcomers) < PRECEDENCE:  # to a crowd, one a second
             self._newcomers[peer] = self._ground.now + _NEWCOMER_S
         self._newcomers_due = min(self._newcomers_due, self._ground.now + _NEWCOMER_INTERVAL_S)
@@ -121,17 +118,24 @@ class OwnVehicle:
         if self._session.vehicle.fresh(Health, now, _SILENT_S) is None:
             # No reading triggers it now: the flight controller is lost, or sends FrSky telemetry.
             self._send_due((_SYS_STATUS,))
-        if self._is_news_wanted and now >= self._repeated_at + _REPEAT_S:
-            self._is_news_wanted, self._repeated_at = False, now
-            self._announced_home = None
-            self.arming_reasons.renew()
         self._announce_home()
+        self._inform_newcomers(everyone)
 
     def _greet(self, now: float) -> None:
         self._newcomers = {peer: until for peer, until in self._newcomers.items() if now < until}
         self._newcomers_due = now + _NEWCOMER_INTERVAL_S if self._newcomers else inf
         newcomers = [peer for peer in self._ground.everyone() if peer in self._newcomers]
         self._ground.beat(self._heartbeat(), newcomers)
+
+    def _inform_newcomers(self, everyone: Sequence[Peer]) -> None:
+        """Tell home and the reasons not to arm: to a crowd, each second to some."""
+        peers = [peer for peer in [*self._uninformed][:PRECEDENCE] if self._uninformed.pop(peer, True) is None]
+        peers = [peer for peer in peers if peer in everyone]
+        for message in self._moment().made((make.home_position,)) if peers else ():
+            self._ground.multicast(pack(message), peers)
+        for peer in peers:
+            if not self._ground.stations.is_listener(peer):
+                self.arming_reasons.tell(Station(peer, 0, 0))
 
     def heard(self, news: Collection[type[Reading]], now: float) -> None:
         """Send the messages that new readings trigger, where due."""
@@ -175,7 +179,8 @@ class OwnVehicle:
             if not made:
                 return None
         elif msgid == messages.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
-            made = [make.autopilot_version(self._session.vehicle)]
+            # A restarted station would otherwise show home at 0, 0.
+            made = [make.autopilot_version(self._session.vehicle), *self._moment().made((make.home_position,))]
         elif (row := _ROWS.get(msgid)) is not None:
             made = self._moment(self._sent_seqs(station.peer)).made(row.makers)
         else:

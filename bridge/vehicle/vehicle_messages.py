@@ -407,9 +407,10 @@ def rc_channels_raw(at: Moment) -> Message:
 
 
 def raw_imu(at: Moment) -> Message:
-    """RAW_IMU: in the flight controller's own scale."""
+    """RAW_IMU: 1/1000 g; gyro and compass in the flight controller's own scale."""
     imu = at.need(ImuSample)
-    return messages.MAVLink_raw_imu_message(at.boot_ms * 1000, *imu.acc, *imu.gyro, *imu.mag)
+    acc_mg = (_fit(axis, 16) for axis in imu.acc_mg)
+    return messages.MAVLink_raw_imu_message(at.boot_ms * 1000, *acc_mg, *imu.gyro, *imu.mag)
 
 
 def servo_output_raw(at: Moment) -> Message:

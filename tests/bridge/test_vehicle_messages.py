@@ -323,6 +323,24 @@ def test_body_rates_come_from_inavs_gyro() -> None:
             assert told_rates == pytest.approx(rates, nan_ok=True)
 
 
+@pytest.mark.parametrize(
+    ("who", "acc", "shown"),
+    [
+        (INAV, (0, 0, 512), (0, 0, -1000)),
+        (INAV, (128, 256, 384), (250, -500, -750)),  # forward, left, up
+        (HARAKIRI, (256, 128, 384), (250, -500, -750)),  # left, forward, up
+        (BETAFLIGHT, (0, 0, 32767), (0, 0, -32768)),
+    ],
+)
+def test_acceleration_at_rest_is_upward_in_mavlinks_axes(
+    who: FlightController, acc: tuple[int, ...], shown: tuple[int, ...]
+) -> None:
+    state = with_replies(Vehicle(), who, RAW_IMU=struct.pack("<9h", *acc, 1, 2, 3, 4, 5, 6))
+    imu = make.raw_imu(at(state))
+    assert (imu.xacc, imu.yacc, imu.zacc) == shown
+    assert (imu.xgyro, imu.ymag) == (1, 5)
+
+
 def test_rates_are_unknown_once_the_gyro_is_silent() -> None:
     state = with_replies(Vehicle(), INAV, RAW_IMU=struct.pack("<9h", 0, 0, 512, 90, 45, -30, 0, 0, 0))
     hear_msp(state, MspFrame(Direction.REPLY, Msp.ATTITUDE, attitude()), INAV, 1.0)

@@ -28,6 +28,7 @@ NOT_LEVEL, RC_LINK = 1 << 8, 1 << 18
 #: INAV's permanent number of the box.
 FAILSAFE = 27
 NOT_FOUND = "No flight controller found: check power, wiring"
+HEARTBEAT = m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3)
 Indoors = tuple[World, GroundStation, Screens]
 LOST, LOST_ON_GROUND = "Flight controller lost: silent for", "PreArm: flight controller lost"
 
@@ -98,6 +99,32 @@ class TestConnecting:
             ask(station, m.MAVLink_command_long_message(1, 1, 511, 0, msgid, -1, 0, 0, 0, 0, 0))
         world.run(10)
         assert all(is_quiet(glance) for glance in screens.look())
+
+    def test_a_restarted_station_is_greeted_again(self) -> None:
+        """Mission Planner on a known endpoint: home stays at 0, 0 until HOME_POSITION comes."""
+        world, _, _ = inav(NOT_LEVEL)
+        before = GroundStation(world, "restarted")
+        before.send(HEARTBEAT)
+        world.run(20)
+        again = GroundStation(world, "restarted")
+        again.send(HEARTBEAT)
+        world.run(1.1)
+        assert len(again.messages("HEARTBEAT")) >= 5
+        assert again.messages("HOME_POSITION")
+        assert again.texts() == ["PreArm: not level"]
+
+    def test_a_station_that_is_never_silent_is_greeted_once(self) -> None:
+        world, station, _ = on_the_ground()
+        station.take()
+        world.run(20)
+        assert len(station.messages("HEARTBEAT")) == pytest.approx(20, abs=1)
+
+    @pytest.mark.parametrize("asked", [m.MAV_CMD_DO_SEND_BANNER, m.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES])
+    def test_home_comes_with_the_version_and_the_banner(self, asked: int) -> None:
+        _, station, _ = on_the_ground()
+        station.take()
+        ask(station, command(asked, 1))
+        assert len(station.messages("HOME_POSITION")) == 1
 
 
 class TestLostFlightController:

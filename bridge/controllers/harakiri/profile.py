@@ -27,6 +27,10 @@ _CAPABILITY = 0x80000000
 _OWN_BOX = "GTUNE"
 
 
+#: Its own axes are left, forward and up (imu.c).
+_ACC_AXES = ((1, 1), (0, -1), (2, -1))
+
+
 def _recognise_patched(board: Interview) -> Conversation[FlightController | None]:
     harakiri = yield from _recognise_unpatched(board)
     if harakiri is None:
@@ -56,6 +60,7 @@ PATCHED = Profile(
     recognise=_recognise_patched,
     missions=HarakiriMissions,
     polls=(*POLLS, BOX_POLL),
+    acc_axes=_ACC_AXES,
     check_kind="harakiri",
     rules=harakiri_rules,
     restarts_after_calibration=True,
@@ -66,6 +71,7 @@ UNPATCHED = Profile(
     _FAMILY,
     recognise=_recognise_unpatched,
     polls=(*POLLS, BOX_POLL),
+    acc_axes=_ACC_AXES,
     missions=Refusal(MissionResult.UNSUPPORTED, "This Harakiri lacks the mission patch"),
     restarts_after_calibration=True,
     arming_blockers=arming_blockers,
