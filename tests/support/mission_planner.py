@@ -140,6 +140,13 @@ class MissionPlanner:
                 self._note(message)
         return True
 
+    def _discard(self) -> None:
+        """Lose the packets that came while no loop was waiting: its reader passes on only what is waited for."""
+        deadline = time.monotonic() + 0.05
+        while self._receive(deadline):
+            pass
+        self._router.clear()
+
     def _note(self, message: Message) -> None:
         """Process a packet before any loop gets it."""
         self.received.append(message)
@@ -382,6 +389,7 @@ class MissionPlanner:
 
     def _start_upload(self, count: int) -> None:
         """MISSION_COUNT, 700 ms x 4. A request for item 0 or 1 means "continue", and so does ANY ack."""
+        self._discard()
         for _ in range(4):
             self.send(messages.MAVLink_mission_count_message(*self._target, count, 0))
             for message in self._packets(0.7):
