@@ -32,7 +32,7 @@ def flying() -> tuple[World, GroundStation]:
     world.run(7)
     station = GroundStation(world)
     # A new station gets HOME_POSITION within a second: that is not a reply.
-    station.send(m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3))
+    station.stay_connected()
     world.run(1.2)
     return world, station
 

@@ -10,7 +10,6 @@ for glance in screens.look():
 from dataclasses import dataclass
 
 from protocols.mavlink.dialect import Message
-from protocols.mavlink.dialect import messages as m
 from tests.support.mission_planner_screen import MissionPlannerScreen
 from tests.support.qgc_screen import QgcScreen
 from tests.support.world import GroundStation
@@ -48,8 +47,7 @@ class Screens:
         for at, message in station.received:
             self._take(at, message)
         station.on_message.append(lambda message: self._take(self._world.now, message))
-        self._station = station
-        self._beat()
+        station.stay_connected()
 
     def glance(self) -> Glance:
         """What the pilot reads now."""
@@ -73,11 +71,6 @@ class Screens:
             self._world.run(began + after - self._world.now)
             glances.append(self.glance())
         return glances
-
-    def _beat(self) -> None:
-        """A heartbeat each second, as both send it."""
-        self._station.send(m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3))
-        self._world.after(1.0, self._beat)
 
     def _take(self, at: float, message: Message) -> None:
         self.mission_planner.take(at, message)

@@ -417,6 +417,11 @@ class GroundStation:
         data = self.pack(message)
         self._transmit(lambda: self.world.receive_from(self, data))
 
+    def stay_connected(self) -> None:
+        """Send a heartbeat each second from now on."""
+        self.send(messages.MAVLink_heartbeat_message(messages.MAV_TYPE_GCS, messages.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3))
+        self.world.after(1.0, self.stay_connected)
+
     def sign(self, key: bytes, timestamp: int, link_id: int = 0) -> None:
         signing = self._mavlink.signing
         signing.secret_key, signing.timestamp, signing.link_id, signing.sign_outgoing = key, timestamp, link_id, True
