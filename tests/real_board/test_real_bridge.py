@@ -11,7 +11,7 @@ from bridge.fc.states.msp import Identifying, Polling
 from protocols.mission_item import MissionItem, MissionResult
 from simulator.emulated_naze.board import EmulatedNaze
 from simulator.emulated_naze.image import Image
-from tests.support.conversations import Upload, records_of, waypoints
+from tests.support.conversations import Download, Upload, records_of, waypoints
 from tests.support.real_bench import Figure, RealBench
 from tests.support.world import GroundStation, World
 
@@ -103,6 +103,31 @@ def test_arming_into_mavlink_on_a_slow_line(image: Image, flash: bytes, figure: 
         _FOUND_WITHIN_S,
     )
     figure(f"armed at {_SLOW_BAUD} baud with tele_prot {tele_prot}", f"found in {found_s:.1f} s, MSP in {back_s:.1f} s")
+
+
+@pytest.mark.parametrize("tele_prot", [0, 2])
+def test_the_mission_is_readable_while_armed(image: Image, flash: bytes, figure: Figure, tele_prot: int) -> None:
+    """Over MSP it is read from the armed board; over MAVLink, which refuses that, it is the list as verified before."""
+    bench = RealBench(image, flash)
+    bench.configure(tele_prot=tele_prot)
+    world = World(peer=EmulatedNaze(image, flash=memoryview(bytearray(bench.flash))))
+    world.wait_ready()
+    assert Upload(GroundStation(world, "writer"), _NEW).run() is MissionResult.ACCEPTED
+    world.naze.faults.armed = True
+    world.wait_until(lambda w: w.naze.armed, _STICKS_S)
+    world.wait_until(lambda w: w.is_found and w.bridge.session.vehicle.armed is True, _FOUND_WITHIN_S)
+    world.run(_SETTLED_S)
+    if tele_prot == 0:
+        world.bridge.missions.held = None
+    operations, began = world.naze.flash_operations, world.now
+    download = Download(GroundStation(world, "reader", sysid=254))
+    items = download.run()
+    figure(f"{len(_NEW)} items read armed with tele_prot {tele_prot}", f"in {world.now - began:.2f} s")
+    assert download.result is None
+    assert [(item.lat_e7, item.lon_e7, item.alt_m) for item in items] == [
+        (item.lat_e7, item.lon_e7, item.alt_m) for item in _NEW
+    ]
+    assert (world.naze.armed, world.naze.flash_operations) == (True, operations)
 
 
 def joined_texts(station: GroundStation) -> str:
