@@ -45,7 +45,7 @@ WRITES = READS | {
 #: Commands that also act without a target field.
 MOVES = {
     "MANUAL_CONTROL", "SERIAL_CONTROL", "HIL_STATE", "HIL_SENSOR", "HIL_GPS", "HIL_RC_INPUTS_RAW", "GPS_INPUT",
-    "GPS_RTCM_DATA", "MANUAL_SETPOINT", "RADIO_STATUS", "RADIO",
+    "GPS_RTCM_DATA", "MANUAL_SETPOINT", "RADIO_STATUS", "RADIO", "VISION_POSITION_ESTIMATE",
 }  # fmt: skip
 
 
@@ -61,9 +61,9 @@ def on_link(station: GroundStation, link: str) -> GroundStation:
     return station
 
 
-def passing(links: dict[str, LinkAccess], sysid: int = 1) -> tuple[World, Autopilot]:
+def passing(links: dict[str, LinkAccess], sysid: int = 1, *, everything: bool = False) -> tuple[World, Autopilot]:
     autopilot = Autopilot(sysid)
-    world = World(peer=autopilot, links=links)
+    world = World(peer=autopilot, links=links, passes_everything=everything)
     world.wait_until(lambda w: w.kind is other.OTHER_MAVLINK, 3)
     world.run(1.5)
     autopilot.received.clear()
@@ -254,6 +254,55 @@ def test_no_message_is_silenced_over_an_open_link(interval_us: float, as_int: bo
     rest = (30, interval_us, 0, 0, 0, 0, 0)
     message = m.MAVLink_command_int_message(1, 1, 0, 511, 0, 0, *rest) if as_int else None
     stranger.send(message or m.MAVLink_command_long_message(1, 1, 511, 0, *rest))
+    world.run(0.1)
+    assert bytes(autopilot.received) == b""
+    assert stranger.texts() == []
+
+
+@pytest.mark.parametrize("as_int", [False, True])
+def test_items_outside_a_list_need_a_proven_station(as_int: bool) -> None:
+    """current 2 is Mission Planner's "fly to here", 3 its "change altitude"."""
+    world, autopilot = passing({})
+    make = m.MAVLink_mission_item_int_message if as_int else m.MAVLink_mission_item_message
+    stranger = GroundStation(world)
+    for current in (0, 1, 2, 3, 4, 255):
+        stranger.send(make(1, 1, 0, 3, 16, current, 1, 0, 0, 0, 0, 1, 1, 9.0))
+    world.run(0.1)
+    assert [message.current for message in decoded(bytes(autopilot.received))] == [0, 1]
+
+
+def test_a_listener_asks_for_the_time_but_does_not_tell_it() -> None:
+    world, autopilot = passing({"udp": LinkAccess(signing())})
+    stranger = GroundStation(world)
+    for tc1, ts1 in ((0, 5), (7, 0), (7, 5), (-1, 5)):
+        stranger.send(m.MAVLink_timesync_message(tc1, ts1))
+    world.run(0.1)
+    assert [(message.tc1, message.ts1) for message in decoded(bytes(autopilot.received))] == [(0, 5)]
+
+
+def test_passing_everything_gives_listeners_no_more() -> None:
+    """The setting is for links that require nothing."""
+    world, autopilot = passing({"keyed": LinkAccess(signing())}, everything=True)
+    listener, other_station = on_link(GroundStation(world, "listener"), "keyed"), GroundStation(world, "other", sysid=7)
+    other_station.send(HELLO)
+    world.run(0.1)
+    autopilot.received.clear()
+    other_station.take()
+    for message in (HELLO, m.MAVLink_mission_request_list_message(1, 1), m.MAVLink_param_request_list_message(0, 0)):
+        listener.send(message)
+    world.run(0.1)
+    assert [message.get_type() for message in decoded(bytes(autopilot.received))] == ["PARAM_REQUEST_LIST"]
+    assert [message for message in other_station.messages() if message.get_srcSystem() != 1] == []
+    other_station.send(m.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0))
+    world.run(0.1)
+    assert "COMMAND_LONG" in [message.get_type() for message in decoded(bytes(autopilot.received))]
+
+
+@pytest.mark.parametrize(("rate_hz", "starts"), [(4, 0), (0, 1), (0, 0)])
+def test_no_stream_is_stopped_over_an_open_link(rate_hz: int, starts: int) -> None:
+    world, autopilot = passing({})
+    stranger = GroundStation(world)
+    stranger.send(m.MAVLink_request_data_stream_message(1, 1, 0, rate_hz, starts))
     world.run(0.1)
     assert bytes(autopilot.received) == b""
     assert stranger.texts() == []

@@ -8,6 +8,7 @@ import pytest
 from bridge.controllers import other
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.fc.profile import Profile
+from bridge.line.msp_link import PROBE
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
@@ -98,6 +99,27 @@ def test_ground_stations_see_one_vehicle_while_frsky_is_sent(board: type[Simulat
         assert max(heartbeat_gaps(station)) <= 1.5
         assert not [text for text in station.texts() if "lost" in text]
     world.assert_line_was_clean()
+
+
+def test_a_board_met_over_msp_keeps_its_family_whatever_its_ids() -> None:
+    """A Harakiri with changed ids: to pass frames on to it could reset it."""
+    world = ready_world()
+    world.naze = MavlinkOnly(1)
+    world.wait_until(lambda w: w.kind is harakiri.MAVLINK, 8)
+    world.run(30)
+    assert world.kind is harakiri.MAVLINK
+
+
+def test_a_harakiri_that_disarms_is_asked_for_msp_at_once() -> None:
+    world = World(SimOptions(tele_prot=TelemetryProtocol.MAVLINK), speeds=(115200,))
+    world.wait_ready()
+    world.faults.armed = True
+    world.wait_until(lambda w: w.kind is harakiri.MAVLINK and w.bridge.session.vehicle.armed is True, 8)
+    world.run(3.3)
+    world.faults.armed = False
+    world.wait_until(lambda w: w.bridge.session.vehicle.armed is False, 5)
+    world.run(0.01)
+    assert PROBE in [data for at, _, data in world.written if at >= world.now - 0.02]
 
 
 @pytest.mark.parametrize("version", [1, 2])
