@@ -12,12 +12,12 @@ An autopilot that speaks MAVLink itself is not represented but passed through, b
 """
 
 from dataclasses import replace
+from functools import partial
 from itertools import count
 from math import inf
 
 from bridge.config import BridgeConfig
 from bridge.fc.actions import FcActions
-from bridge.fc.msp_sharing import MspSharing
 from bridge.fc.profile import FlightController, Spoken
 from bridge.fc.session import FcSession
 from bridge.gcs.ground import FrameListener, Ground
@@ -29,6 +29,7 @@ from bridge.missions.mission_service import NO_LINK, EndingListener, MissionServ
 from bridge.model.events import EventLog
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.vehicle import FlightState, Health, MissionLeg, Readiness
+from bridge.sharing.msp_sharing import MspSharing
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.link_announcer import LinkAnnouncer
 from bridge.vehicle.local_missions import LocalMissions
@@ -87,7 +88,9 @@ class Bridge:
         )
         self.missions = MissionService(self.session.vehicle, self.runner, on_ending)
         self.local = LocalMissions(self.missions, self.ground, log_event, incidents)
-        self.sharing = MspSharing(self.session, self.runner)
+        self.sharing = MspSharing(
+            self.session, self.runner, self.missions, log_event, partial(self.ground.say, Severity.WARNING)
+        )
         self._vehicle = OwnVehicle(self.session, self.missions, self.ground, self._announcer, config.unix_time_s, now)
         #: The seal of the flight controller's settings.
         self.settings = SettingsSeal(
@@ -111,6 +114,8 @@ class Bridge:
     def fc_received(self, data: bytes, now: float) -> None:
         self.session.received(data, now)
         self._pass_on_news(now)
+        if self.sharing.due < inf:
+            self.sharing.serve(now)
 
     def take_fc_output(self) -> list[bytes]:
         """The bytes to be written to the port at the current `session.state.speed`."""
@@ -145,6 +150,7 @@ class Bridge:
     def stop_missions(self, now: float) -> None:
         """Accept no more transfers. An upload that still receives items ends; a running push continues."""
         self.missions.close()
+        self.sharing.stop()
         self._uploads.end(STOPPED, now)
 
     # Time.
@@ -159,6 +165,8 @@ class Bridge:
         self.session.tick(now)
         self._pass_on_news(now)
         self.runner.tick(now)
+        if self.sharing.due < inf:
+            self.sharing.serve(now)
         if self._uploads.is_active:
             self._uploads.tick(now)
         if now >= self._watch.due:
@@ -177,6 +185,7 @@ class Bridge:
         return min(
             self.session.state.deadline(),
             self.runner.due,
+            self.sharing.due,
             self._uploads.next_deadline() if self._uploads.is_active else inf,
             self.ground.stations.due,
             self._announcer.due,

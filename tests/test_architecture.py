@@ -21,6 +21,7 @@ BRIDGE = {
     "bridge.fc": {"bridge.missions", "bridge.line", "bridge.model"},
     "bridge.controllers": {"bridge.fc", "bridge.missions", "bridge.line", "bridge.model"},
     "bridge.gcs": {"bridge.model"},
+    "bridge.sharing": {"bridge.gcs", "bridge.fc", "bridge.missions", "bridge.line", "bridge.model"},
     "bridge.vehicle": {"bridge.gcs", "bridge.fc", "bridge.missions", "bridge.line", "bridge.model"},
 }
 PACKAGES = {

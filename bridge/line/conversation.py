@@ -43,12 +43,16 @@ class Send:
     """Send a request frame. `reply_size`: the size of the whole reply frame, bytes, for the bound on pending replies.
 
     While an `exclusive` request is pending nothing else is sent: the flight controller may be writing flash.
+    `is_kept`: its reply goes into the link's LastReplies. `is_shared`: another program asked; if it gets no reply, that
+    says nothing about the line.
     """
 
     frame: bytes
     command: int
     reply_size: int
     exclusive: bool = False
+    is_kept: bool = False
+    is_shared: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,11 +141,11 @@ def receive(*commands: int) -> Conversation[MspFrame | None]:
 
 
 def ask(
-    frame: bytes, command: int, reply_payload: int, *, tries: int = 3, exclusive: bool = False
+    frame: bytes, command: int, reply_payload: int, *, tries: int = 3, exclusive: bool = False, is_kept: bool = False
 ) -> Conversation[MspFrame | None]:
     """Send a request and wait for its reply, with retries; None if none was answered."""
     for _ in range(tries):
-        yield from send(frame, command, reply_payload, exclusive=exclusive)
+        yield Send(frame, command, frame_size(command, reply_payload), exclusive, is_kept)
         reply = yield from receive(command)
         if reply is not None:
             return reply
@@ -159,7 +163,7 @@ def ask_surely(
     """
     before: MspFrame | None = None
     for _ in range(_MAX_ASKS):
-        reply = yield from ask(frame, command, reply_payload)
+        reply = yield from ask(frame, command, reply_payload, is_kept=True)
         if reply is None or (before is not None and _lasting(reply, lasting) == _lasting(before, lasting)):
             return reply
         before = reply

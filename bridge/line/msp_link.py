@@ -14,6 +14,7 @@ from enum import Enum, auto
 from math import inf
 
 from bridge.line.conversation import Send
+from bridge.line.last_replies import LastReplies
 from protocols.frsky import FRSKY_SPEED
 from protocols.msp.command_line import is_clean
 from protocols.msp.commands import Msp
@@ -128,6 +129,9 @@ class _Request:
     deadline: float
     exclusive: bool
     reply: _Reply = _Reply.AWAITED
+    #: The frame, if its reply is kept.
+    kept: bytes | None = None
+    is_shared: bool = False
 
     @property
     def size_in_ring(self) -> int:
@@ -173,6 +177,7 @@ class MspLink:
         self.requests_lost = 0
         #: From a request's last byte on the wire to its reply.
         self.round_trips = RoundTrips()
+        self.replies = LastReplies()
 
     @property
     def outstanding_bytes(self) -> int:
@@ -183,6 +188,12 @@ class MspLink:
         for sent in self._sent:
             pending.add(self._baud, sent.size_in_ring, sent.sent_at)
         return pending
+
+    def owes(self, command: int) -> bool:
+        """True if a reply to `command` may still arrive, however late, or its request is queued."""
+        return any(sent.command == command for sent in self._sent) or any(
+            message.command == command for message in self._waiting
+        )
 
     def awaits(self, command: int) -> bool:
         """True if a reply to `command` is awaited, or its request is queued."""
@@ -227,7 +238,7 @@ class MspLink:
         for sent in lost:
             sent.reply, sent.deadline = _Reply.LOST, sent.sent_at + _LONGEST_STALL_S
         if lost:
-            self.requests_lost += len(lost)
+            self.requests_lost += sum([not sent.is_shared for sent in lost])
             self._losses_in_a_row += 1
             self._backoff = min(self._backoff * 2, 8.0)
             if self._losses_in_a_row % 2 == 0 and not self.receiver_timeout_s:
@@ -285,9 +296,9 @@ class MspLink:
         timeout_s = EXCLUSIVE_TIMEOUT_S if message.exclusive else self._timeout_s()
         reply_time = (self.outstanding_bytes + message.reply_size) * self.byte_s + len(self._sent) * self.turn_s
         deadline = self._line_free_at + reply_time + timeout_s
-        self._sent.append(
-            _Request(message.command, message.reply_size, self._line_free_at, deadline, message.exclusive)
-        )
+        sent = _Request(message.command, message.reply_size, self._line_free_at, deadline, message.exclusive)
+        sent.kept, sent.is_shared = message.frame if message.is_kept else None, message.is_shared
+        self._sent.append(sent)
 
     def _resync(self, now: float) -> None:
         if any(sent.exclusive and sent.reply is _Reply.AWAITED for sent in self._sent):
@@ -328,8 +339,11 @@ class MspLink:
         if command == self._risky:
             self._follow_up_at = inf
         if earlier:
-            self.requests_lost += sum([sent.reply is _Reply.AWAITED for sent in self._sent[:earlier]])
+            overtaken = self._sent[:earlier]
+            self.requests_lost += sum([sent.reply is _Reply.AWAITED and not sent.is_shared for sent in overtaken])
         del self._sent[: earlier + 1]
+        if oldest.kept and oldest.reply is _Reply.AWAITED and self._is_certain(oldest):
+            self.replies.heard(oldest.kept, reply, now)
         answered: _Request | None = oldest
         if oldest.reply is not _Reply.AWAITED:
             equal = (sent for sent in self._sent if sent.command == command and sent.reply is _Reply.AWAITED)
@@ -345,6 +359,10 @@ class MspLink:
             measured = max(now - answered.sent_at, 0.0)
             self.round_trips.add(measured)
             self.round_trip_s += (measured - self.round_trip_s) / 8
+
+    def _is_certain(self, answered: _Request) -> bool:
+        """False if the reply may be to a later request of the same command, with another index."""
+        return not any(sent.command == answered.command and sent.kept != answered.kept for sent in self._sent)
 
 
 class RoundTrips:

@@ -30,6 +30,13 @@ _ASSUMED_BAUD = 115200
 _BESIDE_MISSIONS = 0.2
 #: No poll gets slower than this.
 _SLOWEST_S = 5.0
+#: Polls that other programs ask for: the shortest interval, and the part of telemetry's share that is theirs at least.
+_FOLLOWED_S = 0.1
+_FOLLOWED_SHARE = 0.1
+#: They ask for it until they were silent for this long.
+_FOLLOWED_FOR_S = 3.0
+#: A reply is current for one interval, or for this long.
+_CURRENT_S = 1.0
 #: Requests due within this time go out together: every wake-up costs CPU time.
 _GATHER_S = 0.01
 #: A lost reply reduces all rates by a tenth, each received one restores a little: 1 % losses change nothing, 10 % halve
@@ -67,6 +74,10 @@ POLLS = (
     Poll(Msp.WP, request(Msp.WP, b"\0"), 21, 2.0),
     Poll(Msp.MOTOR, request(Msp.MOTOR), 16, inf),
     Poll(Msp.RAW_IMU, request(Msp.RAW_IMU), 18, inf),
+    # For other programs only.
+    Poll(Msp.SERVO, request(Msp.SERVO), 16, inf),
+    Poll(Msp.COMP_GPS, request(Msp.COMP_GPS), 5, inf),
+    Poll(Msp.DEBUG, request(Msp.DEBUG), 16, inf),
 )
 #: Asked where the switches must be known in flight; the longest reply is that of 15 boxes with six aux channels.
 BOX_POLL = Poll(Msp.BOX, request(Msp.BOX), 60, 5.0)
@@ -84,6 +95,7 @@ class _Slot:
     cost: float = field(init=False)
     reply_payload: int = field(init=False)
     wanted_s: float = inf
+    followed_until: float = -inf
     interval_s: float = inf
     asked_at: float = -inf
     due: float = -inf
@@ -94,11 +106,21 @@ class _Slot:
     def __post_init__(self) -> None:
         self.expect(self.poll.reply_payload)  # until one was seen
 
+    @property
+    def is_unknown(self) -> bool:
+        """True if the board refuses it."""
+        return self.refusals >= _REFUSALS
+
+    @property
+    def backoff(self) -> float:
+        """The factor for its interval while it is not answered."""
+        return float(2 ** min(max(self.misses - _TOLERATED_MISSES, 0), _MAX_DOUBLINGS))
+
     def expect(self, reply_payload: int) -> None:
         """Set its reply's payload, bytes. Its cost is that of both frames, or the board's time if that is longer."""
         self.reply_payload = reply_payload
         size = frame_size(self.poll.command, reply_payload)
-        self.request = Send(self.poll.frame, self.poll.command, size)
+        self.request = Send(self.poll.frame, self.poll.command, size, is_kept=True)
         self.cost = max(len(self.poll.frame) + size, self.least_cost)
 
     def set_interval(self, interval_s: float) -> None:
@@ -133,7 +155,10 @@ class PollSchedule:
         #: The commands that are polled.
         self.commands: Collection[int] = ()
         self._budget = 0.0
+        self._least_cost = 0.0
         self._line_scale = 1.0
+        self._followed_s = inf
+        self._unfollowed_at = inf  # when programs stop asking for a poll
         self._quality = 1.0
         self._free_at = 0.0
         self._asked_at = -inf
@@ -149,7 +174,8 @@ class PollSchedule:
         self._budget = bytes_per_s * _LINE_SHARE
         self._quality = 1.0
         self._lost_before = 0
-        self._slots = {poll.command: _Slot(poll, turn_s * bytes_per_s) for poll in polls}
+        self._least_cost = turn_s * bytes_per_s
+        self._slots = {poll.command: _Slot(poll, self._least_cost) for poll in polls}
         self.commands = self._slots.keys()
         self._fit()
 
@@ -158,6 +184,25 @@ class PollSchedule:
         if wanted != self._wanted:
             self._wanted = wanted
             self._fit()
+
+    def follow(self, command: int, frame: bytes, now: float) -> float | None:
+        """Poll for another program as long as it asks; None if this request is no poll.
+
+        Returns the age up to which the last reply is current, seconds.
+        """
+        slot = self._slots.get(command)
+        if slot is None or frame != slot.poll.frame:
+            return None
+        is_new = slot.followed_until == -inf
+        slot.followed_until = now + _FOLLOWED_FOR_S
+        self._unfollowed_at = min(self._unfollowed_at, slot.followed_until)
+        if is_new:
+            self._fit()
+        return inf if slot.is_unknown else max(slot.interval_s, _CURRENT_S)
+
+    def rest_s(self, size: int) -> float:
+        """The time in which the rest of the line carries a request and its reply, together `size` bytes."""
+        return max(size, self._least_cost) / (self._budget / _LINE_SHARE - self._budget)
 
     def interval_s(self, command: Msp) -> float | None:
         """The current interval of a poll, seconds; None if it is not polled."""
@@ -171,7 +216,7 @@ class PollSchedule:
 
     def ask(self, link: MspLink, now: float, *, beside_missions: bool) -> None:
         """Send the requests that are due, as far as the link has room."""
-        self._look_at(link, beside_missions)
+        self._look_at(link, beside_missions, now)
         self._asked_at = limit = now
         soon = now + _GATHER_S
         near = [slot for slot in self._slots.values() if slot.due <= soon]
@@ -206,7 +251,7 @@ class PollSchedule:
             self._fit()
         elif is_slowed:
             # The others follow with their own replies.
-            slot.set_interval(self._interval(slot, self._scale))
+            slot.set_interval(self._present_interval(slot))
 
     def next_deadline(self, link: MspLink) -> float:
         """The time of the next request; infinity if a reply must arrive first."""
@@ -222,25 +267,40 @@ class PollSchedule:
             earliest = min(earliest, slot.may_be_asked_at(link, room))
         return max(earliest, self._free_at)
 
-    def _look_at(self, link: MspLink, beside_missions: bool) -> None:
+    def _look_at(self, link: MspLink, beside_missions: bool, now: float) -> None:
+        if now >= self._unfollowed_at:
+            for slot in self._slots.values():
+                slot.followed_until = slot.followed_until if now < slot.followed_until else -inf
+            self._unfollowed_at = min((slot.followed_until for slot in self._followed()), default=inf)
+            self._fit()
         lost, self._lost_before = link.requests_lost - self._lost_before, link.requests_lost
         if lost or beside_missions != self._beside_missions:
             self._quality = max(self._quality * _LOSS_FACTOR**lost, _WORST_QUALITY)
             self._beside_missions = beside_missions
             self._set_intervals()
 
+    def _followed(self) -> list[_Slot]:
+        return [slot for slot in self._slots.values() if slot.followed_until > -inf and not slot.is_unknown]
+
     def _fit(self) -> None:
         """Scale the requested rates to the line."""
         for slot in self._slots.values():
             wanted_s = min(self._wanted.get(slot.poll.command, inf), slot.poll.needed_s)
-            slot.wanted_s = wanted_s if slot.refusals < _REFUSALS else inf
+            slot.wanted_s = inf if slot.is_unknown else wanted_s
+        followed = self._followed()
+        budget = self._budget * (1 - _FOLLOWED_SHARE) if followed else self._budget
+        self._followed_s = inf
         self._line_scale = 1.0
-        if self._bytes_per_s(1.0) > self._budget:
+        if self._bytes_per_s(1.0) > budget:
             step, self._line_scale = 0.5, _LEAST_SCALE
             for _ in range(_HALVINGS):
-                if self._bytes_per_s(self._line_scale + step) <= self._budget:
+                if self._bytes_per_s(self._line_scale + step) <= budget:
                     self._line_scale += step
                 step /= 2
+        if followed:
+            slower = sum(slot.cost for slot in followed if self._interval(slot, self._line_scale) > _FOLLOWED_S)
+            left = max(self._budget - self._bytes_per_s(self._line_scale), self._budget * _FOLLOWED_SHARE)
+            self._followed_s = max(slower / left, _FOLLOWED_S)
         self._set_intervals()
 
     def _bytes_per_s(self, scale: float) -> float:
@@ -248,14 +308,16 @@ class PollSchedule:
 
     def _set_intervals(self) -> None:
         for slot in self._slots.values():
-            slot.set_interval(self._interval(slot, self._scale))
+            slot.set_interval(self._present_interval(slot))
 
-    @property
-    def _scale(self) -> float:
-        return self._line_scale * self._quality * (_BESIDE_MISSIONS if self._beside_missions else 1.0)
+    def _present_interval(self, slot: _Slot) -> float:
+        scale = self._quality * (_BESIDE_MISSIONS if self._beside_missions else 1.0)
+        interval_s = self._interval(slot, self._line_scale * scale)
+        if slot.followed_until == -inf or slot.is_unknown:
+            return interval_s
+        return min(interval_s, self._followed_s / scale * slot.backoff)
 
     def _interval(self, slot: _Slot, scale: float) -> float:
         is_status = slot.poll.command is Msp.STATUS
         slowest = slot.cost / (self._budget * _STATUS_SHARE) if is_status else _SLOWEST_S
-        backoff = 2.0 ** min(max(slot.misses - _TOLERATED_MISSES, 0), _MAX_DOUBLINGS)
-        return min(slot.wanted_s / scale * backoff, max(slot.wanted_s, slowest))
+        return min(slot.wanted_s / scale * slot.backoff, max(slot.wanted_s, slowest))

@@ -75,7 +75,7 @@ class Runner:
     @property
     def needs_line(self) -> bool:
         """True while a conversation that telemetry should make room for runs or waits."""
-        return self._current is not None and (not self._current.in_background or bool(self._queue))
+        return self._current is not None and not all(task.in_background for task in (self._current, *self._queue))
 
     def start(
         self,

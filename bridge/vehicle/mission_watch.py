@@ -42,7 +42,7 @@ class MissionWatch:
 
     def tick(self, now: float) -> None:
         self.due = now + self._missions.watch_s
-        if self._began_at is None and not self._missions.runner.is_busy and self.due < inf:
+        if self._began_at is None and not self._missions.runner.needs_line and self.due < inf:
             self._began_at, self.due = now, inf
             self._missions.runner.start(self._is_outdated(), self._looked, now, in_background=True)
 

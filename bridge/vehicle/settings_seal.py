@@ -87,7 +87,7 @@ class SettingsSeal:
     def tick(self, now: float) -> None:
         controller, runner = self._controller, self._missions.runner
         self.due = now + _RETRY_S
-        if controller is not None and not self._is_reading and not runner.is_busy and self._may_ask():
+        if controller is not None and not self._is_reading and not runner.needs_line and self._may_ask():
             self._is_reading = True
             runner.start(self._read(controller), self._done, now, in_background=True)
 

@@ -11,12 +11,15 @@ class Msp(IntEnum):
     FC_VARIANT = 2
     FC_VERSION = 3
     MODE_RANGES = 34
+    SONAR = 58
     IDENT = 100
     STATUS = 101
     RAW_IMU = 102
+    SERVO = 103
     MOTOR = 104
     RC = 105
     RAW_GPS = 106
+    COMP_GPS = 107
     ATTITUDE = 108
     ALTITUDE = 109
     ANALOG = 110
@@ -29,13 +32,19 @@ class Msp(IntEnum):
     WP = 118
     BOXIDS = 119
     NAV_STATUS = 121
+    STATUS_EX = 150
+    SENSOR_STATUS = 151
     UID = 160
+    GPSSTATISTICS = 166
     RTC = 246
+    DEBUG = 254
     INAV_STATUS = 0x2000
     INAV_ANALOG = 0x2002
     INAV_MISC = 0x2003
     INAV_RATE_PROFILE = 0x2007
     INAV_AIR_SPEED = 0x2009
+    INAV_DEBUG = 0x2019
+    INAV_TEMPERATURES = 0x201E
     PID_V2 = 0x2030
     INAV_EZ_TUNE = 0x2070
 

@@ -114,7 +114,7 @@ class DaemonApi:
             "ground_stations": list(link.ground_stations),
             "refused": [
                 *(f"{count} x {why} ({link})" for (link, why), count in bridge.guard.refused.items()),
-                *(f"{count} x {why} (share)" for why, count in daemon.share_refused.items()),
+                *(f"{count} x {why} (share)" for why, count in bridge.sharing.refused.items()),
             ],
             "recording": daemon.recording,
             "store_trouble": daemon.store_trouble,

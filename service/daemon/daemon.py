@@ -3,18 +3,16 @@
 
 import asyncio
 import time
-from collections import Counter, defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import structlog
 
 from bridge.bridge import Bridge
 from bridge.config import BridgeConfig
-from bridge.fc.msp_sharing import refused
 from bridge.fc.profile import RuleSettings
 from bridge.fc.states.searching import SPEEDS
 from bridge.gcs.guard import LinkAccess
@@ -23,7 +21,6 @@ from bridge.missions.mission_service import DeliveryResult
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.vehicle_groups import Group
-from protocols.msp.frame import MspFrame
 from service.daemon.fc_connection import FcConnection
 from service.daemon.flight_file import FlightFile
 from service.daemon.gcs_connections import GcsConnections
@@ -116,8 +113,6 @@ class Daemon:
         self.store = StoreWorker(settings.state_dir, self._cannot_store)
         #: Set when ground stations can connect.
         self.started = asyncio.Event()
-        #: Refused requests of [[share]] ports, by reason.
-        self.share_refused: Counter[str] = Counter()
         self._followers: list[Follower] = []
         self._timer: asyncio.TimerHandle | None = None
         self._deadline = self._loop.time()  # of the next tick
@@ -149,8 +144,7 @@ class Daemon:
                 if str(address) not in self.settings.access:
                     self.gcs.warn(address)
             for share in self.settings.share:
-                requested = partial(self._shared_request, may_write=share.write)
-                stack.callback(await open_share(share.address, requested))
+                stack.callback(await open_share(share, self.bridge.sharing, self.flush))
             self._signing.start()
             self.started.set()
             self._tick()
@@ -216,16 +210,6 @@ class Daemon:
                 break
             await asyncio.sleep(_REST_INTERVAL_S)
         return not self.bridge.runner.is_busy
-
-    def _shared_request(self, frame: MspFrame, answer: Callable[[MspFrame], None], *, may_write: bool) -> None:
-        """Forward another program's MSP request, or refuse it and log the reason."""
-        why = self.bridge.sharing.request(frame, answer, self._loop.time(), may_write=may_write)
-        if why:
-            self.share_refused[why] += 1
-            level: Level = "debug" if self.share_refused[why] > 1 else "warning"
-            self._log_event(level, "share.refused", command=frame.command, why=why)
-            answer(refused(frame))
-        self.flush()
 
     def _mission_ended(self, mission: ArrivedMission, delivery: DeliveryResult) -> None:
         for follower in self._followers:

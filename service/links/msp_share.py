@@ -5,109 +5,133 @@ import asyncio
 from collections.abc import Callable
 from typing import cast
 
-from bridge.gcs.budget import TokenBucket
-from bridge.gcs.cost import Rate
-from protocols.msp.frame import Direction, MspFrame, MspParser
+from bridge.sharing.msp_sharing import MspSharing
+from bridge.sharing.program import Program
 from service.links.gcs_links import LinkError
-from service.settings.addresses import GcsAddress, family_of
+from service.settings.addresses import family_of
+from service.settings.share import ShareSettings
 from storage.os_error import reason
 
-#: A flood would delay telemetry and missions: requests beyond the limit are dropped, the oldest first.
-_LIMIT = Rate(200, 200)
-_READ_SIZE = 512
-#: A client that does not read its replies is disconnected.
+#: A program that does not read its replies is disconnected.
 _MAX_UNSENT = 65536
-#: A further client displaces the one that has been silent for longest: its laptop may have been switched off.
-_MAX_CLIENTS = 8
-
-#: Takes a request, and a callback for its reply.
-Requested = Callable[[MspFrame, Callable[[MspFrame], None]], None]
+#: A further program displaces the one that has been silent for longest: its laptop may have been switched off.
+_MAX_PROGRAMS = 8
 
 
-async def open_share(address: GcsAddress, requested: Requested) -> Callable[[], None]:
-    """Listen, on tcpin or udpin; LinkError if that fails. Returns a function that closes the port and its clients."""
+async def open_share(share: ShareSettings, sharing: MspSharing, flush: Callable[[], None]) -> Callable[[], None]:
+    """Listen, on tcpin or udpin; LinkError if that fails. Returns a function that closes the port and its connections.
+
+    `flush` carries out the bridge's outputs.
+    """
     loop = asyncio.get_running_loop()
-    where = (address.host, address.port)
-    family = family_of(address.host)
-    requests = _Requests(requested)
+    address = share.address
+    where, family = (address.host, address.port), family_of(address.host)
+    port = _SharePort(sharing, flush, may_write=share.write)
+    server: asyncio.BaseTransport | asyncio.Server
     try:
         if address.kind == "udpin":
-            port, _ = await loop.create_datagram_endpoint(lambda: _UdpShare(requests), local_addr=where, family=family)
-            return port.close
-        clients: dict[asyncio.Transport, None] = {}  # the one silent for longest first
-        server = await loop.create_server(lambda: _TcpClient(requests, clients), *where, family=family)
+            server, _ = await loop.create_datagram_endpoint(lambda: _UdpShare(port), local_addr=where, family=family)
+        else:
+            server = await loop.create_server(lambda: _TcpProgram(port), *where, family=family)
     except OSError as error:
         raise LinkError(f"share {address} cannot be opened: {reason(error)}") from error
 
     def close() -> None:
         server.close()
-        for client in clients:
-            client.abort()
+        port.close()
 
     return close
 
 
-class _Requests:
-    """The requests of all clients of a port."""
+class _SharePort:
+    """The programs on one port."""
 
-    def __init__(self, requested: Requested) -> None:
-        self._requested = requested
-        self._limit = TokenBucket(_LIMIT)
+    def __init__(self, sharing: MspSharing, flush: Callable[[], None], *, may_write: bool) -> None:
+        self._sharing = sharing
+        self._flush = flush
+        self._may_write = may_write
         self._loop = asyncio.get_running_loop()
+        self._programs: dict[Program, Callable[[], None]] = {}  # the one silent for longest first
 
-    def take(self, data: bytes, parser: MspParser, answer: Callable[[MspFrame], None]) -> None:
-        if self._limit.has(self._loop.time()):
-            frames = parser.feed(data[-_READ_SIZE:])
-            self._limit.spend(len(frames))
-            for frame in frames:
-                if frame.direction is Direction.REQUEST:
-                    self._requested(frame, answer)
+    def join(
+        self,
+        address: tuple[str, int],
+        send: Callable[[bytes], None],
+        close: Callable[[], None] | None,
+        forget: Callable[[], None],
+    ) -> Program:
+        """A program has connected. `forget` drops it to make room for another."""
+        if len(self._programs) >= _MAX_PROGRAMS:
+            silent = next(iter(self._programs))
+            forget_silent = self._programs[silent]
+            self.leave(silent)
+            forget_silent()
+        host, number = address[:2]
+        name = f"[{host}]:{number}" if ":" in host else f"{host}:{number}"
+        program = Program(name, host, send, close, may_write=self._may_write)
+        self._programs[program] = forget
+        self._sharing.join(program)
+        return program
+
+    def received(self, program: Program, data: bytes) -> None:
+        if program in self._programs:
+            self._programs[program] = self._programs.pop(program)
+            self._sharing.received(program, data, self._loop.time())
+            self._flush()
+
+    def leave(self, program: Program) -> None:
+        if self._programs.pop(program, None) is not None:
+            self._sharing.leave(program)
+
+    def close(self) -> None:
+        for program, forget in tuple(self._programs.items()):
+            self.leave(program)
+            forget()
 
 
-class _TcpClient(asyncio.Protocol):
-    def __init__(self, requests: _Requests, clients: dict[asyncio.Transport, None]) -> None:
-        self._requests = requests
-        self._clients = clients
-        self._parser = MspParser(takes_low_v2=True)
+class _TcpProgram(asyncio.Protocol):
+    def __init__(self, port: _SharePort) -> None:
+        self._port = port
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
-        if len(self._clients) >= _MAX_CLIENTS:
-            silent = next(iter(self._clients))
-            del self._clients[silent]
-            silent.abort()
-        self._clients[transport] = None
+        address = transport.get_extra_info("peername") or ("", 0)
+        self._program = self._port.join(address, self._send, transport.close, transport.abort)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        self._clients.pop(self._transport, None)
+        self._port.leave(self._program)
 
     def data_received(self, data: bytes) -> None:
-        del self._clients[self._transport]
-        self._clients[self._transport] = None
-        self._requests.take(data, self._parser, self._answer)
+        self._port.received(self._program, data)
 
-    def _answer(self, frame: MspFrame) -> None:
-        # The client may be gone by now.
+    def _send(self, frame: bytes) -> None:
         if self._transport.is_closing():
             return
-        self._transport.write(frame.encode())
+        self._transport.write(frame)
         if self._transport.get_write_buffer_size() > _MAX_UNSENT:
             self._transport.abort()
 
 
 class _UdpShare(asyncio.DatagramProtocol):
-    def __init__(self, requests: _Requests) -> None:
-        self._requests = requests
+    def __init__(self, port: _SharePort) -> None:
+        self._port = port
+        self._programs: dict[tuple[str, int], Program] = {}
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         # Before Python 3.12 the event loop's transport is not a subclass of it.
         self._transport = cast("asyncio.DatagramTransport", transport)
 
     def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
-        def answer(frame: MspFrame) -> None:
-            if not self._transport.is_closing():
-                self._transport.sendto(frame.encode(), addr)
+        if addr not in self._programs:
+            self._programs[addr] = self._port.join(
+                addr, lambda frame: self._send(frame, addr), None, lambda: self._forget(addr)
+            )
+        self._port.received(self._programs[addr], data)
 
-        # Complete requests only: the rest of a truncated one may be lost.
-        self._requests.take(data, MspParser(takes_low_v2=True), answer)
+    def _forget(self, addr: tuple[str, int]) -> None:
+        del self._programs[addr]
+
+    def _send(self, frame: bytes, addr: tuple[str, int]) -> None:
+        if not self._transport.is_closing():
+            self._transport.sendto(frame, addr)

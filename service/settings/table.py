@@ -51,8 +51,8 @@ KEYS = (
     Key(
         "share",
         several('as in [{address = "tcpin:127.0.0.1:5761"}]', parse_share),
-        "Ports on which INAV Configurator, MultiWiiConf or mwp may speak MSP through the bridge while the craft is "
-        "disarmed; also as [[share]] tables. write = true lets them change settings: MSP has no password, so anyone "
+        "Ports on which INAV Configurator, MultiWiiConf or mwp may speak MSP through the bridge; also as [[share]] "
+        "tables. write = true lets them change settings while the craft is disarmed: MSP has no password, so anyone "
         "who reaches the port can.",
         example='[{address = "tcpin:127.0.0.1:5761", write = false}]',
     ),

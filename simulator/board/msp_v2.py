@@ -3,8 +3,7 @@
 
 import struct
 
-from fastcrc.crc8 import dvb_s2
-
+from protocols.msp.frame import crc8
 from simulator.board.msp_port import MspReceiver
 
 _HEADER_SIZE = 8
@@ -50,4 +49,4 @@ class MspReceiverV2(MspReceiver):
             return None
         body, checksum = bytes(frame[3:-1]), frame[-1]
         frame.clear()
-        return (command, body[5:]) if dvb_s2(body) == checksum else None
+        return (command, body[5:]) if crc8(body) == checksum else None

@@ -44,18 +44,38 @@ class InavCommand(IntEnum):
     FC_VARIANT = 2
     FC_VERSION = 3
     BOARD_INFO = 4
+    BUILD_INFO = 5
     NAME = 10
     SET_NAME = 11
     WP_MISSION_LOAD = 18
     WP_MISSION_SAVE = 19
     WP_GETINFO = 20
+    SONAR = 58
     STATUS_EX = 150
+    SENSOR_STATUS = 151
+    GPSSTATISTICS = 166
     RTC = 246
     SETTING = 0x1003
     INAV_STATUS = 0x2000
     INAV_ANALOG = 0x2002
     INAV_AIR_SPEED = 0x2009
     INAV_MIXER = 0x2010
+    INAV_DEBUG = 0x2019
+    INAV_TEMPERATURES = 0x201E
+
+
+#: Asked by INAV Configurator and mwp. Every sensor is healthy, and no rangefinder is on board.
+_CONSTANT_REPLIES: dict[int, bytes] = {
+    InavCommand.API_VERSION: _API_VERSION,
+    InavCommand.FC_VARIANT: b"INAV",
+    InavCommand.BOARD_INFO: b"SIMU\x00\x00\x02\x00\x04SIMU",
+    InavCommand.BUILD_INFO: b"Jan 01 202600:00:00abcdefg",
+    InavCommand.SONAR: b"\xff\xff\xff\xff",
+    InavCommand.SENSOR_STATUS: bytes((1, 1, 1, 1, 1, 1, 0, 0, 0)),
+    InavCommand.GPSSTATISTICS: bytes(20),
+    InavCommand.INAV_DEBUG: bytes(32),
+    InavCommand.INAV_TEMPERATURES: bytes(16),
+}
 
 
 class InavFirmware(MspFirmware):
@@ -218,16 +238,12 @@ class InavFirmware(MspFirmware):
         craft = self.craft_at(self._clock)
         flight = craft.flight
         match command:
-            case InavCommand.API_VERSION:
-                return _API_VERSION
-            case InavCommand.FC_VARIANT:
-                return b"INAV"
             case InavCommand.NAME:
                 return self._name
             case InavCommand.FC_VERSION:
                 return bytes(self._version)
-            case InavCommand.BOARD_INFO:
-                return b"SIMU\x00\x00\x02\x00\x04SIMU"
+            case MspCommand.BOX:
+                return craft.boxes.to_bytes(8, "little")
             case InavCommand.STATUS_EX:
                 return (self._sensors.payload(MspCommand.STATUS, craft) or b"") + bytes(5)
             case InavCommand.INAV_STATUS:
@@ -248,7 +264,7 @@ class InavFirmware(MspFirmware):
                 return struct.pack("<IH", int(unix_s), int(unix_s % 1 * 1000))
             case MspCommand.NAV_STATUS:
                 return self._navigation.status().pack()
-        usual = self._settings.read(command) or self._sensors.payload(command, craft)
+        usual = self._settings.read(command) or _CONSTANT_REPLIES.get(command) or self._sensors.payload(command, craft)
         if command == MspCommand.RC and usual and self._clock < self._sticks_released_at:
             # Roll and pitch; the throttle is low.
             return struct.pack("<2H", _STICK_END_US, _STICK_END_US) + usual[4:]

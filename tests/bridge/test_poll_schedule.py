@@ -4,6 +4,7 @@
 import random
 from collections import Counter
 from collections.abc import Callable, Mapping
+from math import inf
 
 import pytest
 from hypothesis import example, given, settings
@@ -14,7 +15,7 @@ from bridge.line.poll_schedule import POLLS, PollSchedule
 from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser
 
-REPLY_PAYLOADS = {101: 11, 104: 16, 102: 18, 105: 16, 106: 14, 108: 8, 109: 6, 110: 5, 118: 12}
+REPLY_PAYLOADS = {101: 11, 103: 16, 104: 16, 107: 5, 254: 8, 102: 18, 105: 16, 106: 14, 108: 8, 109: 6, 110: 5, 118: 12}
 #: Maps a command to the size of the reply's payload; None: no reply, -1: an error.
 Answer = Callable[[int], int | None]
 
@@ -74,7 +75,7 @@ class Line:
 def test_everything_is_polled_at_the_start() -> None:
     line = Line()
     asked = line.run(0.2)
-    assert set(asked) == set(REPLY_PAYLOADS) - {Msp.RAW_IMU, Msp.MOTOR}
+    assert set(asked) == {poll.command for poll in POLLS if poll.needed_s < inf}
 
 
 def test_a_refused_poll_is_tried_twice_per_flight_controller() -> None:

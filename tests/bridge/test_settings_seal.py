@@ -16,6 +16,7 @@ from protocols.msp.settings import Part
 from simulator.commands.fc_kinds import make_board
 from simulator.naze.board import SimulatedNaze
 from tests.support.conversations import Upload, waypoints
+from tests.support.share_program import ShareProgram
 from tests.support.world import GroundStation, Radio, World
 
 SET_PID, SET_BOX, SET_RC_TUNING, SET_MISC, SET_MODE_RANGE, SET_PID_V2 = 202, 203, 204, 207, 35, 0x2031
@@ -112,11 +113,10 @@ def test_a_change_through_the_bridge_is_not_reported(name: str) -> None:
     case = CASES[name]
     world, station = sealed(case.make)
     seal = world.bridge.settings.state and str(world.bridge.settings.state.seal)
-    replies: list[MspFrame] = []
-    frame = MspFrame(Direction.REQUEST, case.command, case.payload)
-    assert world.bridge.sharing.request(frame, replies.append, world.now, may_write=True) == ""
+    reply = ShareProgram(world, may_write=True).outcome(case.command, case.payload)
+    assert reply is not None
+    assert reply.direction is Direction.REPLY
     world.run(2 * ROUND_S)
-    assert [reply.direction for reply in replies] == [Direction.REPLY]
     assert world.events("settings.changed_on_board") == []
     assert warnings(station) == []
     assert world.bridge.settings.state is not None

@@ -23,7 +23,7 @@ from tests.support.programs import TIMEOUT_S, free_port
 
 #: Repeat like configurators, because the bridge also gives up late replies.
 _ASKED_AGAIN_S = 2.0
-IDENT, SET_PID, REBOOT, SET_MOTOR, EEPROM_WRITE = 100, 202, 68, 214, 250
+IDENT, PID, SET_PID, REBOOT, SET_MOTOR, EEPROM_WRITE = 100, 112, 202, 68, 214, 250
 DATAFLASH_ERASE, V2_FRAME, SET_AUX_RC = 72, 255, 0x2230
 SET_RAW_GPS, MSP2_SENSOR_GPS = 201, 0x1F03
 STATUS, WP = 101, 118
@@ -52,6 +52,12 @@ class Program:
                         while len(replies) < times:
                             replies += self._parser.feed(await self._reader.read(4096))
         return replies[:times]
+
+    async def is_closed_after(self, command: int, payload: bytes = b"") -> bool:
+        """Send a request; True if the connection is closed without a reply."""
+        self._writer.write(MspFrame(Direction.REQUEST, command, payload).encode())
+        async with asyncio.timeout(TIMEOUT_S):
+            return await self._reader.read(4096) == b""
 
 
 @asynccontextmanager
@@ -96,22 +102,21 @@ async def test_requests_are_answered_alongside_telemetry(is_v2: bool) -> None:
 @pytest.mark.parametrize(
     ("write", "command", "payload", "why"),
     [
-        (False, SET_PID, bytes(30), "set write = true"),
-        (False, EEPROM_WRITE, b"", "set write = true"),
-        (True, SET_RAW_GPS, bytes(14), "SET_RAW_GPS is never forwarded"),
-        (True, SET_MOTOR, bytes(16), "the effect of SET_MOTOR"),
-        (False, DATAFLASH_ERASE, b"", "the effect of DATAFLASH_ERASE"),
-        (True, REBOOT, b"", "the effect of REBOOT"),
-        (True, SET_AUX_RC, bytes(3), "the effect of SET_AUX_RC"),
-        (True, V2_FRAME, bytes(9), "the effect of command 255"),
-        (True, MSP2_SENSOR_GPS, bytes(52), "the effect of a sensor's value"),
-        (True, SET_PID, b"\x0d\x0d\x0d" + bytes(27), "could open this flight controller's command line"),
+        (False, SET_PID, bytes(30), "SET_PID: read-only share"),
+        (False, EEPROM_WRITE, b"", "EEPROM_WRITE: read-only share"),
+        (True, SET_RAW_GPS, bytes(14), "SET_RAW_GPS: never forwarded"),
+        (True, SET_MOTOR, bytes(16), "SET_MOTOR: unknown on this board"),
+        (False, DATAFLASH_ERASE, b"", "DATAFLASH_ERASE: unknown"),
+        (True, REBOOT, b"", "REBOOT: unknown"),
+        (True, SET_AUX_RC, bytes(3), "SET_AUX_RC: unknown"),
+        (True, V2_FRAME, bytes(9), "command 255: unknown"),
+        (True, MSP2_SENSOR_GPS, bytes(52), "a sensor's value: unknown"),
+        (True, SET_PID, b"\x0d\x0d\x0d" + bytes(27), "SET_PID: bytes that open the command line"),
     ],
 )
-async def test_a_refused_request_gets_an_error(write: bool, command: int, payload: bytes, why: str) -> None:
+async def test_a_refused_request_closes_the_connection(write: bool, command: int, payload: bytes, why: str) -> None:
     async with shared(write=write) as (daemon, program):
-        (reply,) = await program.ask(command, payload)
-        assert reply.direction is Direction.ERROR
+        assert await program.is_closed_after(command, payload)
         (refusal,) = DaemonApi(daemon).status()["refused"]
         assert why in refusal
 
@@ -122,12 +127,13 @@ async def test_a_change_is_passed_on_if_allowed() -> None:
         assert reply.direction is Direction.REPLY
 
 
-async def test_nothing_is_passed_on_while_armed(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_no_change_is_passed_on_while_armed(monkeypatch: pytest.MonkeyPatch) -> None:
     async with shared(write=True) as (daemon, program):
         monkeypatch.setattr(type(daemon.bridge.session.vehicle), "armed", True)
-        (reply,) = await program.ask(IDENT)
-        assert reply.direction is Direction.ERROR
-        assert list(daemon.share_refused) == ["the craft is armed"]
+        (reply,) = await program.ask(IDENT)  # the bridge knows it
+        assert reply.direction is Direction.REPLY
+        assert await program.is_closed_after(EEPROM_WRITE)
+        assert list(daemon.bridge.sharing.refused) == ["EEPROM_WRITE: armed"]
 
 
 async def test_a_mission_transfer_is_not_disturbed() -> None:
@@ -137,10 +143,12 @@ async def test_a_mission_transfer_is_not_disturbed() -> None:
         async with asyncio.timeout(TIMEOUT_S):
             while not daemon.bridge.runner.is_busy:  # noqa: ASYNC110
                 await asyncio.sleep(0)
-            (reply,) = await program.ask(IDENT)
-            assert reply.direction is Direction.ERROR
-            assert list(daemon.share_refused) == ["a mission transfer is running"]
+            (known,) = await program.ask(IDENT)
+            assert not pushing.done()
+            (waiting,) = await program.ask(PID)
+            assert {known.direction, waiting.direction} == {Direction.REPLY}
             assert (await pushing)["ack"] == "MAV_MISSION_ACCEPTED"
+        assert daemon.bridge.sharing.refused == {}
 
 
 async def test_over_udp_each_program_gets_its_own_replies() -> None:
@@ -153,24 +161,25 @@ async def test_over_udp_each_program_gets_its_own_replies() -> None:
             (reply,) = MspParser().feed(await loop.sock_recv(program, 4096))
         return reply
 
-    question, change = (
+    question, pid, change = (
         MspFrame(Direction.REQUEST, command, payload).encode()
-        for command, payload in ((IDENT, b""), (SET_PID, bytes(30)))
+        for command, payload in ((IDENT, b""), (PID, b""), (SET_PID, bytes(30)))
     )
     async with sharing(f"udpin:127.0.0.1:{port}") as daemon:
         with socket.socket(type=socket.SOCK_DGRAM) as first, socket.socket(type=socket.SOCK_DGRAM) as second:
             for program in first, second:
                 program.setblocking(False)
             await loop.sock_sendto(first, question[:-2], ("127.0.0.1", port))  # truncated, so it is dropped
-            answered, refused = await asyncio.gather(ask(first, question), ask(second, change))
+            await loop.sock_sendto(second, change, ("127.0.0.1", port))  # gets no reply
+            answered, other = await asyncio.gather(ask(first, question), ask(second, pid))
     assert (answered.direction, answered.payload[0]) == (Direction.REPLY, 211)
-    assert (refused.direction, refused.command) == (Direction.ERROR, SET_PID)
-    assert len(daemon.share_refused) == 1
+    assert (other.direction, other.command) == (Direction.REPLY, PID)
+    assert daemon.bridge.sharing.refused.total() == 1
 
 
 async def test_a_further_client_displaces_the_silent_one(monkeypatch: pytest.MonkeyPatch) -> None:
     """A laptop that was switched off never closes its connection."""
-    monkeypatch.setattr("service.links.msp_share._MAX_CLIENTS", 2)
+    monkeypatch.setattr("service.links.msp_share._MAX_PROGRAMS", 2)
     async with shared() as (daemon, first):
         address = daemon.settings.share[0].address
         silent, silent_writer = await asyncio.open_connection(address.host, address.port)
@@ -186,13 +195,16 @@ async def test_a_further_client_displaces_the_silent_one(monkeypatch: pytest.Mon
         further_writer.close()
 
 
-async def test_a_flood_is_dropped() -> None:
-    async with shared() as (daemon, program):
-        program._writer.write(MspFrame(Direction.REQUEST, REBOOT).encode() * 50_000)
-        await program._writer.drain()
-        (reply,) = await program.ask(IDENT)
-        assert reply.direction in Direction
-        assert 0 < daemon.share_refused.total() < 15_000
+async def test_a_flood_is_dropped_and_another_program_is_answered() -> None:
+    async with shared() as (daemon, flooder):
+        address = daemon.settings.share[0].address
+        reader, writer = await asyncio.open_connection(address.host, address.port)
+        before = daemon.traffic["fc"].pieces_received
+        flooder._writer.write(MspFrame(Direction.REQUEST, PID).encode() * 50_000)
+        replies = await Program(reader, writer).ask(IDENT, times=50)
+        assert len(replies) == 50
+        assert daemon.traffic["fc"].pieces_received < before + 5000
+        writer.close()
 
 
 async def test_noise_is_not_passed_on() -> None:
@@ -200,7 +212,7 @@ async def test_noise_is_not_passed_on() -> None:
         program._writer.write(b"###\r\r\rRRR#\n" * 100)
         (reply,) = await program.ask(IDENT)
         assert reply.direction is Direction.REPLY
-        assert daemon.share_refused == {}
+        assert daemon.bridge.sharing.refused == {}
 
 
 @pytest.mark.parametrize(

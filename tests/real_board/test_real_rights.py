@@ -16,6 +16,7 @@ from simulator.board.simulated_board import Power
 from simulator.emulated_naze.board import EmulatedNaze
 from simulator.emulated_naze.image import Image
 from tests.support.real_bench import IDENT, Figure, RealBench
+from tests.support.share_program import ShareProgram
 from tests.support.world import World
 
 _LENGTHS = (0, 1, 2, 7, 16, 58, 64, 243)
@@ -24,7 +25,6 @@ _FILLS = (0x00, 0x10, 0xFF)
 _SWITCH_ON_US = 2000
 _BOOT_S = 20.0
 _STICKS_S = 5.0
-_ANSWERED_WITHIN_S = 2.0
 #: Time for a scheduled write of the configuration, and for what a request starts.
 _SETTLED_S = 3.0
 
@@ -109,14 +109,10 @@ def fills_buffer(frame: MspFrame) -> bool:
 
 
 def ask(world: World, frame: MspFrame) -> bool:
-    """Send a request through a read-only share, wait for its reply; True if it was let through."""
-    answers: list[MspFrame] = []
-    is_refused = world.bridge.sharing.request(frame, answers.append, world.now, may_write=False)
-    if is_refused:
-        return False
-    world.receive_from_fc(b"")  # sends it
-    world.run_until(lambda w: bool(answers) or not w.bridge.runner.is_busy, _ANSWERED_WITHIN_S)
-    return True
+    """Send a request through a read-only share and wait for its end; True if it reached the board."""
+    world.written.clear()
+    ShareProgram(world).outcome(frame.command, frame.payload)
+    return request(frame.command, frame.payload) in [data for _, _, data in world.written]
 
 
 def name(frame: MspFrame) -> str:

@@ -35,6 +35,7 @@ from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission, RecalledMission
 from bridge.model.settings import SealMemory, SealsOfThisRun
 from bridge.model.verdict import SentSeqs
+from bridge.sharing.program import Program
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MAGIC_V1, MavlinkSplitter
 from protocols.mission_record import ListIdentity, identify
@@ -249,6 +250,11 @@ class World:
         if not self._is_away:
             self.bridge.gcs_received(station.peer, data, self.now, datagram=datagram)
             self._flush()
+
+    def receive_from_program(self, program: Program, data: bytes) -> None:
+        """Let bytes from a program on a share arrive now."""
+        self.bridge.sharing.received(program, data, self.now)
+        self._flush()
 
     def push(self, items: Sequence[Any]) -> list[Any]:
         """Push like the command line; the returned list receives the outcome."""

@@ -2,6 +2,7 @@
 """INAV's own readings: load, arming blockers, battery percentage and cells, airspeed (MSP v2), time."""
 
 from collections.abc import Mapping
+from math import inf
 
 from bridge.fc.msp_telemetry import hear_box_flags
 from bridge.fc.profile import Decoder, FlightController
@@ -29,6 +30,14 @@ INAV_POLLS = (
     # For ATTITUDE's rates.
     Poll(Msp.RAW_IMU, request(Msp.RAW_IMU), 18, 0.1),
     Poll(Msp.RTC, request(Msp.RTC), RTC_SIZE, 2.0),
+    # For other programs only.
+    Poll(Msp.SENSOR_STATUS, request(Msp.SENSOR_STATUS), 9, inf),
+    Poll(Msp.BOX, request(Msp.BOX), 8, inf),  # the active boxes
+    Poll(Msp.STATUS_EX, request(Msp.STATUS_EX), 16, inf),
+    Poll(Msp.GPSSTATISTICS, request(Msp.GPSSTATISTICS), 20, inf),
+    Poll(Msp.SONAR, request(Msp.SONAR), 4, inf),
+    Poll(Msp.INAV_DEBUG, request(Msp.INAV_DEBUG), 32, inf),
+    Poll(Msp.INAV_TEMPERATURES, request(Msp.INAV_TEMPERATURES), 16, inf),
 )
 _MAX_RSSI = 1023
 #: In INAV_STATUS.
@@ -96,6 +105,10 @@ def _home(vehicle: Vehicle, payload: bytes, _controller: FlightController, _now:
         vehicle.hear_home(home.lat_e7, home.lon_e7, home.alt_cm / 100)
 
 
+def _nothing(_vehicle: Vehicle, _payload: bytes, _controller: FlightController, _now: float) -> None:
+    """INAV's BOX has the active boxes, as INAV_STATUS does; the switches' ranges are elsewhere."""
+
+
 INAV_DECODERS: Mapping[int, Decoder] = {
     Msp.INAV_STATUS: _inav_status,
     Msp.INAV_ANALOG: _inav_analog,
@@ -103,4 +116,5 @@ INAV_DECODERS: Mapping[int, Decoder] = {
     Msp.ANALOG: _analog,
     Msp.WP: _home,
     Msp.RTC: _time,
+    Msp.BOX: _nothing,
 }

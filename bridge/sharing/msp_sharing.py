@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Answers MSP requests of other programs, from the last replies to the bridge itself or from the flight controller.
+
+A reply that is known costs the line nothing, in flight and during a mission transfer, too. The others are requested
+one at a time, for each program in turn, by a disarmed craft only, and when no poll is due. They use the part of the
+line that telemetry leaves, while no mission needs it. A request that cannot be answered yet waits. After 3 s its
+program is disconnected, because programs misread MSP's error reply: INAV Configurator takes it for success.
+"""
+
+from collections import Counter, deque
+from collections.abc import Callable
+from math import inf
+
+from bridge.fc.profile import FlightController
+from bridge.fc.session import FcSession
+from bridge.gcs.budget import Shares, TokenBucket
+from bridge.gcs.cost import Rate
+from bridge.line.conversation import Conversation, LinkLost, Send, ask_status, receive
+from bridge.line.msp_link import MspLink
+from bridge.line.runner import Runner
+from bridge.missions.mission_service import MissionService
+from bridge.model.events import EventLog, Level
+from bridge.sharing.permission import ARMED, is_unknown_read, refusal, right_of
+from bridge.sharing.program import Program, WaitingRequest
+from protocols.msp.frame import Direction, MspFrame, frame_size
+from protocols.rights.effect import Effect
+
+#: The requests of all programs: each of n busy ones has 1 / (n + 1) of them.
+_TOTAL = Rate(400, 400)
+#: For this long a reply also answers the same request of other programs.
+_CURRENT_S = 0.2
+#: An unanswered request occupies the line longer than any other: its program pauses.
+_PAUSE_AFTER_LOSS_S = 0.5
+#: The interval at which waiting requests are looked at if nothing happens on the line.
+_LOOK_AGAIN_S = 0.1
+#: A program that repeats its attempts is reported this often; all together at this rate.
+_REPORT_INTERVAL_S = 30.0
+_REPORTS = Rate(0.2, 5)
+_MAX_REPORTED = 64
+#: SET_RTC and COMMON_SET_TZ: mwp sets an INAV's clock each time it connects, and goes on after an error.
+_CLOCK = frozenset((247, 0x1002))
+_NO_REPLY = "no reply from the flight controller"
+
+
+class MspSharing:
+    """`tell` sends a text to all ground stations.
+
+    `refused`: requests that were refused or not answered in time, by reason.
+    """
+
+    def __init__(
+        self,
+        session: FcSession,
+        runner: Runner,
+        missions: MissionService,
+        log_event: EventLog,
+        tell: Callable[[str], None],
+    ) -> None:
+        self._session = session
+        self._runner = runner
+        self._missions = missions
+        self._log_event = log_event
+        self._tell = tell
+        self._programs: deque[Program] = deque()  # the next one to have a request forwarded first
+        self._total = Shares(_TOTAL)
+        self._forwarded: WaitingRequest | None = None
+        #: When the line has carried the last forwarded request and its reply.
+        self._free_at = 0.0
+        self._stopped = False
+        self._reported: dict[tuple[str, bool], float] = {}  # by host and kind of request, the oldest first
+        self._reports = TokenBucket(_REPORTS)
+        self.refused: Counter[str] = Counter()
+        #: Called after a request that may have changed settings.
+        self.on_change: Callable[[float], None] = lambda _now: None
+        #: The time of the next `serve`; infinity while no request waits.
+        self.due = inf
+
+    def join(self, program: Program) -> None:
+        self._programs.append(program)
+
+    def leave(self, program: Program) -> None:
+        if program in self._programs:
+            self._programs.remove(program)
+
+    def received(self, program: Program, data: bytes, now: float) -> None:
+        """Take bytes of a program."""
+        if program in self._programs and self._total.left(now) > self._total.used(program):
+            self._total.spend(program, program.take(data, now))
+            if program.waiting:
+                self.serve(now)
+
+    def stop(self) -> None:
+        """Forward nothing more: the bridge is stopping."""
+        self._stopped = True
+
+    def serve(self, now: float) -> None:
+        """Answer what can be answered, disconnect who waited too long, and forward the next request."""
+        waiting = [program for program in self._programs if program.waiting]
+        for program in waiting:
+            self._answer(program, now)
+            for request in tuple(program.waiting):
+                if request.until <= now and request is not self._forwarded:
+                    self._give_up(program, request, now)
+        if self._forwarded is None and self._free_at <= now:
+            self._forward_next(now)
+        deadlines = [request.until for program in self._programs for request in program.waiting if request.until > now]
+        again = now + _LOOK_AGAIN_S if self._free_at <= now else min(self._free_at, now + _LOOK_AGAIN_S)
+        self.due = min([again, *deadlines]) if any(program.waiting for program in self._programs) else inf
+
+    def _answer(self, program: Program, now: float) -> None:
+        """Answer or refuse a program's requests, those of the same command in order. A change holds up what follows."""
+        link, controller = self._session.state.link, self._session.state.controller
+        if link is None or controller is None:
+            return
+        unanswered = set[int]()
+        for request in tuple(program.waiting):
+            frame = request.frame
+            if request is self._forwarded and request.is_change:
+                return
+            right = right_of(frame, controller)
+            if is_unknown_read(right, frame):
+                # As the flight controller itself would reply.
+                program.answer(request, MspFrame(Direction.ERROR, frame.command))
+                continue
+            armed = self._session.vehicle.armed
+            why = refusal(frame, right, link, may_write=program.may_write, armed=armed)
+            if why:
+                self._refuse(program, request, right.name, why, now)
+                if program not in self._programs:
+                    return
+                continue
+            request.is_change = right.effect is Effect.CHANGE
+            if request.is_change:
+                return
+            if frame.command not in unanswered:
+                reply = self._known(request, link, now)
+                if reply is None:
+                    unanswered.add(frame.command)
+                else:
+                    program.answer(request, reply)
+
+    def _known(self, request: WaitingRequest, link: MspLink, now: float) -> MspFrame | None:
+        max_age_s = self._session.polls.follow(request.frame.command, request.asked, now)
+        request.is_polled = max_age_s is not None
+        if max_age_s == inf:
+            return MspFrame(Direction.ERROR, request.frame.command)
+        return link.replies.get(request.asked, _CURRENT_S if max_age_s is None else max_age_s, now)
+
+    def _forward_next(self, now: float) -> None:
+        """Forward the first request that needs the line, of the program whose turn it is."""
+        link, controller = self._session.state.link, self._session.state.controller
+        if self._obstacle() or self._runner.is_busy or link is None or controller is None:
+            return
+        if self._session.polls.next_deadline(link) <= now:
+            return  # telemetry first
+        for program in self._programs:
+            request = None if now < program.blocked_until else _first_unknown(program.waiting)
+            if request is None or (request.frame.payload and link.owes(request.frame.command)):
+                continue
+            if request.is_change and self._missions.occupied() is not None:
+                continue
+            self._programs.remove(program)
+            self._programs.append(program)
+            self._forward(program, request, controller, now)
+            return
+
+    def _obstacle(self) -> str:
+        """The reason why no request can be forwarded now; empty if it can."""
+        state = self._session.state
+        if state.link is None or state.controller is None:
+            return "no flight controller speaks MSP now"
+        armed = self._session.vehicle.armed
+        if armed is not False:
+            return ARMED if armed else "not yet known to be disarmed"
+        if self._stopped:
+            return "naze-bridge is stopping"
+        return "a mission transfer is running" if self._runner.needs_line else ""
+
+    def _forward(self, program: Program, request: WaitingRequest, controller: FlightController, now: float) -> None:
+        self._forwarded = request
+        right = right_of(request.frame, controller)
+
+        def done(reply: MspFrame | str | LinkLost, at: float) -> None:
+            self._forwarded = None
+            size = len(request.asked) + (len(reply.encode()) if isinstance(reply, MspFrame) else 0)
+            self._free_at = now + self._session.polls.rest_s(size)
+            if not isinstance(reply, MspFrame):
+                program.blocked_until = at + _PAUSE_AFTER_LOSS_S
+            if request.is_change:
+                self.on_change(at)
+                if (link := self._session.state.link) is not None:
+                    link.replies.forget()
+            if request.is_change and request in program.waiting:
+                if isinstance(reply, MspFrame):
+                    program.answer(request, reply)
+                elif reply == ARMED:
+                    self._refuse(program, request, right.name, ARMED, at)
+                else:
+                    # It may have been carried out, so it is not repeated.
+                    self._give_up(program, request, at)
+            self.serve(at)
+
+        conversation = _carry(request, frame_size(request.frame.command, right.reply), controller.arm_bit)
+        self._runner.start(conversation, done, now, in_background=True)
+
+    def _refuse(self, program: Program, request: WaitingRequest, name: str, why: str, now: float) -> None:
+        if request.frame.command in _CLOCK:
+            program.answer(request, MspFrame(Direction.ERROR, request.frame.command))
+            return
+        level = self._level(program, name, why, now, is_change=True)
+        self._log_event(level, "share.refused", program=program.name, command=name, why=why)
+        if level == "warning":
+            self._tell(f"{program.host}: {name} refused ({why})")
+        self._disconnect(program, request)
+
+    def _give_up(self, program: Program, request: WaitingRequest, now: float) -> None:
+        why = self._obstacle() or _NO_REPLY
+        controller = self._session.state.controller
+        right = None if controller is None else right_of(request.frame, controller)
+        name = f"command {request.frame.command}" if right is None else right.name
+        level = self._level(program, name, why, now, is_change=False)
+        self._log_event(level, "share.unanswered", program=program.name, command=name, why=why)
+        self._disconnect(program, request)
+
+    def _disconnect(self, program: Program, request: WaitingRequest) -> None:
+        """Without a connection, only this request gets no reply."""
+        program.waiting.remove(request)
+        if program.close is not None:
+            self._programs.remove(program)
+            program.waiting.clear()
+            program.close()
+
+    def _level(self, program: Program, command: str, why: str, now: float, *, is_change: bool) -> Level:
+        """Count a request that got no reply; "warning" if that is news."""
+        kind = program.host, is_change
+        what = f"{command}: {why}"
+        self.refused[what if what in self.refused or len(self.refused) < _MAX_REPORTED else "other requests"] += 1
+        if now < self._reported.get(kind, -inf) + _REPORT_INTERVAL_S or not self._reports.has(now):
+            return "debug"
+        self._reports.spend()
+        if len(self._reported) >= _MAX_REPORTED:
+            del self._reported[next(iter(self._reported))]
+        self._reported.pop(kind, None)
+        self._reported[kind] = now
+        return "warning"
+
+
+def _first_unknown(waiting: list[WaitingRequest]) -> WaitingRequest | None:
+    """The first request to forward: a change only when everything before it was answered."""
+    for request in waiting:
+        if request.is_change:
+            return request if request is waiting[0] else None
+        if not request.is_polled:
+            return request
+    return None
+
+
+def _carry(request: WaitingRequest, reply_size: int, arm_bit: int | None) -> Conversation[MspFrame | str]:
+    """Forward a request; its reply, or the reason for none. No poll may have reported yet that the craft was armed."""
+    command = request.frame.command
+    if request.is_change:
+        status = yield from ask_status()
+        if status is None or arm_bit is None:
+            return _NO_REPLY
+        if status.box_flags >> arm_bit & 1:
+            return ARMED
+    is_read = not request.is_change
+    yield Send(request.asked, command, reply_size, exclusive=not is_read, is_kept=is_read, is_shared=True)
+    reply = yield from receive(command)
+    return reply or _NO_REPLY

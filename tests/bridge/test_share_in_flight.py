@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Other programs keep a live display while the craft is armed, and none of their requests reaches the line."""
+
+import pytest
+
+from protocols.msp.frame import Direction, MspParser, request
+from simulator.commands.fc_kinds import make_board
+from tests.support.share_program import ShareProgram
+from tests.support.world import World
+
+STATUS, RAW_IMU, SERVO, MOTOR, RC, RAW_GPS, COMP_GPS, ATTITUDE, ALTITUDE, ANALOG = range(101, 111)
+BOX, WP, NAV_STATUS, STATUS_EX, SENSOR_STATUS, DEBUG, PID = 113, 118, 121, 150, 151, 254, 112
+NAME, WP_GETINFO = 10, 20
+INAV_STATUS, INAV_ANALOG, INAV_MIXER = 0x2000, 0x2002, 0x2010
+#: The poll loops: INAV Configurator's js/periodicStatusUpdater.js with the Setup and GPS tabs, and build_pollreqs() in
+#: mwp's mwp-handle_serial.vala, MultiWiiConf's draw(). In flight mwp leaves out GPSSTATISTICS.
+CONFIGURATOR = (SENSOR_STATUS, INAV_STATUS, BOX, INAV_ANALOG, ATTITUDE, RAW_GPS, COMP_GPS, RC)
+MWP_INAV = (INAV_STATUS, INAV_ANALOG, NAV_STATUS, RAW_GPS, COMP_GPS, WP, ATTITUDE, ALTITUDE)
+MWP_MULTIWII = (STATUS, ANALOG, NAV_STATUS, RAW_GPS, COMP_GPS, WP, ATTITUDE, ALTITUDE)
+MWP_HARAKIRI = (STATUS, ANALOG, RAW_GPS, COMP_GPS, WP, ATTITUDE, ALTITUDE)
+MULTIWIICONF = (STATUS, RAW_IMU, SERVO, MOTOR, RC, RAW_GPS, COMP_GPS, ALTITUDE, ANALOG, DEBUG, ATTITUDE)
+
+
+def ready(kind: str) -> World:
+    world = World(speeds=(115200,), peer=None if kind == "harakiri" else make_board(kind))
+    world.wait_ready(30)
+    world.run(3)
+    return world
+
+
+def arm(world: World) -> None:
+    world.naze.faults.armed = True
+    world.wait_until(lambda world: bool(world.bridge.session.vehicle.armed), 5)
+    world.run(0.3)
+
+
+@pytest.mark.parametrize(
+    ("kind", "loop"),
+    [
+        ("inav", CONFIGURATOR),
+        ("inav", MWP_INAV),
+        ("multiwii", MWP_MULTIWII),
+        ("harakiri", MWP_HARAKIRI),
+        ("harakiri", MULTIWIICONF),
+    ],
+)
+@pytest.mark.parametrize("is_connected_before", [True, False])
+def test_a_display_stays_live_in_flight(kind: str, loop: tuple[int, ...], is_connected_before: bool) -> None:
+    world = ready(kind)
+    program = ShareProgram(world)
+    if is_connected_before:
+        program.ask_in_turn(0.005, loop)
+        world.run(3)
+    arm(world)
+    if not is_connected_before:
+        program.ask_in_turn(0.005, loop)
+    program.replies.clear()
+    world.run(1)
+    world.written.clear()
+    world.run(10)
+    assert program.closed_at is None
+    counts = dict.fromkeys(loop, 0)
+    for _, frame in program.replies:
+        counts[frame.command] += 1
+    # Once a second, and what the bridge had no poll for until now, too.
+    assert min(counts.values()) >= 10
+    # Polls, and the watch of the mission.
+    sent = {frame.command for _, _, data in world.written for frame in MspParser().feed(data)}
+    assert sent <= {*world.bridge.session.polls.commands, WP_GETINFO}
+
+
+def test_values_in_flight_are_the_boards_last() -> None:
+    world = ready("inav")
+    arm(world)
+    program = ShareProgram(world)
+    program.ask_every(0.1, (ATTITUDE, b""), (RAW_GPS, b""))
+    world.run(20)
+    payloads = {frame.payload for _, frame in program.replies if frame.command == RAW_GPS}
+    assert len(payloads) >= 5  # it flies
+    asked_at, reply = program.replies[-2 if program.replies[-1][1].command == RAW_GPS else -1]
+    assert reply.command == ATTITUDE
+    assert world.now - asked_at < 1
+
+
+def test_in_flight_nothing_else_reaches_the_line() -> None:
+    world = ready("inav")
+    arm(world)
+    programs = [ShareProgram(world, f"192.0.2.{host}:1", may_write=True) for host in range(3)]
+    world.written.clear()
+    asked_at = world.now
+    for program, command in zip(programs, (PID, INAV_MIXER, NAME), strict=True):
+        program.ask(command, is_v2=True)
+    world.run(4)
+    sent = {frame.command for _, _, data in world.written for frame in MspParser().feed(data)}
+    assert not sent & {PID, INAV_MIXER, NAME}
+    assert [program.closed_at for program in programs] == [pytest.approx(asked_at + 3, abs=0.3)] * 3
+    assert {event.facts["why"] for event in world.events("share.unanswered")} == {"armed"}
+
+
+def test_a_waiting_read_is_forwarded_once_the_craft_has_landed() -> None:
+    world = ready("harakiri")
+    arm(world)
+    program = ShareProgram(world)
+    program.ask(PID)
+    world.run(1)
+    world.naze.faults.armed = False
+    world.run(1.5)
+    assert [frame.direction for _, frame in program.replies] == [Direction.REPLY]
+
+
+def test_a_refused_poll_is_answered_with_the_boards_error() -> None:
+    """Without its GPS a real INAV refuses GPSSTATISTICS; this model refuses the command of another program's poll."""
+    world = ready("multiwii")
+    program = ShareProgram(world)
+    replies = [program.wait_for(SERVO, seconds=4) for _ in range(4)]
+    arm(world)
+    world.written.clear()
+    replies += [program.wait_for(SERVO, seconds=4) for _ in range(4)]
+    assert {reply.direction for reply in replies} == {Direction.ERROR}
+    assert request(SERVO) not in b"".join(data for _, _, data in world.written)
