@@ -103,6 +103,8 @@ def test_a_board_is_found_after_unplugging_during_a_write(bench: Bench, planner:
     bench.board.set("unplug")
     assert_denied(lambda: planner.write_rest(NEW, 20))
     planner.wait_for_text("Flight controller lost")
+    planner.listen(1.5)
+    assert planner.read_hud() == "Flight controller lost during the upload"
     assert_denied(lambda: planner.write(NEW))
     planner.wait_for_text("No link to the flight controller")
     bench.board.set("plug")

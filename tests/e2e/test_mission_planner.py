@@ -2,13 +2,14 @@
 """Mission Planner writes, reads, cancels and is refused, on good and bad links."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import pytest
 
-from bridge.missions.mission_texts import finding_lines
+from bridge.missions.mission_texts import finding_lines, summary
 from bridge.model.verdict import Result
 from protocols.mavlink.dialect import Message, messages
-from protocols.mission_item import Command, MissionResult
+from protocols.mission_item import Command, Frame, MissionResult
 from tests.support.benches import Bench
 from tests.support.lossy_udp import Direction
 from tests.support.mission_planner import MissionPlanner, UploadFailed
@@ -66,6 +67,11 @@ def test_every_request_while_connecting_is_answered(shared: Bench) -> None:
     heartbeat = planner.messages("HEARTBEAT")[-1]
     assert (heartbeat.autopilot, heartbeat.type) == (messages.MAV_AUTOPILOT_ARDUPILOTMEGA, 2)
     assert planner.texts
+    # Nothing is wrong, so nothing is on the HUD, and nothing is said.
+    planner.listen(1.5)
+    assert planner.read_hud() == ""
+    assert planner.screen.heard() == []
+    assert planner.messages("HOME_POSITION")
 
 
 def test_the_vehicle_moves_on_its_map(shared: Bench) -> None:
@@ -115,6 +121,9 @@ def test_a_write_is_stored_with_the_rules_applied(shared: Bench, count: int, use
     lines = finding_lines(verdict.findings)
     assert lines
     assert all(line in planner.joined_texts() for _, line in lines)
+    # The summary stands on the HUD, also after the radius and a Read.
+    assert planner.read_hud() == summary(count, verdict)
+    assert planner.screen.heard()[0] == summary(count, verdict)
 
 
 def test_a_read_of_float_items_shows_the_same_list(shared: Bench) -> None:
@@ -163,12 +172,14 @@ def test_a_write_survives_loss_duplication_and_reordering(shared: Bench, count: 
 def test_write_fast_is_written_and_verified(shared: Bench, count: int) -> None:
     planner = shared.mission_planner()
     plan = plain_plan(count, start=2 * count)
+    plan[0] = replace(plan[0], frame=Frame.GLOBAL_RELATIVE_ALT)
     planner.write_fast(plan)
     until(lambda: shared.board.records() == records_of(judge(plan)), "the list on the board")
     planner.wait_for_text("Mission verified")
     requested = [message.seq for message in planner.messages("MISSION_REQUEST")]
     assert max(requested) < count
     assert MissionResult.INVALID_SEQUENCE not in planner.acks()
+    assert planner.read_hud() == ""
 
 
 def test_write_fast_over_a_bad_radio_writes_everything_or_nothing(shared: Bench, kept: list[str]) -> None:
