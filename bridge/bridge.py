@@ -268,5 +268,7 @@ class Bridge:
         self._was_armed = armed
         if armed and self._uploads.is_active:
             self._uploads.end(ARMED, now)
+        if armed:
+            self.settings.armed()
         self.ground.record_flight(on=armed and not self.is_passing_through)
         self._log_event("info", "vehicle.armed" if armed else "vehicle.disarmed")

@@ -63,8 +63,8 @@ class Ground:
         self._text_id = 0
         #: The time of the last input.
         self.now = 0.0
-        #: A text for each newcomer, about a problem that began before it connected.
-        self.notice = ""
+        #: Texts for each newcomer, about problems that began before it connected.
+        self.notices: list[str] = []
         #: Frames from ground stations whose checksum was wrong.
         self.bad_frames = 0
         #: Whole frames from ground stations, by link and message id.
@@ -162,8 +162,8 @@ class Ground:
             if is_unknown:
                 self._log_event("info", "gcs.found", station=str(station))
             self._on_newcomer(peer)
-            if self.notice:
-                self.say(Severity.WARNING, self.notice, station)
+            for notice in self.notices:
+                self.say(Severity.WARNING, notice, station)
 
     def record(self, peer: Peer, frame: MavlinkFrame, now: float) -> None:
         if not self.stations.is_listener(peer) and self.budgets.allows(Cost.RECORDED, peer, now):

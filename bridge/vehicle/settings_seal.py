@@ -65,6 +65,8 @@ class SettingsSeal:
         #: True if the settings were changed through the bridge since the last reading.
         self._is_ours = False
         self._is_reading = False
+        #: The text for ground stations that connect later.
+        self._told = ""
         #: None until the settings of a board were read; those of a lost board stay.
         self.state: SettingsState | None = None
         #: The time of the next `tick`, monotonic s.
@@ -81,8 +83,14 @@ class SettingsSeal:
     def changed_here(self, now: float) -> None:
         """A program changed settings through the bridge: the next reading is compared with no earlier one."""
         self._is_ours = True
+        if self._board is not None:
+            self._memory.keep(self._board, Seal({}))  # the daemon may end before
         if self._controller is not None:
             self.due = now + _AFTER_CHANGE_S
+
+    def armed(self) -> None:
+        """The pilot has decided to fly: stations that connect from now on are not told of an earlier change."""
+        self._tell_newcomers("")
 
     def tick(self, now: float) -> None:
         controller, runner = self._controller, self._missions.runner
@@ -105,7 +113,16 @@ class SettingsSeal:
         change = SettingsChange(changed, now)
         self.state = replace(self.state, change=change)
         self._ground.say(Severity.WARNING, change.text(_MOST_TEXT))
+        self._tell_newcomers(change.text(_MOST_TEXT))
         self._log_event("warning", "settings.changed_on_board", detail=change.text(), seal=str(self.state.seal))
+
+    def _tell_newcomers(self, text: str) -> None:
+        """A board is mostly found before the first ground station connects. An empty text: no more."""
+        if self._told in self._ground.notices:
+            self._ground.notices.remove(self._told)
+        self._told = text
+        if text:
+            self._ground.notices.append(text)
 
     def _read(self, controller: FlightController) -> Conversation[list[ChangedPart] | None]:
         """Read the settings; returns the parts that changed without the bridge, None if it was interrupted."""

@@ -225,7 +225,7 @@ class Daemon:
 
     def _cannot_store(self, why: str) -> None:
         self.store_trouble = why
-        self.bridge.ground.notice = "Missions are kept in memory: state folder unusable"
+        self.bridge.ground.notices.append("Missions are kept in memory: state folder unusable")
         self.flush()
 
     def _fault(self, _loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:

@@ -140,6 +140,37 @@ def test_a_change_between_two_runs_is_reported() -> None:
     assert again.events("settings.changed_on_board") == []
 
 
+def test_a_station_that_connects_later_is_told_until_the_craft_is_armed() -> None:
+    world, _ = sealed(naze)
+    on_the_board(world, SET_PID, bytes(30))
+    world.run(ROUND_S)
+    told = world.events("settings.changed_on_board")[0].facts["detail"]
+    heartbeat = messages.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3)
+    late = GroundStation(world, "late")
+    late.send(heartbeat)
+    late.send(heartbeat)
+    world.run(1)
+    assert warnings(late) == [told]
+    world.naze.faults.armed = True
+    world.wait_until(lambda world: world.bridge.session.vehicle.armed is True, 5)
+    world.run(1)
+    later = GroundStation(world, "later")
+    later.send(heartbeat)
+    world.run(1)
+    assert warnings(later) == []
+
+
+def test_a_change_through_the_bridge_survives_a_restart_before_the_next_reading() -> None:
+    seals = SealsOfThisRun()
+    board = naze()
+    world, _ = sealed(lambda: board, seals)
+    frame = MspFrame(Direction.REQUEST, SET_PID, bytes(30))
+    assert world.bridge.sharing.request(frame, lambda _: None, world.now, may_write=True) == ""
+    world.run(1)
+    again, _ = sealed(lambda: board, seals)
+    assert again.events("settings.changed_on_board") == []
+
+
 def test_another_board_is_no_change() -> None:
     seals = SealsOfThisRun()
     for make in (naze, inav, multiwii, naze):
