@@ -164,8 +164,8 @@ def test_a_change_through_the_bridge_survives_a_restart_before_the_next_reading(
     seals = SealsOfThisRun()
     board = naze()
     world, _ = sealed(lambda: board, seals)
-    frame = MspFrame(Direction.REQUEST, SET_PID, bytes(30))
-    assert world.bridge.sharing.request(frame, lambda _: None, world.now, may_write=True) == ""
+    on_the_board(world, SET_PID, bytes(30))
+    world.bridge.settings.changed_here(world.now)
     world.run(1)
     again, _ = sealed(lambda: board, seals)
     assert again.events("settings.changed_on_board") == []
