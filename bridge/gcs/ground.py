@@ -159,11 +159,11 @@ class Ground:
         is_listener, is_unknown = self._standing(peer) is Standing.LISTENER, self.stations.is_unknown(peer)
         if self.stations.heard(station, frame.version, now, is_listener=is_listener):
             self._everyone = None
+            self._on_newcomer(peer)
             if is_unknown:
                 self._log_event("info", "gcs.found", station=str(station))
-            self._on_newcomer(peer)
-            for notice in self.notices:
-                self.say(Severity.WARNING, notice, station)
+                for notice in self.notices:
+                    self.say(Severity.WARNING, notice, station)
 
     def record(self, peer: Peer, frame: MavlinkFrame, now: float) -> None:
         if not self.stations.is_listener(peer) and self.budgets.allows(Cost.RECORDED, peer, now):
