@@ -141,8 +141,8 @@ class MessageRouter:
             self._uploads.item(station, item, now)
 
     def _set_current(self, station: Station, _message: Message, now: float) -> None:
-        self._vehicle.refuse_current(station.peer, now)
         self._commands.refuse(station, m.MAV_CMD_DO_SET_MISSION_CURRENT)
+        self._vehicle.refuse_current(station, now)
 
     def _data_stream(self, station: Station, message: Message, _now: float) -> None:
         rate_hz = message.req_message_rate if message.start_stop else 0

@@ -38,7 +38,7 @@ _POLLS_INTERVAL_S = 0.25
 _NEWCOMER_S, _NEWCOMER_INTERVAL_S = 3.0, 0.2
 #: Without a reading for this long, SYS_STATUS is sent anyway, to report that nothing is known.
 _SILENT_S = 3.0
-#: Longer than MAVSDK waits for a changed MISSION_CURRENT (2.5 s), and Mission Planner between two tries (2 s).
+#: Longer than MAVSDK waits for a changed MISSION_CURRENT (2.5 s).
 _NO_CURRENT_S = 4.0
 #: Mission Planner shows a text for this time.
 _SHOWN_S = 10.0
@@ -83,6 +83,8 @@ class OwnVehicle:
         self._newcomers: dict[Peer, float] = {}
         self._newcomers_due = inf
         self._polls_set_at, self._polls_due = -inf, inf
+        #: The peers that have sent REQUEST_DATA_STREAM.
+        self._stream_users: set[Peer] = set()
         #: Armed, mode, failsafe and lost as last announced.
         self._announced: tuple[bool | None, FlightMode | str | None, bool, bool] | None = None
 
@@ -109,6 +111,7 @@ class OwnVehicle:
     def _end_second(self, now: float) -> None:
         self._second_ends = max(self._second_ends + _TICK_S, now)
         everyone = self._ground.everyone()
+        self._stream_users.intersection_update(everyone)
         unwatched = () if self._session.vehicle.armed else self._ground.unheard()
         self._rates.keep(everyone, set(filter(self._ground.has_standing, everyone)), unwatched)
         self._set_polls(everyone)
@@ -197,12 +200,16 @@ class OwnVehicle:
         self._follow_requests()
         return True
 
-    def refuse_current(self, peer: Peer, now: float) -> None:
-        """Withhold MISSION_CURRENT from a ground station whose MISSION_SET_CURRENT was refused.
+    def refuse_current(self, station: Station, now: float) -> None:
+        """Send MISSION_CURRENT to a ground station whose MISSION_SET_CURRENT was refused, or withhold it.
 
-        Mission Planner takes any for success. MAVSDK repeats its request at each that has another number, without end.
+        Mission Planner's window hangs until one arrives. MAVSDK, which requests no streams, repeats its request at each
+        that has another number, without end.
         """
-        self._rates.withhold(peer, messages.MAVLINK_MSG_ID_MISSION_CURRENT, now + _NO_CURRENT_S)
+        if station.peer in self._stream_users:
+            self.send_once(station, messages.MAVLINK_MSG_ID_MISSION_CURRENT)
+        else:
+            self._rates.withhold(station.peer, messages.MAVLINK_MSG_ID_MISSION_CURRENT, now + _NO_CURRENT_S)
 
     def let_read(self, peer: Peer) -> None:
         """Withhold SYS_STATUS from a ground station for as long as Mission Planner shows a text, while disarmed.
@@ -214,6 +221,7 @@ class OwnVehicle:
 
     def set_stream(self, peer: Peer, stream: int, interval_s: float) -> None:
         """Set the interval of all messages of one of ArduPilot's streams."""
+        self._stream_users.add(peer)
         for row in TELEMETRY:
             if row.stream == stream or (stream == _ALL_STREAMS and row.stream != NO_STREAM):
                 self.set_interval(peer, row.msgid, interval_s)

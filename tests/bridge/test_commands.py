@@ -181,7 +181,7 @@ def test_only_the_sender_gets_the_refusal(refused: Message) -> None:
 
 
 def test_the_current_waypoint_cannot_be_set() -> None:
-    """A MISSION_CURRENT would be success to Mission Planner, and another request to MAVSDK."""
+    """A MISSION_CURRENT would be another request to MAVSDK, which requests no streams."""
     world, asking, other = two_stations()
     asking.send(m.MAVLink_mission_set_current_message(1, 1, 3))
     world.run(3)
@@ -190,6 +190,23 @@ def test_the_current_waypoint_cannot_be_set() -> None:
     assert len(other.messages("MISSION_CURRENT")) == 3
     world.run(3)
     assert asking.messages("MISSION_CURRENT")
+
+
+def test_set_wp_in_mission_planner_ends_at_once() -> None:
+    """Without one MISSION_CURRENT its window hangs for 12 s, while it repeats the request six times."""
+    world, asking, other = two_stations()
+    asking.send(m.MAVLink_request_data_stream_message(1, 1, m.MAV_DATA_STREAM_EXTENDED_STATUS, 2, 1))
+    world.run(5)
+    for _ in range(2):
+        asking.take()
+        other.take()
+        asking.send(m.MAVLink_mission_set_current_message(1, 1, 3))
+        world.run(0.1)
+        answers = [message.get_type() for message in asking.messages("STATUSTEXT", "MISSION_CURRENT")]
+        assert answers[:2] == ["STATUSTEXT", "MISSION_CURRENT"]
+        assert not any(text for text in other.texts() if "cannot be set" in text)
+        world.run(5)
+    assert len([text for text in asking.texts() if "cannot be set" in text]) == 1
 
 
 def test_a_command_for_another_system_is_not_answered(flying: tuple[World, GroundStation]) -> None:

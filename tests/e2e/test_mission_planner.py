@@ -397,3 +397,13 @@ def test_an_item_sent_before_its_request_is_accepted(shared: Bench) -> None:
     planner.send(messages.MAVLink_mission_count_message(1, 1, len(plan), 0))
     planner.write_rest(plan, 0)
     assert shared.board.records() == records_of(judge(plan))
+
+
+def test_set_wp_is_refused_at_once_with_one_text(shared: Bench) -> None:
+    planner = shared.mission_planner()
+    planner.connect()
+    planner.texts.clear()
+    assert planner.set_current(2) == 1
+    planner.wait_for_text("The current waypoint cannot be set")
+    planner.listen(2)
+    assert planner.joined_texts().count("cannot be set") == 1

@@ -329,6 +329,15 @@ class MissionPlanner:
         if radius_m is not None:
             self.set_parameter("WPNAV_RADIUS", radius_m * 100)
 
+    def set_current(self, seq: int) -> int:
+        """Set WP: its window hangs until a MISSION_CURRENT comes; returns the number of requests (setWPCurrent)."""
+        for tries in range(1, 7):
+            self.send(messages.MAVLink_mission_set_current_message(*self._target, seq))
+            for message in self._packets(2.0):
+                if message.get_type() == "MISSION_CURRENT":
+                    return tries
+        raise TimedOut("Timeout on read - setWPCurrent")
+
     def get_home(self) -> None:
         """Command 410, 700 ms a try; without a reply it reads item 0 instead."""
         for _ in range(4):
