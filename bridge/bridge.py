@@ -30,6 +30,7 @@ from bridge.model.events import EventLog
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.vehicle import FlightState, Health, MissionLeg, Readiness
 from bridge.sharing.msp_sharing import MspSharing
+from bridge.vehicle.calibration import Calibration
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.link_announcer import LinkAnnouncer
 from bridge.vehicle.local_missions import LocalMissions
@@ -103,7 +104,8 @@ class Bridge:
         downloads = MissionDownloads(self.missions, self.ground)
         self._parameters = Parameters(self.missions, self.ground, config.sysid)
         actions = FcActions(self.session, self.missions, self.runner)
-        commands = CommandService(self.ground, self._vehicle, actions, self.session, config.version)
+        self._calibration = Calibration(self.ground, self.runner, self._announcer)
+        commands = CommandService(self.ground, self._vehicle, actions, self.session, self._calibration, config.version)
         router = MessageRouter(self.ground, self._uploads, downloads, self._parameters, commands, self._vehicle)
         self._incoming = Incoming(
             self.guard, self.ground, router, self._parameters, self.session.send_mavlink, config.sysid, config.compid
@@ -178,6 +180,8 @@ class Bridge:
                 self._incoming.forget(peer)
         if now >= self._announcer.due:
             self._say(self._announcer.tick(now, self.session.state.trouble))
+        if now >= self._calibration.due:
+            self._calibration.tick(now)
         if now >= self._vehicle.due and not self.is_passing_through:
             self._vehicle.tick(now)
 
@@ -189,6 +193,7 @@ class Bridge:
             self._uploads.next_deadline() if self._uploads.is_active else inf,
             self.ground.stations.due,
             self._announcer.due,
+            self._calibration.due,
             self._watch.due,
             self.settings.due,
             inf if self.is_passing_through else self._vehicle.due,
@@ -226,6 +231,7 @@ class Bridge:
         # On a port that was opened since, an armed board may be another one.
         self.missions.use(store, now, is_same_board=self.session.met_family == controller.profile.family)
         self._say(self._announcer.found(controller, now))
+        self._calibration.controller_found(now)
         if not isinstance(store, Refusal):
             # Read its list at once: MISSION_CURRENT reports the count, and the first Read needs no wait.
             self._watch.due = now

@@ -10,30 +10,37 @@ from dataclasses import dataclass
 from enum import Enum
 
 from bridge.fc.session import FcSession
-from bridge.line.conversation import Conversation, LinkLost, ask_status, receive, send
+from bridge.line.conversation import Conversation, LinkLost, Pause, ask, ask_status, receive, send
 from bridge.line.runner import Runner
 from bridge.missions.mission_service import MissionService
 from protocols.msp.commands import Msp, MspAction
 from protocols.msp.frame import Direction, request
-from protocols.msp.telemetry import STATUS_SIZE, Sensor
+from protocols.msp.telemetry import RAW_IMU_SIZE, STATUS_SIZE, Sensor, decode_raw_imu
 from protocols.rights.effect import Effect
 from protocols.rights.msp import msp_right
 
 _STATUS_CHECKS = 2
 _ASKS_AFTER_ACTION = 12
+#: After a restart the first readings may still settle.
+_SETTLED_S, _LEVEL_CHECKS, _LEVEL_INTERVAL_S = 1.0, 5, 0.1
+#: Of 1 g: 3 degrees. An uncalibrated sensor is off by as much.
+_MAX_TILT = 0.05
 
 
 @dataclass(frozen=True, slots=True)
 class FcAction:
-    """`needs` must be on board. `freezes`: a Harakiri does nothing else until it is done, and then restarts."""
+    """`needs` must be on board. A Harakiri does nothing else until it is done, and then restarts.
+
+    instruction: for the pilot.
+    """
 
     command: MspAction
     needs: Sensor
-    freezes: bool
+    instruction: str
 
 
-CALIBRATE_ACCELEROMETER = FcAction(MspAction.ACC_CALIBRATION, Sensor.ACCELEROMETER, freezes=True)
-CALIBRATE_COMPASS = FcAction(MspAction.MAG_CALIBRATION, Sensor.COMPASS, freezes=True)
+CALIBRATE_ACCELEROMETER = FcAction(MspAction.ACC_CALIBRATION, Sensor.ACCELEROMETER, "Keep the craft level and still")
+CALIBRATE_COMPASS = FcAction(MspAction.MAG_CALIBRATION, Sensor.COMPASS, "Turn the craft about all axes")
 
 
 class ActionResult(Enum):
@@ -45,6 +52,8 @@ class ActionResult(Enum):
     NO_LINK = "No MSP link to the flight controller"
     OCCUPIED = "Wait for the mission transfer to end"
     NO_SENSOR = "The flight controller has no such sensor"
+    SIX_POSITIONS = "Six positions: calibrate with INAV Configurator"
+    RUNNING = "A calibration is running"
     NO_ANSWER = "No answer from the flight controller"
     REFUSED = "Not supported by the flight controller"
 
@@ -80,6 +89,9 @@ class FcActions:
         if self._session.vehicle.armed:
             on_done(ActionResult.ARMED)
             return
+        if action is CALIBRATE_ACCELEROMETER and controller.profile.calibrates_six_positions:
+            on_done(ActionResult.SIX_POSITIONS)
+            return
         if self._runner.needs_line or self._missions.acquire(self) is not None:
             on_done(ActionResult.OCCUPIED)
             return
@@ -91,11 +103,25 @@ class FcActions:
             self._missions.release(self)
             if isinstance(result, LinkLost):
                 result = ActionResult.NO_ANSWER
-            elif result is ActionResult.DONE and action.freezes and controller.profile.restarts_after_calibration:
+            elif result is ActionResult.DONE and controller.profile.restarts_after_calibration:
                 result = ActionResult.FREEZES
             on_done(result)
 
         self._runner.start(_act(action, arm_mask), done, now)
+
+
+def is_level() -> Conversation[bool | None]:
+    """True if the accelerometer reads a level craft, as it does right after its calibration; None: no answer."""
+    yield Pause(_SETTLED_S)
+    forward = left = up = 0
+    for _ in range(_LEVEL_CHECKS):
+        reply = yield from ask(request(Msp.RAW_IMU), Msp.RAW_IMU, RAW_IMU_SIZE)
+        imu = None if reply is None else decode_raw_imu(reply.payload)
+        if imu is None:
+            return None
+        forward, left, up = (total + value for total, value in zip((forward, left, up), imu.acc, strict=True))
+        yield Pause(_LEVEL_INTERVAL_S)
+    return max(abs(forward), abs(left)) <= _MAX_TILT * up
 
 
 def _act(action: FcAction, arm_mask: int) -> Conversation[ActionResult]:

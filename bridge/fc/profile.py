@@ -78,7 +78,8 @@ class Profile:
     missions: how they are written to it, or the reply to any attempt.
     check_kind, rules: how `naze-bridge check --kind` calls it, and the rules it applies.
     mavlink_sender: MAVLink version, sysid and compid it sends with; None matches any.
-    restarts_after_calibration: it reboots by itself when a calibration is done.
+    restarts_after_calibration: it reboots by itself when a calibration is done. calibrates_six_positions: its
+    accelerometer needs one request in each of six positions.
     arming_blockers: the known reasons that prevent arming at a time; None: not heard yet.
     notice: a warning for the pilot while this profile is active.
     """
@@ -102,6 +103,7 @@ class Profile:
     mavlink_sender: tuple[int, int, int] | None = None
     restarts_after_calibration: bool = False
     arming_blockers: Callable[[Vehicle, float], tuple[str, ...] | None] = _none_known
+    calibrates_six_positions: bool = False
     notice: str | None = None
 
 

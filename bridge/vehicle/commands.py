@@ -19,6 +19,7 @@ from bridge.fc.session import FcSession
 from bridge.gcs.flash_budget import TOO_MANY_WRITES
 from bridge.gcs.ground import Ground
 from bridge.gcs.station import Severity, Station
+from bridge.vehicle.calibration import Calibration
 from bridge.vehicle.own_vehicle import OwnVehicle
 from protocols.mavlink.command import CommandResult
 from protocols.mavlink.dialect import messages
@@ -32,6 +33,9 @@ _ASKS_FOR = {
     messages.MAV_CMD_GET_HOME_POSITION: messages.MAVLINK_MSG_ID_HOME_POSITION,
 }
 
+#: Gyro and barometer have no request in MSP.
+_CALIBRATED_AT_START = ({1: 1}, {3: 1}, {1: 1, 3: 1})
+_AT_START = "Gyro and baro calibrate at each power-on: keep it still"
 _FLY = "It is flown with the transmitter"
 _OUTPUTS = "Motors, servos and relays cannot be driven here"
 #: Commands that would act on the aircraft: command number -> text for the pilot.
@@ -72,6 +76,8 @@ _OUTCOMES = {
     ActionResult.NO_LINK: CommandResult.DENIED,
     ActionResult.OCCUPIED: CommandResult.TEMPORARILY_REJECTED,
     ActionResult.NO_SENSOR: CommandResult.DENIED,
+    ActionResult.SIX_POSITIONS: CommandResult.UNSUPPORTED,
+    ActionResult.RUNNING: CommandResult.TEMPORARILY_REJECTED,
     ActionResult.NO_ANSWER: CommandResult.FAILED,
     ActionResult.REFUSED: CommandResult.UNSUPPORTED,
 }
@@ -81,12 +87,19 @@ class CommandService:
     """Executes commands and acknowledges them. `version`: of the bridge."""
 
     def __init__(
-        self, ground: Ground, vehicle: OwnVehicle, actions: FcActions, session: FcSession, version: str
+        self,
+        ground: Ground,
+        vehicle: OwnVehicle,
+        actions: FcActions,
+        session: FcSession,
+        calibration: Calibration,
+        version: str,
     ) -> None:
         self._ground = ground
         self._vehicle = vehicle
         self._actions = actions
         self._session = session
+        self._calibration = calibration
         self._version = version
 
     def take(self, station: Station, command: int, params: Sequence[float], now: float) -> None:
@@ -94,14 +107,16 @@ class CommandService:
         action = _action(command, params)
         if action is None:
             self._acknowledge(station, command, self._do(station, command, params))
-        elif self._actions.present == action:
+        elif action in (self._actions.present, self._calibration.action):
             # Repeated by the user or duplicated by the network.
             self._acknowledge(station, command, CommandResult.IN_PROGRESS)
+        elif self._calibration.action is not None:
+            self._acted(station, command, action, ActionResult.RUNNING, now)
         elif not self._ground.flash.allows(station.peer, now):
             self._ground.say(Severity.ERROR, TOO_MANY_WRITES, station)
             self._acknowledge(station, command, CommandResult.TEMPORARILY_REJECTED)
         else:
-            self._actions.start(action, lambda outcome: self._acted(station, command, outcome), now)
+            self._actions.start(action, lambda outcome: self._acted(station, command, action, outcome, now), now)
 
     def refuse(self, station: Station, command: int) -> None:
         """Give the reason for refusing a message that does the same as `command` but is not acknowledged."""
@@ -111,13 +126,20 @@ class CommandService:
         ack = messages.MAVLink_command_ack_message(command, result, 0, 0, station.sysid, station.compid)
         self._ground.to(station, ack)
 
-    def _acted(self, station: Station, command: int, outcome: ActionResult) -> None:
+    def _acted(self, station: Station, command: int, action: FcAction, outcome: ActionResult, now: float) -> None:
         result = _OUTCOMES[outcome]
         if outcome in NOT_DONE:
             self._ground.flash.not_written(station.peer)
-        severity = Severity.NOTICE if result is CommandResult.ACCEPTED else Severity.ERROR
-        self._ground.say(severity, outcome.value, station)
-        self._acknowledge(station, command, result)
+        if result is not CommandResult.ACCEPTED:
+            self._ground.say(Severity.ERROR, outcome.value, station)
+            self._acknowledge(station, command, result)
+            return
+        self._ground.say(Severity.NOTICE, action.instruction, station)
+        if outcome is ActionResult.FREEZES:
+            self._ground.say(Severity.NOTICE, outcome.value, station)
+        if command == messages.MAV_CMD_DO_START_MAG_CAL:
+            self._acknowledge(station, command, result)
+        self._calibration.begin(station, command, action, now, restarts=outcome is ActionResult.FREEZES)
 
     def _do(self, station: Station, command: int, params: Sequence[float]) -> CommandResult:
         match command:
@@ -141,6 +163,17 @@ class CommandService:
             case messages.MAV_CMD_RUN_PREARM_CHECKS:
                 self._vehicle.arming_reasons.tell(station)
                 return CommandResult.ACCEPTED
+            case messages.MAV_CMD_DO_ACCEPT_MAG_CAL:
+                return CommandResult.ACCEPTED  # it is stored already
+            case messages.MAV_CMD_DO_CANCEL_MAG_CAL if self._calibration.is_endless:
+                self._ground.say(Severity.ERROR, "It cannot be cancelled: wait, or power the craft off", station)
+                return CommandResult.DENIED
+            case messages.MAV_CMD_DO_CANCEL_MAG_CAL:
+                # QGroundControl also asks in this way if there is such a calibration.
+                return CommandResult.ACCEPTED
+            case messages.MAV_CMD_PREFLIGHT_CALIBRATION if _asked(params) in _CALIBRATED_AT_START:
+                self._ground.say(Severity.ERROR, _AT_START, station)
+                return CommandResult.DENIED
         if command in _ASKS_FOR:
             return self._send_once(station, _ASKS_FOR[command])
         if command in _REFUSED:
@@ -186,12 +219,19 @@ def _msgid(param: float) -> int:
 def _action(command: int, params: Sequence[float]) -> FcAction | None:
     """The flight controller action for a command; None if there is none.
 
-    MAV_CMD_PREFLIGHT_CALIBRATION: one sensor at a time; param2 for the compass, param5 for the accelerometers (1, or 4
-    for "simple").
+    MAV_CMD_PREFLIGHT_CALIBRATION: one sensor at a time; param2 for the compass, param5 for the accelerometers (1, 2 for
+    "level", 4 for "simple": these boards have one for all).
     """
-    asked = {number: param for number, param in enumerate(params, 1) if param and not math.isnan(param)}
+    if command == messages.MAV_CMD_DO_START_MAG_CAL and params[0] in (0, 1):  # all compasses, or the first
+        return CALIBRATE_COMPASS
     if command == messages.MAV_CMD_PREFLIGHT_CALIBRATION:
-        if asked in ({5: 1}, {5: 4}):
+        asked = _asked(params)
+        if asked in ({5: 1}, {5: 2}, {5: 4}):
             return CALIBRATE_ACCELEROMETER
         return CALIBRATE_COMPASS if asked == {2: 1} else None
     return None
+
+
+def _asked(params: Sequence[float]) -> dict[int, float]:
+    """The parameters that are set, by number from 1."""
+    return {number: param for number, param in enumerate(params, 1) if param and not math.isnan(param)}

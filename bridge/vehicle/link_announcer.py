@@ -29,6 +29,8 @@ class LinkAnnouncer:
         self._silent_since: float | None = now
         #: The time of the next `tick`.
         self.due = now + (_LOST_S if was_found else _NOT_FOUND_S)
+        #: No loss is reported until then: the silence was asked for.
+        self._quiet_until = -inf
         #: True from the first text about a loss until the flight controller is back.
         self.is_lost = False
 
@@ -42,7 +44,13 @@ class LinkAnnouncer:
     def lost(self, silent_since: float) -> None:
         if self._silent_since is None:
             self._silent_since = silent_since
-        self.due = min(self.due, self._silent_since + _LOST_S)
+        self.due = max(min(self.due, self._silent_since + _LOST_S), self._quiet_until)
+
+    def expect_silence(self, until: float) -> None:
+        """The flight controller will be silent, and restart, because the pilot asked for that."""
+        self._quiet_until = until
+        if self._silent_since is not None and not self.is_lost:
+            self.due = max(self._silent_since + _LOST_S, until)
 
     def found(self, controller: FlightController, now: float) -> tuple[Severity, str] | None:
         silent_since, self._silent_since, self.due = self._silent_since, None, inf

@@ -15,6 +15,7 @@ _STATUS = struct.Struct("<HHHIB")
 STATUS_SIZE = _STATUS.size
 _MOTORS = struct.Struct("<8H")
 _RAW_IMU = struct.Struct("<9h")
+RAW_IMU_SIZE = _RAW_IMU.size
 _RAW_GPS = struct.Struct("<BBiihH")
 _ATTITUDE = struct.Struct("<hhh")
 _ALTITUDE = struct.Struct("<ih")

@@ -17,6 +17,7 @@ METRES_PER_DEGREE = 111_320.0
 METRES_PER_DEGREE_EAST = METRES_PER_DEGREE * math.cos(math.radians(FIELD_LAT_E7 / 1e7))
 FULL_BATTERY_V = 12.6
 EMPTY_BATTERY_V = 10.2
+LEVEL_ACC = 0, 0, 512
 _IDLE_SAG_VS = 0.0002
 _FLIGHT_SAG_VS = 0.003
 
@@ -41,12 +42,16 @@ class FlightState:
 
 @dataclass(frozen=True, slots=True)
 class Craft:
-    """The craft at one moment. `boxes`: the pilot's switches but ARM, one bit each; `home`: where it was armed."""
+    """The craft at one moment. `boxes`: the pilot's switches but ARM, one bit each; `home`: where it was armed.
+
+    `acc`: the accelerometer, 512 for 1 g: forward, left, up.
+    """
 
     flight: FlightState
     armed: bool
     boxes: int
     home: tuple[int, int] | None
+    acc: tuple[int, int, int] = LEVEL_ACC
 
     def way_home(self) -> tuple[float, float]:
         """Distance in metres and direction in degrees; zeros without a home."""

@@ -78,7 +78,7 @@ class SensorReplies:
                 flags = craft.boxes & _STATUS_FLAGS
                 return struct.pack("<HHHIB", self.cycle_time_us, 0, self.sensors, flags, 0)
             case MspCommand.RAW_IMU:
-                return struct.pack("<9h", 0, 0, 512, 0, 0, 0, 210, 0, -430)
+                return struct.pack("<9h", *craft.acc, 0, 0, 0, 210, 0, -430)
             case MspCommand.MOTOR:
                 return struct.pack("<8H", *(_CRUISE_US if armed else _LOWEST_US,) * 4, *(0,) * 4)
             case MspCommand.RC:

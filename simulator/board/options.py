@@ -4,6 +4,8 @@
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 
+from simulator.board.flight import LEVEL_ACC
+
 
 class TelemetryProtocol(IntEnum):
     """The CLI's `tele_prot`: the protocol of the UART while the craft is armed."""
@@ -73,7 +75,7 @@ class BoardFaults:
 
 @dataclass(slots=True, kw_only=True)
 class Faults(BoardFaults):
-    """Switches of a simulated firmware.
+    """Switches of a simulated firmware. `acc`: see Craft.
 
     `boxes`: the pilot's switches except ARM, one bit for each of BOXNAMES. `busy`: a configuration write is scheduled.
     `extension` takes effect at the next boot. Without `msp` only MAVLink is answered.
@@ -82,6 +84,7 @@ class Faults(BoardFaults):
     """
 
     boxes: int = 1
+    acc: tuple[int, int, int] = LEVEL_ACC
     busy: bool = False
     extension: bool = True
     msp: bool = True

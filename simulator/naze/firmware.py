@@ -109,7 +109,7 @@ class Firmware:
         """The sensor values at `now`, which must not be before the last loop."""
         since = now - self._clock
         flight = fly(now - self._booted_at, self._flown + (since if self.armed else 0.0), self.armed)
-        return Craft(flight, self.armed, self._faults.boxes, self._home)
+        return Craft(flight, self.armed, self._faults.boxes, self._home, self._faults.acc)
 
     # -- the main loop ---------------------------------------------------------------------------------------
 

@@ -66,10 +66,9 @@ def test_an_action_is_done_once_on_the_ground(
     world, station = a_world()
     station.send(make(command, params))
     world.run(0.6)
-    assert results(station) == [ACCEPTED]
+    assert results(station) == [IN_PROGRESS]
     assert done(world) == [action]
-    (text,) = station.texts()
-    assert text == ActionResult.FREEZES.value
+    assert station.texts()[-1] == ActionResult.FREEZES.value
     world.run(20)
     # The board restarts after a calibration and is found again.
     assert world.naze.counters.resets == (action == 205)
@@ -173,7 +172,7 @@ def test_despite_lost_bytes_an_action_is_done_at_most_once() -> None:
         station.send(long(*COMPASS[:2]))
         world.run(4)
         assert len(done(world)) <= 1
-        assert results(station) in ([ACCEPTED], [FAILED])
+        assert results(station) in ([IN_PROGRESS], [FAILED])
 
 
 def test_a_repeated_command_is_answered_in_progress() -> None:
@@ -182,7 +181,7 @@ def test_a_repeated_command_is_answered_in_progress() -> None:
         station.send(long(*ACCELEROMETER[:2]))
     station.send(long(*COMPASS[:2]))
     world.run(0.6)
-    assert results(station) == [IN_PROGRESS, IN_PROGRESS, TEMPORARILY_REJECTED, ACCEPTED]
+    assert results(station) == [IN_PROGRESS, IN_PROGRESS, TEMPORARILY_REJECTED, IN_PROGRESS]
     assert done(world) == [205]
 
 
@@ -211,10 +210,7 @@ def test_calibrating_a_missing_sensor_is_denied(monkeypatch: pytest.MonkeyPatch)
 @pytest.mark.parametrize(
     ("command", "params"),
     [
-        (CALIBRATION, (1, 0, 0, 0, 0, 0, 0)),  # gyro
-        (CALIBRATION, (0, 0, 1, 0, 0, 0, 0)),  # pressure
         (CALIBRATION, (0, 0, 0, 1, 0, 0, 0)),  # radio control
-        (CALIBRATION, (0, 0, 0, 0, 2, 0, 0)),  # board level
         (CALIBRATION, (0, 1, 0, 0, 1, 0, 0)),  # two at once
         (CALIBRATION, (0, 0, 0, 0, 0, 0, 0)),
         (CALIBRATION, (math.nan, 0, 0, 0, 0, 0, 0)),
@@ -234,7 +230,13 @@ def test_other_actions_are_unsupported(command: int, params: tuple[float, ...]) 
 
 def test_no_other_command_reaches_the_flight_controller() -> None:
     world, station = a_world()
-    for command in (*range(CALIBRATION), *range(246, 700), *range(3000, 3010), *range(42400, 42800)):
+    for command in (
+        *range(CALIBRATION),
+        *range(246, 700),
+        *range(3000, 3010),
+        *range(42400, 42424),
+        *range(42425, 42800),
+    ):
         station.send(long(command, (1, 1, 1, 1, 1, 1, 1)))
     world.run(1)
     frames = [frame for _, _, data in world.written for frame in MspParser().feed(data)]

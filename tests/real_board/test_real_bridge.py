@@ -8,6 +8,7 @@ import pytest
 from bridge.fc.states.cli import Cli
 from bridge.fc.states.harakiri_mavlink import HarakiriMavlink
 from bridge.fc.states.msp import Identifying, Polling
+from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import MissionItem, MissionResult
 from simulator.emulated_naze.board import EmulatedNaze
 from simulator.emulated_naze.image import Image
@@ -150,3 +151,15 @@ def test_the_cli_is_recognised_and_left_alone(world: World, station: GroundStati
         world.run(0.5)
     world.wait_until(lambda w: w.is_found, _BOOT_S)
     assert Upload(station, _OLD).run() is MissionResult.ACCEPTED
+
+
+def test_the_accelerometer_page_of_mission_planner_ends_with_success(
+    world: World, station: GroundStation, figure: Figure
+) -> None:
+    """It collects values for 9 s, stores the result, restarts, and then reads level."""
+    began = world.now
+    station.send(m.MAVLink_command_long_message(1, 1, m.MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, 0, 2, 0, 0))
+    world.wait_until(lambda _: "calibration" in joined_texts(station).split("restarts")[-1], 2 * _BOOT_S)
+    assert "Accel calibration successful" in joined_texts(station)
+    assert "lost" not in joined_texts(station)
+    figure("accelerometer calibration, from the button to the result", f"{world.now - began:.1f} s")

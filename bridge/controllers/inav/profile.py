@@ -62,6 +62,7 @@ PROFILE = Profile(
     has_2d_fix=True,
     has_gyro_deg_s=True,
     accepts_any_byte=True,
+    calibrates_six_positions=True,
     # Its serial task runs 100 times a second (fc_tasks.c).
     turn_s=0.01,
     silence_s=SILENCE_WITH_H7_S,
