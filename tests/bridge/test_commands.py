@@ -117,7 +117,8 @@ def test_all_command_numbers_are_acknowledged(flying: tuple[World, GroundStation
     for first in range(0, len(numbers), 100):
         world.run(4.0)  # faster would exceed the rate limit
         received += answers(flying, *(long(number) for number in numbers[first : first + 100]))
-    assert [ack[0] for ack in acks(received)] == numbers
+    # A calibration is refused only after a request to the flight controller.
+    assert sorted(ack[0] for ack in acks(received)) == numbers
 
 
 @pytest.mark.parametrize(
