@@ -288,10 +288,15 @@ class Ground:
             peers = self._texts.new_to(peers, text, self.now)
         if peers and self.is_recording and RECORDER not in peers:
             peers = [*peers, RECORDER]  # a text for one station is part of the flight's log, too
-        pieces = split_text(text)
         self._text_id = self._text_id % _MAX_TEXT_ID + 1
+        # MAVSDK joins the pieces with nothing in between, and shows padding as a gap.
+        joining = [peer for peer in peers if self.stations.is_like_mavsdk(peer)]
+        self._send_pieces(severity, cut_text(text), joining)
+        self._send_pieces(severity, split_text(text), [peer for peer in peers if peer not in joining])
+
+    def _send_pieces(self, severity: Severity, pieces: Sequence[str], peers: Sequence[Peer]) -> None:
         for chunk, piece in enumerate(pieces):
-            # With an id, MAVSDK and QGroundControl join the pieces; Mission Planner shows each by itself.
+            # With an id, MAVSDK, MAVProxy and QGroundControl join the pieces; Mission Planner shows each by itself.
             text_id = self._text_id if len(pieces) > 1 else 0
             message = messages.MAVLink_statustext_message(severity, piece.encode("ascii", "replace"), text_id, chunk)
             self.multicast(pack(message), peers)
@@ -316,6 +321,13 @@ class Ground:
 
     def _version(self, peer: Peer) -> int:
         return 2 if peer.link in self._signers else self.stations.version(peer)
+
+
+def cut_text(text: str) -> list[str]:
+    """Cut into pieces of 50 characters; the last one is shorter, and may be empty, which ends the text."""
+    if len(text) <= _TEXT_SIZE:
+        return [text]
+    return [text[at : at + _TEXT_SIZE] for at in range(0, len(text) + 1, _TEXT_SIZE)]
 
 
 def split_text(text: str) -> list[str]:

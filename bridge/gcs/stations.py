@@ -44,6 +44,9 @@ class _Known:
     heard_at: float
     beats: int = 0
     beat_at: float = -inf
+    #: It has sent REQUEST_DATA_STREAM; a command.
+    uses_streams: bool = False
+    uses_commands: bool = False
     #: When each (sysid, compid) was last heard from there.
     speakers: dict[tuple[int, int], float] = field(default_factory=dict)
 
@@ -237,6 +240,22 @@ class Stations:
 
     def peers(self) -> list[Peer]:
         return list(self._known)
+
+    def note_request(self, peer: Peer, *, streams: bool) -> None:
+        """A peer has sent REQUEST_DATA_STREAM, or else a command."""
+        if (known := self._known.get(peer)) is not None:
+            known.uses_streams |= streams
+            known.uses_commands |= not streams
+
+    def uses_streams(self, peer: Peer) -> bool:
+        """True for Mission Planner, QGroundControl, MAVProxy and DroneKit soon after connecting, never for MAVSDK."""
+        known = self._known.get(peer)
+        return known is not None and known.uses_streams
+
+    def is_like_mavsdk(self, peer: Peer) -> bool:
+        """True for a peer that asks by commands only, and on MAVLink 2, as MAVSDK does from its connection on."""
+        known = self._known.get(peer)
+        return known is not None and known.version == 2 and known.uses_commands and not known.uses_streams
 
     def at(self, peer: Peer) -> list[Station]:
         """The stations heard from a peer; several behind a radio or a router."""

@@ -104,6 +104,7 @@ class CommandService:
 
     def take(self, station: Station, command: int, params: Sequence[float], now: float) -> None:
         """Execute a command and acknowledge it. `params`: param1..param7."""
+        self._ground.stations.note_request(station.peer, streams=False)
         action = _action(command, params)
         if action is None:
             self._acknowledge(station, command, self._do(station, command, params))

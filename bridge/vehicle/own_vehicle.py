@@ -83,8 +83,6 @@ class OwnVehicle:
         self._newcomers: dict[Peer, float] = {}
         self._newcomers_due = inf
         self._polls_set_at, self._polls_due = -inf, inf
-        #: The peers that have sent REQUEST_DATA_STREAM.
-        self._stream_users: set[Peer] = set()
         #: Armed, mode, failsafe and lost as last announced.
         self._announced: tuple[bool | None, FlightMode | str | None, bool, bool] | None = None
 
@@ -111,7 +109,6 @@ class OwnVehicle:
     def _end_second(self, now: float) -> None:
         self._second_ends = max(self._second_ends + _TICK_S, now)
         everyone = self._ground.everyone()
-        self._stream_users.intersection_update(everyone)
         unwatched = () if self._session.vehicle.armed else self._ground.unheard()
         self._rates.keep(everyone, set(filter(self._ground.has_standing, everyone)), unwatched)
         self._set_polls(everyone)
@@ -206,7 +203,7 @@ class OwnVehicle:
         Mission Planner's window hangs until one arrives. MAVSDK, which requests no streams, repeats its request at each
         that has another number, without end.
         """
-        if station.peer in self._stream_users:
+        if self._ground.stations.uses_streams(station.peer):
             self.send_once(station, messages.MAVLINK_MSG_ID_MISSION_CURRENT)
         else:
             self._rates.withhold(station.peer, messages.MAVLINK_MSG_ID_MISSION_CURRENT, now + _NO_CURRENT_S)
@@ -221,7 +218,7 @@ class OwnVehicle:
 
     def set_stream(self, peer: Peer, stream: int, interval_s: float) -> None:
         """Set the interval of all messages of one of ArduPilot's streams."""
-        self._stream_users.add(peer)
+        self._ground.stations.note_request(peer, streams=True)
         for row in TELEMETRY:
             if row.stream == stream or (stream == _ALL_STREAMS and row.stream != NO_STREAM):
                 self.set_interval(peer, row.msgid, interval_s)

@@ -19,6 +19,7 @@ from bridge.missions.fc_mission_store import AnyFcMissionStore, PushFailure
 from bridge.missions.mission_service import MissionService
 from bridge.model.refusal import Refusal
 from bridge.model.vehicle import Health, Orientation, Readiness
+from protocols.mavlink.codec import pack
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.inav import ARMING_BLOCKERS
 from protocols.msp.mission import MAX_RADIUS_CM
@@ -151,15 +152,22 @@ class Parameters:
         )
 
     def _send(self, station: Station | None, name: str) -> None:
-        """Send PARAM_VALUE, if there is such a parameter; None: to all stations, which keep a copy."""
+        """Send PARAM_VALUE, or PARAM_ERROR without such a parameter; None: to all stations, which keep a copy."""
         values = self._values()
         if name not in values:
-            return
-        if station is None:
+            self._refuse_unknown(station, name)
+        elif station is None:
             self._ground.broadcast(_message(values, name))
             self._told |= {name: values[name]} if self._told else {}
         else:
             self._ground.to(station, _message(values, name))
+
+    def _refuse_unknown(self, station: Station | None, name: str) -> None:
+        """PARAM_ERROR, which MAVLink 1 lacks: without it MAVSDK waits 3 s."""
+        if station is not None and name:
+            unknown = messages.MAV_PARAM_ERROR_DOES_NOT_EXIST
+            missing = messages.MAVLink_param_error_message(station.sysid, station.compid, name.encode(), -1, unknown)
+            self._ground.multicast(pack(missing), [station.peer])
 
 
 def _message(values: Mapping[str, float], name: str) -> Message:

@@ -445,7 +445,9 @@ def test_a_parameter_that_cannot_be_set_is_answered_with_its_value() -> None:
         # An unchanged value is no news.
         assert values(answers((world, station), param_set(name, present)))[0][:2] == (name.decode(), present)
         assert station.texts() == []
-    assert answers((world, station), param_set(b"NO_SUCH_NAME", 7.0)) == []
+    (missing,) = answers((world, station), param_set(b"NO_SUCH_NAME", 7.0))
+    assert (missing.get_type(), missing.param_id) == ("PARAM_ERROR", "NO_SUCH_NAME")
+    assert missing.error == m.MAV_PARAM_ERROR_DOES_NOT_EXIST
 
 
 def test_setting_the_radius_while_armed_is_refused_with_a_text() -> None:

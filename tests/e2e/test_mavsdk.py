@@ -12,6 +12,7 @@ import pytest
 from mavsdk import ComponentType
 from mavsdk.asyncio import Configuration, Mavsdk
 from mavsdk.asyncio.plugins.mavlink_direct.mavlink_direct import MavlinkDirectAsync, MavlinkMessage
+from mavsdk.asyncio.plugins.mission.mission import MissionAsync, MissionError, MissionResult
 from mavsdk.asyncio.plugins.mission_raw import (
     MissionItem,
     MissionPlan,
@@ -19,7 +20,7 @@ from mavsdk.asyncio.plugins.mission_raw import (
     MissionRawError,
     MissionRawResult,
 )
-from mavsdk.asyncio.plugins.param.param import ParamAsync
+from mavsdk.asyncio.plugins.param.param import ParamAsync, ParamError, ParamResult
 from mavsdk.asyncio.plugins.telemetry.telemetry import TelemetryAsync
 
 from protocols.mission_item import Command
@@ -213,12 +214,12 @@ async def test_setting_the_current_item_ends_and_blocks_no_later_call(shared: Be
 
 
 async def test_long_texts_arrive_whole_and_once(shared: Bench) -> None:
-    """MAVSDK joins the pieces of a STATUSTEXT, like QGroundControl."""
+    """MAVSDK joins the pieces of a STATUSTEXT with nothing in between: padding would be a gap."""
     texts: list[str] = []
     async with vehicle_at(shared.daemon.port) as vehicle, asyncio.timeout(TIMEOUT_S):
         upload = asyncio.ensure_future(MissionRawAsync(vehicle).upload_mission(raw_items(mixed_plan(20))))
         async for text in TelemetryAsync(vehicle).subscribe_status_text():
-            texts.append(" ".join(text.text.split()))
+            texts.append(text.text)
             if texts[-1].startswith("WP 8: Yaw"):
                 break
         await upload
@@ -229,6 +230,15 @@ async def test_long_texts_arrive_whole_and_once(shared: Bench) -> None:
         "WP 6: Alt changed from 19.5 to 19 m (whole numbers only)",
         "WP 7: DO_SET_ROI_NONE dropped, no ROI from here on",
     ]
+
+
+async def test_the_mission_plugin_cannot_read_what_an_ardupilot_sends(shared: Bench, kept: list[str]) -> None:
+    """It takes only waypoints of a relative frame, and home has frame 0; `mission_raw` reads the list."""
+    async with vehicle_at(shared.daemon.port) as vehicle:
+        with pytest.raises(MissionError) as refused:
+            await MissionAsync(vehicle).download_mission()
+        assert refused.value.result == MissionResult.UNSUPPORTED
+        assert len(await MissionRawAsync(vehicle).download_mission()) == len(kept)
 
 
 async def test_cancelling_keeps_the_old_list(shared: Bench, kept: list[str]) -> None:
@@ -252,6 +262,10 @@ async def test_cancelling_keeps_the_old_list(shared: Bench, kept: list[str]) -> 
 async def test_parameters_and_telemetry_work(shared: Bench) -> None:
     async with vehicle_at(shared.daemon.port) as vehicle:
         parameters = ParamAsync(vehicle)
+        for unknown in (parameters.get_param_float("NOT_THERE"), parameters.set_param_float("NOT_THERE", 1.0)):
+            with pytest.raises(ParamError) as missing:
+                await unknown
+            assert missing.value.result == ParamResult.DOES_NOT_EXIST
         found = {each.name: each.value for each in (await parameters.get_all_params()).float_params}
         assert (found["SYSID_THISMAV"], found["WPNAV_RADIUS"], found["RCMAP_THROTTLE"]) == (1.0, 200.0, 3.0)
         # The first one's flash write is still pending when the next one arrives.

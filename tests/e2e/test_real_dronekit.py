@@ -12,7 +12,7 @@ import pytest
 from protocols.mission_item import Command
 from simulator.board.flight import FIELD_LAT_E7, FIELD_LON_E7
 from tests.support.benches import Bench
-from tests.support.dronekit import command, vehicle_at
+from tests.support.dronekit import GaveUp, command, vehicle_at
 from tests.support.programs import until
 
 HOME = FIELD_LAT_E7 / 1e7, FIELD_LON_E7 / 1e7
@@ -51,3 +51,14 @@ def test_missions_are_written_to_an_empty_and_to_a_full_board(shared: Bench) -> 
         held = download(vehicle)
         assert [each.x for each in held] == [pytest.approx(HOME[0] + step * 1e-4, abs=1e-5) for step in range(145)]
         assert held.next == 0
+
+
+def test_an_upload_without_a_download_needs_a_timeout(shared: Bench, caplog: pytest.LogCaptureFixture) -> None:
+    """Its first command is item 0 then. It ignores the ack that rejects the list; the reason is in its log."""
+    with vehicle_at(shared.daemon.port) as vehicle:
+        vehicle.commands.clear()
+        vehicle.commands.add(command(Command.NAV_TAKEOFF, 0, 0, 10))
+        vehicle.commands.add(command(Command.NAV_WAYPOINT, HOME[0] + 1e-3, HOME[1], 20))
+        with pytest.raises(GaveUp):
+            vehicle.commands.upload(timeout=5)
+        until(lambda: "must be a WAYPOINT" in caplog.text, "the reason")

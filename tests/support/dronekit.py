@@ -16,7 +16,11 @@ _PAST.basestring = str  # type: ignore[attr-defined]
 sys.modules.setdefault("past", ModuleType("past"))
 sys.modules.setdefault("past.builtins", _PAST)
 
+import dronekit  # noqa: E402
 from dronekit import Command, connect  # noqa: E402
+
+#: Raised by `upload` and `wait_ready`.
+GaveUp = dronekit.TimeoutError
 
 
 @contextmanager
