@@ -401,7 +401,7 @@ def test_an_item_sent_before_its_request_is_accepted(shared: Bench) -> None:
 
 def test_set_wp_is_refused_at_once_with_one_text(shared: Bench) -> None:
     planner = shared.mission_planner()
-    planner.connect()
+    planner.request_streams()
     planner.texts.clear()
     assert planner.set_current(2) == 1
     planner.wait_for_text("The current waypoint cannot be set")

@@ -225,13 +225,12 @@ class MissionPlanner:
         """All of its requests in the first seconds."""
         m = messages
         self.wait_for_vehicle()
-        system, component = self._target
         for _ in range(2):
             self.send(m.MAVLink_statustext_message(6, b"Mission Planner"))
         if not self._mavlink_1_only:
             self._send_signed(m.MAVLink_statustext_message(6, b"Mission Planner"))
-        for stream, rate in (*_STREAMS, *_STREAMS):
-            self.send(m.MAVLink_request_data_stream_message(system, component, stream, rate, 1))
+        for _ in range(2):
+            self.request_streams()
         self.command(m.MAV_CMD_REQUEST_MESSAGE, 148)
         self.command(m.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES, 1)
         self.request_version()
@@ -243,6 +242,11 @@ class MissionPlanner:
         self.command(m.MAV_CMD_REQUEST_MESSAGE, 269)
         self.command(m.MAV_CMD_REQUEST_MESSAGE, 280)
         self.command(m.MAV_CMD_SET_MESSAGE_INTERVAL, 271)
+
+    def request_streams(self) -> None:
+        """At the first heartbeat, and about every 38 s."""
+        for stream, rate in _STREAMS:
+            self.send(messages.MAVLink_request_data_stream_message(*self._target, stream, rate, 1))
 
     def command(self, command: int, param1: float = 0.0, tries: int = 1) -> int | None:
         """COMMAND_LONG, 2 s a try; return the MAV_RESULT, None without an ack."""
