@@ -26,6 +26,8 @@ _REMINDERS_S = (2.0, 4.0)
 #: QGroundControl waits 1.5 s for the final ack, and MAVSDK 2.5 s; neither asks for it again. So it is sent three times.
 _ACK_AGAIN_S = (0.4, 0.9)
 _NOT_WHOLE = Refusal(MissionResult.UNSUPPORTED, "A mission can only be written as a whole")
+#: QGroundControl leaves out what the vehicle does not offer to store, and says nothing.
+_ONLY_MISSIONS = "Fences and rally points are not stored here"
 _UNKNOWN_UPLOAD = Refusal(MissionResult.OPERATION_CANCELLED, "Unknown upload: write it again")
 
 
@@ -56,6 +58,8 @@ class UploadAnswers:
         self._answers: dict[Station, _Answer] = {}  # oldest first
         #: To be sent later: the reason for a refusal, or the final ack again.
         self._later: list[tuple[float, Station, str | None]] = []
+        #: Those that know that only missions are stored.
+        self._informed: set[Peer] = set()
         #: The time of the next `tick`; infinity if nothing is to be sent later.
         self.due = inf
 
@@ -91,6 +95,10 @@ class UploadAnswers:
         The summary is last, and the only warning: Mission Planner shows the last one, and its voice says the first.
         """
         accepted = delivery.ack is MissionResult.ACCEPTED
+        if verdict.result is Result.ACCEPTED and station.peer not in self._informed:
+            connected = self._ground.stations
+            self._informed = {station.peer, *(peer for peer in self._informed if not connected.is_unknown(peer))}
+            self._ground.say(Severity.INFO, _ONLY_MISSIONS, station)
         for news, line in finding_lines(verdict.findings) if accepted else ():
             if line != delivery.text:
                 self._ground.say(Severity.NOTICE if news is News.WARNING else Severity.INFO, line, station)

@@ -224,7 +224,8 @@ _CLEANFLIGHT: Rights = {
     for command, right in _BETAFLIGHT.items()
     if command < 256
 }
-#: The reply to LOGIC_CONDITIONS overruns the buffer of boards without a flash chip. 246 reads the clock, and sets that
+#: The reply to LOGIC_CONDITIONS overruns the buffer of boards without a flash chip. PID_V2 derives the PIDs again if
+#: EZ Tune is on: to the same values, unless others were typed into the command line. 246 reads the clock, and sets that
 #: of Betaflight. SET_WP of the numbers 0 and 255 moves home or the place that the craft holds.
 _INAV: Rights = {
     **_NEW_READS, **_NEW_MOVES, **_NEW_CHANGES,

@@ -346,3 +346,13 @@ class TestRestart:
         world.faults.boxes = 0
         world.run(1)
         assert not any(glance.failsafe for glance in screens.look())
+
+
+def test_once_after_its_first_write_a_station_hears_that_only_missions_are_stored() -> None:
+    world, station, screens = on_the_ground()
+    for _ in range(2):
+        assert Upload(station, waypoints(9)).run() is MissionResult.ACCEPTED
+        world.run(5.0)
+    notices = [text for text in station.texts() if text == "Fences and rally points are not stored here"]
+    assert len(notices) == 1
+    assert all(glance.hud != notices[0] for glance in screens.look())
