@@ -4,7 +4,7 @@
 A Pi has no battery-backed clock: after a reboot its time may be a day behind. New signatures would then reuse old
 timestamps, and recorded ones would be accepted. So the last timestamp is kept in a file. To spare the SD card, the file
 runs 10 s ahead; a clean stop writes the true value. After a power cut the timestamps heard since the last write are
-unknown, but all are below the file's: until that time is reached, nothing is accepted.
+unknown, but all are below the file's: nothing up to that time is accepted any more, also after another restart.
 """
 
 import asyncio
@@ -20,8 +20,8 @@ from service.settings.addresses import GcsAddress
 from service.settings.write_access import WriteAccess
 
 FILE_NAME = "signing.json"
-#: The timestamp in the file, the streams' by link, and True after a clean stop.
-_Kept = tuple[int, Mapping[str, list[list[int]]], bool]
+#: The timestamp in the file, the streams' by link, and the timestamp up to which frames are refused.
+_Kept = tuple[int, Mapping[str, list[list[int]]], int]
 #: The file's lead, and so how long signatures are refused after a power cut.
 _AHEAD = 10 * TICKS_PER_S
 _LOOK_S = 1.0
@@ -43,10 +43,9 @@ class SigningState:
         if keys and state_dir is not None:
             self._file = StateFile(state_dir / FILE_NAME, "timestamps restart from the clock")
             kept = self._file.load(_read)
-        self._stored, streams, was_ended = kept or (0, {}, True)
+        self._stored, streams, self._refused_until = kept or (0, {}, -1)
         self._timestamps = Timestamps(clock, self._stored)
-        refused_until = -1 if was_ended else self._stored + int(_LOOK_S * TICKS_PER_S)
-        by_key = {key: Signing(key, self._timestamps, refused_until) for key in keys.values()}
+        by_key = {key: Signing(key, self._timestamps, self._refused_until) for key in keys.values()}
         self._signings = {name: by_key[key] for name, key in keys.items()}
         for name, signing in self._signings.items():
             for sysid, compid, link_id, timestamp in streams.get(name, ()):
@@ -74,24 +73,24 @@ class SigningState:
             return
         if self._timer is not None:
             self._timer.cancel()
-            self._file.save(self._state(self._timestamps.now(), is_end=True))
+            self._file.save(self._state(self._timestamps.now(), self._refused_until))
         self._file.close()
 
     def _look(self, loop: asyncio.AbstractEventLoop, file: StateFile) -> None:
         """Write once the stored time is reached, by our clock or by a peer's that is far ahead."""
         if self._timestamps.last >= self._stored:
             self._stored = self._timestamps.now() + _AHEAD
-            file.save(self._state(self._stored, is_end=False))
+            file.save(self._state(self._stored, self._stored + int(_LOOK_S * TICKS_PER_S)))
         self._timer = loop.call_later(_LOOK_S, self._look, loop, file)
 
-    def _state(self, timestamp: int, *, is_end: bool) -> dict[str, object]:
+    def _state(self, timestamp: int, refused_until: int) -> dict[str, object]:
         """The contents for the next run. Streams that it would reject as too old anyway are left out."""
         late = timestamp - TOLERANCE
         streams = {
             name: [[*stream, last] for stream, last in signing.streams.items() if last >= late]
             for name, signing in self._signings.items()
         }
-        return {"timestamp": timestamp, "is_end": is_end, "streams": streams}
+        return {"timestamp": timestamp, "refused_until": refused_until, "streams": streams}
 
 
 def _read(state: Any) -> _Kept:
@@ -99,4 +98,4 @@ def _read(state: Any) -> _Kept:
         str(name): [[int(number) for number in (sysid, compid, link_id, last)] for sysid, compid, link_id, last in all_]
         for name, all_ in state["streams"].items()
     }
-    return int(state["timestamp"]), streams, bool(state.get("is_end", True))
+    return int(state["timestamp"]), streams, int(state.get("refused_until", -1))

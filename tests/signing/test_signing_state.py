@@ -104,6 +104,10 @@ async def test_frames_from_before_a_power_cut_are_replays_after_it(tmp_path: Pat
     assert signing(state).check(recorded) is Check.VALID
     state = pi.boot()
     assert signing(state).check(recorded) is Check.UNSURE
+    state.close()
+    # A regular stop forgets nothing of that.
+    state = pi.boot()
+    assert signing(state).check(recorded) is Check.UNSURE
     assert signing(state).check(frame(ticks(NOON) + AHEAD + 2 * TICKS_PER_S)) is Check.VALID
     state.close()
     # After a regular stop the state is exact.
