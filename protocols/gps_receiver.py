@@ -6,14 +6,15 @@ The data is not decoded.
 
 import re
 from functools import reduce
+from itertools import accumulate
 from operator import xor
 
 _NMEA = re.compile(rb"\$((?:G[A-Z]|BD|P)[A-Z]{3},[ -)+-~]{0,90})\*([0-9A-F]{2})")
 _UBX_SYNC = b"\xb5\x62"
 _UBX_FRAME = 8
 _UBX_LONGEST = 1024
-#: Longer than any NMEA sentence and usual UBX frame.
-_KEPT = 1200
+#: At least an NMEA sentence.
+_LONGEST_SENTENCE = 110
 
 
 class GpsWatch:
@@ -21,32 +22,33 @@ class GpsWatch:
 
     def __init__(self) -> None:
         self.heard = ""
-        self._data = b""
+        self._text = self._frame = b""
 
     def feed(self, data: bytes) -> None:
         if self.heard:
             return
-        self._data = (self._data + data)[-_KEPT:]
-        if any(reduce(xor, body) == int(checksum, 16) for body, checksum in _NMEA.findall(self._data)):
+        text = self._text + data
+        self._text = text[text.rfind(b"$") :][-_LONGEST_SENTENCE:]
+        if any(reduce(xor, body) == int(checksum, 16) for body, checksum in _NMEA.findall(text)):
             self.heard = "NMEA"
-        elif _has_ubx(self._data):
+        elif self._has_ubx(self._frame + data):
             self.heard = "UBX"
 
-
-def _has_ubx(data: bytes) -> bool:
-    start = data.find(_UBX_SYNC)
-    while start >= 0:
-        size = int.from_bytes(data[start + 4 : start + 6], "little")
-        frame = data[start : start + _UBX_FRAME + size]
-        if size <= _UBX_LONGEST and len(frame) == _UBX_FRAME + size and _fletcher(frame[2:-2]) == frame[-2:]:
-            return True
-        start = data.find(_UBX_SYNC, start + 1)
-    return False
+    def _has_ubx(self, data: bytes) -> bool:
+        """Try each frame once, when it is complete."""
+        start = data.find(_UBX_SYNC)
+        while start >= 0:
+            end = start + _UBX_FRAME + int.from_bytes(data[start + 4 : start + 6], "little")
+            if end <= start + _UBX_FRAME + _UBX_LONGEST:
+                if end > len(data):
+                    break
+                if _fletcher(data[start + 2 : end - 2]) == data[end - 2 : end]:
+                    return True
+            start = data.find(_UBX_SYNC, start + 1)
+        # The next sync's first byte may be the last.
+        self._frame = data[start:]
+        return False
 
 
 def _fletcher(data: bytes) -> bytes:
-    first = second = 0
-    for byte in data:
-        first = (first + byte) & 0xFF
-        second = (second + first) & 0xFF
-    return bytes((first, second))
+    return bytes((sum(data) & 0xFF, sum(accumulate(data)) & 0xFF))

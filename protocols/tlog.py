@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from fastcrc.crc16 import mcrf4xx
 
 from protocols.mavlink.dialect import CRC_EXTRA, messages
-from protocols.mavlink.frame import MAGIC_V1, MAGIC_V2, MavlinkFrame, MavlinkSplitter
+from protocols.mavlink.frame import MAGIC_V1, MAGIC_V2, MavlinkFrame, whole_frame
 
 STAMP_SIZE = 8
 #: pymavlink uses the two lowest bits as a link number.
@@ -61,7 +61,7 @@ def read_tlog(data: bytes, msgids: Container[int] | None = None) -> Iterator[Tlo
             at += 1
         elif msgids is not None and _msgid(data, start) not in msgids and _begins(data, end + STAMP_SIZE):
             at = end
-        elif (frame := _checked(data[start:end])) is None:
+        elif (frame := whole_frame(data[start:end])) is None:
             at += 1
         else:
             yield TlogRecord(first_stamp_us(data[at:start]), frame)
@@ -99,11 +99,6 @@ def _msgid(data: bytes, start: int) -> int:
 def _begins(data: bytes, start: int) -> bool:
     """True if a frame may begin at `start`, or the log has ended."""
     return start >= len(data) or data[start] in _HEADERS
-
-
-def _checked(raw: bytes) -> MavlinkFrame | None:
-    found = MavlinkSplitter().feed(raw)
-    return found[0] if found and found[0].raw == raw else None
 
 
 def _without_signature(frame: bytes) -> bytes:

@@ -9,8 +9,8 @@ above 255: `$X` direction flag command size payload crc, command and size 16 bit
 import struct
 from dataclasses import dataclass, field
 from enum import Enum
-from functools import reduce
-from operator import xor
+
+from fastcrc.crc8 import dvb_s2
 
 _START = b"$"
 _V1, _V2 = ord("M"), ord("X")
@@ -53,13 +53,13 @@ class MspFrame:
         direction = bytes((self.direction.value,))
         if self.is_v2 or self.command > _HIGHEST_V1_COMMAND:
             body = _V2_HEADER.pack(0, self.command, len(self.payload)) + self.payload
-            return b"$X" + direction + body + bytes((crc8(body),))
+            return b"$X" + direction + body + bytes((dvb_s2(body),))
         size = len(self.payload)
         if size >= _JUMBO and self.direction is not Direction.REQUEST:
             body = bytes((_JUMBO, self.command)) + size.to_bytes(2, "little") + self.payload
         else:
             body = bytes((size, self.command)) + self.payload
-        return b"$M" + direction + body + bytes((reduce(xor, body),))
+        return b"$M" + direction + body + bytes((_xor(body),))
 
 
 def request(command: int, payload: bytes = b"") -> bytes:
@@ -149,25 +149,17 @@ def _decode(frame: bytearray) -> MspFrame | None:
     direction = _DIRECTIONS[frame[2]]
     if frame[1] == _V1:
         payload_at = 7 if frame[3] == _JUMBO and direction is not Direction.REQUEST else 5
-        return None if reduce(xor, frame[3:]) else MspFrame(direction, frame[4], bytes(frame[payload_at:-1]))
-    body = frame[3:-1]
-    if crc8(body) != frame[-1]:
+        return None if _xor(frame[3:]) else MspFrame(direction, frame[4], bytes(frame[payload_at:-1]))
+    body = bytes(frame[3:-1])
+    if dvb_s2(body) != frame[-1]:
         return None
-    return MspFrame(direction, int.from_bytes(body[1:3], "little"), bytes(body[_V2_HEADER.size :]), is_v2=True)
+    return MspFrame(direction, int.from_bytes(body[1:3], "little"), body[_V2_HEADER.size :], is_v2=True)
 
 
-def crc8(data: bytes | bytearray) -> int:
-    """The checksum of v2, DVB-S2's."""
-    crc = 0
-    for byte in data:
-        crc = _CRC_TABLE[crc ^ byte]
-    return crc
-
-
-def _crc_of_byte(byte: int) -> int:
-    for _ in range(8):
-        byte = (byte << 1) ^ 0xD5 if byte & 0x80 else byte << 1
-    return byte & 0xFF
-
-
-_CRC_TABLE = bytes(map(_crc_of_byte, range(256)))
+def _xor(data: bytes | bytearray) -> int:
+    """The checksum of v1. Halves at a time, because a damaged header may claim 4 KB."""
+    value, size = int.from_bytes(data), len(data)
+    while size > 1:
+        size = (size + 1) // 2
+        value = value >> 8 * size ^ value & (1 << 8 * size) - 1
+    return value

@@ -3,7 +3,8 @@
 
 import struct
 
-from protocols.msp.frame import crc8
+from fastcrc.crc8 import dvb_s2
+
 from simulator.board.msp_port import MspReceiver
 
 _HEADER_SIZE = 8
@@ -49,4 +50,4 @@ class MspReceiverV2(MspReceiver):
             return None
         body, checksum = bytes(frame[3:-1]), frame[-1]
         frame.clear()
-        return (command, body[5:]) if crc8(body) == checksum else None
+        return (command, body[5:]) if dvb_s2(body) == checksum else None

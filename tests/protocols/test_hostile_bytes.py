@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bytes chosen to cost time: no parser executes more than a few lines of code for each."""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any
+
+import pytest
+
+from protocols.frsky import FrskyParser
+from protocols.gps_receiver import GpsWatch
+from protocols.mavlink.frame import MavlinkSplitter
+from protocols.msp.command_line import EchoWatch
+from protocols.msp.frame import MAX_REPLY, MspParser
+from protocols.tlog import read_tlog
+from protocols.uart_capture import read_capture
+
+SIZE = 10_000
+#: Above a false header every 7 bytes whose checksum is computed line by line over 256 bytes.
+LINES_PER_BYTE = 60
+#: A header that claims a long frame, or the beginning of something else, repeated.
+PATTERNS = {
+    "MAVLink 1 magics": b"\xfe",
+    "MAVLink 2 magics": b"\xfd",
+    "MAVLink 1 heartbeats": b"\xfe\x09\x00\x01\x01\x00",
+    "MAVLink 2 headers": b"\xfd\xff\x00\x00\x00\x01\x01\x01\x00\x00",
+    "signed headers": b"\xfd\xff\x01\x00\x00\x01\x01\x01\x00\x00",
+    "MSP": b"$",
+    "MSP requests": b"$M<\xff\x01",
+    "MSP jumbo replies": b"$M>\xff\x01" + MAX_REPLY.to_bytes(2, "little"),
+    "MSP v2 requests": b"$X<\x00\x01\x01\xff\x00",
+    "MSP v2 replies": b"$X>\x00\xff\xff" + MAX_REPLY.to_bytes(2, "little"),
+    "MSP v2 errors": b"$X!\x00\xff\xff" + (MAX_REPLY // 2).to_bytes(2, "little"),
+    "NMEA": b"$GPGGA,",
+    "NMEA with wrong checksums": b"$GPGGA,*00",
+    "UBX headers": b"\xb5\x62\x01\x01\xff\x00",
+    "long UBX headers": b"\xb5\x62\x01\x01\x00\x04",
+    "FrSky marks": b"^",
+    "FrSky values": b"^\x01\x00\x00",
+    "capture lines": b'{"t":1,"baud":1,"open":"a"}\n',
+    "unfinished capture lines": b'{"t":1.000000,"baud":115200,"open":"""""',
+    "hex": b'{"t":1.000000,"baud":115200,"read":"' + b"aa" * 20,
+    "marks": b'{"naze-bridge-uart":',
+}
+
+
+def in_pieces(feed: Callable[[bytes], Any]) -> Callable[[bytes, int], None]:
+    def parse(data: bytes, size: int) -> None:
+        for start in range(0, len(data), size):
+            feed(data[start : start + size])
+
+    return parse
+
+
+def mavlink(data: bytes, size: int) -> None:
+    splitter = MavlinkSplitter()
+    in_pieces(splitter.feed)(data, size)
+    splitter.reset()
+
+
+def msp(data: bytes, size: int) -> None:
+    parser = MspParser(takes_low_v2=size != SIZE)
+    in_pieces(parser.feed)(data, size)
+    parser.reset()
+
+
+OF_FILES = {"tlog", "tlog of heartbeats", "capture"}
+PARSERS: dict[str, Callable[[bytes, int], None]] = {
+    "MAVLink": mavlink,
+    "MSP": msp,
+    "FrSky": lambda data, size: in_pieces(FrskyParser().feed)(data, size),
+    "GPS": lambda data, size: in_pieces(GpsWatch().feed)(data, size),
+    "echo": lambda data, size: in_pieces(EchoWatch().feed)(data, size),
+    "tlog": lambda data, _: [*read_tlog(data)].clear(),
+    "tlog of heartbeats": lambda data, _: [*read_tlog(data, {0})].clear(),
+    "capture": lambda data, _: read_capture(data).clear(),
+}
+CASES = [(name, size) for name in PARSERS for size in (1, 64, SIZE) if size == SIZE or name not in OF_FILES]
+
+
+@contextmanager
+def counted_lines() -> Iterator[list[int]]:
+    """Count the lines executed in protocols/."""
+    count = [0]
+
+    def line(_frame: FrameType, event: str, _argument: object) -> object:
+        count[0] += event == "line"
+        return line
+
+    def call(frame: FrameType, _event: str, _argument: object) -> object:
+        return line if "/protocols/" in frame.f_code.co_filename else None
+
+    before = sys.gettrace()
+    sys.settrace(call)  # type: ignore[arg-type]
+    try:
+        yield count
+    finally:
+        sys.settrace(before)
+
+
+@pytest.mark.parametrize(("name", "size"), CASES)
+def test_no_byte_costs_more_than_a_few_lines(name: str, size: int) -> None:
+    for title, pattern in PATTERNS.items():
+        data = (pattern * (SIZE // len(pattern) + 1))[:SIZE]
+        with counted_lines() as lines:
+            PARSERS[name](data, size)
+        assert lines[0] <= LINES_PER_BYTE * SIZE, (title, lines[0] / SIZE)
