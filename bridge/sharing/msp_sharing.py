@@ -25,7 +25,7 @@ from bridge.sharing.program import Program, WaitingRequest
 from protocols.msp.frame import Direction, MspFrame, frame_size
 from protocols.rights.effect import Effect
 
-#: The requests of all programs: each of n busy ones has 1 / (n + 1) of them.
+#: The requests of all programs: each of n busy hosts has 1 / (n + 1) of them. More ports gain it nothing.
 _TOTAL = Rate(400, 400)
 #: For this long a reply also answers the same request of other programs.
 _CURRENT_S = 0.2
@@ -84,10 +84,15 @@ class MspSharing:
 
     def received(self, program: Program, data: bytes, now: float) -> None:
         """Take bytes of a program."""
-        if program in self._programs and self._total.left(now) > self._total.used(program):
-            self._total.spend(program, program.take(data, now))
-            if program.waiting:
-                self.serve(now)
+        if program not in self._programs:
+            return
+        taken = program.take(data, now) if self._total.left(now) > self._total.used(program.host) else None
+        if taken is None:
+            self._count("too many requests")
+            return
+        self._total.spend(program.host, taken)
+        if program.waiting:
+            self.serve(now)
 
     def stop(self) -> None:
         """Forward nothing more: the bridge is stopping."""
@@ -233,8 +238,7 @@ class MspSharing:
     def _level(self, program: Program, command: str, why: str, now: float, *, is_change: bool) -> Level:
         """Count a request that got no reply; "warning" if that is news."""
         kind = program.host, is_change
-        what = f"{command}: {why}"
-        self.refused[what if what in self.refused or len(self.refused) < _MAX_REPORTED else "other requests"] += 1
+        self._count(f"{command}: {why}")
         if now < self._reported.get(kind, -inf) + _REPORT_INTERVAL_S or not self._reports.has(now):
             return "debug"
         self._reports.spend()
@@ -243,6 +247,9 @@ class MspSharing:
         self._reported.pop(kind, None)
         self._reported[kind] = now
         return "warning"
+
+    def _count(self, what: str) -> None:
+        self.refused[what if what in self.refused or len(self.refused) < _MAX_REPORTED else "other requests"] += 1
 
 
 def _first_unknown(waiting: list[WaitingRequest]) -> WaitingRequest | None:

@@ -63,10 +63,10 @@ class Program:
         self._parser = MspParser(takes_low_v2=True)
         self._budget = TokenBucket(_LIMIT)
 
-    def take(self, data: bytes, now: float) -> int:
-        """Queue the requests in `data`, or drop them if they are too many; the number that were parsed."""
+    def take(self, data: bytes, now: float) -> int | None:
+        """Queue the requests in `data`; the number that were parsed, None if all were dropped because of a flood."""
         if not self._budget.has(now):
-            return 0
+            return None
         if self.close is None:
             # Complete requests only: the rest of a truncated one may be lost.
             self._parser = MspParser(takes_low_v2=True)

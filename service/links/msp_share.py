@@ -2,6 +2,7 @@
 """`[[share]]`: TCP and UDP ports on which other programs speak MSP through the bridge."""
 
 import asyncio
+from collections import Counter
 from collections.abc import Callable
 from typing import cast
 
@@ -14,7 +15,8 @@ from storage.os_error import reason
 
 #: A program that does not read its replies is disconnected.
 _MAX_UNSENT = 65536
-#: A further program displaces the one that has been silent for longest: its laptop may have been switched off.
+#: A further program displaces the one that has been silent for longest, of the host with the most programs: its laptop
+#: may have been switched off.
 _MAX_PROGRAMS = 8
 
 
@@ -61,12 +63,13 @@ class _SharePort:
         forget: Callable[[], None],
     ) -> Program:
         """A program has connected. `forget` drops it to make room for another."""
+        host, number = address[:2]
         if len(self._programs) >= _MAX_PROGRAMS:
-            silent = next(iter(self._programs))
+            programs = Counter([host, *(program.host for program in self._programs)])
+            silent = max(self._programs, key=lambda program: programs[program.host])  # the first of several
             forget_silent = self._programs[silent]
             self.leave(silent)
             forget_silent()
-        host, number = address[:2]
         name = f"[{host}]:{number}" if ":" in host else f"{host}:{number}"
         program = Program(name, host, send, close, may_write=self._may_write)
         self._programs[program] = forget

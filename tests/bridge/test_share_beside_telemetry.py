@@ -96,6 +96,19 @@ def test_many_flooders_leave_an_honest_program_its_part() -> None:
     assert 200 * 12 <= sum(len(flooder.replies) for flooder in flooders) <= 400 * 12  # of 2000 a second
 
 
+def test_many_ports_of_a_host_gain_it_nothing() -> None:
+    world, _ = flying_station("harakiri")
+    for port in range(30):
+        ShareProgram(world, f"192.0.2.66:{port}", over_udp=True).ask_every(0.01, (IDENT, b""))
+    honest = ShareProgram(world, "192.0.2.99:1", over_udp=True)
+    honest.ask_every(0.02, (IDENT, b""))
+    world.run(2)
+    honest.replies.clear()
+    world.run(5)
+    assert 249 <= len(honest.replies) <= 251
+    assert world.bridge.sharing.refused["too many requests"] > 1000
+
+
 def test_reads_that_are_never_answered_do_not_slow_telemetry() -> None:
     """A lost reply slows the polls, because the line may be bad. These say nothing about it."""
     board = FakeInav(drop=lambda frame: "reply" if frame.command in (PID, MISC) else "")

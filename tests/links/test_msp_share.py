@@ -195,6 +195,21 @@ async def test_a_further_client_displaces_the_silent_one(monkeypatch: pytest.Mon
         further_writer.close()
 
 
+async def test_connections_of_one_host_displace_only_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("service.links.msp_share._MAX_PROGRAMS", 2)
+    async with shared() as (daemon, silent):
+        address = daemon.settings.share[0].address
+        writers: list[asyncio.StreamWriter] = []
+        for _ in range(3):
+            reader, writer = await asyncio.open_connection(address.host, address.port, local_addr=("127.0.0.2", 0))
+            writers.append(writer)
+            await Program(reader, writer).ask(IDENT)
+        (reply,) = await silent.ask(IDENT)
+        assert reply.direction is Direction.REPLY
+        for writer in writers:
+            writer.close()
+
+
 async def test_a_flood_is_dropped_and_another_program_is_answered() -> None:
     async with shared() as (daemon, flooder):
         address = daemon.settings.share[0].address
