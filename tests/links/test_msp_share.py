@@ -50,7 +50,9 @@ class Program:
                 with suppress(TimeoutError):
                     async with asyncio.timeout(_ASKED_AGAIN_S):
                         while len(replies) < times:
-                            replies += self._parser.feed(await self._reader.read(4096))
+                            data = await self._reader.read(4096)
+                            assert data, "the share has disconnected"
+                            replies += self._parser.feed(data)
         return replies[:times]
 
     async def is_closed_after(self, command: int, payload: bytes = b"") -> bool:
@@ -251,8 +253,11 @@ async def test_an_empty_setter_is_no_read(monkeypatch: pytest.MonkeyPatch) -> No
     async with shared() as (daemon, program):
         for setting, setter in SETTERS.items():
             (before,) = await program.ask(setting)
-            await program.ask(WP, b"\xff" * 58)
-            await program.ask(setter)
+            for command, payload in ((WP, b"\xff" * 58), (setter, b"")):
+                address = daemon.settings.share[0].address
+                reader, writer = await asyncio.open_connection(address.host, address.port)
+                assert await Program(reader, writer).is_closed_after(command, payload)
+                writer.close()
             (after,) = await program.ask(setting)
             assert after == before
         (status,) = await program.ask(STATUS)
