@@ -29,7 +29,6 @@ NOT_OURS = {
     "rejected by the Mav, item had a bad option wp# N",
     "Upload MISSION failed ... DENIED",
     "Upload MISSION failed ... UNSUPPORTED",
-    "No configuration received within 10 seconds",
     "begin, send, wait, commit",
     "only item 1",
 }
