@@ -25,7 +25,7 @@ from bridge.sharing.program import Program, WaitingRequest
 from protocols.msp.frame import Direction, MspFrame, frame_size
 from protocols.rights.effect import Effect
 
-#: The requests of all programs: each of n busy hosts has 1 / (n + 1) of them. More ports gain it nothing.
+#: The requests of all programs: each of n busy accounts has 1 / (n + 1) of them.
 _TOTAL = Rate(400, 400)
 #: For this long a reply also answers the same request of other programs.
 _CURRENT_S = 0.2
@@ -86,11 +86,11 @@ class MspSharing:
         """Take bytes of a program."""
         if program not in self._programs:
             return
-        taken = program.take(data, now) if self._total.left(now) > self._total.used(program.host) else None
+        taken = program.take(data, now) if self._total.left(now) > self._total.used(program.account) else None
         if taken is None:
             self._count("too many requests")
             return
-        self._total.spend(program.host, taken)
+        self._total.spend(program.account, taken)
         if program.waiting:
             self.serve(now)
 

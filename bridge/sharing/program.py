@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A program on a share: its budget and its waiting requests."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 
 from bridge.gcs.budget import TokenBucket
@@ -57,6 +57,8 @@ class Program:
         self.send = send
         self.close = close
         self.may_write = may_write
+        #: Over UDP that of its host: a port more costs nothing there.
+        self.account: Hashable = host if close is None else self
         self.waiting: list[WaitingRequest] = []
         #: Nothing is forwarded for it until then.
         self.blocked_until = 0.0

@@ -96,6 +96,17 @@ def test_many_flooders_leave_an_honest_program_its_part() -> None:
     assert 200 * 12 <= sum(len(flooder.replies) for flooder in flooders) <= 400 * 12  # of 2000 a second
 
 
+def test_a_flooder_leaves_another_program_of_its_host_its_part() -> None:
+    world, _ = flying_station("harakiri")
+    ShareProgram(world, "192.0.2.66:1").ask_every(0.0025, (IDENT, b""))
+    honest = ShareProgram(world, "192.0.2.66:2")
+    honest.ask_every(0.02, (IDENT, b""))
+    world.run(2)
+    honest.replies.clear()
+    world.run(5)
+    assert 249 <= len(honest.replies) <= 251
+
+
 def test_many_ports_of_a_host_gain_it_nothing() -> None:
     world, _ = flying_station("harakiri")
     for port in range(30):
