@@ -287,7 +287,7 @@ def test_refused_fence_and_rally_points_keep_their_mission_type(shared: Bench, k
     assert shared.board.records() == kept
 
 
-def test_writing_and_reading_while_armed_are_refused(bench: Bench) -> None:
+def test_writing_while_armed_is_refused(bench: Bench) -> None:
     planner = bench.mission_planner()
     planner.connect()
     plan = plain_plan(12)
