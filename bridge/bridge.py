@@ -12,7 +12,6 @@ An autopilot that speaks MAVLink itself is not represented but passed through, b
 """
 
 from dataclasses import replace
-from functools import partial
 from itertools import count
 from math import inf
 
@@ -89,9 +88,7 @@ class Bridge:
         )
         self.missions = MissionService(self.session.vehicle, self.runner, on_ending)
         self.local = LocalMissions(self.missions, self.ground, log_event, incidents)
-        self.sharing = MspSharing(
-            self.session, self.runner, self.missions, log_event, partial(self.ground.say, Severity.WARNING)
-        )
+        self.sharing = MspSharing(self.session, self.runner, self.missions, log_event, self._say_refused)
         self._vehicle = OwnVehicle(self.session, self.missions, self.ground, self._announcer, config.unix_time_s, now)
         #: The seal of the flight controller's settings.
         self.settings = SettingsSeal(
@@ -209,6 +206,10 @@ class Bridge:
     def _say(self, news: tuple[Severity, str] | None) -> None:
         if news is not None and not self.is_passing_through:
             self.ground.say(*news)
+
+    def _say_refused(self, text: str) -> None:
+        """A program's request was refused. In flight a warning would cover what concerns the craft."""
+        self.ground.say(Severity.NOTICE if self.session.vehicle.armed else Severity.WARNING, text)
 
     def _newcomer(self, peer: Peer) -> None:
         if not self.is_passing_through:

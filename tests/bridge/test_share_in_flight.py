@@ -3,10 +3,11 @@
 
 import pytest
 
+from bridge.gcs.station import Severity
 from protocols.msp.frame import Direction, MspParser, request
 from simulator.commands.fc_kinds import make_board
 from tests.support.share_program import ShareProgram
-from tests.support.world import World
+from tests.support.world import GroundStation, World
 
 STATUS, RAW_IMU, SERVO, MOTOR, RC, RAW_GPS, COMP_GPS, ATTITUDE, ALTITUDE, ANALOG = range(101, 111)
 BOX, WP, NAV_STATUS, STATUS_EX, SENSOR_STATUS, DEBUG, PID = 113, 118, 121, 150, 151, 254, 112
@@ -118,3 +119,18 @@ def test_a_refused_poll_is_answered_with_the_boards_error() -> None:
     replies += [program.wait_for(SERVO, seconds=4) for _ in range(4)]
     assert {reply.direction for reply in replies} == {Direction.ERROR}
     assert request(SERVO) not in b"".join(data for _, _, data in world.written)
+
+
+@pytest.mark.parametrize(("is_armed", "severity"), [(False, Severity.WARNING), (True, Severity.NOTICE)])
+def test_a_refused_write_is_no_warning_in_flight(is_armed: bool, severity: Severity) -> None:
+    """A warning would cover what concerns the craft on Mission Planner's HUD."""
+    world = ready("harakiri")
+    if is_armed:
+        arm(world)
+    station = GroundStation(world)
+    station.stay_connected()
+    world.run(2)
+    ShareProgram(world).ask(202, bytes(30))
+    world.run(1)
+    texts = [message for message in station.messages("STATUSTEXT") if "SET_PID refused" in message.text]
+    assert [message.severity for message in texts] == [severity]
