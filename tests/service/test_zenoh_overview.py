@@ -16,7 +16,7 @@ def state_of(age_s: float | None) -> VehicleReport:
     groups["status"] = Status(armed=True, mode=max((mode.name for mode in FlightMode), key=len), age_s=age_s)
     groups["battery"] = Battery(voltage_v=25.2, age_s=age_s)
     groups["position"] = Position(lat_deg=-45.3838123, lon_deg=-178.4733456, height_m=-1200.4, age_s=age_s)
-    return VehicleReport(link=Link(state="MSP"), mission=MissionIdentity(146, "deadbeef"), **groups)
+    return VehicleReport(link=Link(state="MSP"), mission=MissionIdentity(146, "deadbeef"), settings=None, **groups)
 
 
 def test_the_longest_overview_of_a_day_fits() -> None:
