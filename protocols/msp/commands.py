@@ -54,4 +54,3 @@ class MspAction(IntEnum):
 
     ACC_CALIBRATION = 205
     MAG_CALIBRATION = 206
-    EEPROM_WRITE = 250
