@@ -29,14 +29,14 @@ from bridge.model.events import EventLog
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.vehicle import FlightState, Health, MissionLeg, Readiness
 from bridge.sharing.msp_sharing import MspSharing
+from bridge.transfers.downloads import MissionDownloads
+from bridge.transfers.local_missions import LocalMissions
+from bridge.transfers.mission_watch import MissionWatch
+from bridge.transfers.uploads import STOPPED, MissionUploads
 from bridge.vehicle.calibration import Calibration
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.link_announcer import LinkAnnouncer
-from bridge.vehicle.local_missions import LocalMissions
 from bridge.vehicle.message_router import Incoming, MessageRouter
-from bridge.vehicle.mission_download import MissionDownloads
-from bridge.vehicle.mission_upload import STOPPED, MissionUploads
-from bridge.vehicle.mission_watch import MissionWatch
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.parameters import Parameters
 from bridge.vehicle.settings_seal import SettingsSeal

@@ -22,7 +22,15 @@ BRIDGE = {
     "bridge.controllers": {"bridge.fc", "bridge.missions", "bridge.line", "bridge.model"},
     "bridge.gcs": {"bridge.model"},
     "bridge.sharing": {"bridge.gcs", "bridge.fc", "bridge.missions", "bridge.line", "bridge.model"},
-    "bridge.vehicle": {"bridge.gcs", "bridge.fc", "bridge.missions", "bridge.line", "bridge.model"},
+    "bridge.transfers": {"bridge.gcs", "bridge.missions", "bridge.line", "bridge.model"},
+    "bridge.vehicle": {
+        "bridge.transfers",
+        "bridge.gcs",
+        "bridge.fc",
+        "bridge.missions",
+        "bridge.line",
+        "bridge.model",
+    },
 }
 PACKAGES = {
     "protocols": set[str](),

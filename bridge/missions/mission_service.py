@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The mission operations shared by all clients: one transfer at a time, checks, delivery, read-back.
 
-Ground stations (bridge.vehicle.mission_upload, mission_download) and the command line (local_missions) both use it.
+Ground stations (bridge.transfers.uploads, downloads) and the command line (local_missions) both use it.
 """
 
 from collections.abc import Callable, Mapping, Sequence

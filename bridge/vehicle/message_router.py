@@ -10,9 +10,9 @@ from bridge.gcs.ground import Ground
 from bridge.gcs.guard import Guard, GuardRefusal, denial
 from bridge.gcs.routes import Routes
 from bridge.gcs.station import Peer, Severity, Station
+from bridge.transfers.downloads import MissionDownloads
+from bridge.transfers.uploads import MissionUploads
 from bridge.vehicle.commands import CommandService
-from bridge.vehicle.mission_download import MissionDownloads
-from bridge.vehicle.mission_upload import MissionUploads
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.parameters import Parameters
 from protocols.mavlink.codec import MavlinkDecoder

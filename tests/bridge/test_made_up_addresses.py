@@ -12,9 +12,10 @@ import pytest
 from bridge.gcs.guard import LinkAccess
 from bridge.gcs.station import Peer, Station
 from bridge.gcs.stations import MAX_PEERS
-from bridge.vehicle import mission_upload, upload_states
-from bridge.vehicle.upload_answers import UploadAnswers
-from bridge.vehicle.upload_list import UploadList
+from bridge.transfers import upload_states
+from bridge.transfers import uploads as uploads_module
+from bridge.transfers.upload_answers import UploadAnswers
+from bridge.transfers.upload_list import UploadList
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import MissionResult
@@ -228,7 +229,7 @@ def test_of_too_many_uploads_the_oldest_without_standing_ends() -> None:
 
 def test_of_too_many_uploads_the_oldest_without_items_ends(monkeypatch: pytest.MonkeyPatch) -> None:
     """None of the stations has precedence, and each has announced one list."""
-    monkeypatch.setattr(mission_upload, "_MOST_UPLOADS", 64)
+    monkeypatch.setattr(uploads_module, "_MOST_UPLOADS", 64)
     world = ready_world()
     for number in range(16):
         world.bridge.ground.stations.heard(Station(Peer("udp", f"first {number}"), 255, 190), 2, world.now)

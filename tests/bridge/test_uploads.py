@@ -9,7 +9,7 @@ from itertools import pairwise
 import pytest
 
 from bridge.model.mission_log import Outcome
-from bridge.vehicle.upload_states import Asking, Delivering, Receiving, UploadState
+from bridge.transfers.upload_states import Asking, Delivering, Receiving, UploadState
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol

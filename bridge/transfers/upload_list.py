@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from math import inf
 
 from bridge.gcs.station import Peer, Station
-from bridge.vehicle.upload_states import Asking, Complete, Delivering, Receiving, Upload, UploadState
+from bridge.transfers.upload_states import Asking, Complete, Delivering, Receiving, Upload, UploadState
 
 #: A host with more uploads than this is the first to lose one.
 _MOST_OF_HOST = 2

@@ -25,9 +25,9 @@ from bridge.model.finding import Finding
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.refusal import Refusal
 from bridge.model.verdict import CLEARED_LIST, Result, Verdict
-from bridge.vehicle.upload_answers import UploadAnswers
-from bridge.vehicle.upload_list import UploadList
-from bridge.vehicle.upload_states import (
+from bridge.transfers.upload_answers import UploadAnswers
+from bridge.transfers.upload_list import UploadList
+from bridge.transfers.upload_states import (
     TRANSITIONS,
     Announced,
     Asking,
