@@ -40,7 +40,7 @@ BROWSER_PACKAGES := chromium chromium-driver
 BROWSER := { command -v chromium && command -v chromedriver; } >/dev/null
 # For tests of the installed Debian package: needs permission to create namespaces, which some containers lack.
 BARE_ROOT := { $(BIN)/python tests/support/bare_root.py; } >/dev/null 2>&1
-IN_BARE_ROOT := tests/service/test_debian_package.py::test_in_a_bare_root
+IN_BARE_ROOT := tests/packaging/test_debian_package.py::test_in_a_bare_root
 INSTALL = if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
 	  echo "installing $(1)"; \
 	  apt-get update -q >/dev/null && DEBIAN_FRONTEND=noninteractive apt-get install -qy --no-install-recommends $(1) >/dev/null; \
@@ -58,7 +58,7 @@ test: $(VENV)/.test-ready
 	@$(MAKE) -s -C firmware tools
 	@$(BARE_ROOT) || echo 'The Debian package: NOT INSTALLED anywhere: no namespaces can be made here'
 	$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile --no-loadscope-reorder \
-	    $$($(BROWSER) || echo --ignore=tests/web/test_web_page.py) \
+	    $$($(BROWSER) || echo --ignore=tests/service/web/test_web_page.py) \
 	    $$($(BARE_ROOT) || echo --deselect=$(IN_BARE_ROOT)) $(ARGS)
 
 # Turns of phrase that are not English, or say again what a name says; CONTRIBUTING.md has the rule.
@@ -89,7 +89,7 @@ soak: $(VENV)/.test-ready
 	SOAK_MINUTES=$(or $(MINUTES),30) $(BIN)/python -m pytest tests/e2e/test_soak.py $(ARGS)
 
 fuzz: $(VENV)/.test-ready
-	FUZZ_EXAMPLES=$(or $(EXAMPLES),13000) $(BIN)/python -m pytest tests/bridge/test_fuzz.py --timeout 0 --numprocesses $(JOBS) $(ARGS)
+	FUZZ_EXAMPLES=$(or $(EXAMPLES),13000) $(BIN)/python -m pytest tests/scenarios/test_fuzz.py --timeout 0 --numprocesses $(JOBS) $(ARGS)
 
 deb: $(VENV)/.demo-ready
 	$(BIN)/python -m deb.build $(ARCH)

@@ -15,15 +15,18 @@ settings.load_profile("unhurried")
 
 #: The longest files. They start first; otherwise one of them could run alone at the end.
 _LONG = (
-    "tests/service/test_debian_package",
+    "tests/packaging/test_debian_package",
     "tests/firmware/test_firmware_core",
     "tests/e2e/test_mission_planner",
-    "tests/bridge/test_push_faults",
+    "tests/bridge/controllers/harakiri/test_mission_store",
     "tests/e2e/test_soak",
-    "tests/web/test_page_accessibility",
+    "tests/service/web/test_page_accessibility",
 )
 #: Folders of tests that mostly wait for programs, those with the longest files first.
-_WAITING = tuple(f"tests/{name}/" for name in ("web", "fleet", "e2e", "attack", "cli", "links", "doctor", "settings"))
+_WAITING = tuple(
+    f"tests/{name}/"
+    for name in ("service/web", "fleet", "e2e", "attack", "service/cli", "service/links", "service/settings")
+)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -46,7 +46,7 @@ _FOLLOW_UP_S = 0.04
 _REPLY_SIZES = {Msp.IDENT: 7 + FRAME_OVERHEAD, Msp.FC_VARIANT: FRAME_OVERHEAD}
 #: Fills a parser that waits for the rest of a cut frame (64 payload bytes and a checksum on an unpatched Harakiri),
 #: with whole harmless frames. Their order has no period: eleven times the same, read by a receiver at a twelfth of the
-#: speed, can come out as three '#' in a row (tests/bridge/test_probe_at_wrong_speed.py).
+#: speed, can come out as three '#' in a row (tests/bridge/fc/states/test_probe_at_wrong_speed.py).
 _RESYNC_COMMANDS = (
     *(Msp.FC_VARIANT, Msp.FC_VARIANT, Msp.IDENT, Msp.FC_VARIANT, Msp.IDENT, Msp.IDENT),
     *(Msp.IDENT, Msp.IDENT, Msp.FC_VARIANT, Msp.FC_VARIANT, Msp.IDENT),

@@ -23,13 +23,13 @@ from tests.support.programs import REPOSITORY, TIMEOUT_S, Daemon, free_port, unt
 
 #: Commands that are not run here, by their beginning, with the reason.
 NOT_RUN = {
-    "naze-bridge demo": "tests/cli/test_demo.py runs it",
-    "naze-bridge fleet list": "needs a router: tests/fleet/test_fleet_commands.py runs it",
+    "naze-bridge demo": "tests/service/cli/test_demo.py runs it",
+    "naze-bridge fleet list": "needs a router: tests/fleet/test_command.py runs it",
     "naze-bridge fleet watch": "needs a router: tests/fleet/test_watch_screen.py runs it",
-    "naze-bridge fleet push": "needs a router: tests/fleet/test_fleet_push.py runs it",
-    "naze-bridge fleet verify": "needs a router: tests/fleet/test_fleet_missions.py runs it",
-    "naze-bridge fleet pull": "needs a router: tests/fleet/test_fleet_missions.py runs it",
-    "naze-bridge fleet mavlink": "needs a router: tests/fleet/test_fleet_mavlink.py runs it",
+    "naze-bridge fleet push": "needs a router: tests/fleet/test_push.py runs it",
+    "naze-bridge fleet verify": "needs a router: tests/fleet/test_push_command.py runs it",
+    "naze-bridge fleet pull": "needs a router: tests/fleet/test_push_command.py runs it",
+    "naze-bridge fleet mavlink": "needs a router: tests/fleet/test_gcs_relay.py runs it",
     "naze-bridge sim --image": "needs a firmware image: `make real-board` runs it",
     "naze-bridge sim --link /tmp/naze --core": "needs the compiled core: tests/e2e/test_compiled_core.py runs it",
     "make": "long, or changes the machine; its target is checked",
@@ -39,7 +39,7 @@ NOT_RUN = {
     "python examples/zenoh-tls/make_certificates.py": "tests/support/secured_fleet.py runs it",
     "pip install trustme": "a test dependency",
     "pip install naze-bridge[emulator]": "needs the package index; the extra is checked",
-    ".venv/bin/python -m pip wheel": "takes long; tests/service/test_debian_package.py builds this wheel",
+    ".venv/bin/python -m pip wheel": "takes long; tests/packaging/test_debian_package.py builds this wheel",
     "pipx install": "needs the package index",
     "zenohd": "not in Debian; tests use it if $ZENOHD names it",
     "docker compose": "needs Docker; tests/fleet/test_fleet_kit.py checks the files",

@@ -17,7 +17,7 @@ LANGUAGES = {
     "sh": "tests/docs/test_doc_commands.py",
     "toml": "tests/docs/test_doc_settings.py",
     "console": "tests/docs/test_doc_texts.py",
-    "python": "tests/fleet/test_fleet_commands.py",
+    "python": "tests/fleet/test_command.py",
     "msp": "tests/docs/test_msp_mission_page.py",
     "text": "nothing: a drawing",
 }

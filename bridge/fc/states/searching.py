@@ -6,9 +6,9 @@ speak MAVLink only. So the search listens for both, but probes for MSP and prefe
 
 Each visit to a speed first only listens, then probes as well; an MSP reply is confirmed by a second one. Evidence is
 two equal replies to our own probes, a heartbeat with plausible fields, or two MAVLink frames of one sender; noise
-produces none of them (tests/bridge/test_autosense_noise.py). A board that echoes our probes is in its command line.
+produces none of them (test_autosense_noise.py). A board that echoes our probes is in its command line.
 Only whole IDENT requests are ever sent. At a wrong speed the flight controller receives different bytes;
-tests/bridge/test_probe_at_wrong_speed.py shows that none of them makes a run that Harakiri acts on.
+test_probe_at_wrong_speed.py shows that none of them makes a run that Harakiri acts on.
 """
 
 from collections.abc import Iterator, Sequence

@@ -1,0 +1,488 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""INAV with several stored missions, and lists changed on the board by other programs."""
+
+from collections import Counter
+from dataclasses import replace
+
+import pytest
+
+from bridge.controllers.nav.stored_missions import erased, flown, split_missions
+from bridge.missions.list_check import check_list
+from bridge.missions.mission_service import HeldMission
+from bridge.model.mission_log import Outcome
+from bridge.model.refusal import Refusal
+from protocols.mavlink.dialect import messages
+from protocols.mission_item import MissionResult
+from protocols.msp.commands import Msp
+from protocols.msp.frame import MspParser
+from protocols.msp.nav import LAST, Nav, NavAction
+from simulator.board.msp_board import MspBoard
+from simulator.board.msp_options import MspOptions
+from simulator.board.nav_waypoint import FLAG_HOME, FLAG_LAST, WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
+from simulator.board.options import Faults
+from simulator.commands.fc_kinds import make_board, new_eeprom
+from simulator.inav.boxes import BOXES
+from simulator.inav.mission import CAPACITY
+from simulator.multiwii.mission import MultiWiiMission
+from tests.bridge.controllers.inav.test_mission_store import ACCEPTED, board_with, without_home
+from tests.bridge.controllers.nav.test_mission_store import RULES, packed, plan
+from tests.support.conversations import Download, Upload, clear_message
+from tests.support.msp_bench import waypoint
+from tests.support.world import GroundStation, World
+
+NAV_WP = 1 << BOXES["9.1.0"].index(28)
+NOTHING_MORE = NavWaypoint().pack(0)[1:]
+
+
+class Bench:
+    """A board whose EEPROM has missions of the given sizes from another planner."""
+
+    def __init__(self, *sizes: int, faults: Faults | None = None) -> None:
+        records = [record for mission in sets(*sizes) for record in mission]
+        filled = records + [NOTHING_MORE] * (CAPACITY - len(records))
+        self.eeprom = bytearray(b"".join(bytes((number,)) + record for number, record in enumerate(filled, 1)))
+        self.faults = faults or Faults(boxes=0)
+        self.board: MspBoard = make_board("inav", MspOptions(), self.faults, memoryview(self.eeprom))
+        self.world = World(speeds=(115200,), peer=self.board, plugged=False)
+        self.station = GroundStation(self.world)
+        self.station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+        self.world.run(0.5)
+        self.world.plug()
+        self.world.wait_ready(10)
+        self.world.run(5)
+
+    def stored(self) -> list[list[bytes]]:
+        """The missions in the EEPROM, without record numbers."""
+        records = [bytes(self.eeprom[at + 1 : at + WAYPOINT_SIZE]) for at in range(0, len(self.eeprom), WAYPOINT_SIZE)]
+        missions: list[list[bytes]] = [[]]
+        for record in records:
+            missions[-1].append(record)
+            if record[-1] == LAST:
+                missions.append([])
+        return [mission for mission in missions if mission and mission != [NOTHING_MORE]]
+
+    def flown(self) -> list[bytes]:
+        """The list that the board would fly if armed now."""
+        self.faults.armed = True
+        self.world.run(3)
+        assert self.board.armed
+        held = self.world.bridge.missions.held
+        self.faults.armed = False
+        self.world.run(3)
+        return [] if held is None else [record.pack() for record in held.records]
+
+    def text(self) -> str:
+        """All texts so far; long ones arrive in pieces."""
+        self.world.run(0.1)
+        return " ".join(self.station.texts())
+
+
+def sets(*sizes: int) -> list[list[bytes]]:
+    return [packed(plan(size + 1, shift)) for shift, size in enumerate(sizes, 1)]
+
+
+def others_of(bench: Bench) -> list[list[bytes]]:
+    def packed_records(held: HeldMission) -> list[bytes]:
+        return [record.pack() for record in held.records]
+
+    return [packed_records(held) for held in bench.world.bridge.missions.others]
+
+
+# -- several missions ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("selected", [1, 2, 3])
+def test_a_download_shows_the_loaded_mission(selected: int) -> None:
+    bench = Bench(4, 6, 9, faults=Faults(boxes=0, selected_mission=selected))
+    shown = Download(bench.station).run()
+    assert without_home(shown) == without_home(plan((5, 7, 10)[selected - 1], selected))
+    assert others_of(bench) == [mission for number, mission in enumerate(sets(4, 6, 9), 1) if number != selected]
+
+
+@pytest.mark.parametrize("selected", [1, 2])
+def test_an_upload_replaces_the_loaded_mission_and_keeps_the_others(selected: int) -> None:
+    bench = Bench(4, 6, 9, faults=Faults(boxes=0, selected_mission=selected))
+    bench.faults.selected_mission = 0
+    assert Upload(bench.station, plan(21, 7)).run() is ACCEPTED
+    kept = [mission for number, mission in enumerate(sets(4, 6, 9), 1) if number != selected]
+    assert bench.stored() == [packed(plan(21, 7)), *kept]
+    assert without_home(Download(bench.station).run()) == without_home(plan(21, 7))
+    assert bench.flown() == packed(plan(21, 7))
+    bench.world.run(3)
+    assert others_of(bench) == kept
+
+
+def test_missions_that_no_longer_fit_are_reported_and_copied_to_the_pi() -> None:
+    bench = Bench(4, 30, 60)
+    assert Upload(bench.station, plan(81, 7)).run() is ACCEPTED
+    assert bench.stored() == [packed(plan(81, 7)), sets(4, 30)[1]]
+    copies = [mission for mission, _ in bench.world.store.missions if mission.source.startswith("copy")]
+    assert [[record.pack() for record in copy.verdict.records] for copy in copies] == [sets(4, 30, 60)[2]]
+    assert "Mission of 60 records does not fit" in bench.text()
+
+
+def test_without_a_copy_of_what_it_erases_nothing_is_written() -> None:
+    bench = Bench(4, 30, 60)
+    bench.world.store.failing = True
+    assert Upload(bench.station, plan(81, 7)).run() is MissionResult.DENIED
+    assert "could not be copied to the Pi" in bench.text()
+    assert bench.stored() == sets(4, 30, 60)
+
+
+def test_record_fields_without_an_item_field_survive_a_read_and_a_write() -> None:
+    """From another planner: a user action, a leg that flies home, a landing's ground elevation."""
+    legs = [
+        waypoint(1, p3=0b110),
+        waypoint(2, flag=FLAG_HOME),
+        waypoint(0, lat_e7=0, lon_e7=0, flag=FLAG_HOME),
+        waypoint(3, NavAction.LAND, p2=130, p3=1),
+        waypoint(4, NavAction.RTH, lat_e7=0, lon_e7=0, alt_cm=0, flag=FLAG_LAST),
+    ]
+    bench = Bench(9)
+    bench.eeprom[: 5 * WAYPOINT_SIZE] = b"".join(leg.pack(number) for number, leg in enumerate(legs, 1))
+    bench.faults.stick_loads += 1
+    bench.world.run(3)
+    before = bytes(bench.eeprom[: 5 * WAYPOINT_SIZE])
+    items = Download(bench.station).run()
+    assert Upload(bench.station, items).run() is ACCEPTED
+    assert bytes(bench.eeprom[: 5 * WAYPOINT_SIZE]) == before
+    assert bench.world.store.missions[-1][0].verdict.findings == ()
+
+
+def test_clear_clears_the_loaded_mission() -> None:
+    bench = Bench(4, 6)
+    bench.station.send(clear_message())
+    bench.world.run(3)
+    assert bench.stored()[-1] == sets(4, 6)[1]
+    assert Download(bench.station).run()[1:] == []
+    assert bench.flown() == []
+
+
+def test_after_a_failed_push_all_missions_are_restored() -> None:
+    bench = Bench(4, 6)
+    upload = Upload(bench.station, plan(100, 7))
+    bench.world.run(0.4)
+    bench.world.bridge.runner.stop(bench.world.now)
+    upload.run(2)
+    bench.world.run(3)
+    assert bench.stored() == sets(4, 6)
+    assert bench.flown() == sets(4, 6)[0]
+
+
+def test_missions_are_split_at_their_last_records_and_the_last_are_dropped() -> None:
+    records = check_list(plan(10), RULES).records
+    one, two = records[:3], records[3:9]
+    ended = (*one[:2], replace(one[2], flag=LAST)), (*two[:5], replace(two[5], flag=LAST))
+    assert split_missions([*ended[0], *ended[1], one[0]]) == list(ended)
+    assert (flown(ended, 2), flown(ended, 3), flown((), 1)) == (ended[1], ended[0], ())
+    assert [erased(ended, room) for room in (9, 8, 2)] == [(), ended[1:], ended]
+
+
+# -- a list that changes on the board ------------------------------------------------------------------------
+
+
+def restart(bench: Bench) -> None:
+    bench.board.power_off(bench.world.now)
+    bench.world.run(3)
+    bench.board.power_on(bench.world.now)
+    bench.world.wait_until(lambda w: w.is_found, 15)
+    bench.world.run(3)
+
+
+def test_after_a_restart_the_saved_mission_is_loaded_and_reported() -> None:
+    bench = Bench()
+    assert Upload(bench.station, plan(13)).run() is ACCEPTED
+    restart(bench)
+    assert without_home(Download(bench.station).run()) == without_home(plan(13))
+    assert "Saved mission loaded again: 12 records" in bench.text()
+    assert bench.flown() == packed(plan(13))
+
+
+def test_a_saved_mission_from_another_planner_is_reported_as_such() -> None:
+    bench = Bench(4)
+    assert "not written by naze-bridge" in bench.text()
+    assert bench.flown() == sets(4)[0]
+
+
+def test_while_armed_the_missing_mission_is_reported_but_not_loaded() -> None:
+    bench = Bench(4, faults=Faults(boxes=0, armed=True))
+    assert bench.text().count("No mission is loaded: disarm to load the saved one") == 1
+    # None is loaded, so there is nothing to fly.
+    assert without_home(Download(bench.station).run()) == []
+    bench.faults.armed = False
+    bench.world.run(3)
+    assert without_home(Download(bench.station).run()) == without_home(plan(5, 1))
+
+
+def pulled(bench: Bench) -> HeldMission | Refusal:
+    answers: list[HeldMission | Refusal] = []
+    bench.world.bridge.local.pull(answers.append, bench.world.now)
+    bench.world.wait_until(lambda _: bool(answers), 30)
+    return answers[0]
+
+
+@pytest.mark.parametrize("command", [Msp.STATUS, Nav.GETINFO, Nav.LOAD])
+@pytest.mark.parametrize("lost", [3, 5, 12])
+def test_a_list_that_is_not_loaded_yet_is_not_read_as_empty(command: int, lost: int) -> None:
+    """Until the board has answered and loaded its saved mission, reading fails."""
+    bench = Bench(4)
+    bench.board.power_off(bench.world.now)
+    bench.world.run(3)
+    requests = Counter[int]()
+    receive, frames = bench.board.receive, MspParser()
+
+    def receive_others(data: bytes, now: float) -> None:
+        for frame in frames.feed(data):
+            requests[frame.command] += 1
+            if not bench.world.is_found or frame.command != command or requests[command] > lost:
+                receive(frame.encode(), now)
+
+    bench.board.receive = receive_others  # type: ignore[method-assign]
+    bench.board.power_on(bench.world.now)
+    bench.world.wait_until(lambda world: world.is_found, 30)
+    requests.clear()
+    held = pulled(bench)
+    while isinstance(held, Refusal):
+        held = pulled(bench)
+    assert [record.pack() for record in held.records] == sets(4)[0]
+    bench.world.run(2)
+    assert "Saved mission loaded, not written by naze-bridge: 4 records" in bench.text()
+
+
+@pytest.mark.parametrize("armed", [False, True])
+def test_a_mission_selected_by_sticks_is_noticed_within_two_seconds(armed: bool) -> None:
+    bench = Bench(4, 6)
+    bench.faults.armed = armed
+    bench.world.run(3)
+    bench.faults.selected_mission = 2
+    bench.world.run(2.0)
+    held = bench.world.bridge.missions.held
+    assert held is not None
+    assert [record.pack() for record in held.records] == sets(4, 6)[1]
+    assert "changed: 6 records" in bench.text()
+
+
+def test_another_clients_list_is_noticed_and_its_progress_is_correct() -> None:
+    bench = Bench(9)
+    assert Upload(bench.station, plan(21, 7)).run() is ACCEPTED
+    bench.eeprom[: 4 * WAYPOINT_SIZE] = b"".join(
+        bytes((number,)) + record for number, record in enumerate(sets(4)[0], 1)
+    )
+    bench.faults.stick_loads += 1
+    bench.world.run(2.0)
+    assert "changed: 4 records" in bench.text()
+    held = bench.world.bridge.missions.held
+    assert held is not None
+    assert [record.pack() for record in held.records] == sets(4)[0]
+    bench.faults.armed, bench.faults.boxes = True, NAV_WP
+    bench.world.run(5)
+    assert {message.total for message in bench.station.messages("MISSION_CURRENT")[-3:]} == {4}
+
+
+@pytest.mark.parametrize(("size", "turn_ms"), [(3, 10.0), (30, 10.0)])
+@pytest.mark.parametrize("kind", ["inav", "multiwii"])
+def test_a_list_of_the_same_size_is_noticed_within_two_seconds(kind: str, size: int, turn_ms: float) -> None:
+    """Another client has moved one waypoint."""
+    options = MspOptions(serial_task_ms=turn_ms)
+    eeprom = new_eeprom(kind, options)
+    board = make_board(kind, options, Faults(boxes=0), memoryview(eeprom))
+    world = World(speeds=(115200,), peer=board)
+    world.wait_ready(20)
+    world.run(2)
+    station = GroundStation(world)
+    assert Upload(station, plan(size + 1), tries=60).run(60) is ACCEPTED
+    world.run(3)
+    moved = plan(size + 1)
+    moved[size // 2] = replace(moved[size // 2], alt_m=33.0)
+    changed = packed(moved)[size // 2 - 1]
+    if kind == "inav":
+        eeprom[(size // 2 - 1) * WAYPOINT_SIZE + 1 : size // 2 * WAYPOINT_SIZE] = changed
+        board._firmware._mission.load()  # type: ignore[union-attr]
+    else:
+        MultiWiiMission(memoryview(eeprom), options.capacity).store(size // 2, unpack_waypoint(b"\0" + changed)[1])
+    world.run(2.0)
+    assert f"Mission on the flight controller changed: {size} records" in " ".join(station.texts())
+    assert [record.pack() for record in world.bridge.missions.held.records] == packed(moved)  # type: ignore[union-attr]
+
+
+def with_the_longest_list(streams_hz: int = 0) -> tuple[MspBoard, World, GroundStation]:
+    """The board serves one request per 10 ms. Above 0, a ground station requests all telemetry at this rate."""
+    board, world, station = board_with(serial_task_ms=10.0)
+    assert Upload(station, plan(CAPACITY + 1)).run(60) is ACCEPTED
+    for stream in range(1, 13) if streams_hz else ():
+        station.send(messages.MAVLink_request_data_stream_message(1, 1, stream, streams_hz, 1))
+    return board, world, station
+
+
+@pytest.mark.parametrize("streams_hz", [0, 50])
+def test_another_list_of_the_longest_size_is_noticed_within_two_seconds(streams_hz: int) -> None:
+    board, world, station = with_the_longest_list(streams_hz)
+    world.run(3)
+    other = packed(plan(CAPACITY + 1, 3))
+    mission = board._firmware._mission  # type: ignore[union-attr]
+    for number, record in enumerate(other, 1):
+        mission.write(number, unpack_waypoint(bytes((number,)) + record)[1])
+    world.run(2.0)
+    assert f"Mission on the flight controller changed: {CAPACITY} records" in " ".join(station.texts())
+    assert [record.pack() for record in world.bridge.missions.held.records] == other  # type: ignore[union-attr]
+
+
+def test_one_changed_record_in_the_longest_list_is_noticed_from_the_upload() -> None:
+    board, world, station = with_the_longest_list()
+    world.run(3)
+    records = packed(plan(CAPACITY + 1))
+    records[0] = packed(plan(CAPACITY + 1, 3))[0]
+    mission = board._firmware._mission  # type: ignore[union-attr]
+    for number, record in enumerate(records, 1):
+        mission.write(number, unpack_waypoint(bytes((number,)) + record)[1])
+        world.run(0.01)
+    world.run(2.0)
+    assert f"Mission on the flight controller changed: {CAPACITY} records" in " ".join(station.texts())
+
+
+@pytest.mark.parametrize("streams_hz", [0, 50])
+def test_a_reloaded_former_list_is_noticed_within_two_seconds(streams_hz: int) -> None:
+    """Another client has changed one of many records without saving, and loads the saved list."""
+    board, world, _ = with_the_longest_list(streams_hz)
+    ours = packed(plan(CAPACITY + 1))
+    records = [*ours[:76], packed(plan(CAPACITY + 1, 3))[76], *ours[77:]]
+    mission = board._firmware._mission  # type: ignore[union-attr]
+    for number, record in enumerate(records, 1):
+        mission.write(number, unpack_waypoint(bytes((number,)) + record)[1])
+    world.run(10)
+    assert [record.pack() for record in world.bridge.missions.held.records] == records  # type: ignore[union-attr]
+    mission.load()
+    world.run(2.0)
+    assert [record.pack() for record in world.bridge.missions.held.records] == ours  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("streams_hz", [0, 50])
+def test_a_list_that_the_sticks_load_is_read_at_once(streams_hz: int) -> None:
+    """It is of the longest size, has never been seen, and differs in one record."""
+    board, world, _ = with_the_longest_list(streams_hz)
+    for number in (1, 60, 119):
+        world.run(3)
+        changed = packed(plan(CAPACITY + 1, 7))[number - 1]
+        board._eeprom[(number - 1) * WAYPOINT_SIZE + 1 : number * WAYPOINT_SIZE] = changed
+        board.faults.stick_loads += 1
+        world.run(3)
+        assert world.bridge.missions.held.records[number - 1].pack() == changed  # type: ignore[union-attr]
+
+
+def test_a_list_that_another_client_is_writing_is_reported_once_it_is_complete() -> None:
+    bench = Bench(9)
+    before = len(bench.station.texts())
+    mission = bench.board._firmware._mission  # type: ignore[union-attr]
+    for number in range(1, 31):
+        mission.write(number, waypoint(number, flag=FLAG_LAST if number == 30 else 0))
+        bench.world.run(0.1)
+    bench.world.run(2)
+    text = " ".join(bench.station.texts()[before:])
+    assert text == "Mission on the flight controller changed: 30 records"
+
+
+def test_a_list_that_another_client_left_unfinished_is_reported() -> None:
+    bench = Bench(9)
+    bench.board._firmware._mission.write(1, waypoint(1))  # type: ignore[union-attr]
+    bench.world.run(2)
+    assert "Mission on the flight controller changed: 0 records" in bench.text()
+
+
+def test_a_multiwii_is_not_read_in_flight() -> None:
+    """Reading a record would change the record that it flies."""
+    board, world, station = board_with("multiwii")
+    assert Upload(station, plan(9), tries=60).run(60) is ACCEPTED
+    board.faults.armed, board.faults.boxes = True, 1 << 10
+    world.run(2)
+    before = len(world.written)
+    world.run(5)
+    asked = [frame for _, _, data in world.written[before:] for frame in MspParser().feed(data)]
+    assert not [frame for frame in asked if frame.command == Nav.WP and frame.payload != b"\0"]
+    board.faults.armed = False
+    world.run(5)
+    assert not [text for text in station.texts() if "changed" in text]
+
+
+@pytest.mark.parametrize("is_blank", [False, True])
+def test_after_a_read_a_multiwii_still_hovers_at_the_end_of_a_return_home(is_blank: bool) -> None:
+    """It would land if the last record read had a p1 (a hold, or an erased record)."""
+    board, world, station = board_with("multiwii")
+    if not is_blank:
+        items = [replace(item, p1=7.0) for item in plan(9)]
+        assert Upload(station, items, tries=60).run(60) is ACCEPTED
+        world.run(3)
+        assert Download(station).run() is not None
+    written = board.counters.flash_writes
+    world.run(3)
+    board.faults.armed, board.faults.boxes = True, 1 << 7
+    world.run(60)
+    craft = board.truth(world.now)
+    assert craft is not None
+    assert craft.flight.height_m > 5
+    assert board.counters.flash_writes == written
+
+
+def test_polling_an_empty_multiwii_reports_nothing() -> None:
+    _, world, station = board_with("multiwii")
+    before = len(world.written)
+    world.run(5)
+    assert not [text for text in station.texts() if "changed" in text]
+    asked = [frame for _, _, data in world.written[before:] for frame in MspParser().feed(data)]
+    assert [frame.payload for frame in asked if frame.command == Nav.WP and frame.payload[0] > 1] == []
+
+
+def test_after_a_push_that_fails_for_good_the_saved_mission_is_loaded() -> None:
+    bench = Bench()
+    assert Upload(bench.station, plan(13)).run() is ACCEPTED
+    upload = Upload(bench.station, plan(100, 1))
+    bench.world.after(0.5, lambda: setattr(bench.faults, "armed", True))
+    assert upload.run() is not ACCEPTED
+    bench.world.run(1)
+    bench.faults.armed = False
+    bench.world.run(4)
+    assert without_home(Download(bench.station).run()) == without_home(plan(13))
+    assert "Saved mission loaded again" in bench.text()
+    assert bench.world.store.outcomes().count(Outcome.VERIFIED) == 1
+
+
+@pytest.mark.parametrize("selected", [1, 2])
+def test_another_clients_change_to_a_mission_that_is_not_loaded_is_kept(selected: int) -> None:
+    """The sizes, the selection and the loaded mission are as before."""
+    bench = Bench(4, 6, faults=Faults(boxes=0, selected_mission=selected))
+    bench.faults.selected_mission = 0
+    missions = sets(4, 6)
+    changed = missions[2 - selected] = packed(plan(7 - 2 * (selected - 1), 9))
+    store(bench, *missions)
+    bench.world.run(4)
+    assert Upload(bench.station, plan(21, 7)).run() is ACCEPTED
+    assert bench.stored() == [packed(plan(21, 7)), changed]
+
+
+def test_while_the_other_missions_cannot_be_read_nothing_is_written() -> None:
+    """Another client writes a list just before the push, and reading it fails."""
+    bench = Bench(4, 6)
+    receive, frames = bench.board.receive, MspParser()
+    lost: list[int] = []
+
+    def receive_others(data: bytes, now: float) -> None:
+        for frame in frames.feed(data):
+            if bench.world.bridge.missions.writing and not lost:
+                store(bench, *sets(5, 7))
+            if bench.world.bridge.missions.writing and frame.command == Nav.WP and len(lost) < 5:
+                lost.append(frame.command)
+            else:
+                receive(frame.encode(), now)
+
+    bench.board.receive = receive_others  # type: ignore[method-assign]
+    assert Upload(bench.station, plan(21, 7)).run(5) is MissionResult.DENIED
+    assert lost
+    bench.world.run(5)
+    assert bench.stored() == sets(5, 7)
+    assert others_of(bench) == sets(5, 7)[1:]
+
+
+def store(bench: Bench, *missions: list[bytes]) -> None:
+    """Another client writes and saves these missions."""
+    for number, record in enumerate((record for mission in missions for record in mission), 1):
+        bench.eeprom[(number - 1) * WAYPOINT_SIZE + 1 : number * WAYPOINT_SIZE] = record
+    bench.board._firmware._mission.load()  # type: ignore[union-attr]

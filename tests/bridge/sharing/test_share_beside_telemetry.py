@@ -1,0 +1,259 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Other programs take nothing from ground stations, missions and each other: floods, transfers, and repeated reads."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from protocols.mavlink.dialect import messages as m
+from protocols.msp.frame import Direction, MspParser
+from service.cli.mission_source import load_mission
+from simulator.board.msp_options import MspOptions
+from simulator.board.options import SimOptions
+from simulator.commands.fc_kinds import make_board
+from tests.support.fake_inav import FakeInav
+from tests.support.share_program import ShareProgram
+from tests.support.world import GroundStation, World
+
+IDENT, RC_TUNING, PID, MISC, BOXNAMES, PIDNAMES, ATTITUDE, WP = 100, 111, 112, 114, 116, 117, 108, 118
+API_VERSION, FC_VARIANT, FC_VERSION, BOARD_INFO, BUILD_INFO, UID, NAME, BOXIDS = 1, 2, 3, 4, 5, 160, 10, 119
+INAV_MIXER = 0x2010
+EXAMPLES = Path(__file__).parents[3] / "examples"
+#: A different read each time: what one reply answers is no load.
+FLOODS = {
+    "harakiri": [(command, b"") for command in (PID, RC_TUNING, MISC, BOXNAMES, PIDNAMES)],
+    "inav": [(WP, bytes((number,))) for number in range(1, 121)],
+}
+
+
+def flying_station(kind: str, baud: int = 115200) -> tuple[World, GroundStation]:
+    peer = None if kind == "harakiri" else make_board(kind, MspOptions(baud=baud))
+    world = World(SimOptions(baud=baud), speeds=(baud,), peer=peer)
+    station = GroundStation(world)
+
+    def beat() -> None:
+        station.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
+        world.after(1.0, beat)
+
+    beat()
+    world.wait_ready(60)
+    world.run(3)
+    return world, station
+
+
+def attitudes(world: World, station: GroundStation) -> int:
+    station.take()
+    world.run(10)
+    return len(station.take("ATTITUDE"))
+
+
+def push_s(world: World, kind: str) -> float:
+    """The time that it takes to write six missions."""
+    items = load_mission(EXAMPLES / ("long-146.waypoints" if kind == "harakiri" else "naze-field.waypoints"))
+    elapsed = 0.0
+    for count in range(6):
+        outcome = world.push(items[: len(items) - count])
+        elapsed += world.wait_until(lambda _, outcome=outcome: outcome != [], 60)  # type: ignore[misc]
+        assert outcome[0][0].ack == m.MAV_MISSION_ACCEPTED
+        world.run(0.5)
+    return elapsed
+
+
+@pytest.mark.parametrize("baud", [115200, 19200])
+@pytest.mark.parametrize("kind", FLOODS)
+def test_a_flooder_harms_only_itself(kind: str, baud: int) -> None:
+    world, station = flying_station(kind, baud)
+    before, push_before_s = attitudes(world, station), push_s(world, kind)
+    for host in (66, 67):
+        ShareProgram(world, f"192.0.2.{host}:1").ask_every(0.005, *FLOODS[kind])
+    honest = ShareProgram(world)
+    honest.ask_every(0.2, (INAV_MIXER if kind == "inav" else PID, b""))
+    world.run(1)
+    assert attitudes(world, station) >= 0.8 * before
+    assert push_s(world, kind) <= 1.1 * push_before_s + 0.1
+    honest.replies.clear()
+    world.run(12)
+    assert 59 <= len(honest.replies) <= 61
+    assert honest.closed_at is None
+    assert world.events("fc.lost") == []
+    if kind == "harakiri":
+        world.assert_line_was_clean()
+
+
+def test_many_flooders_leave_an_honest_program_its_part() -> None:
+    world, _ = flying_station("harakiri")
+    flooders = [ShareProgram(world, f"192.0.2.{host}:1") for host in range(10)]
+    for flooder in flooders:
+        flooder.ask_every(0.005, (IDENT, b""), (PID, b""))
+    honest = ShareProgram(world, "192.0.2.99:1")
+    honest.ask_every(0.2, (ATTITUDE, b""), (MISC, b""))
+    world.run(2)
+    for program in (honest, *flooders):
+        program.replies.clear()
+    world.run(12)
+    assert 59 <= len(honest.replies) <= 61
+    assert 200 * 12 <= sum(len(flooder.replies) for flooder in flooders) <= 400 * 12  # of 2000 a second
+
+
+def test_a_flooder_leaves_another_program_of_its_host_its_part() -> None:
+    world, _ = flying_station("harakiri")
+    ShareProgram(world, "192.0.2.66:1").ask_every(0.0025, (IDENT, b""))
+    honest = ShareProgram(world, "192.0.2.66:2")
+    honest.ask_every(0.02, (IDENT, b""))
+    world.run(2)
+    honest.replies.clear()
+    world.run(5)
+    assert 249 <= len(honest.replies) <= 251
+
+
+def test_many_ports_of_a_host_gain_it_nothing() -> None:
+    world, _ = flying_station("harakiri")
+    for port in range(30):
+        ShareProgram(world, f"192.0.2.66:{port}", over_udp=True).ask_every(0.01, (IDENT, b""))
+    honest = ShareProgram(world, "192.0.2.99:1", over_udp=True)
+    honest.ask_every(0.02, (IDENT, b""))
+    world.run(2)
+    honest.replies.clear()
+    world.run(5)
+    assert 249 <= len(honest.replies) <= 251
+    assert world.bridge.sharing.refused["too many requests"] > 1000
+
+
+def test_reads_that_are_never_answered_do_not_slow_telemetry() -> None:
+    """A lost reply slows the polls, because the line may be bad. These say nothing about it."""
+    board = FakeInav(drop=lambda frame: "reply" if frame.command in (PID, MISC) else "")
+    board.answers = {**board.answers, ATTITUDE: bytes(6)}
+    world = World(speeds=(115200,), peer=board)
+    world.wait_ready(5)
+    ShareProgram(world, "192.0.2.9:1", over_udp=True).ask_every(0.1, (ATTITUDE, b""))
+    world.run(3)
+    board.commands.clear()
+    world.run(10)
+    before = board.commands.count(ATTITUDE)
+    for host in range(4):
+        ShareProgram(world, f"192.0.2.{host}:1", over_udp=True).ask_every(0.005, (PID, b""), (MISC, b""))
+    world.run(3)
+    board.commands.clear()
+    world.run(10)
+    assert board.commands.count(ATTITUDE) >= 0.8 * before
+    assert board.commands.count(PID) >= 1
+    assert world.events("fc.lost") == []
+
+
+def requests_written(world: World, *commands: int) -> int:
+    frames = MspParser().feed(b"".join(data for _, _, data in world.written))
+    return sum(frame.command in commands for frame in frames)
+
+
+def test_the_replies_of_polls_cost_the_line_nothing() -> None:
+    world, station = flying_station("harakiri")
+    world.written.clear()
+    world.run(10)
+    before = requests_written(world, ATTITUDE)
+    program = ShareProgram(world)
+    world.written.clear()
+    program.ask_every(0.02, (ATTITUDE, b""))
+    world.run(10)
+    assert len(program.replies) >= 499
+    assert requests_written(world, ATTITUDE) <= before * 1.05
+    assert attitudes(world, station) >= 240
+
+
+def test_a_poll_that_only_a_program_wants_runs_while_it_asks() -> None:
+    world = World(speeds=(115200,))
+    world.wait_ready()
+    program = ShareProgram(world)
+    program.ask_every(0.1, (ATTITUDE, b""))
+    world.run(2)
+    world.written.clear()
+    world.run(5)
+    assert requests_written(world, ATTITUDE) >= 45
+    program.closed_at = world.now
+    world.run(4)
+    world.written.clear()
+    world.run(5)
+    assert requests_written(world, ATTITUDE) <= 6
+
+
+def test_constant_replies_are_asked_for_once() -> None:
+    world, _ = flying_station("inav")
+    program = ShareProgram(world)
+    greeting = (API_VERSION, FC_VARIANT, FC_VERSION, BOARD_INFO, BUILD_INFO, UID, BOXNAMES, BOXIDS)
+    first = [program.wait_for(command).payload for command in greeting]
+    world.run(1)
+    again = [program.wait_for(command, seconds=5).payload for command in greeting]
+    world.run(1)
+    world.written.clear()
+    assert first == again == [program.wait_for(command).payload for command in greeting]
+    # The link's own question is API_VERSION.
+    assert requests_written(world, *set(greeting) - {API_VERSION}) == 0
+
+
+def test_programs_that_ask_for_the_same_cost_one_request() -> None:
+    world, _ = flying_station("harakiri")
+    programs = [ShareProgram(world, f"192.0.2.{host}:1") for host in range(5)]
+    world.run(5)  # the bridge has read the settings itself
+    world.written.clear()
+    for program in programs:
+        program.ask(PID)
+    world.run(0.5)
+    assert [len(program.replies) for program in programs] == [1] * 5
+    assert requests_written(world, PID) == 1
+
+
+def greet(program: ShareProgram, commands: Sequence[int]) -> None:
+    """Ask like INAV Configurator, which waits for each reply."""
+    for command in commands:
+        assert program.wait_for(command, is_v2=True).direction is Direction.REPLY
+
+
+@pytest.mark.parametrize(("kind", "baud"), [("inav", 19200), ("harakiri", 19200)])
+def test_requests_during_a_transfer_wait_for_its_end(kind: str, baud: int) -> None:
+    world, _ = flying_station(kind, baud)
+    polled = (ATTITUDE, IDENT, BOXNAMES) if kind == "harakiri" else (ATTITUDE, FC_VARIANT, BOXIDS)
+    others = (PID, MISC) if kind == "harakiri" else (API_VERSION, BUILD_INFO, NAME, BOARD_INFO, UID)
+    items = load_mission(EXAMPLES / "naze-field.waypoints")
+    for _ in range(3):
+        outcome = world.push(items)
+        world.run(0.05)
+        program = ShareProgram(world)
+        greet(program, polled)
+        assert world.bridge.runner.needs_line  # it still runs
+        assert outcome == []
+        greet(program, others)
+        assert outcome != []
+        assert program.closed_at is None
+        world.run(2)
+
+
+def test_who_waits_too_long_is_disconnected() -> None:
+    world, _ = flying_station("harakiri", 2400)
+    items = load_mission(EXAMPLES / "long-146.waypoints")
+    outcome = world.push(items)
+    world.run(1)
+    program, over_udp = ShareProgram(world), ShareProgram(world, "192.0.2.9:1", over_udp=True)
+    asked_at = world.now
+    program.ask(PID)
+    over_udp.ask(PID)
+    world.run(4)
+    assert outcome == []
+    assert program.closed_at == pytest.approx(asked_at + 3, abs=0.3)
+    assert program.replies == over_udp.replies == []
+    assert {event.facts["why"] for event in world.events("share.unanswered")} == {"a mission transfer is running"}
+
+
+def test_without_a_flight_controller_requests_wait_for_it() -> None:
+    world = World(speeds=(115200,), powered=False)
+    world.run(1)
+    program = ShareProgram(world)
+    program.ask(PID)
+    world.naze.power_on_booted(world.now)
+    world.run(3)
+    assert [frame.direction for _, frame in program.replies] == [Direction.REPLY]
+    world.power_off()
+    world.run(5)
+    program.ask(PID)
+    world.run(4)
+    assert len(program.replies) == 1
+    assert program.closed_at is not None

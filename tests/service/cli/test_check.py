@@ -1,0 +1,259 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`naze-bridge check` as used by a person and by a script."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+
+from protocols.mission_file import read_mission_file, write_qgc_wpl
+from protocols.mission_item import MissionItem
+from protocols.msp.mission import unpack_records
+from service.cli.main import main
+
+EXAMPLES = Path(__file__).parents[3] / "examples"
+FIELD, PLAN, LONG = (EXAMPLES / name for name in ("naze-field.waypoints", "naze-field.plan", "long-146.waypoints"))
+
+HOME = MissionItem(0, 16, 0, 0.0, 2.0, 0.0, 0.0, 453838000, 84733000, 131.0)
+POINT = MissionItem(1, 16, 3, 0.0, 2.0, 0.0, 0.0, 453839000, 84734000, 10.0)
+LAND = MissionItem(1, 21, 3, 0.0, 0.0, 0.0, 0.0, 0, 0, 0.0)
+SPEED = MissionItem(1, 178, 3, 1.0, 4.0, 0.0, 0.0, 0, 0, 0.0)
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(main, ["check", *map(str, arguments)])
+
+
+def objects(result: Result) -> list[dict[str, Any]]:
+    def refuse(token: str) -> None:
+        raise AssertionError(f"{token} is not JSON")
+
+    return [json.loads(line, parse_constant=refuse) for line in result.stdout.splitlines()]
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> dict[str, Path]:
+    texts = {
+        "clean": write_qgc_wpl([HOME, POINT]),
+        "rejected": write_qgc_wpl([HOME, LAND]),
+        "cleared": write_qgc_wpl([HOME, SPEED]),
+        "damaged": write_qgc_wpl([HOME, POINT])[:-20],
+    }
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+    return {name: tmp_path / name for name in [*texts, "missing"]}
+
+
+@pytest.mark.parametrize(
+    ("names", "code"),
+    [
+        (["clean"], 0),
+        (["cleared"], 3),
+        (["rejected"], 1),
+        (["damaged"], 2),
+        (["missing"], 2),
+        (["clean", "cleared"], 3),
+        (["cleared", "rejected"], 1),
+        (["rejected", "clean"], 1),
+        (["clean", "damaged", "rejected"], 2),
+    ],
+)
+@pytest.mark.parametrize("mode", [[], ["--json"]])
+def test_the_exit_code_of_several_files_is_the_worst(
+    files: dict[str, Path], names: list[str], code: int, mode: list[str]
+) -> None:
+    assert run(*mode, *[files[name] for name in names]).exit_code == code
+
+
+def test_strict_treats_changes_as_rejection(files: dict[str, Path]) -> None:
+    assert run("--strict", files["clean"]).exit_code == 0
+    assert run(FIELD).exit_code == 0
+    assert run("--strict", FIELD).exit_code == 1
+    assert run("--strict", files["cleared"]).exit_code == 1
+    assert run("--strict", FIELD, files["damaged"]).exit_code == 2
+
+
+def test_json_has_one_object_per_file_with_the_documented_keys(files: dict[str, Path]) -> None:
+    result = run("--json", FIELD, files["rejected"], files["cleared"], files["missing"])
+    accepted, rejected, cleared, missing = objects(result)
+    keys = ["file", "result", "ack", "items", "sent_seqs", "records", "count", "checksum", "findings"]
+    assert list(accepted) == list(rejected) == list(cleared) == keys
+    assert (accepted["file"], accepted["result"], accepted["ack"]) == (str(FIELD), "ACCEPTED", "MAV_MISSION_ACCEPTED")
+    assert (rejected["result"], rejected["ack"]) == ("REJECTED", "MAV_MISSION_INVALID")
+    assert (cleared["result"], cleared["ack"]) == ("CLEARED", "MAV_MISSION_ACCEPTED")
+    assert rejected["items"] == rejected["records"] == cleared["items"] == cleared["records"] == []
+    assert list(missing) == ["file", "error"]
+    assert missing["file"] == str(files["missing"])
+    assert "No such file" in missing["error"]
+    item_keys = ["seq", "command", "frame", "p1", "p2", "p3", "p4", "lat_e7", "lon_e7", "alt_m"]
+    assert {tuple(item) for item in accepted["items"]} == {tuple(item_keys)}
+    assert {tuple(finding) for finding in accepted["findings"]} == {
+        ("seq", "field", "was", "becomes", "why", "command", "news")
+    }
+    assert {len(record) for record in accepted["records"]} == {32}
+    assert len(accepted["records"]) == len(accepted["items"])
+
+
+def test_json_stays_json_with_infinite_values(tmp_path: Path) -> None:
+    path = tmp_path / "inf.waypoints"
+    path.write_text(write_qgc_wpl([HOME, POINT]).replace("\t0\t2\t0\t0\t45.3839", "\tinf\tnan\t0\tnan\t45.3839"))
+    (document,) = objects(run("--json", path))
+    changes = {finding["field"]: (finding["was"], finding["becomes"]) for finding in document["findings"]}
+    assert changes == {"p1": ("inf", 0), "p2": (None, 2)}
+
+
+def test_radius_and_capacity_are_the_flight_controllers(files: dict[str, Path]) -> None:
+    (document,) = objects(run("--json", "--wp-radius-cm", 550, files["clean"]))
+    assert [item["p2"] for item in document["items"]] == [6, 6]
+    assert run("--capacity", 145, LONG).exit_code == 1
+    assert run("--capacity", 146, LONG).exit_code == 0
+    (document,) = objects(run("--json", "--capacity", 145, LONG))
+    assert document["ack"] == "MAV_MISSION_NO_SPACE"
+
+
+@pytest.mark.parametrize("option", [["--wp-radius-cm", "-1"], ["--capacity", "x"], []])
+def test_wrong_usage_is_refused(option: list[str]) -> None:
+    assert run(*option).exit_code == 2
+
+
+def test_a_person_sees_sent_and_stored_values_with_reasons() -> None:
+    output = run(FIELD).stdout
+    for words in ("naze-field.waypoints", "20->15", "6->5", "5->-", "18.5->18", "DO_CHANGE_SPEED", "400->255"):
+        assert words in output
+    assert "WP 1: Alt changed from 20 to 15 m (take-off 2..15 m)" in output
+    assert "ACCEPTED: 13 of 14 items stored, 1 dropped, values changed: 6; 13 records, checksum " in output
+
+
+def test_items_keep_their_partners_where_numbers_differ(tmp_path: Path) -> None:
+    """INAV drops a TAKEOFF, shows a speed just before its leg, and inserts one where a jump changes the speed."""
+    path = tmp_path / "speeds.waypoints"
+    commands = [(22, 0.0, 0.0), (178, 1.0, 5.0), (201, 0.0, 0.0), (16, 0.0, 0.0), (178, 1.0, 8.0), (16, 0.0, 0.0)]
+    commands += [(16, 0.0, 0.0), (177, 4.0, 1.0)]
+    places = [replace(POINT, lat_e7=POINT.lat_e7 + 1000 * seq) for seq in range(8)]  # type: ignore[operator]
+    sent = [HOME, *(replace(p, command=c, p1=p1, p2=p2) for p, (c, p1, p2) in zip(places, commands, strict=True))]
+    path.write_text(write_qgc_wpl(sent))
+    (document,) = objects(run("--json", "--kind", "inav", path))
+    assert [item["command"] for item in document["items"]] == [16, 201, 178, 16, 178, 16, 16, 177]
+    assert document["sent_seqs"] == [0, 3, 2, 4, 5, 6, 7, 8]
+    rows = run("--kind", "inav", path).stdout.splitlines()
+    for words in (["1->-", "TAKEOFF"], ["2", "DO_CHANGE_SPEED"], ["3->1", "DO_SET_ROI"], ["4->3", "WAYPOINT"]):
+        assert any(row.split()[:2] == words for row in rows), words
+    commands = [(16, 0.0, 0.0), (16, 0.0, 0.0), (178, 1.0, 5.0), (16, 0.0, 0.0), (177, 1.0, 1.0), (16, 0.0, 0.0)]
+    sent = [HOME, *(replace(p, command=c, p1=p1, p2=p2) for p, (c, p1, p2) in zip(places, commands, strict=False))]
+    path.write_text(write_qgc_wpl(sent))
+    rows = run("--kind", "inav", path).stdout.splitlines()
+    for words in (["-->1", "DO_CHANGE_SPEED"], ["1->2", "WAYPOINT"], ["6->7", "WAYPOINT"]):
+        assert any(row.split()[:2] == words for row in rows), words
+
+
+def test_a_person_sees_why_a_list_is_rejected_or_cleared(files: dict[str, Path]) -> None:
+    assert "REJECTED: MAV_MISSION_INVALID, Rejected, WP 1: LAND cannot be alone" in run(files["rejected"]).stdout
+    assert "CLEARED: MAV_MISSION_ACCEPTED, Mission erased" in run(files["cleared"]).stdout
+
+
+def test_an_unreadable_file_is_one_sentence_on_stderr(files: dict[str, Path]) -> None:
+    result = run(files["damaged"])
+    assert result.stdout == ""
+    assert result.stderr.startswith(f"naze-bridge: {files['damaged']}, line 3: ")
+    assert result.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("name", ["", "[bold]x.waypoints", "ü.waypoints"])
+def test_any_path_is_shown_unchanged(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    if name:
+        path.write_text(write_qgc_wpl([HOME, POINT]))
+        assert name in run(path).stdout.replace("\n", "")
+    else:
+        assert "Is a directory" in run(path).stderr
+
+
+def test_an_endless_file_is_refused() -> None:
+    result = run("/dev/zero")
+    assert result.exit_code == 2
+    assert "larger than 8 MB" in result.stderr
+
+
+def test_the_examples_have_the_intended_results() -> None:
+    documents = objects(run("--json", FIELD, PLAN, LONG))
+    assert [document["result"] for document in documents] == ["ACCEPTED"] * 3
+    assert [len(document["items"]) for document in documents] == [13, 10, 146]
+    assert len(read_mission_file(LONG.read_bytes(), "long")) == 146
+    for document in documents:
+        assert any("0d0d0d" in record for record in document["records"]), "no hazard bytes"
+        for item, record in zip(document["items"], document["records"], strict=True):
+            (held,) = unpack_records(bytes.fromhex(record))
+            assert (held.lat_e7, held.lon_e7, held.height_m) == (item["lat_e7"], item["lon_e7"], item["alt_m"])
+    assert {item["command"] for item in documents[0]["items"]} >= {16, 18, 19, 20, 21, 22, 201}
+    assert {finding["becomes"] for finding in documents[0]["findings"]} >= {"dropped", 15}
+
+
+@pytest.mark.parametrize(("kind", "stored", "findings"), [("harakiri", 2, 1), ("inav", 3, 0), ("multiwii", 2, 1)])
+def test_each_kind_of_flight_controller_has_its_rules(tmp_path: Path, kind: str, stored: int, findings: int) -> None:
+    home, point = (replace(item, p2=2.0 if kind == "harakiri" else 0.0) for item in (HOME, POINT))
+    file = tmp_path / "speed.waypoints"
+    file.write_text(write_qgc_wpl([home, SPEED, replace(point, seq=2)]))
+    (found,) = objects(run("--json", "--kind", kind, file))
+    assert (len(found["items"]), len(found["findings"])) == (stored, findings)
+    assert len(found["records"][0]) == 2 * (16 if kind == "harakiri" else 20)
+    assert run("--kind", kind, "--capacity", "1000", LONG).exit_code == 0
+    assert run("--kind", kind, LONG).exit_code == (1 if kind == "inav" else 0)
+
+
+def test_home_and_the_take_off_limit_may_be_given(tmp_path: Path) -> None:
+    path = tmp_path / "nowhere.waypoints"
+    climb = replace(POINT, command=22, lat_e7=0, lon_e7=0, alt_m=25.0)
+    path.write_text(write_qgc_wpl([replace(HOME, lat_e7=0, lon_e7=0), climb, replace(POINT, seq=2)]))
+    assert run(path).exit_code == 1
+    placed = run("--json", "--home", "45.5,8.25", "--takeoff-max-m", "30", path)
+    (document,) = objects(placed)
+    assert (document["items"][0]["lat_e7"], document["items"][0]["lon_e7"]) == (455000000, 82500000)
+    assert document["items"][1]["alt_m"] == 25
+    assert run("--home", "45.5", path).exit_code == 2
+    assert run("--home", "91,0", path).exit_code == 2
+
+
+def test_the_take_off_limit_is_the_daemons(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, config = tmp_path / "high.waypoints", tmp_path / "config.toml"
+    climb = replace(POINT, command=22, lat_e7=0, lon_e7=0, alt_m=25.0)
+    path.write_text(write_qgc_wpl([HOME, climb, replace(POINT, seq=2)]))
+    config.write_text("takeoff_max_m = 25")
+    monkeypatch.setenv("NAZE_BRIDGE_CONFIG", str(config))
+    assert objects(run("--json", path))[0]["items"][1]["alt_m"] == 25
+    config.write_text("takeoff_max_m = 999")
+    assert run(path).exit_code == 2
+    assert "takeoff_max_m" in run(path).stderr
+    monkeypatch.setenv("NAZE_BRIDGE_CONFIG", "")  # as if it were not set
+    assert objects(run("--json", path))[0]["items"][1]["alt_m"] == 15
+
+
+def test_a_list_that_is_too_long_is_refused_without_a_table(tmp_path: Path) -> None:
+    path = tmp_path / "long.waypoints"
+    path.write_text(write_qgc_wpl([HOME, *(replace(POINT, seq=seq) for seq in range(1, 60000))]))
+    output = run(path).stdout
+    assert len(output.splitlines()) < 5
+    assert "60000 items, but only 146 fit" in output
+
+
+def test_filled_in_defaults_appear_only_in_the_table(tmp_path: Path) -> None:
+    path = tmp_path / "no-radius.waypoints"
+    path.write_text(write_qgc_wpl([replace(HOME, p2=0.0), replace(POINT, p2=0.0, alt_m=10.5)]))
+    output = run(path).stdout
+    assert output.count("0->2") == 2
+    assert "Hit Rad" not in output
+    assert "WP 1: Alt changed from 10.5 to 10 m" in output
+
+
+@pytest.mark.parametrize("columns", [10, 40])
+def test_a_narrow_terminal_shortens_no_value(columns: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    def table() -> list[str]:
+        return run(FIELD).stdout.partition("\n\n")[0].splitlines()
+
+    monkeypatch.setenv("COLUMNS", "80")
+    whole = table()
+    assert "18.5->18" in whole[9]
+    monkeypatch.setenv("COLUMNS", str(columns))
+    assert table() == whole

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Commands that use a flight controller directly (`--fc`), and faults outside naze-bridge."""
+
+import json
+import os
+import pwd
+import resource
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from protocols.mission_file import write_qgc_wpl
+from service.cli.main import main
+from tests.support.benches import Starter
+from tests.support.plan import judge, plain_plan, plan_text, records_of
+from tests.support.programs import Board, run_naze_bridge
+
+EXAMPLES = Path(__file__).parents[3] / "examples"
+
+
+@pytest.fixture
+def board(tmp_path: Path) -> Iterator[Board]:
+    with ExitStack() as stack:
+        yield Starter(tmp_path, stack).board()
+
+
+def assert_one_sentence(ended: subprocess.CompletedProcess[str], code: int, *parts: str) -> None:
+    assert ended.returncode == code, ended
+    (sentence,) = ended.stderr.splitlines()
+    assert sentence.startswith("naze-bridge: ")
+    assert not [part for part in parts if part not in sentence], sentence
+
+
+def test_a_pushed_mission_is_pulled_unchanged(board: Board, tmp_path: Path) -> None:
+    plan = plain_plan(5)
+    file = tmp_path / "plan"
+    file.write_text(plan_text(plan))
+    assert run_naze_bridge("push", file, "--fc", board.link).returncode == 0
+    assert board.records() == records_of(judge(plan))
+    assert run_naze_bridge("pull", tmp_path / "held", "--fc", board.link).returncode == 0
+    assert (tmp_path / "held").read_text() == write_qgc_wpl(judge(plan).items)
+    board.assert_unharmed()
+
+
+def test_status_waits_for_telemetry(tmp_path: Path) -> None:
+    """At 9600 baud a round of polls takes longer than identifying the flight controller."""
+    with ExitStack() as stack:
+        board = Starter(tmp_path, stack).board("--baud", "9600")
+        status = json.loads(run_naze_bridge("status", "--json", "--fc", f"{board.link},9600").stdout)
+    assert (status["armed"], status["mission_records"], status["speed_baud"]) == (False, 0, 9600)
+    assert status["battery_v"] > 9
+    assert status["satellites"] > 4
+
+
+def test_a_missing_port_is_one_sentence(tmp_path: Path) -> None:
+    assert_one_sentence(run_naze_bridge("status", "--fc", tmp_path / "naze"), 1, "is missing", str(tmp_path))
+
+
+def test_a_port_used_by_another_program_is_one_sentence(board: Board) -> None:
+    script = "import serial, sys; port = serial.Serial(sys.argv[1], exclusive=True); print('open', flush=True); input()"
+    with subprocess.Popen(
+        [sys.executable, "-c", script, str(board.link)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as other:
+        assert other.stdout is not None
+        assert other.stdout.readline() == "open\n"
+        assert_one_sentence(run_naze_bridge("pull", "--fc", board.link), 1, "is busy", "has it open")
+        other.kill()
+
+
+def test_a_tcp_port_without_a_listener_is_one_sentence() -> None:
+    assert_one_sentence(
+        run_naze_bridge("pull", "--fc", "tcp:127.0.0.1:9"),
+        1,
+        "9 cannot be reached: Connection refused; is it switched on, and the port right?",
+    )
+
+
+def test_an_unknown_host_is_one_sentence() -> None:
+    advice = "check the name and the network"
+    assert_one_sentence(run_naze_bridge("pull", "--fc", "tcp:[fe80::1%no-card]:9"), 1, advice)
+
+
+# -- the machine ---------------------------------------------------------------------------------------------
+
+
+def test_a_full_disk_behind_standard_output_is_one_sentence(tmp_path: Path) -> None:
+    def leave_100_bytes() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
+
+    with (tmp_path / "output").open("w") as output:
+        ended = run_naze_bridge("check", EXAMPLES / "long-146.waypoints", stdout=output, preexec_fn=leave_100_bytes)
+    assert_one_sentence(ended, os.EX_IOERR, "cannot be written", "File too large")
+
+
+def test_a_full_disk_behind_the_log_does_not_stop_the_program(tmp_path: Path) -> None:
+    def leave_nothing() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
+
+    script = (
+        "import structlog; from service.machine.log_setup import set_up_logging; set_up_logging('info');"
+        "[structlog.get_logger().warning('a.line') for _ in range(3)]; print('goes on')"
+    )
+    with (tmp_path / "log").open("w") as log:
+        ended = subprocess.run(
+            [sys.executable, "-c", script],
+            stdout=subprocess.PIPE,
+            stderr=log,
+            text=True,
+            preexec_fn=leave_nothing,
+            check=False,
+        )
+    assert (ended.returncode, ended.stdout) == (0, "goes on\n")
+
+
+def test_a_closed_pipe_is_not_reported() -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    ended = run_naze_bridge("check", EXAMPLES / "long-146.waypoints", stdout=writing)
+    os.close(writing)
+    assert ended.stderr == ""
+
+
+@pytest.mark.parametrize("command", [["status"], ["missions", "list"], ["run", "--fc", "sim:"]])
+def test_a_user_without_a_home_is_told_of_the_state_dir_option(
+    monkeypatch: pytest.MonkeyPatch, command: list[str]
+) -> None:
+    def unknown_user(uid: int) -> None:
+        raise KeyError(uid)
+
+    monkeypatch.setattr(pwd, "getpwuid", unknown_user)
+    for name in ("HOME", "XDG_STATE_HOME", "STATE_DIRECTORY"):
+        monkeypatch.delenv(name, raising=False)
+    ended = CliRunner().invoke(main, command)
+    assert ended.exit_code == 2
+    assert ended.stderr.splitlines()[0].startswith("naze-bridge: this user has no home folder")
+    assert "--state-dir" in ended.stderr
+
+
+def test_a_daemon_does_not_load_libraries_of_commands() -> None:
+    """A Pi may have only 512 MB."""
+    script = (
+        "import sys, click; from service.cli.main import main; main.get_command(click.Context(main), 'run');"
+        "print(*sorted({'rich', 'pygments', 'zenoh', 'starlette', 'prometheus_client'} & set(sys.modules)))"
+    )
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert ended.stdout == "\n"
+
+
+def test_help_loads_neither_the_daemon_nor_large_libraries() -> None:
+    """Each takes a noticeable part of a second on a Pi."""
+    script = (
+        "import sys, click; from service.cli.main import main; context = click.Context(main); main.get_help(context);"
+        "print(*sorted({'asyncio', 'bridge', 'pymavlink', 'rich', 'service.settings'} & set(sys.modules)));"
+        "[main.get_command(context, name).get_help(context) for name in main.list_commands(context)];"
+        "print(*sorted({'numpy', 'pymavlink.mavutil', 'service.daemon.daemon', 'starlette'} & set(sys.modules)))"
+    )
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert ended.stdout == "\n\n"

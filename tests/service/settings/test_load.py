@@ -1,0 +1,271 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings from files, drop-ins, environment and flags, and messages about invalid ones."""
+
+import os
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from generators.config_sample import page, sample
+from service.settings import Settings, SettingsError, load_settings
+from service.settings.passphrase import new_passphrase
+from service.settings.table import KEYS
+from tests.support.programs import run_naze_bridge
+
+REPOSITORY = Path(__file__).parents[3]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "conf.d").mkdir()
+    return tmp_path
+
+
+def load(folder: Path, text: str, **drop_ins: str) -> Settings:
+    config = folder / "naze.toml"
+    config.write_text(text)
+    for name, drop_in in drop_ins.items():
+        (folder / "conf.d" / f"{name}.toml").write_text(drop_in)
+    return load_settings(config, "sim:", (), folder)
+
+
+def problems(folder: Path, text: str, **drop_ins: str) -> list[str]:
+    with pytest.raises(SettingsError) as caught:
+        load(folder, text, **drop_ins)
+    return [str(problem).removeprefix(f"{folder}/") for problem in caught.value.problems]
+
+
+def test_drop_ins_override_the_file_and_earlier_drop_ins(folder: Path) -> None:
+    settings = load(folder, "sysid = 2\ntakeoff_max_m = 20", a="sysid = 3\nlog_level = 'debug'", b="sysid = 4")
+    assert (settings.sysid, settings.takeoff_max_m, settings.log_level) == (4, 20, "debug")
+
+
+def test_a_drop_in_adds_to_a_table(folder: Path) -> None:
+    zenoh = load(folder, "[zenoh]\nvehicle = 'one'\nprefix = 'club'", a="[zenoh]\nvehicle = 'two'").zenoh
+    assert zenoh is not None
+    assert (zenoh.vehicle, zenoh.prefix) == ("two", "club")
+    assert load(folder, "", a="").zenoh is None
+
+
+def test_flags_override_the_environment_which_overrides_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NAZE_BRIDGE_SYSID", "9")
+    monkeypatch.setenv("NAZE_BRIDGE_FC", "/dev/ttyUSB7")
+    monkeypatch.setenv("NAZE_BRIDGE_GCS", "udpin:127.0.0.1:1 tcpin:127.0.0.1:2")
+    monkeypatch.setenv("NAZE_BRIDGE_RECORD_TLOG", "false")
+    monkeypatch.setenv("NAZE_BRIDGE_ZENOH_VEHICLE", "three")
+    settings = load(folder, "sysid = 2\nrecord_tlog = true")
+    assert (settings.sysid, str(settings.fc), settings.tlog) == (9, "sim:", None)
+    assert [str(address) for address in settings.gcs] == ["udpin:127.0.0.1:1", "tcpin:127.0.0.1:2"]
+    assert settings.zenoh is not None
+    assert settings.zenoh.vehicle == "three"
+
+
+@pytest.mark.parametrize(
+    ("variable", "text", "words"),
+    [
+        ("NAZE_BRIDGE_SYSID", "many", "NAZE_BRIDGE_SYSID: sysid is 'many', but must be a whole number, 1..255"),
+        ("NAZE_BRIDGE_SYSID", "9" * 5000, "but must be"),
+        (
+            "NAZE_BRIDGE_RECORD_TLOG",
+            "maybe",
+            "NAZE_BRIDGE_RECORD_TLOG: record_tlog is 'maybe', but must be true or false",
+        ),
+        ("NAZE_BRIDGE_SYSIDD", "1", "NAZE_BRIDGE_SYSIDD: this is not a setting; did you mean 'NAZE_BRIDGE_SYSID'?"),
+    ],
+)
+def test_an_invalid_variable_is_named(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, variable: str, text: str, words: str
+) -> None:
+    monkeypatch.setenv(variable, text)
+    (found,) = problems(folder, "")
+    assert words in found
+
+
+def test_all_errors_are_reported_at_once_with_their_lines(folder: Path) -> None:
+    text = """
+# a comment
+sysid = 300
+gcs = [
+    "udpin:0.0.0.0:14550",
+    "tcpin:0.0.0.0",
+]
+takeof_max_m = 15
+[zenoh]
+vehicle = "a/b"
+encodings = "json"
+"""
+    lines = problems(folder, text, late="tlog_days = 'all'")
+    wanted = [
+        "naze.toml:8: 'takeof_max_m' is not a setting; did you mean 'takeoff_max_m'?",
+        "naze.toml:11: 'zenoh.encodings' is not a setting; did you mean 'zenoh.encoding'?",
+        "naze.toml:4: 'tcpin:0.0.0.0' needs a host and a port: use udpin:0.0.0.0:14550",
+        "naze.toml:3: sysid is 300, but must be 1..255 (MAVLink system id of the vehicle",
+        "conf.d/late.toml:1: tlog_days is 'all', but must be a whole number, 1..3650 (How long",
+        "naze.toml:10: zenoh.vehicle is 'a/b', with '/' in it: make a name of letters, digits and dashes",
+    ]
+    assert [line[: len(words)] for line, words in zip(lines, wanted, strict=True)] == wanted
+
+
+def test_a_value_in_place_of_a_table_is_an_error(folder: Path) -> None:
+    assert problems(folder, "zenoh = true") == ["naze.toml:1: zenoh must be a table: begin it with [zenoh]"]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('gcs = ["udpin:0.0.0.0:14550", "udpin:127.0.0.1:14550"]', "would both listen on UDP port 14550"),
+        ('gcs = ["tcpin:[::]:5760", "tcpin:[::]:5760"]', "would both listen on TCP port 5760"),
+        (
+            'gcs = ["tcpin:0.0.0.0:5760"]\nshare = [{address = "tcpin:127.0.0.1:5760"}]',
+            "gcs tcpin:0.0.0.0:5760 and share tcpin:127.0.0.1:5760 would both listen on TCP port 5760",
+        ),
+        ('gcs = ["tcpin:0.0.0.0:7447"]\n[zenoh]\nlisten = ["tcp/0.0.0.0:7447"]', "zenoh.listen tcp/0.0.0.0:7447"),
+        ('gcs = ["udpin:0.0.0.0:7447"]\n[zenoh]\nlisten = ["quic/0.0.0.0:7447"]', "UDP port 7447: change one"),
+        ('gcs = ["udpout:10.0.0.1:9", "tcpin:[::]:5", "udpout:10.0.0.1:9"]', "is listed 2 times: remove the others"),
+    ],
+)
+def test_one_port_used_twice_is_an_error(folder: Path, text: str, words: str) -> None:
+    (found,) = problems(folder, text)
+    assert found.startswith("naze.toml:1: ")
+    assert words in found
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        'gcs = ["udpin:0.0.0.0:14550", "tcpin:0.0.0.0:14550"]',
+        'gcs = ["udpin:127.0.0.1:14550", "udpin:127.0.0.2:14550"]',
+        'gcs = ["udpin:0.0.0.0:14550", "udpin:[::]:14550"]',
+        'gcs = ["udpout:127.0.0.1:14550", "udpin:0.0.0.0:14550"]',
+    ],
+)
+def test_ports_that_do_not_conflict_are_accepted(folder: Path, text: str) -> None:
+    assert len(load(folder, text).gcs) == 2
+
+
+@pytest.mark.parametrize(
+    ("fc", "more", "words"),
+    [
+        ("tcp:127.0.0.1:5760", 'gcs = ["tcpin:0.0.0.0:5760"]', "would connect to itself"),
+        ("tcp:localhost:5760", 'gcs = ["tcpin:0.0.0.0:5760"]', "would connect to itself"),
+        ("tcp:127.0.0.1:8080", "[web]", "fc tcp:127.0.0.1:8080 is web.listen 127.0.0.1:8080"),
+        ("/dev/ttyUSB0,57600", 'record_uart = "/dev/ttyUSB0"', "is the flight controller's port: name a file"),
+    ],
+)
+def test_a_flight_controller_port_with_another_use_is_an_error(folder: Path, fc: str, more: str, words: str) -> None:
+    config = folder / "naze.toml"
+    config.write_text(f'fc = "{fc}"\n{more}')
+    with pytest.raises(SettingsError) as caught:
+        load_settings(config, None, (), folder)
+    (problem,) = caught.value.problems
+    assert words in str(problem)
+
+
+def test_the_same_port_number_on_another_host_is_accepted(folder: Path) -> None:
+    config = folder / "naze.toml"
+    config.write_text('fc = "tcp:192.168.4.9:5760"\ngcs = ["tcpin:0.0.0.0:5760"]')
+    assert str(load_settings(config, None, (), folder).fc) == "tcp:192.168.4.9:5760"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('"zenoh.prefix" = "x"', """'"zenoh.prefix"' is not a setting; did you mean 'zenoh.prefix'?"""),
+        ("sysid = 0x" + "f" * 8000, "sysid is far too large, but must be 1..255"),
+        (f'log_level = "{"x" * 100_000}"', "xxx', but must be "),
+        ("x" * 100_000 + " = 1", "xxx' is not a setting"),
+    ],
+)
+def test_odd_values_give_one_short_sentence(folder: Path, text: str, words: str) -> None:
+    (found,) = problems(folder, text)
+    assert words in found
+    assert len(found) < 520
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"fc = auto", "this is not valid TOML (text needs quotes, a list brackets): Invalid value (at line 1"),
+        (b"\xff\xfef\0c\0", "this is not UTF-8 text: save it with that encoding"),
+        (b"a = " + b"[" * 5000, "this is not valid TOML"),
+        (b"#" * (2 << 20), "this cannot be read: it is larger than 1 MB"),
+    ],
+)
+def test_a_file_that_is_not_a_configuration_is_an_error(folder: Path, content: bytes, words: str) -> None:
+    (folder / "conf.d" / "x.toml").write_bytes(content)
+    (found,) = problems(folder, "")
+    assert found.startswith(f"conf.d/x.toml: {words}")
+
+
+def test_pipes_folders_and_broken_links_are_errors(folder: Path) -> None:
+    os.mkfifo(folder / "conf.d" / "a.toml")
+    (folder / "conf.d" / "b.toml").mkdir()
+    (folder / "conf.d" / "c.toml").symlink_to("/dev/null")
+    (folder / "conf.d" / "d.toml").symlink_to("nowhere")
+    assert problems(folder, "") == [
+        "conf.d/a.toml: this is a pipe: name a file, so that it can be read again at a reload",
+        "conf.d/b.toml: this cannot be read: Is a directory",
+        "conf.d/d.toml: this cannot be read: No such file or directory",
+    ]
+
+
+def test_unlistable_drop_ins_are_an_error(folder: Path) -> None:
+    (folder / "conf.d").rmdir()
+    assert load(folder, "sysid = 2").sysid == 2
+    (folder / "conf.d").write_text("")
+    assert problems(folder, "") == ["conf.d: this cannot be read: Not a directory"]
+
+
+def test_a_file_of_unknown_settings_gives_21_errors_at_most(folder: Path) -> None:
+    lines = problems(folder, "\n".join(f"option{number} = 1" for number in range(5000)))
+    assert len(lines) == 21
+    assert lines[19].startswith("naze.toml:20: 'option19' is not a setting")
+    assert lines[20] == "naze.toml: 4980 more are not settings: is this naze-bridge's file?"
+
+
+def test_check_config_reports_success_or_errors(folder: Path) -> None:
+    config = folder / "naze.toml"
+    config.write_text('fc = "/dev/serial0"')
+    ended = run_naze_bridge("run", "--check-config", "--config", config)
+    assert (ended.returncode, ended.stdout) == (0, "The settings are valid.\n")
+    config.write_text('fc = "/dev/serial0"\nsysid = 0\ntlog_days = 0\n')
+    ended = run_naze_bridge("run", "--check-config", "--config", config)
+    assert ended.returncode == 2
+    assert f"{config}:2: sysid is 0" in ended.stderr
+    assert f"{config}:3: tlog_days is 0" in ended.stderr
+    assert not (folder / "missions.db").exists()
+
+
+def test_check_config_warns_of_a_weak_key_and_does_not_quote_it(folder: Path) -> None:
+    config, key = folder / "naze.toml", folder / "gcs.key"
+    config.write_text('fc = "sim:"\ngcs = [{address = "udpin:0.0.0.0:14550", key_file = "gcs.key"}]\n')
+    key.write_text("q\n")
+    key.chmod(0o600)
+    ended = run_naze_bridge("run", "--check-config", "--config", config)
+    assert (ended.returncode, ended.stdout) == (0, "The settings are valid.\n")
+    (warning,) = ended.stderr.splitlines()
+    assert f"udpin:0.0.0.0:14550: the key in {key} is weak" in warning
+    assert "setup --new-key" in warning
+    key.write_text(f"{new_passphrase()}\n")
+    assert run_naze_bridge("run", "--check-config", "--config", config).stderr == ""
+
+
+def test_the_sample_is_up_to_date_and_has_the_defaults(folder: Path) -> None:
+    checked_in = (REPOSITORY / "systemd" / "config.toml").read_text()
+    assert checked_in == sample(), "run make config-sample"
+    assert load(folder, checked_in) == load(folder, "")
+
+
+def test_every_line_of_the_sample_is_valid(folder: Path) -> None:
+    lines = [line.removeprefix("#") for line in sample().splitlines() if line and not line.startswith("# ")]
+    text = "\n".join(line for line in lines if not line.startswith("config_file"))
+    assert load(folder, text).zenoh is not None
+    tables = tomllib.loads("\n".join(lines))
+    named = {name for name, value in tables.items() if not isinstance(value, dict)}
+    named |= {f"{table}.{name}" for table, inner in tables.items() if isinstance(inner, dict) for name in inner}
+    assert named == {key.name for key in KEYS}
+
+
+def test_the_page_has_every_setting() -> None:
+    assert page() in (REPOSITORY / "docs" / "configuration.md").read_text(), "run make config-sample"
