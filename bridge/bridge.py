@@ -242,7 +242,6 @@ class Bridge:
             self._incoming.routes.from_autopilot(frames)
 
     def _pass_on_news(self, now: float) -> None:
-        self.report.now = now
         if self.report.watched:
             self.session.settle_telemetry()
         if not self.session.vehicle.news:

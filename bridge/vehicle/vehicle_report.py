@@ -71,13 +71,13 @@ class VehicleReporter:
         self._ground = ground
         self._settings = settings
         self._want = want
-        #: Ages count up to this time, monotonic s.
-        self.now = 0.0
         #: Groups updated since the last `take_fresh`; some may no longer be watched.
         self.fresh: set[Group] = set()
         #: The groups in use: they are polled, and `take_fresh` returns the updated ones.
         self.watched: frozenset[Group] = frozenset()
-        self._makers: Mapping[Group, Callable[[], Any]] = {group: getattr(self, f"_{group.value}") for group in Group}
+        self._makers: Mapping[Group, Callable[[float], Any]] = {
+            group: getattr(self, f"_{group.value}") for group in Group
+        }
 
     def heard(self, news: Collection[type[Reading]]) -> None:
         """The vehicle has new readings. To be called while groups are watched."""
@@ -97,33 +97,31 @@ class VehicleReporter:
         self.fresh.clear()
         return fresh
 
-    def group(self, group: Group) -> Any:
+    def group(self, group: Group, now: float) -> Any:
         """The current values of a group: an instance of its class in bridge.model.vehicle_groups."""
         self._session.settle_telemetry()
-        return self._makers[group]()
+        return self._makers[group](now)
 
-    def whole(self) -> VehicleReport:
+    def whole(self, now: float) -> VehicleReport:
         held = self._missions.held
         mission = None if held is None else MissionIdentity(held.identity.count, f"{held.identity.checksum:08x}")
         settings = None
         if (sealed := self._settings.state) is not None:
             settings = SettingsIdentity(str(sealed.seal), None if sealed.change is None else sealed.change.text())
-        return VehicleReport(**{group.value: self.group(group) for group in Group}, mission=mission, settings=settings)
+        groups = {group.value: self.group(group, now) for group in Group}
+        return VehicleReport(**groups, mission=mission, settings=settings)
 
     def _last(self, kind: type[ReadingT]) -> ReadingT | None:
         return self._session.vehicle.last(kind)
 
-    def _age_s(self, reading: Reading | None) -> float | None:
-        return None if reading is None else max(round(self.now - reading.heard_at, 1), 0.0)
-
-    def _attitude(self) -> Attitude:
-        now = self._last(Orientation)
-        if now is None:
+    def _attitude(self, now: float) -> Attitude:
+        attitude = self._last(Orientation)
+        if attitude is None:
             return Attitude()
-        heading_deg = _direction(now.heading_deg) if now.is_north_known else None
-        return Attitude(_rounded(now.roll_deg), _rounded(now.pitch_deg), heading_deg, self._age_s(now))
+        heading_deg = _direction(attitude.heading_deg) if attitude.is_north_known else None
+        return Attitude(_rounded(attitude.roll_deg), _rounded(attitude.pitch_deg), heading_deg, _age_s(attitude, now))
 
-    def _position(self) -> Position:
+    def _position(self, now: float) -> Position:
         home, here, height = self._session.vehicle.home, self._last(GlobalPosition), self._last(Height)
         return Position(
             lat_deg=None if here is None else here.lat_e7 / 1e7,
@@ -137,30 +135,30 @@ class VehicleReporter:
             home_lon_deg=None if home is None else home.lon_e7 / 1e7,
             home_distance_m=None if home is None or here is None else round(distance_m(here, home), 1),
             home_direction_deg=None if home is None or here is None else _direction(bearing_deg(here, home)),
-            age_s=self._age_s(here or height),
+            age_s=_age_s(here or height, now),
         )
 
-    def _gps(self) -> Gps:
-        now = self._last(GpsFix)
-        if now is None:
+    def _gps(self, now: float) -> Gps:
+        gps = self._last(GpsFix)
+        if gps is None:
             return Gps()
-        course_deg = _direction(now.course_deg)
-        return Gps(_FIXES[now.fix], now.satellites, now.hdop, now.ground_speed_m_s, course_deg, self._age_s(now))
+        course_deg = _direction(gps.course_deg)
+        return Gps(_FIXES[gps.fix], gps.satellites, gps.hdop, gps.ground_speed_m_s, course_deg, _age_s(gps, now))
 
-    def _battery(self) -> Battery:
-        now = self._last(Power)
-        if now is None:
+    def _battery(self, now: float) -> Battery:
+        power = self._last(Power)
+        if power is None:
             return Battery()
-        more = now.cells, now.remaining_percent, self._age_s(now)
-        return Battery(now.voltage_v, now.current_a, now.drawn_mah, *more)
+        more = power.cells, power.remaining_percent, _age_s(power, now)
+        return Battery(power.voltage_v, power.current_a, power.drawn_mah, *more)
 
-    def _rc(self) -> Rc:
+    def _rc(self, now: float) -> Rc:
         sticks, signal = self._last(Sticks), self._last(Signal)
         if sticks is None:
             return Rc()
-        return Rc(sticks.channels_us, None if signal is None else round(signal.strength * 100, 1), self._age_s(sticks))
+        return Rc(sticks.channels_us, None if signal is None else round(signal.strength * 100, 1), _age_s(sticks, now))
 
-    def _status(self) -> Status:
+    def _status(self, now: float) -> Status:
         state, health = self._last(FlightState), self._last(Health)
         mode = None if state is None else state.mode
         return Status(
@@ -169,10 +167,10 @@ class VehicleReporter:
             sensors=None if health is None else _names(health.sensors),
             cycle_time_us=None if health is None else health.cycle_time_us,
             i2c_errors=None if health is None else health.i2c_errors,
-            age_s=self._age_s(state),
+            age_s=_age_s(state, now),
         )
 
-    def _link(self) -> Link:
+    def _link(self, _now: float) -> Link:
         state = self._session.state
         controller, msp = state.controller, state.link
         return Link(
@@ -184,6 +182,10 @@ class VehicleReporter:
             bad_checksums=state.bad_checksums,
             ground_stations=tuple(str(peer) for peer in self._ground.stations.peers()),
         )
+
+
+def _age_s(reading: Reading | None, now: float) -> float | None:
+    return None if reading is None else max(round(now - reading.heard_at, 1), 0.0)
 
 
 def _rounded(value: float | None) -> float | None:

@@ -90,7 +90,7 @@ class DaemonApi:
     def status(self) -> Json:
         daemon = self._daemon
         bridge, web = daemon.bridge, daemon.settings.web
-        report = bridge.report.whole()
+        report = bridge.report.whole(self._loop.time())
         settings = bridge.settings.state
         change = None if settings is None else settings.change
         link, mission, firmware = report.link, report.mission, bridge.session.vehicle.version

@@ -117,7 +117,7 @@ class Api:
         return _json(
             {
                 "version": version(),
-                **asdict(daemon.bridge.report.whole()),
+                **asdict(daemon.bridge.report.whole(now)),
                 "traffic": {name: asdict(traffic) for name, traffic in daemon.traffic.items()},
                 "port": {"address": daemon.fc.where, "trouble": daemon.fc.trouble},
                 "refused": [f"{count} x {why} ({link})" for (link, why), count in daemon.bridge.guard.refused.items()],

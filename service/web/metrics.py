@@ -4,6 +4,7 @@
 Imported only if it is used: the client library takes several megabytes.
 """
 
+import asyncio
 import time
 from collections.abc import Iterator, Mapping
 from itertools import accumulate
@@ -164,7 +165,7 @@ class _State(Collector):
             yield _round_trips(state.link.round_trips)
 
     def _vehicle(self) -> Iterator[Metric]:
-        report = self._daemon.bridge.report.whole()
+        report = self._daemon.bridge.report.whole(asyncio.get_running_loop().time())
         records = None if report.mission is None else report.mission.count
         known: dict[str, tuple[str, float | None]] = {
             "armed": ("1 while it is armed.", report.status.armed),

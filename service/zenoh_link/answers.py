@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Queries about the vehicle: state, overview, history, mission/current and mission/list."""
 
+import asyncio
+
 from bridge.bridge import Bridge
 from service.daemon.api import DaemonApi
 from service.daemon.mission_data import Json, strict
@@ -33,10 +35,10 @@ class Answers:
         }
 
     async def _state(self, _: Question) -> Json:
-        return self._data.state()
+        return self._data.state(asyncio.get_running_loop().time())
 
     async def _overview(self, _: Question) -> Json:
-        return plain(overview_of(self._data.state()))
+        return plain(overview_of(self._data.state(asyncio.get_running_loop().time())))
 
     async def _past(self, question: Question) -> Json:
         most = question.whole_number("positions", 0, _MAX_POSITIONS)

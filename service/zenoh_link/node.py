@@ -151,8 +151,9 @@ class Node(Follower):
     def _publish(self, group: Group, *, gathered: bool = False) -> None:
         key = keys.TELEMETRY[group]
         if self._publisher.has_readers(key):
-            sample = self._daemon.bridge.report.group(group)
-            if self._rates.admits(group, sample, self._loop.time(), gathered=gathered):
+            now = self._loop.time()
+            sample = self._daemon.bridge.report.group(group, now)
+            if self._rates.admits(group, sample, now, gathered=gathered):
                 self._publisher.put(key, plain(sample))
 
     def _send_reliably(self, key: ZenohKey, body: Callable[[], Json]) -> None:
@@ -173,7 +174,7 @@ class Node(Follower):
         self._pending_publish = None
         for group in {Group.LINK, *self._rates.held_back}:
             self._publish(group, gathered=True)
-        state = self._data.state()
+        state = self._data.state(self._loop.time())
         marks = (state["status"]["armed"], state["mission"], state["link"]["state"], state["others_of_this_name"])
         if self._publisher.is_declared and self._rates.admits_state(marks, self._loop.time()):
             self._publisher.put(keys.STATE, state)

@@ -23,12 +23,12 @@ class VehicleData:
         self._others = others
         self._clock = clock
 
-    def state(self) -> Json:
+    def state(self, now: float) -> Json:
         return {
             "vehicle": self._vehicle,
             "others_of_this_name": len(self._others),
             "time_source": self._clock.source(self._bridge.session.vehicle),
-            **plain(self._bridge.report.whole()),
+            **plain(self._bridge.report.whole(now)),
         }
 
 

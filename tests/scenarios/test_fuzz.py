@@ -95,7 +95,7 @@ def test_no_reply_raises(seed: int) -> None:
         world.run(0.5)
         faults.armed = inputs.random.random() < 0.5
         for group in world.bridge.report.take_fresh():
-            to_json(asdict(world.bridge.report.group(group)))
+            to_json(asdict(world.bridge.report.group(group, world.now)))
     world.run(1)
 
 

@@ -116,7 +116,7 @@ class Receivers:
 
     def group(self, group: Group) -> Any:
         key, payloads = TELEMETRY[group], Payloads(self.encoding, lambda: 0.0)
-        body = payloads.head(key) | plain(self.report.group(group))
+        body = payloads.head(key) | plain(self.report.group(group, NOW))
         return decoded(payloads.encode(key, body), str(payloads.encoding(key)))
 
     def message(self, maker: Maker) -> Any:
@@ -149,7 +149,6 @@ def test_groups_have_the_values_of_mavlink_messages(
             vehicle.hear(reading)
     if home is not None:
         vehicle.hear_home(*home)
-    bridge.report.now = NOW
     receivers = Receivers(vehicle, bridge.report, encoding)
     attitude_is_true(receivers)
     position_is_true(receivers)

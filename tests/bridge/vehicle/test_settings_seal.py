@@ -94,7 +94,7 @@ def requests(world: World, since: float) -> list[int]:
 def test_a_change_without_the_bridge_is_reported_once_by_name(name: str) -> None:
     case = CASES[name]
     world, station = sealed(case.make)
-    before = world.bridge.report.whole().settings
+    before = world.bridge.report.whole(world.now).settings
     assert before is not None
     assert before.changed is None
     on_the_board(world, case.command, case.payload)
@@ -103,7 +103,7 @@ def test_a_change_without_the_bridge_is_reported_once_by_name(name: str) -> None
     (event,) = world.events("settings.changed_on_board")
     assert (event.level, event.facts["detail"]) == ("warning", told)
     assert warnings(station) == [told]
-    after = world.bridge.report.whole().settings
+    after = world.bridge.report.whole(world.now).settings
     assert after is not None
     assert (after.changed, after.seal == before.seal) == (told, False)
 
@@ -221,7 +221,7 @@ def test_a_board_without_the_commands_is_left_alone() -> None:
     world.run(300)
     asked = requests(world, 0.0)
     assert all(asked.count(command) <= 2 for command in (RC_TUNING, PID, MISC, 34))
-    assert world.bridge.report.whole().settings is None
+    assert world.bridge.report.whole(world.now).settings is None
     assert not [event for event in world.log_event if event.level == "warning"]
 
 

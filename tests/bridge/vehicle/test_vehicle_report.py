@@ -41,7 +41,7 @@ def test_groups_have_the_values_sent_to_ground_stations() -> None:
     station.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
     world.wait_ready()
     world.run(5.0)
-    report = world.bridge.report.whole()
+    report = world.bridge.report.whole(world.now)
     attitude, position = last(station, "ATTITUDE"), last(station, "GLOBAL_POSITION_INT")
     assert report.attitude.pitch_deg == pytest.approx(math.degrees(attitude.pitch), abs=1e-4)
     assert report.attitude.roll_deg == pytest.approx(math.degrees(attitude.roll), abs=1e-4)
@@ -65,10 +65,11 @@ def test_groups_have_the_values_sent_to_ground_stations() -> None:
 
 
 def test_everything_is_unknown_before_a_flight_controller_is_found() -> None:
-    report = World(plugged=False).bridge.report
-    assert {group: report.group(group) for group in EMPTY} == EMPTY
-    assert report.group(Group.LINK).state == "no port"
-    assert report.whole().mission is None
+    world = World(plugged=False)
+    report = world.bridge.report
+    assert {group: report.group(group, world.now) for group in EMPTY} == EMPTY
+    assert report.group(Group.LINK, world.now).state == "no port"
+    assert report.whole(world.now).mission is None
 
 
 def test_a_lost_link_keeps_the_last_values() -> None:
@@ -76,12 +77,12 @@ def test_a_lost_link_keeps_the_last_values() -> None:
     world.wait_ready()
     world.run(3.0)
     report = world.bridge.report
-    known = {group: without_age(report.group(group)) for group in EMPTY}
+    known = {group: without_age(report.group(group, world.now)) for group in EMPTY}
     assert None not in (known[Group.POSITION].lat_deg, known[Group.ATTITUDE].roll_deg)
     world.unplug()
     world.run(10)
-    assert {group: without_age(report.group(group)) for group in EMPTY} == known
-    assert all(report.group(group).age_s > 9 for group in EMPTY)
+    assert {group: without_age(report.group(group, world.now)) for group in EMPTY} == known
+    assert all(report.group(group, world.now).age_s > 9 for group in EMPTY)
 
 
 def test_watched_groups_are_polled_and_published_with_each_reply() -> None:
@@ -120,13 +121,17 @@ def test_groups_are_made_from_a_mavlink_autopilot() -> None:
     assert report.take_fresh() == {
         Group.ATTITUDE, Group.POSITION, Group.GPS, Group.BATTERY, Group.RC, Group.STATUS
     }  # fmt: skip
-    assert without_age(report.group(Group.ATTITUDE)) == Attitude(5.73, -11.46, round(math.degrees(-0.3), 2) % 360)
-    assert without_age(report.group(Group.POSITION)) == Position(45.3838, 8.4733, 131.0, 20.0, 0.5, 1.0, -2.0)
-    assert without_age(report.group(Group.GPS)) == Gps("2D", None, 1.2, None, None)
-    assert without_age(report.group(Group.BATTERY)) == Battery(12.6, None, None, 3, 100)
-    assert without_age(report.group(Group.RC)) == Rc((1500, 1501, 1000, 1502), 50.0)
-    assert without_age(report.group(Group.STATUS)) == Status(True, "4", ("accelerometer", "compass"))
-    assert report.group(Group.LINK).state == "MAVLink"
+    assert without_age(report.group(Group.ATTITUDE, world.now)) == Attitude(
+        5.73, -11.46, round(math.degrees(-0.3), 2) % 360
+    )
+    assert without_age(report.group(Group.POSITION, world.now)) == Position(
+        45.3838, 8.4733, 131.0, 20.0, 0.5, 1.0, -2.0
+    )
+    assert without_age(report.group(Group.GPS, world.now)) == Gps("2D", None, 1.2, None, None)
+    assert without_age(report.group(Group.BATTERY, world.now)) == Battery(12.6, None, None, 3, 100)
+    assert without_age(report.group(Group.RC, world.now)) == Rc((1500, 1501, 1000, 1502), 50.0)
+    assert without_age(report.group(Group.STATUS, world.now)) == Status(True, "4", ("accelerometer", "compass"))
+    assert report.group(Group.LINK, world.now).state == "MAVLink"
 
 
 def test_an_autopilot_with_a_new_system_id_is_followed() -> None:
@@ -140,9 +145,21 @@ def test_an_autopilot_with_a_new_system_id_is_followed() -> None:
     world.wait_until(lambda w: bool(w.bridge.session.vehicle.armed), 8)
     autopilot.send(m.MAVLink_attitude_message(1, 0.5, 0, 0, 0, 0, 0))
     world.run(0.05)
-    assert world.bridge.report.group(Group.ATTITUDE).roll_deg == 28.65
+    assert world.bridge.report.group(Group.ATTITUDE, world.now).roll_deg == 28.65
     assert world.bridge.session.vehicle.home is None
     assert world.events("vehicle.armed") != []
+
+
+def test_the_age_of_a_value_grows_while_the_bridge_hears_nothing_and_has_nothing_to_do() -> None:
+    world, autopilot, _ = passing()
+    world.bridge.report.watch(Group)
+    autopilot.send(m.MAVLink_attitude_message(1, 0.25, 0, 0, 0, 0, 0))
+    world.run(0.1)
+    heard_at = world.now
+    world.unplug()
+    # No tick and no input in between: the age is that of the moment of the question.
+    assert world.bridge.report.group(Group.ATTITUDE, heard_at + 10).age_s == pytest.approx(10, abs=0.2)
+    assert world.bridge.report.whole(heard_at + 10).attitude.age_s == pytest.approx(10, abs=0.2)
 
 
 def test_two_autopilots_on_one_line_are_not_mixed() -> None:
@@ -155,7 +172,7 @@ def test_two_autopilots_on_one_line_are_not_mixed() -> None:
         autopilot.outgoing += m.MAVLink_attitude_message(1, 0.5, 0, 0, 0, 0, 0).pack(other)
         world.run(0.5)
         assert world.bridge.session.vehicle.armed is False
-        assert world.bridge.report.group(Group.ATTITUDE).roll_deg is None
+        assert world.bridge.report.group(Group.ATTITUDE, world.now).roll_deg is None
 
 
 def test_after_a_stall_the_same_one_of_two_autopilots_is_shown() -> None:
@@ -176,7 +193,7 @@ def test_after_a_stall_the_same_one_of_two_autopilots_is_shown() -> None:
         autopilot.outgoing += m.MAVLink_attitude_message(1, roll, 0, 0, 0, 0, 0).pack(sender)
     world.run(0.1)
     assert world.bridge.session.vehicle.armed is False
-    assert world.bridge.report.group(Group.ATTITUDE).roll_deg == 14.32
+    assert world.bridge.report.group(Group.ATTITUDE, world.now).roll_deg == 14.32
 
 
 def test_a_companion_on_board_does_not_replace_an_autopilot_that_restarts() -> None:
@@ -197,7 +214,7 @@ def test_an_unused_channel_does_not_move_the_others() -> None:
     autopilot.send(m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3))
     autopilot.send(m.MAVLink_rc_channels_message(1, 5, 1500, 1501, 65535, 1502, 1800, *[65535] * 13, 127))
     world.run(0.05)
-    assert world.bridge.report.group(Group.RC).channels_us == (1500, 1501, 0, 1502, 1800)
+    assert world.bridge.report.group(Group.RC, world.now).channels_us == (1500, 1501, 0, 1502, 1800)
 
 
 def test_the_autopilots_own_remaining_charge_is_shown() -> None:
@@ -206,7 +223,7 @@ def test_the_autopilots_own_remaining_charge_is_shown() -> None:
     autopilot.send(m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3))
     autopilot.send(m.MAVLink_sys_status_message(7, 7, 6, 0, 12600, 100, 43, 0, 0, 0, 0, 0, 0))
     world.run(0.05)
-    assert world.bridge.report.group(Group.BATTERY).remaining_percent == 43
+    assert world.bridge.report.group(Group.BATTERY, world.now).remaining_percent == 43
 
 
 def test_the_second_block_of_channels_does_not_replace_the_first() -> None:
@@ -216,7 +233,7 @@ def test_the_second_block_of_channels_does_not_replace_the_first() -> None:
     for port in (0, 1):
         autopilot.send(m.MAVLink_rc_channels_raw_message(1, port, *[1500 + port] * 8, 127))
         world.run(0.05)
-    assert world.bridge.report.group(Group.RC).channels_us == (1500,) * 8
+    assert world.bridge.report.group(Group.RC, world.now).channels_us == (1500,) * 8
 
 
 def test_a_voltage_is_not_renewed_by_the_consumption() -> None:
@@ -229,7 +246,7 @@ def test_a_voltage_is_not_renewed_by_the_consumption() -> None:
         consumed = 500 + battery
         autopilot.send(m.MAVLink_battery_status_message(battery, 0, 0, 0, [65535] * 10, 100, consumed, -1, 50))
     world.run(0.05)
-    power = world.bridge.report.group(Group.BATTERY)
+    power = world.bridge.report.group(Group.BATTERY, world.now)
     assert power.age_s is not None
     assert power.age_s > 9
     assert power.drawn_mah == 500
@@ -239,11 +256,11 @@ def test_groups_continue_when_an_armed_harakiri_switches_to_mavlink() -> None:
     world = World(SimOptions(tele_prot=TelemetryProtocol.MAVLINK))
     world.wait_ready()
     world.run(2.0)
-    before = world.bridge.report.whole()
+    before = world.bridge.report.whole(world.now)
     world.faults.armed = True
     world.wait_until(lambda w: w.kind is harakiri.MAVLINK, 10)
     world.run(3.0)
-    now = world.bridge.report.whole()
+    now = world.bridge.report.whole(world.now)
     assert now.status.armed
     assert now.position.lat_deg == pytest.approx(before.position.lat_deg, abs=0.01)
     assert now.battery.voltage_v == pytest.approx(before.battery.voltage_v, abs=1.0)
@@ -266,7 +283,7 @@ def test_arbitrary_contents_of_an_intact_frame_raise_nothing(data: st.DataObject
         autopilot.outgoing += b"\xfd" + checked + crc.to_bytes(2, "little")
     world.run(0.05)
     for group in EMPTY:
-        found = world.bridge.report.group(group)
+        found = world.bridge.report.group(group, world.now)
         assert isinstance(found, type(EMPTY[group]))
         assert json.dumps(asdict(found), allow_nan=False)
 
@@ -276,4 +293,4 @@ def test_autopilots_on_mavlink_1_and_2_are_reported_separately() -> None:
     autopilot.send(m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3))
     autopilot.send(m.MAVLink_attitude_message(1, 0.5, 0, 0, 0, 0, 0))
     world.run(0.05)
-    assert world.bridge.report.group(Group.ATTITUDE).roll_deg == 28.65
+    assert world.bridge.report.group(Group.ATTITUDE, world.now).roll_deg == 28.65
