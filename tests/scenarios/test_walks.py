@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The length of four walks through the code: a budget that may only shrink.
+
+A walk is one or more whole wake-ups of a daemon on a simulated Naze (one UDP station, memory instead of a disk, no log
+file), from the event loop's callback until it returns. Counted with sys.setprofile are the Python functions called in
+bridge/, protocols/, service/ and storage/, comprehensions and resumed generators included; the calls into a file that
+was entered and left before; and the files.
+
+attitude: a reply to MSP_ATTITUDE is read and sent on, at the default rates.
+item: a MISSION_ITEM_INT in the middle of a list of nine is received, and the next one requested.
+ack: from the last of three items to its MISSION_ACK: the list is stored, pushed, verified and concluded. Telemetry that
+arrives meanwhile counts, too.
+arming: a reply to MSP_STATUS in which the craft is armed, and the heartbeat that reports it.
+"""
+
+import asyncio
+from functools import partial
+
+import pytest
+
+from protocols.mavlink.dialect import Message
+from protocols.mavlink.dialect import messages as m
+from tests.support.walks import TracedDaemon, WakeUp, Walk, measure, run_traced
+
+#: Lower these whenever a walk has become shorter; never raise them.
+CEILINGS = {
+    "attitude": Walk(calls=80, returns=29, files=22),
+    "item": Walk(calls=167, returns=72, files=27),
+    "ack": Walk(calls=895, returns=414, files=41),
+    "arming": Walk(calls=170, returns=76, files=27),
+}
+#: A walk may be this much shorter than its ceiling.
+_SLACK = 0.05
+_TARGET = (1, 1)
+
+
+def _item(seq: int) -> Message:
+    frame = m.MAV_FRAME_GLOBAL_RELATIVE_ALT if seq else m.MAV_FRAME_GLOBAL
+    place = (473_977_000 + 1000 * seq, 85_456_000, 20.0)
+    return m.MAVLink_mission_item_int_message(
+        *_TARGET, seq, frame, m.MAV_CMD_NAV_WAYPOINT, 0, 1, 0.0, 2.0, 0.0, 0.0, *place
+    )
+
+
+def _requests(seq: int, wake_up: WakeUp) -> bool:
+    return any(message.get_type() == "MISSION_REQUEST" and message.seq == seq for message in wake_up.sent)
+
+
+def _reports_armed(wake_up: WakeUp) -> bool:
+    armed = m.MAV_MODE_FLAG_SAFETY_ARMED
+    return any(message.get_type() == "HEARTBEAT" and message.base_mode & armed for message in wake_up.sent)
+
+
+async def _upload(daemon: TracedDaemon, count: int, last: int) -> None:
+    """Send a list up to the item `last`; only the wake-ups after it are kept."""
+    daemon.send(m.MAVLink_mission_count_message(*_TARGET, count))
+    for seq in range(last + 1):
+        await daemon.until(partial(_requests, seq))
+        daemon.wake_ups.clear()
+        daemon.send(_item(seq))
+
+
+async def _attitude(daemon: TracedDaemon) -> Walk:
+    return measure(await daemon.until(lambda wake_up: wake_up.types == ["ATTITUDE"]))
+
+
+async def _middle_item(daemon: TracedDaemon) -> Walk:
+    await _upload(daemon, 9, 4)
+    return measure(await daemon.until(partial(_requests, 5)))
+
+
+async def _ack(daemon: TracedDaemon) -> Walk:
+    await _upload(daemon, 3, 2)
+    ack = await daemon.until(lambda wake_up: "MISSION_ACK" in wake_up.types)
+    return measure(*daemon.wake_ups[: daemon.wake_ups.index(ack) + 1])
+
+
+async def _arming(daemon: TracedDaemon) -> Walk:
+    daemon.faults.armed = True
+    return measure(await daemon.until(_reports_armed))
+
+
+_WALKS = {"attitude": _attitude, "item": _middle_item, "ack": _ack, "arming": _arming}
+
+
+@pytest.mark.parametrize("name", CEILINGS)
+def test_a_walk_does_not_get_longer(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    walks: list[Walk] = []
+
+    async def story(daemon: TracedDaemon) -> None:
+        await daemon.until(lambda wake_up: "ATTITUDE" in wake_up.types)
+        await asyncio.sleep(5.0)  # the first heartbeats and texts
+        daemon.wake_ups.clear()
+        walks.append(await _WALKS[name](daemon))
+
+    run_traced(story, monkeypatch)
+    (walk,), ceiling = walks, CEILINGS[name]
+    for what in ("calls", "returns", "files"):
+        measured, most = getattr(walk, what), getattr(ceiling, what)
+        assert measured <= most, f"{name}: {measured} {what}, more than the ceiling of {most}: {walk}"
+        assert measured >= most * (1 - _SLACK) - 1, f"{name} has become shorter: lower its ceiling to {walk}"
