@@ -16,6 +16,8 @@ from types import ModuleType
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 PATCHES = sorted((FIRMWARE / "patches").glob("*.patch"))
@@ -75,8 +77,21 @@ class Workshop:
         done = subprocess.run(command, capture_output=True, text=True)
         return done.returncode, done.stdout + done.stderr
 
+    def git(self, *arguments: str) -> str:
+        command = ["git", "-C", str(self.tree), "-c", "user.name=A", "-c", "user.email=a@b", *arguments]
+        return subprocess.run(command, check=True, capture_output=True, text=True).stdout
+
+    def make_clone(self) -> None:
+        """Make the tree a git work tree, and the patch one for its commit."""
+        self.git("init", "-q")
+        self.git("add", "-A")
+        self.git("commit", "-qm", "base")
+        path = self.firmware / "patches" / "Tree.patch"
+        path.write_text(path.read_text().replace("0123abc", self.git("rev-parse", "HEAD").strip()))
+
     def files(self) -> dict[str, bytes]:
-        return {str(path.relative_to(self.tree)): path.read_bytes() for path in self.tree.rglob("*") if path.is_file()}
+        files = (path for path in self.tree.rglob("*") if path.is_file() and ".git" not in path.parts)
+        return {str(path.relative_to(self.tree)): path.read_bytes() for path in files}
 
 
 @pytest.fixture
@@ -157,6 +172,92 @@ def test_dos_line_ends_of_one_file_are_reported_with_other_differences(workshop:
     assert "src/mw.h: has SHA-256" in printed
 
 
+LONG = b"".join(b"    line(%d);\n" % number for number in range(40))
+
+
+@pytest.fixture
+def clone(tmp_path: Path) -> Workshop:
+    """A workshop whose tree is a git clone, and whose main.c has room for other changes."""
+    workshop = Workshop(tmp_path)
+    main = workshop.tree / "src" / "main.c"
+    main.write_bytes(MAIN + LONG)
+    patch = workshop.firmware / "patches" / "Tree.patch"
+    short, long = (hashlib.sha256(content).hexdigest() for content in (MAIN, MAIN + LONG))
+    patch.write_text(patch.read_text().replace(short, long))
+    workshop.make_clone()
+    return workshop
+
+
+@pytest.mark.parametrize("committed", [False, True])
+def test_a_tree_with_changes_of_its_own_is_merged(clone: Workshop, committed: bool) -> None:
+    main = clone.tree / "src" / "main.c"
+    main.write_bytes(main.read_bytes().replace(b"line(30)", b"line(31)"))
+    if committed:
+        clone.git("commit", "-qam", "my defaults")
+    mine = clone.files()
+    note = "merged with, or relying on, files with changes of your own: src/main.c\n"
+    assert clone.run() == (0, f"Tree: patched; build it with make\n{note}")
+    patched = clone.files()
+    assert patched["src/main.c"] == PATCHED + LONG.replace(b"line(30)", b"line(31)")
+    assert patched["src/util.c"] == UTIL + b"int three(void);\n"
+    assert clone.run() == (0, f"Tree: brought up to date; build it with make\n{note}")
+    assert clone.files() == patched
+    main.write_bytes(main.read_bytes().replace(b"line(20)", b"line(21)"))
+    assert clone.run("--remove") == (0, f"Tree: restored to the state before the patch\n{note}")
+    assert clone.files() == mine | {"src/main.c": mine["src/main.c"].replace(b"line(20)", b"line(21)")}
+
+
+def test_a_change_of_a_file_that_the_patch_relies_on_is_reported(clone: Workshop) -> None:
+    (clone.tree / "src" / "mw.h").write_bytes(b"void loop(int);\n")
+    code, printed = clone.run()
+    assert code == 0
+    assert "relying on, files with changes of your own: src/mw.h" in printed
+
+
+def test_conflicts_are_named_by_file_and_line_and_nothing_is_applied(clone: Workshop) -> None:
+    main = clone.tree / "src" / "main.c"
+    main.write_bytes(b"/* mine */\n\n" + MAIN + LONG)
+    (clone.tree / "src" / "util.c").write_bytes(UTIL + b"int four(void);\n")
+    before = clone.files()
+    code, printed = clone.run()
+    assert code == 2
+    assert "nothing was changed" in printed
+    assert "\n  src/main.c:1\n" in printed
+    assert "\n  src/util.c:2\n" in printed
+    assert clone.files() == before
+
+
+def test_removing_keeps_a_changed_line_of_the_patch_as_a_conflict(clone: Workshop) -> None:
+    clone.run()
+    main = clone.tree / "src" / "main.c"
+    main.write_bytes(main.read_bytes().replace(b"two();", b"two(2);"))
+    before = clone.files()
+    code, printed = clone.run("--remove")
+    assert code == 2
+    assert re.search(r"^  src/main\.c:\d$", printed, re.MULTILINE)
+    assert clone.files() == before
+
+
+@given(
+    edits=st.lists(
+        st.tuples(st.integers(0, 43), st.sampled_from(["change", "insert", "delete"])), min_size=1, max_size=4
+    )
+)
+def test_a_merge_keeps_both_sides_or_is_a_conflict(edits: list[tuple[int, str]]) -> None:
+    apply = load_apply(FIRMWARE / "apply")
+    old = (MAIN + LONG).splitlines(keepends=True)
+    mine = list(old)
+    for number, (at, edit) in enumerate(sorted(edits, reverse=True)):
+        line = b"edit(%d);\n" % number
+        mine[at : at + (edit != "insert")] = [] if edit == "delete" else [line]
+    merged, conflicts = apply.merge(b"".join(mine), b"".join(old), PATCHED + LONG)
+    assert all(1 <= line <= len(mine) + 1 for line in conflicts)
+    if not conflicts:
+        added = [line for line in PATCHED.splitlines(keepends=True) if line not in old]
+        assert [line for line in merged.splitlines(keepends=True) if line not in added] == mine
+        assert [line for line in merged.splitlines(keepends=True) if line in added] == added
+
+
 def half_patch(workshop: Workshop) -> None:
     """Leave the state of an interrupted copy: a patched file, an unpatched file, one of the core's files."""
     workshop.run()
@@ -202,8 +303,8 @@ def test_removing_keeps_foreign_files(workshop: Workshop) -> None:
     assert not (workshop.tree / "src" / "naze_mission.h").exists()
 
 
-def load_apply(workshop: Workshop) -> ModuleType:
-    loader = SourceFileLoader("firmware_apply", str(workshop.firmware / "apply"))
+def load_apply(path: Path) -> ModuleType:
+    loader = SourceFileLoader("firmware_apply", str(path))
     module = module_from_spec(spec_from_loader("firmware_apply", loader))  # type: ignore[arg-type]
     sys.modules["firmware_apply"] = module  # required by dataclass
     loader.exec_module(module)
@@ -228,7 +329,7 @@ def test_all_files_change_or_none(
     workshop: Workshop, remove: bool, operation: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The first, second, ... write, rename or deletion fails, as on a full disk."""
-    apply = load_apply(workshop)
+    apply = load_apply(workshop.firmware / "apply")
     if remove:
         workshop.run()
     before = workshop.files()
