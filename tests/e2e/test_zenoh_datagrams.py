@@ -6,7 +6,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from tests.e2e.test_zenoh_recovery import recovering
+from tests.service.zenoh_link.test_history import recovering
 from tests.support.benches import Starter
 from tests.support.lossy_udp import Direction, LossyUdp
 from tests.support.plan import plain_plan

@@ -2,20 +2,13 @@
 """Fixtures for the status page's tests."""
 
 from collections.abc import Iterator
-from contextlib import ExitStack, closing
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
-from tests.support.benches import Starter
 from tests.support.chromium import Browsers
 from tests.support.web_bench import WebBench, web_bench
-
-
-@pytest.fixture
-def start(tmp_path: Path) -> Iterator[Starter]:
-    with ExitStack() as stack:
-        yield Starter(tmp_path, stack)
 
 
 @pytest.fixture(scope="session")

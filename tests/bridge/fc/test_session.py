@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A bug in any state of the line starts a new search.
 
-The daemon's part (log the exception, call `Bridge.restart`) is tested in tests/e2e/test_daemon_log.py.
+The daemon's part (log the exception, call `Bridge.restart`) is tested in tests/service/daemon/test_daemon.py.
 """
 
 import pytest

@@ -8,11 +8,8 @@ import re
 import signal
 import subprocess
 import termios
-from collections.abc import Iterator
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from pathlib import Path
-
-import pytest
 
 from tests.support.benches import Starter
 from tests.support.programs import NAZE_BRIDGE, REPOSITORY, TIMEOUT_S, Board, run_naze_bridge
@@ -22,12 +19,6 @@ LONG = EXAMPLES / "long-146.waypoints"
 CTRL_C = b"\x03"
 #: By now some of the records are written.
 UNDER_WAY = r"[1-9][0-9]*/146"
-
-
-@pytest.fixture
-def start(tmp_path: Path) -> Iterator[Starter]:
-    with ExitStack() as stack:
-        yield Starter(tmp_path, stack)
 
 
 def slow_board(start: Starter) -> Board:

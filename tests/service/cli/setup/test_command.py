@@ -10,9 +10,9 @@ import pytest
 import segno
 from click.testing import CliRunner, Result
 
+from service.cli.main import main
 from service.cli.setup import command
 from service.cli.setup.change import Machine
-from service.cli.setup.command import setup
 from service.cli.setup.steps import KEY_FILE, SETTINGS_FILE
 from service.settings.passphrase import weakness
 
@@ -41,7 +41,7 @@ class Pi:
         (self.root / _WANTED_BY / "naze-bridge.service").symlink_to("x")
 
     def setup(self, *options: str, answers: str = "") -> Result:
-        return CliRunner().invoke(setup, ["--root", str(self.root), *options], input=answers)
+        return CliRunner().invoke(main, ["setup", "--root", str(self.root), *options], input=answers)
 
 
 @pytest.fixture

@@ -27,7 +27,7 @@ def test_the_state_has_link_vehicle_and_traffic(lasting_web: WebBench) -> None:
 
 
 def test_metrics_are_served(lasting_web: WebBench) -> None:
-    """Their contents are tested in tests/e2e/test_metrics.py."""
+    """Their contents are tested in tests/service/web/test_metrics.py."""
     answer = lasting_web.ask("/metrics")
     assert answer.status == 200
     assert answer.headers["Content-Type"].startswith("text/plain; version=0.0.4")
