@@ -13,7 +13,7 @@ from service.settings.addresses import parse_fc, parse_gcs
 from service.web.metrics import Metrics
 from tests.support.plain_station import udp_station
 from tests.support.plan import plain_plan
-from tests.support.programs import free_port, until
+from tests.support.programs import free_port, until_async
 
 Samples = dict[tuple[str, tuple[str, ...]], float]
 
@@ -42,7 +42,7 @@ async def test_prometheus_reads_the_counters_of_a_daemon(tmp_path: Path) -> None
     assert ("battery_volts", ()) not in before
     running = asyncio.create_task(daemon.run())
     await daemon.started.wait()
-    await asyncio.to_thread(until, lambda: ("battery_volts", ()) in read(metrics), "a battery voltage")
+    await until_async(lambda: ("battery_volts", ()) in read(metrics), "a battery voltage")
 
     def write() -> list[MissionResult]:
         with udp_station((link.host, link.port)) as station:
