@@ -22,7 +22,7 @@
 #   make rights-page    regenerate the tables of docs/rights.md from protocols/rights/
 #   make inav-page      regenerate the table of docs/inav.md
 #   make config-sample  regenerate systemd/config.toml and the keys of docs/configuration.md
-#   make zenoh-schemas  regenerate service/zenoh_link/schemas/ from the payload types
+#   make zenoh-schemas  regenerate payloads/schemas/ from the payload types
 #   make clean          remove all generated files that are not in git
 
 PYTHON ?= python3

@@ -21,9 +21,9 @@ from benchmarks.figure import Figure, Floor
 from benchmarks.missions import COUNT, random_mission
 from benchmarks.processes import ENVIRONMENT, ROOT, cpu_s, daemon, wait_for
 from benchmarks.zenoh_programs import ALL_TELEMETRY, configuration
+from payloads.keys import STATE, full
+from payloads.names import DEFAULT_PREFIX
 from protocols.mission_file import write_qgc_wpl
-from service.settings.zenoh import DEFAULT_PREFIX
-from service.zenoh_link.keys import STATE, full
 from tests.support.programs import NAZE_BRIDGE, free_port
 from tests.support.zenoh_router import client, running_router
 

@@ -26,12 +26,13 @@ from benchmarks.telemetry import ATTITUDES, POLLS_HZ, Controller, drain, instant
 from benchmarks.zenoh_programs import ALL_TELEMETRY, configuration
 from bridge.model.vehicle import Orientation
 from bridge.model.vehicle_groups import Group
+from payloads.keys import TELEMETRY, full
+from payloads.names import DEFAULT_PREFIX
 from service.daemon.daemon import Daemon
 from service.settings import Settings
 from service.settings.addresses import parse_fc
-from service.settings.zenoh import DEFAULT_PREFIX, ZenohSettings
+from service.settings.zenoh import ZenohSettings
 from service.settings.zenoh_config import make_config
-from service.zenoh_link.keys import TELEMETRY, full
 from service.zenoh_link.node import Node
 from tests.support.zenoh_router import client, running_router
 

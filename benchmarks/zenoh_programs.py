@@ -3,7 +3,7 @@
 
 from pathlib import Path
 
-from service.zenoh_link.keys import VERSION
+from payloads.keys import VERSION
 
 #: The suffix of all of a vehicle's telemetry keys.
 ALL_TELEMETRY = f"v{VERSION}/telemetry/*"

@@ -21,7 +21,7 @@ _PAGES = (
     *("firmware/README.md", "systemd/naze-bridge.service", "systemd/60-naze-bridge.rules"),
     "systemd/config.toml",
 )
-_SCHEMAS = "service/zenoh_link/schemas"
+_SCHEMAS = "payloads/schemas"
 _SCRIPTS = ("postinst", "prerm", "postrm")
 #: Of pymavlink's 44 MB of dialects the bridge imports one, and pymavlink's own mavutil one; lxml is for its generator.
 _DIALECTS = ("v20/__init__.py", "v20/ardupilotmega.py", "v20/all.py")

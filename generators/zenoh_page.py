@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from generators.zenoh_schemas import schemas
-from service.daemon.mission_data import Json
-from service.zenoh_link.compact import object_schema
-from service.zenoh_link.keys import KEYS
+from payloads.compact import object_schema
+from payloads.keys import KEYS
+from payloads.mission_data import Json
 
 PAGE = Path(__file__).parents[1] / "docs" / "zenoh-payloads.md"
 _HEAD = """\
@@ -16,10 +16,9 @@ _HEAD = """\
 # Payloads over zenoh
 
 The fields of each payload of [zenoh](zenoh.md), from the JSON Schemas in
-[`service/zenoh_link/schemas/`](../service/zenoh_link/schemas/). Every payload begins with the first
-three. null means "not known", which includes values that the flight controller cannot measure: a
-board without a compass has no heading. Ignore fields that you do not know: new ones do not change
-the version.
+[`payloads/schemas/`](../payloads/schemas/). Every payload begins with the first three. null means
+"not known", which includes values that the flight controller cannot measure: a board without a
+compass has no heading. Ignore fields that you do not know: new ones do not change the version.
 """
 _WIDTH = 100
 #: A command's reply is described in docs/zenoh.md: one of several objects.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The published state of a vehicle, in groups of named values: for zenoh, the web page and the command line.
 
-None means "not known". The notes on the fields are part of the published schemas (service/zenoh_link/schemas).
+None means "not known". The notes on the fields are part of the published schemas (payloads/schemas).
 """
 
 from dataclasses import dataclass

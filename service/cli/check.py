@@ -15,16 +15,16 @@ from bridge.fc.profile import RuleSettings
 from bridge.missions.list_check import MissionRules, check_list
 from bridge.model.finding import DROPPED, without_defaults
 from bridge.model.verdict import Result, Verdict
+from payloads.mission_data import verdict_data
 from protocols.mission_file import MissionFileError
 from protocols.mission_item import MissionItem, MissionResult, degrees_to_e7, is_on_earth
 from protocols.mission_record import identify
-from service.cli.mission_source import load_mission, shown_path
-from service.cli.mission_table import mission_table
-from service.cli.options import PATH
-from service.cli.printing import print_json, print_table
-from service.cli.sentences import complain, say
-from service.daemon.mission_data import verdict_data
 from service.settings import SettingsError, takeoff_limit_m
+from terminal.mission_source import load_mission, shown_path
+from terminal.mission_table import mission_table
+from terminal.options import PATH
+from terminal.printing import print_json, print_table
+from terminal.sentences import complain, say
 
 #: The rules of each flight controller that stores missions.
 _RULES: Mapping[str, Callable[[RuleSettings], MissionRules]] = {

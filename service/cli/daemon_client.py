@@ -10,14 +10,14 @@ from typing import Any, TypeVar
 
 import click
 
-from service.cli.options import PATH
-from service.cli.sentences import INTERRUPTED, complain, fail
+from payloads.mission_data import Json, plain
 from service.daemon.client import ControlError, Interrupted, NoDaemonError, ask_daemon
-from service.daemon.mission_data import Json, plain
 from service.settings import SettingsError, default_state_dir
 from service.settings.addresses import AddressError, parse_fc
 from service.settings.load import SERVICE_STATE
 from storage.store_error import StoreError
+from terminal.options import PATH
+from terminal.sentences import INTERRUPTED, complain, fail
 
 _GOES_ON = "the daemon continues with the mission, and the result follows; to exit now, press Ctrl-C again"
 _LEFT = "interrupted; the daemon continues with the mission: see `naze-bridge missions list`"

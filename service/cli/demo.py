@@ -14,17 +14,17 @@ from pathlib import Path
 import click
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
+from payloads.mission_data import Json, mission_findings, mission_items
 from protocols.mission_file import MissionFileError
 from protocols.mission_item import MissionItem, MissionResult
 from service.cli.mission_client import ClientError, connect
-from service.cli.mission_source import load_mission
-from service.cli.mission_table import mission_table
-from service.cli.options import PATH
-from service.cli.printing import print_table
-from service.cli.sentences import fail, say
 from service.daemon.client import ControlError, ask_daemon
-from service.daemon.mission_data import Json, mission_findings, mission_items
 from service.machine.host import Host
+from terminal.mission_source import load_mission
+from terminal.mission_table import mission_table
+from terminal.options import PATH
+from terminal.printing import print_table
+from terminal.sentences import fail, say
 
 #: A link to examples/ in the repository, a file in the installed package.
 _EXAMPLE = Path(__file__).parent / "naze-field.waypoints"

@@ -5,10 +5,10 @@ import asyncio
 from collections.abc import Callable
 from contextlib import suppress
 
+from payloads.mission_data import Json
 from service.daemon.api import DaemonApi
 from service.daemon.client import STATUS, ControlError, Interrupted
 from service.daemon.daemon import Daemon
-from service.daemon.mission_data import Json
 from service.machine.log_setup import set_up_logging
 from service.settings import Settings, takeoff_limit_m
 from service.settings.addresses import AutoFc, FcAddress

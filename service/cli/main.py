@@ -9,9 +9,9 @@ from typing import Any, NoReturn
 
 import click
 
-from service.cli.command_group import LazyCommand, LazyGroup
-from service.cli.sentences import INTERRUPTED, complain
 from storage.os_error import reason
+from terminal.command_group import LazyCommand, LazyGroup
+from terminal.sentences import INTERRUPTED, complain
 
 _COMMANDS = {
     "setup": LazyCommand("service.cli.setup.command:setup", "Set this Raspberry Pi up: UART, Wi-Fi, page, service."),
@@ -23,7 +23,7 @@ _COMMANDS = {
     "pull": LazyCommand("service.cli.mission_commands:pull", "Read the mission from the flight controller."),
     "clear": LazyCommand("service.cli.mission_commands:clear", "Clear the mission on the flight controller."),
     "missions": LazyCommand("service.cli.stored_missions:missions", "List, show, compare and restore missions."),
-    "fleet": LazyCommand("service.cli.fleet.command:fleet", "Manage many vehicles over Eclipse zenoh."),
+    "fleet": LazyCommand("service.cli.fleet_command:fleet", "Manage many vehicles over Eclipse zenoh."),
     "sim": LazyCommand("simulator.commands.sim:sim", "Simulate a flight controller."),
     "demo": LazyCommand("service.cli.demo:demo", "Demonstrate a mission upload to a simulated Naze."),
 }

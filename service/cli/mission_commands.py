@@ -7,14 +7,14 @@ from pathlib import Path
 
 import click
 
+from payloads.mission_data import ACCEPTED, Json, mission_findings, mission_items
 from protocols.mission_file import MissionFileError, write_mission_file, write_qgc_wpl
 from service.cli.daemon_client import ask, ask_with_progress, bridge_options
-from service.cli.mission_source import load_mission, save_mission, shown_path
-from service.cli.mission_table import mission_table
-from service.cli.options import PATH
-from service.cli.printing import print_json, print_table
-from service.cli.sentences import complain, fail, say
-from service.daemon.mission_data import ACCEPTED, Json, mission_findings, mission_items
+from terminal.mission_source import load_mission, save_mission, shown_path
+from terminal.mission_table import mission_table
+from terminal.options import PATH
+from terminal.printing import print_json, print_table
+from terminal.sentences import complain, fail, say
 
 _NO_SPACE = "MAV_MISSION_NO_SPACE"
 _UNREADABLE = 2

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import click
 
-from service.cli.options import PATH
-from service.cli.sentences import complain
 from service.settings import DEFAULT_GCS, SettingsError, load_settings
 from service.settings.load import CONFIG_VARIABLE
 from service.settings.passphrase import STRONGER
+from terminal.options import PATH
+from terminal.sentences import complain
 
 
 @click.command()

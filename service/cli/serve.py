@@ -7,7 +7,7 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from service.cli.sentences import fail
+from payloads.names import ZenohSettingsError
 from service.daemon.client import ControlError, socket_of_daemon
 from service.daemon.control_server import ControlServer
 from service.daemon.daemon import Daemon
@@ -16,9 +16,9 @@ from service.links.gcs_links import LinkError
 from service.machine.log_setup import set_up_logging
 from service.machine.notify import Notifier
 from service.settings import Settings, SettingsError
-from service.settings.zenoh import ZenohSettingsError
 from storage.state_lock import StateUnusableError, state_lock
 from storage.store_error import StoreError
+from terminal.sentences import fail
 
 if TYPE_CHECKING:
     from service.web.server import WebServer

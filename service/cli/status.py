@@ -6,14 +6,14 @@ from pathlib import Path
 
 import click
 
+from payloads.mission_data import Json
 from service.cli.daemon_client import ask, bridge_options
-from service.cli.printing import print_json
-from service.cli.sentences import say
 from service.daemon.client import STATUS
-from service.daemon.mission_data import Json
 from service.machine.host import Host
 from service.settings.addresses import client_hosts, parse_gcs
 from service.settings.web import ListenAddress, parse_listen
+from terminal.printing import print_json
+from terminal.sentences import say
 
 _MINUTE_S, _HOUR_S, _DAY_S = 60, 3600, 86400
 

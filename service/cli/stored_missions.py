@@ -9,14 +9,14 @@ import click
 from rich.table import Column, Table
 from rich.text import Text
 
-from service.cli.command_group import CommandGroup
+from payloads.comparison import difference
+from payloads.mission_data import MOST, Json, mission_findings, mission_items
 from service.cli.daemon_client import ask_store, ask_with_progress, bridge_options, daemon_options
 from service.cli.mission_commands import show_delivery
-from service.cli.mission_table import mission_table, rows_table
-from service.cli.printing import print_json, print_table
-from service.cli.sentences import say
-from service.daemon.mission_data import MOST, Json, mission_findings, mission_items
-from service.web.comparison import difference
+from terminal.command_group import CommandGroup
+from terminal.mission_table import mission_table, rows_table
+from terminal.printing import print_json, print_table
+from terminal.sentences import say
 
 
 class _Number(click.IntRange):

@@ -9,11 +9,11 @@ from typing import TypeVar
 from bridge.missions.mission_service import DeliveryResult, HeldMission
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.refusal import Refusal
+from payloads.mission_data import MOST, Json, mission_items, verdict_data, whole_number
 from protocols.mission_item import MissionItem
 from protocols.mission_record import pack_records
 from service.daemon.client import ControlError
 from service.daemon.daemon import Daemon
-from service.daemon.mission_data import MOST, Json, mission_items, verdict_data, whole_number
 from service.daemon.store_worker import as_dicts
 from service.machine.package import version
 from storage.mission_store import MissionStore, MissionSummary, ReceivedMission, StoredMission

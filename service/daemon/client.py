@@ -13,7 +13,7 @@ from pathlib import Path
 from tempfile import gettempdir
 from zlib import crc32
 
-from service.daemon.mission_data import Json, plain, to_json
+from payloads.mission_data import Json, plain, to_json
 from service.settings import SettingsError, default_state_dir
 
 #: The request for the bridge's status.

@@ -15,10 +15,10 @@ from pathlib import Path
 
 import structlog
 
+from payloads.mission_data import Json, to_json
 from service.daemon.api import DaemonApi
 from service.daemon.client import ControlError
 from service.daemon.daemon import Daemon
-from service.daemon.mission_data import Json, to_json
 from storage.os_error import reason
 from storage.store_error import StoreError
 

@@ -21,10 +21,10 @@ from bridge.missions.mission_service import DeliveryResult
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.vehicle_groups import Group
+from payloads.mission_data import Json
 from service.daemon.fc_connection import FcConnection
 from service.daemon.flight_file import FlightFile
 from service.daemon.gcs_connections import GcsConnections
-from service.daemon.mission_data import Json
 from service.daemon.seal_file import SealFile
 from service.daemon.store_worker import StoreWorker
 from service.links.msp_share import open_share

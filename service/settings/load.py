@@ -7,6 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from payloads.names import ZenohSettingsError
 from service.settings.addresses import GcsAddress, SerialFc, parse_gcs, split_gcs
 from service.settings.config_files import Given, nearest, read_files
 from service.settings.key import ENVIRONMENT_PREFIX, Problem, SettingsError, Unfit
@@ -15,7 +16,7 @@ from service.settings.settings import DEFAULT_GCS, Settings, TlogLimits
 from service.settings.table import KEYS
 from service.settings.web import WebSettings
 from service.settings.write_access import WriteAccess
-from service.settings.zenoh import ZenohSettings, ZenohSettingsError
+from service.settings.zenoh import ZenohSettings
 
 #: The environment variable for the configuration file itself.
 CONFIG_VARIABLE = "NAZE_BRIDGE_CONFIG"

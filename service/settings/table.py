@@ -6,13 +6,15 @@ from functools import partial
 from pathlib import Path
 
 from bridge.model.autopilot import Autopilot
+from payloads.keys import PayloadEncoding
+from payloads.names import check_name
 from service.settings.addresses import parse_fc
 from service.settings.key import Key, Unfit, choice, file_name, several, table, text, whole, yes_no
 from service.settings.settings import DEFAULT_GCS, LogLevel, PassThroughRule, Settings, TlogLimits
 from service.settings.share import parse_share
 from service.settings.web import WebSettings, parse_listen
 from service.settings.write_access import parse_link
-from service.settings.zenoh import I_KNOW, PayloadEncoding, ZenohProfile, ZenohSettings, check_name, check_rates
+from service.settings.zenoh import I_KNOW, ZenohProfile, ZenohSettings, check_rates
 
 _DEFAULT = Settings()
 _LIMITS = TlogLimits()

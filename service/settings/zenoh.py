@@ -1,32 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The `[zenoh]` table of the configuration file."""
 
-import re
-import socket
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 
 from bridge.model.vehicle_groups import Group
-from protocols.plain_text import plain_text
+from payloads.keys import PayloadEncoding
+from payloads.names import DEFAULT_PREFIX, ZenohSettingsError, host_name
 
 #: The value that allows commands without authentication.
 I_KNOW = "I know"
-DEFAULT_PREFIX = "fleet"
-_FORBIDDEN = re.compile(r"[*$?#/\s]")
-_MAX_NAME = 64
-
-
-class ZenohSettingsError(ValueError):
-    """A zenoh setting that cannot be used; the text is one sentence."""
-
-
-class PayloadEncoding(Enum):
-    """The encoding of payloads."""
-
-    JSON = "json"
-    CBOR = "cbor"
 
 
 class ZenohProfile(Enum):
@@ -39,11 +24,6 @@ class ZenohProfile(Enum):
 #: The name of the vehicle's state among the groups in tables of rates.
 STATE_NAME = "state"
 _MAX_RATE_HZ = 50.0
-
-
-def host_name() -> str:
-    """The machine's name as a vehicle name: characters that a key cannot hold become dashes."""
-    return _FORBIDDEN.sub("-", plain_text(socket.gethostname())).lstrip("@")[:_MAX_NAME] or "vehicle"
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,21 +58,3 @@ def check_rates(rates: object) -> dict[str, float]:
         if isinstance(hz, bool) or not isinstance(hz, int | float) or not 0 <= hz <= _MAX_RATE_HZ:
             raise ZenohSettingsError(f"zenoh.rates.{name} must be a rate in Hz, 0 to {_MAX_RATE_HZ:.0f}; 0: never")
     return {name: float(hz) for name, hz in rates.items()}
-
-
-def check_name(what: str, name: str) -> str:
-    """The name; ZenohSettingsError, which begins with `what`, if it cannot be one chunk of a key."""
-    bad = _FORBIDDEN.search(name)
-    if not name:
-        wrong = "empty"
-    elif bad is not None:
-        wrong = f"{name!r}, with {bad.group()!r} in it"
-    elif plain_text(name) != name:
-        wrong = f"{name!a}, with characters that cannot be shown"
-    elif name.startswith("@"):
-        wrong = f"{name!r}, with @ in front"
-    elif len(name) > _MAX_NAME:
-        wrong = f"longer than {_MAX_NAME} characters"
-    else:
-        return name
-    raise ZenohSettingsError(f'{what} is {wrong}: make a name of letters, digits and dashes, as "naze-1"')

@@ -2,13 +2,13 @@
 """The zenoh configuration of the daemon's session: the user's file, completed by the bridge's defaults."""
 
 import json
-from dataclasses import dataclass, fields
-from pathlib import Path
 from typing import Any
 
 import zenoh
 
-from service.settings.zenoh import I_KNOW, ZenohProfile, ZenohSettings, ZenohSettingsError
+from payloads.endpoints import all_endpoints, in_short
+from payloads.names import ZenohSettingsError
+from service.settings.zenoh import I_KNOW, ZenohProfile, ZenohSettings
 
 #: Commands up to 10 MB get a reply; larger ones are not assembled in a Pi's memory.
 _MAX_MESSAGE_BYTES = 16 << 20
@@ -35,15 +35,6 @@ _METERED_LEASE_MS = 30_000
 _AUTHENTICATED = ("tls/", "quic/")
 
 
-@dataclass(frozen=True, slots=True)
-class TlsFiles:
-    """PEM files as zenoh's `transport/link/tls` names them; None: not given."""
-
-    root_ca_certificate: Path | None = None
-    connect_certificate: Path | None = None
-    connect_private_key: Path | None = None
-
-
 def make_config(settings: ZenohSettings) -> zenoh.Config:
     """The session's configuration; ZenohSettingsError says in one sentence why it cannot be used."""
     config = zenoh.Config() if settings.config_file is None else _read(settings)
@@ -61,26 +52,11 @@ def make_config(settings: ZenohSettings) -> zenoh.Config:
                 raise ZenohSettingsError(f"zenoh.{setting} cannot be used: {in_short(error)}") from error
     if json.loads(config.get_json("mode")) is None:
         # Peers that have only a router in common do not see each other; every session sees a client.
-        listens = _endpoints(json.loads(config.get_json("listen/endpoints")))
+        listens = all_endpoints(json.loads(config.get_json("listen/endpoints")))
         config.insert_json5("mode", '"peer"' if listens else '"client"')
     if settings.commands or settings.mavlink_in:
         _require_authentication(settings, config)
     return config
-
-
-def connect_endpoints(config: zenoh.Config) -> list[str]:
-    return _endpoints(json.loads(config.get_json("connect/endpoints")))
-
-
-def tls_files(config: zenoh.Config) -> TlsFiles:
-    tls = json.loads(config.get_json("transport/link/tls"))
-    return TlsFiles(*(Path(tls[field.name]) if tls[field.name] else None for field in fields(TlsFiles)))
-
-
-def in_short(error: Exception) -> str:
-    """An error of zenoh on one line, without the places in its source."""
-    text = " ".join(str(error).split())
-    return text.split(" at /")[0].removesuffix(".")
 
 
 def _read(settings: ZenohSettings) -> zenoh.Config:
@@ -116,19 +92,11 @@ def _without_authentication(config: zenoh.Config) -> str | None:
         tls = setting("transport/link/tls")
         if setting("scouting/multicast/enabled"):
             return "found by multicast scouting"
-        for endpoint in _endpoints(setting("listen/endpoints")):
+        for endpoint in all_endpoints(setting("listen/endpoints")):
             if not (endpoint.startswith(_AUTHENTICATED) and tls["enable_mtls"] and tls["root_ca_certificate"]):
                 return f"accepted at {endpoint}"
-        for endpoint in _endpoints(setting("connect/endpoints")):
+        for endpoint in all_endpoints(setting("connect/endpoints")):
             by_certificate = endpoint.startswith(_AUTHENTICATED) and tls["connect_certificate"]
             if not by_certificate and not (password["user"] and password["password"]):
                 return f"behind {endpoint}"
     return None
-
-
-def _endpoints(setting: Any) -> list[str]:
-    """All endpoints; a setting may have them per mode."""
-    by_mode = setting.values() if isinstance(setting, dict) else [setting]
-    return [
-        each["endpoint"] if isinstance(each, dict) else each for endpoints in by_mode if endpoints for each in endpoints
-    ]

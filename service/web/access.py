@@ -17,7 +17,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.daemon.mission_data import to_json
+from payloads.mission_data import to_json
 from service.web.token import Token, TokenError
 
 Handler = Callable[[Request], Awaitable[Response]]

@@ -31,17 +31,17 @@ from starlette.routing import Route
 
 from bridge.missions.mission_service import HeldMission
 from bridge.model.mission_log import Outcome
+from payloads.comparison import difference, shown, stored_mission
+from payloads.mission_data import MOST, Json, mission_items, to_json
 from protocols.mission_item import MissionItem
 from service.daemon.api import DaemonApi
 from service.daemon.client import ControlError
 from service.daemon.daemon import Daemon
-from service.daemon.mission_data import MOST, Json, mission_items, to_json
 from service.machine.host import Host
 from service.machine.package import version
 from service.recording.tlog_recorder import TLOG_FOLDER
 from service.settings.web import WebSettings
 from service.web.access import MAX_FILE, check_token, guarded
-from service.web.comparison import difference, shown, stored_mission
 from service.web.connect_help import connect_help, page_urls, qr_code
 from service.web.link_history import LinkHistory
 from service.web.metrics import CONTENT_TYPE, Metrics

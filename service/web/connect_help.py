@@ -7,7 +7,7 @@ from io import BytesIO
 
 import segno
 
-from service.daemon.mission_data import Json
+from payloads.mission_data import Json
 from service.settings.addresses import GcsAddress, client_hosts, is_any_address
 from service.settings.web import ListenAddress
 

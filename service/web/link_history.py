@@ -5,8 +5,8 @@ import asyncio
 from collections import deque
 from dataclasses import asdict, dataclass
 
+from payloads.mission_data import Json
 from service.daemon.daemon import Daemon
-from service.daemon.mission_data import Json
 
 INTERVAL_S = 2.0
 _SAMPLES = 150  # five minutes

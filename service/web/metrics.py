@@ -18,9 +18,9 @@ from bridge.line.msp_link import BOUNDS_S, RoundTrips
 from bridge.missions.mission_service import DeliveryResult
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission
+from payloads.names import host_name
 from service.daemon.daemon import Daemon, Follower
 from service.machine.package import version
-from service.settings.zenoh import host_name
 
 #: The content type of /metrics.
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"

@@ -15,12 +15,12 @@ import structlog
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
 
+from payloads.comparison import MAX_ROWS, checked_mission
+from payloads.mission_data import ACCEPTED, Json
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
 from service.daemon.api import DaemonApi
 from service.daemon.client import ControlError
-from service.daemon.mission_data import ACCEPTED, Json
-from service.web.comparison import MAX_ROWS, checked_mission
 from storage.store_error import StoreError
 
 _PAUSE_S = 0.25

@@ -8,7 +8,7 @@ import os
 from functools import partial
 from pathlib import Path
 
-from service.daemon.mission_data import Json
+from payloads.mission_data import Json
 from service.machine.threads import BackgroundThread
 from service.recording.tlog_folder import is_log_name
 

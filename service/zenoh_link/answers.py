@@ -4,12 +4,12 @@
 import asyncio
 
 from bridge.bridge import Bridge
+from payloads import keys
+from payloads.mission_data import Json, strict
+from payloads.overview import overview_of
+from payloads.payload import plain
 from service.daemon.api import DaemonApi
-from service.daemon.mission_data import Json, strict
-from service.zenoh_link import keys
 from service.zenoh_link.history import History
-from service.zenoh_link.overview import overview_of
-from service.zenoh_link.payload import plain
 from service.zenoh_link.queries import Answerer, Question
 from service.zenoh_link.vehicle_data import VehicleData, mission_current
 

@@ -5,12 +5,12 @@ import asyncio
 from collections.abc import Callable, Set
 
 from bridge.model.vehicle_groups import Group
+from payloads import keys
+from payloads.mission_data import ACCEPTED, MOST, Json
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
 from service.daemon.api import DaemonApi
-from service.daemon.mission_data import ACCEPTED, MOST, Json
 from service.settings.zenoh import STATE_NAME
-from service.zenoh_link import keys
 from service.zenoh_link.liveliness import RENAME
 from service.zenoh_link.queries import Answerer, QueryRefused, Question
 from service.zenoh_link.rates import MAX_REQUEST_HZ, MAX_REQUEST_S, SampleRates

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from math import inf
 from pathlib import Path
 
+from payloads.mission_data import Json
 from service.daemon.api import DaemonApi
-from service.daemon.mission_data import Json
 from service.zenoh_link.log_reader import LogReader
 from service.zenoh_link.logged_past import LoggedPast
 from service.zenoh_link.time_range import parse_time_range

@@ -6,7 +6,7 @@ import asyncio
 import zenoh
 
 from bridge.model.events import EventLog
-from service.daemon.mission_data import Json
+from payloads.mission_data import Json
 from service.machine.threads import post
 
 RENAME = "give one of the two another zenoh.vehicle"

@@ -15,10 +15,10 @@ from itertools import pairwise
 from math import inf
 from pathlib import Path
 
+from payloads.mission_data import Json
 from protocols.mavlink.codec import MavlinkDecoder
 from protocols.mavlink.dialect import Message, messages
 from protocols.tlog import STAMP_SIZE, read_tlog
-from service.daemon.mission_data import Json
 from service.recording.tlog_folder import is_log_name
 from service.zenoh_link.time_range import TimeRange
 

@@ -7,9 +7,9 @@ from collections.abc import Set
 import zenoh
 
 from bridge.gcs.station import Peer
+from payloads.keys import MAVLINK_OUT
 from service.daemon.gcs_connections import GcsConnections
 from service.machine.threads import post
-from service.zenoh_link.keys import MAVLINK_OUT
 from service.zenoh_link.publisher import Publisher
 
 #: All subscribers are one peer: zenoh does not tell them apart.

@@ -19,23 +19,24 @@ from bridge.missions.mission_service import DeliveryResult, HeldMission
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.vehicle_groups import Group
+from payloads import keys
+from payloads.endpoints import connect_endpoints, endpoint_trouble, tls_files
+from payloads.keys import ZenohKey
+from payloads.mission_data import Json
+from payloads.overview import overview_of
+from payloads.payload import Payloads, plain
 from service.daemon.api import DaemonApi
 from service.daemon.daemon import Daemon, Follower
-from service.daemon.mission_data import Json
 from service.recording.tlog_recorder import TLOG_FOLDER
 from service.settings.zenoh import ZenohSettings
-from service.settings.zenoh_config import connect_endpoints, make_config, tls_files
-from service.zenoh_link import keys, vehicle_data
+from service.settings.zenoh_config import make_config
+from service.zenoh_link import vehicle_data
 from service.zenoh_link.answers import Answers
 from service.zenoh_link.commands import CommandQueries
-from service.zenoh_link.endpoint_trouble import endpoint_trouble
 from service.zenoh_link.history import History
-from service.zenoh_link.keys import ZenohKey
 from service.zenoh_link.liveliness import Liveliness
 from service.zenoh_link.mavlink_link import MavlinkLink
 from service.zenoh_link.outage_log import log_outages
-from service.zenoh_link.overview import overview_of
-from service.zenoh_link.payload import Payloads, plain
 from service.zenoh_link.publisher import Publisher
 from service.zenoh_link.queries import Queries
 from service.zenoh_link.rates import SampleRates

@@ -10,10 +10,10 @@ from collections.abc import Callable
 import zenoh
 from zenoh import ext
 
-from service.daemon.mission_data import Json
+from payloads.keys import STATE, SampleDelivery, ZenohKey
+from payloads.mission_data import Json
+from payloads.payload import Payloads
 from service.machine.threads import post
-from service.zenoh_link.keys import STATE, SampleDelivery, ZenohKey
-from service.zenoh_link.payload import Payloads
 
 #: How soon after a sample its number is published, so that a subscriber notices if the last one was lost.
 _LAST_NUMBER_S = 1.0

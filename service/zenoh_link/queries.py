@@ -9,11 +9,11 @@ from functools import partial
 import structlog
 import zenoh
 
+from payloads.keys import UPLOAD, QueryKind, ZenohKey
+from payloads.mission_data import Json, to_json
+from payloads.payload import Payloads
 from service.daemon.client import ControlError
-from service.daemon.mission_data import Json, to_json
 from service.machine.threads import post
-from service.zenoh_link.keys import UPLOAD, QueryKind, ZenohKey
-from service.zenoh_link.payload import Payloads
 from service.zenoh_link.session import JobKind, SessionThread
 from storage.os_error import reason
 from storage.store_error import StoreError

@@ -12,7 +12,7 @@ from enum import Enum
 import structlog
 import zenoh
 
-from service.settings.zenoh_config import in_short
+from payloads.endpoints import in_short
 
 Job = Callable[[], None]
 

@@ -8,9 +8,9 @@ from bridge.bridge import Bridge
 from bridge.missions.mission_service import DeliveryResult, HeldMission
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission
+from payloads.mission_data import Json, strict
+from payloads.payload import plain
 from service.daemon.api import delivery_data
-from service.daemon.mission_data import Json, strict
-from service.zenoh_link.payload import plain
 from service.zenoh_link.time_source import SampleClock
 
 

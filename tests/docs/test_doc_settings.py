@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 import pytest
 
-from service.cli.fleet.conditions import parse_condition
+from fleet.conditions import parse_condition
 from service.cli.main import main
 from service.settings import Settings, load_settings
 from service.settings.addresses import parse_gcs

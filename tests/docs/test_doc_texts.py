@@ -55,7 +55,7 @@ def test_the_report_of_doctor(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 def texts() -> str:
     """All texts in the code and the status page, one per line, with \\0 for each inserted value."""
     found = []
-    for package in ("bridge", "protocols", "service"):
+    for package in ("bridge", "fleet", "payloads", "protocols", "service", "terminal"):
         for file in (REPOSITORY / package).rglob("*.py"):
             for node in ast.walk(ast.parse(file.read_text())):
                 if isinstance(node, ast.JoinedStr):
@@ -86,7 +86,8 @@ def _part(part: ast.expr) -> str:
 @cache
 def keys() -> set[str]:
     """The keys of all objects that the service makes."""
-    trees = (ast.parse(file.read_text()) for file in (REPOSITORY / "service").rglob("*.py"))
+    files = (file for package in ("fleet", "payloads", "service") for file in (REPOSITORY / package).rglob("*.py"))
+    trees = (ast.parse(file.read_text()) for file in files)
     made = (node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Dict))
     return {_part(key) for each in made for key in each.keys if key is not None}
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from generators.zenoh_page import PAGE as PAYLOADS
 from generators.zenoh_page import page
-from service.zenoh_link.keys import KEYS, VERSION
+from payloads.keys import KEYS, VERSION
 
 PAGE = (Path(__file__).parents[2] / "docs" / "zenoh.md").read_text()
 SECTIONS = dict(re.findall(r"^##+ ([^\n]*)\n(.*?)(?=^##+ |\Z)", PAGE, re.MULTILINE | re.DOTALL))

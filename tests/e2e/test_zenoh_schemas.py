@@ -11,9 +11,8 @@ from jsonschema import Draft202012Validator
 
 from bridge.model.vehicle_groups import Group
 from generators.zenoh_schemas import schemas, text
-from service.settings.zenoh import PayloadEncoding
-from service.zenoh_link.compact import SCHEMAS as FOLDER
-from service.zenoh_link.keys import COMMANDS, KEYS, MAVLINK_OUT, VERSION
+from payloads.compact import SCHEMAS as FOLDER
+from payloads.keys import COMMANDS, KEYS, MAVLINK_OUT, VERSION, PayloadEncoding
 from tests.support.benches import Starter
 from tests.support.plan import plain_plan
 from tests.support.programs import until

@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 import trustme
 
+from payloads.keys import COMMANDS
 from service.settings.key import SettingsError
 from service.settings.load import load_settings
-from service.zenoh_link.keys import COMMANDS
 from tests.support.benches import Bench, Starter
 from tests.support.plan import judge, plain_plan, plan_text, records_of
 from tests.support.programs import until

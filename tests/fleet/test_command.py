@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 import zenoh
 
+from fleet.session import open_session
 from protocols.mission_file import read_mission_file
 from protocols.mission_item import Command
-from service.cli.fleet.session import open_session
 from tests.support.doc_pages import blocks
 from tests.support.fleet_bench import Fleet
 from tests.support.plan import HOME, PlanRow, judge, plain_plan, plan_file, records_of, waypoint

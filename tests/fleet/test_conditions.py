@@ -3,8 +3,8 @@
 
 import pytest
 
-from service.cli.fleet.conditions import matching, parse_condition
-from service.cli.fleet.vehicle import FleetVehicle
+from fleet.conditions import matching, parse_condition
+from fleet.vehicle import FleetVehicle
 
 KITE = FleetVehicle("kite", "1", answers=True, armed=True, battery_v=11.1, mode="AUTO")
 OWL = FleetVehicle("owl", "2", answers=False)

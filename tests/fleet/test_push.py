@@ -4,8 +4,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.cli.fleet.push import FleetPush
-from service.cli.fleet.vehicle import BridgeId
+from fleet.push import FleetPush
+from fleet.vehicle import BridgeId
 
 ACCEPTED = {"result": {"ack": "MAV_MISSION_ACCEPTED", "text": "Mission verified: 3 records", "findings": []}}
 NAMES = ("a", "b", "c")

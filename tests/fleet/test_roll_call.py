@@ -15,9 +15,9 @@ from typing import Any
 
 import pytest
 
-from service.cli.fleet.roll_call import roll_call
-from service.cli.fleet.session import FleetError
-from service.zenoh_link.keys import UPLOAD
+from fleet.roll_call import roll_call
+from fleet.session import FleetError
+from payloads.keys import UPLOAD
 from tests.support.fleet_bench import I_KNOW, Fleet
 from tests.support.plan import judge, plain_plan, plan_text, records_of
 from tests.support.programs import NAZE_BRIDGE, TIMEOUT_S, until

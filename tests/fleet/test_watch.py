@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from service.cli.fleet.watch import watching
+from fleet.watch import watching
 from tests.support.fleet_bench import Fleet
 from tests.support.plan import plain_plan, plan_text
 from tests.support.programs import until

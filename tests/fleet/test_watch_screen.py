@@ -7,14 +7,13 @@ from typing import Any
 import zenoh
 from rich.console import Console
 
-from service.cli.fleet.vehicle import FleetVehicle, in_order
-from service.cli.fleet.watch import Watch, watching
-from service.cli.fleet.watch_screen import ScreenRow, screen
-from service.settings.zenoh import PayloadEncoding
-from service.zenoh_link import compact
-from service.zenoh_link.keys import OVERVIEW
-from service.zenoh_link.overview import Overview
-from service.zenoh_link.payload import encoding_of, plain
+from fleet.vehicle import FleetVehicle, in_order
+from fleet.watch import Watch, watching
+from fleet.watch_screen import ScreenRow, screen
+from payloads import compact
+from payloads.keys import OVERVIEW, PayloadEncoding
+from payloads.overview import Overview
+from payloads.payload import encoding_of, plain
 from tests.support.programs import until
 
 

@@ -9,8 +9,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from service.cli.fleet.roll_call import roll_call
-from service.cli.fleet.session import open_session
+from fleet.roll_call import roll_call
+from fleet.session import open_session
 from tests.support.programs import Board, Daemon, run_naze_bridge, until
 from tests.support.zenoh_router import Router, running_router
 

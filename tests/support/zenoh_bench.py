@@ -10,8 +10,8 @@ from typing import Any
 
 import zenoh
 
-from service.zenoh_link.keys import VERSION
-from service.zenoh_link.payload import decoded
+from payloads.keys import VERSION
+from payloads.payload import decoded
 from tests.support.benches import Bench, Starter
 from tests.support.programs import TIMEOUT_S, free_port, until
 

@@ -9,16 +9,16 @@ from pathlib import Path
 
 import click
 
+from payloads.mission_data import Json
 from service.cli.doctor.checked import Checked, Grade
-from service.cli.options import PATH
-from service.cli.printing import print_json
-from service.cli.sentences import say
 from service.daemon.client import STATUS, ControlError, ask_daemon
-from service.daemon.mission_data import Json
 from service.machine.host import Host
 from service.settings import Settings, SettingsError, load_settings
 from service.settings.load import CONFIG_VARIABLE, SERVICE_CONFIG, SERVICE_STATE
 from storage.store_error import StoreError
+from terminal.options import PATH
+from terminal.printing import print_json
+from terminal.sentences import say
 
 _COLOURS = {Grade.OK: "green", Grade.NOTE: "yellow", Grade.PROBLEM: "red"}
 

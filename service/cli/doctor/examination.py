@@ -7,6 +7,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
+from payloads.mission_data import Json
 from service.cli.doctor.checked import Checked, Grade
 from service.cli.doctor.flight_controller import check_flight_controller
 from service.cli.doctor.keys import check_keys
@@ -24,7 +25,6 @@ from service.cli.doctor.port import (
 )
 from service.cli.doctor.zenoh import check_zenoh
 from service.daemon.client import ControlError
-from service.daemon.mission_data import Json
 from service.machine.host import Host
 from service.settings import Settings
 from service.settings.addresses import AutoFc, FcAddress, parse_fc

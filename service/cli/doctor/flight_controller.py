@@ -5,9 +5,9 @@ from collections.abc import Callable
 
 from bridge.fc.states.base import Closed
 from bridge.fc.states.cli import Cli
+from payloads.mission_data import Json
 from service.cli.doctor.checked import Checked, note, ok, problem
 from service.daemon.client import ControlError
-from service.daemon.mission_data import Json
 from service.settings.addresses import FcAddress
 
 _WIRING = "is it powered? TX goes to RX, RX to TX, GND to GND; a Naze's USB socket is empty; MSP is on at this UART"

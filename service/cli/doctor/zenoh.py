@@ -3,8 +3,9 @@
 
 from typing import Any
 
+from payloads.names import ZenohSettingsError
 from service.cli.doctor.checked import Checked, note, ok, problem
-from service.settings.zenoh import ZenohSettings, ZenohSettingsError
+from service.settings.zenoh import ZenohSettings
 
 _CONNECT_TIMEOUT_MS = 2000
 
@@ -14,8 +15,8 @@ def check_zenoh(settings: ZenohSettings | None) -> Checked:
     if settings is None:
         return ok("zenoh", "off")
     # Importing zenoh takes half a second.
-    from service.settings.zenoh_config import connect_endpoints, make_config, tls_files
-    from service.zenoh_link.endpoint_trouble import endpoint_trouble
+    from payloads.endpoints import connect_endpoints, endpoint_trouble, tls_files
+    from service.settings.zenoh_config import make_config
 
     try:
         config = make_config(settings)

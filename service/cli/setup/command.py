@@ -10,8 +10,6 @@ from pathlib import Path
 import click
 
 from service.cli.doctor.command import diagnose
-from service.cli.options import PATH
-from service.cli.sentences import complain, fail
 from service.cli.setup.change import Machine, SetupError, Step, is_root
 from service.cli.setup.state_folder import page_token
 from service.cli.setup.steps import GCS_PORT, PAGE_PORT, SetupChoices, current_key, missing_steps
@@ -21,6 +19,8 @@ from service.machine.raspberry_pi import pi_model
 from service.settings.addresses import AddressError, parse_fc
 from service.settings.passphrase import STRONGER, new_passphrase, weakness
 from storage.os_error import reason
+from terminal.options import PATH
+from terminal.sentences import complain, fail
 
 _LEAST_PASSWORD, _MOST_PASSWORD, _MOST_SSID = 8, 63, 32
 #: The search spends 9 s on a port: three are tried by then.

@@ -9,13 +9,13 @@ import json
 import re
 from typing import NamedTuple
 
-from service.cli.sentences import complain
 from service.links.port_memory import PORTS_FILE
 from service.machine.host import Host
 from service.settings.load import SERVICE_STATE
 from service.web.token import DEFAULT_NAME
 from storage.bounded_file import read_untrusted
 from storage.os_error import reason
+from terminal.sentences import complain
 
 _MAX_PORTS_FILE, _MAX_TOKEN_FILE = 1 << 16, 4096
 #: SerialPort.key of a USB device: its socket ("1-1.3"), vendor and product, and possibly its serial number.

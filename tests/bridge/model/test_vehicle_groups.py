@@ -34,11 +34,10 @@ from bridge.model.vehicle_groups import Group
 from bridge.vehicle import vehicle_messages as make
 from bridge.vehicle.vehicle_messages import Maker
 from bridge.vehicle.vehicle_report import VehicleReporter
+from payloads.keys import TELEMETRY, PayloadEncoding
+from payloads.payload import Payloads, decoded, plain
 from protocols.mavlink.codec import FrameWriter, pack
 from protocols.msp.telemetry import Sensor
-from service.settings.zenoh import PayloadEncoding
-from service.zenoh_link.keys import TELEMETRY
-from service.zenoh_link.payload import Payloads, decoded, plain
 from tests.support.world import World
 
 NOW = 100.0

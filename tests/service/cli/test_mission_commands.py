@@ -21,8 +21,8 @@ import pytest
 
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import Command
-from service.cli.mission_source import save_mission
 from storage.mission_store import open_store
+from terminal.mission_source import save_mission
 from tests.support.benches import Starter
 from tests.support.plan import HOME, PlanRow, judge, plain_plan, plan_text, records_of, waypoint
 from tests.support.programs import Daemon, run_naze_bridge

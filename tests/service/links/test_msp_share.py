@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 
 from protocols.msp.frame import Direction, MspFrame, MspParser
-from service.cli.mission_source import load_mission
 from service.daemon.api import DaemonApi
 from service.daemon.daemon import Daemon
 from service.settings import Settings
@@ -19,6 +18,7 @@ from service.settings.addresses import SimulatedFc, parse_gcs
 from service.settings.share import ShareSettings, parse_share
 from simulator.board.options import Faults
 from simulator.naze.board import SimulatedNaze
+from terminal.mission_source import load_mission
 from tests.support.programs import TIMEOUT_S, free_port
 
 #: Repeat like configurators, because the bridge also gives up late replies.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Missions on the status page: listed, compared, and restored under the same rules as elsewhere."""
 
-from service.settings.zenoh import host_name
+from payloads.names import host_name
 from tests.support.benches import Starter
 from tests.support.plan import plain_plan
 from tests.support.programs import until

@@ -5,7 +5,7 @@ import asyncio
 
 from structlog.testing import capture_logs
 
-from service.daemon.mission_data import Json
+from payloads.mission_data import Json
 from service.web.mission_files import MissionWriter, Progress
 
 

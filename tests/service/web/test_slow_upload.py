@@ -8,9 +8,9 @@ from typing import Any, cast
 import pytest
 from starlette.requests import Request
 
+from payloads.mission_data import Json
 from protocols.mission_item import MissionItem
 from service.daemon.api import DaemonApi
-from service.daemon.mission_data import Json
 from service.web import mission_files
 from service.web.mission_files import MissionFiles, MissionWriter
 from tests.support.plan import plain_plan, plan_text

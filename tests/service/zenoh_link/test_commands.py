@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 import zenoh
 
-from service.zenoh_link.keys import COMMANDS
+from payloads.keys import COMMANDS
 from tests.support.benches import Bench, Starter
 from tests.support.plan import judge, plain_plan, plan_text, records_of
 from tests.support.programs import until

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from payloads.mission_data import Json
 from protocols.mavlink.dialect import Message, messages
 from protocols.tlog import tlog_record
 from service.daemon.api import DaemonApi
 from service.daemon.daemon import Daemon
-from service.daemon.mission_data import Json
 from service.settings import Settings
 from service.settings.addresses import SimulatedFc
 from service.zenoh_link.history import History

@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from payloads.keys import COMMANDS
 from protocols.mavlink.codec import MavlinkDecoder
 from protocols.mavlink.frame import MavlinkSplitter
-from service.zenoh_link.keys import COMMANDS
 from tests.support.benches import Bench, Starter
 from tests.support.plan import judge, plain_plan, plan_text, records_of
 from tests.support.programs import until

@@ -7,10 +7,11 @@ from typing import Any, cast
 import zenoh
 from structlog.testing import capture_logs
 
-from service.settings.zenoh import PayloadEncoding, ZenohSettings
+from payloads import keys
+from payloads.keys import PayloadEncoding
+from payloads.payload import Payloads
+from service.settings.zenoh import ZenohSettings
 from service.settings.zenoh_config import make_config
-from service.zenoh_link import keys
-from service.zenoh_link.payload import Payloads
 from service.zenoh_link.queries import Queries, Question
 from service.zenoh_link.session import Job, JobKind, SessionThread
 from tests.support.programs import TIMEOUT_S, until

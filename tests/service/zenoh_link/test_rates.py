@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from bridge.model import vehicle_groups
 from bridge.model.vehicle_groups import Attitude, Battery, Group, Position, Rc, Status
-from service.settings.zenoh import ZenohProfile, ZenohSettingsError, check_rates
+from payloads.names import ZenohSettingsError
+from service.settings.zenoh import ZenohProfile, check_rates
 from service.zenoh_link.rates import SampleRates
 
 GAPS_S = st.lists(st.floats(0.01, 3.0), min_size=2, max_size=300)

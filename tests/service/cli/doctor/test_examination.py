@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import pytest
 
 from bridge.fc.states.cli import Cli
+from payloads.mission_data import Json
 from service.cli.doctor.checked import Checked, Grade
 from service.cli.doctor.examination import examine
 from service.cli.doctor.flight_controller import check_flight_controller
@@ -20,7 +21,6 @@ from service.cli.doctor.network import check_ports, check_wifi
 from service.cli.doctor.port import check_console, check_holder, check_modem_manager, check_permission, check_port
 from service.cli.doctor.zenoh import check_zenoh
 from service.daemon.client import ControlError
-from service.daemon.mission_data import Json
 from service.settings import Settings, load_settings
 from service.settings.addresses import AutoFc, SerialFc, parse_gcs
 from service.settings.zenoh import ZenohSettings

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`fleet enroll` and `fleet expel`: a member's login, and its rights in the router's configuration."""
+
+from pathlib import Path
+
+import click
+
+from fleet.enrolment import EnrolmentError, FleetFolder, FleetRouter, Role
+from fleet.options import check_endpoint
+from payloads.names import DEFAULT_PREFIX, ZenohSettingsError
+from terminal.options import PATH
+from terminal.sentences import fail
+
+_folder_option = click.option(
+    "--folder", type=PATH, default=Path("fleet"), show_default=True, help="Folder of the fleet's files."
+)
+
+
+@click.command(short_help="Add a vehicle or a person to a fleet.")
+@click.argument("name")
+@click.option(
+    "--role",
+    type=click.Choice([each.value for each in Role if each is not Role.EXPELLED]),
+    default=Role.VEHICLE.value,
+    show_default=True,
+    help="A vehicle publishes only under its own name, a pilot may do everything, a guest only watch.",
+)
+@_folder_option
+@click.option("--prefix", default=DEFAULT_PREFIX, show_default=True, help="First part of the vehicles' keys.")
+@click.option(
+    "--router",
+    callback=check_endpoint,
+    default="tcp/router.local:7447",
+    show_default=True,
+    metavar="ENDPOINT",
+    help="The router's address for members: tls/... for certificates, tcp/... for passwords.",
+)
+def enroll(name: str, role: str, folder: Path, prefix: str, router: str) -> None:
+    """Add a vehicle or a person to a fleet: makes the login and the router's access control.
+
+    Restart the router afterwards: it reads both only at its start. A name enrolled again keeps its login.
+    """
+    fleet, way_in = FleetFolder(folder.absolute()), FleetRouter(router, prefix)
+    try:
+        files = fleet.enroll(name, Role(role), way_in)
+    except ZenohSettingsError as error:
+        raise click.UsageError(str(error)) from error
+    except EnrolmentError as error:
+        fail(str(error))
+    click.echo(f"Copy to {name}: {', '.join(str(file) for file in files)}")
+    if role == Role.VEHICLE.value:
+        click.echo(f'In its configuration file:\n\n[zenoh]\nvehicle = "{name}"\nconfig_file = "{files[0].name}"')
+    if way_in.is_tls:
+        click.echo(f"\nCertificates: python make_certificates.py {folder} ROUTER_HOST {name} (examples/zenoh-tls)")
+    click.echo(f"\nThen restart the router with {fleet.path / 'router.json5'}.")
+
+
+@click.command(short_help="Remove a vehicle or a person from a fleet.")
+@click.argument("name")
+@_folder_option
+def expel(name: str, folder: Path) -> None:
+    """Remove a vehicle or a person from a fleet: the rights, and the password if it has one.
+
+    Restart the router afterwards: until then its present sessions and its login still work. A certificate stays valid,
+    but without rights, so the name of a member with a certificate cannot be enrolled again.
+    """
+    fleet = FleetFolder(folder.absolute())
+    try:
+        fleet.expel(name)
+    except EnrolmentError as error:
+        fail(str(error))
+    click.echo(f"{name} is expelled.\n\nNow restart the router with {fleet.path / 'router.json5'}.")
+    click.echo(f"Until then {name}'s sessions go on, and it can open new ones.")

@@ -1,0 +1,256 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The members of a fleet, and the router's access control made from them: `fleet enroll`, `fleet expel`.
+
+A folder holds `members.json` (names and roles), `passwords.txt` (the router's) or the certificates that
+examples/zenoh-tls/make_certificates.py makes, `router.json5`, and one `NAME.json5` for each member.
+
+A certificate cannot be revoked: zenoh reads no revocation lists (1.10). The router admits every certificate of the
+fleet, but gives rights only to the names in its configuration, and an expelled name is never used again.
+"""
+
+import json
+import secrets
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+
+from payloads.mission_data import Json
+from payloads.names import check_name
+from storage.atomic_file import replace_file
+from storage.os_error import reason
+
+#: zenoh's own is 1,000. Each session costs the router some 100 kB.
+_MAX_SESSIONS = 12_000
+_ACCEPT_PENDING = 1_000
+#: Beyond this, samples to a slow receiver are dropped rather than collected.
+_BUFFER_BYTES = 32 << 10
+_LISTEN = ("declare_subscriber", "query", "liveliness_query", "declare_liveliness_subscriber")
+_SPEAK = ("put", "delete", "declare_queryable", "reply", "liveliness_token")
+#: Verbatim chunks match no wildcard: each needs its own expression.
+_EXPRESSIONS = ("**", "**/@adv/**", "@cmd/**", "@mavlink/**")
+_VIEWED = ("*/v1/**", "*/v1/**/@adv/**")
+
+
+#: NAME.json5, NAME.pem and NAME.key are the router's, or those of the certificate authority.
+_RESERVED = ("router", "ca")
+_ROUTER, _MEMBERS, _PASSWORDS = "router.json5", "members.json", "passwords.txt"
+
+
+class Role(Enum):
+    """A member's rights: to be one vehicle, to do everything, only to watch, or none any more."""
+
+    VEHICLE = "vehicle"
+    PILOT = "pilot"
+    GUEST = "guest"
+    EXPELLED = "expelled"
+
+
+class EnrolmentError(Exception):
+    """A member cannot be enrolled or expelled; one sentence."""
+
+
+@dataclass(frozen=True, slots=True)
+class FleetRouter:
+    """The router. `endpoint`: its address for members. `prefix`: the first part of the vehicles' keys."""
+
+    endpoint: str
+    prefix: str
+
+    @property
+    def is_tls(self) -> bool:
+        """True if members have certificates; else each has a password."""
+        return self.endpoint.startswith(("tls/", "quic/"))
+
+
+@dataclass(frozen=True, slots=True)
+class FleetFolder:
+    """A fleet's files. Methods raise EnrolmentError if they cannot be read or written."""
+
+    path: Path
+
+    def members(self) -> dict[str, Role]:
+        """Names and roles, also of expelled members."""
+        try:
+            found = json.loads(self._read(_MEMBERS) or "{}")
+            return {name: Role(role) for name, role in found.items()}
+        except (ValueError, AttributeError) as error:
+            raise EnrolmentError(f"{self.path / _MEMBERS} is not a list of members: {error}") from error
+
+    def enroll(self, name: str, role: Role, router: FleetRouter) -> list[Path]:
+        """Add a member and write the router's configuration; returns the member's own files. ZenohSettingsError."""
+        _check_member(name)
+        check_name("--prefix", router.prefix)
+        members = self.members()
+        former = members.get(name, role)
+        if former is Role.EXPELLED and router.is_tls:
+            raise EnrolmentError(f"{name} was expelled, and its certificate is still valid: choose another name")
+        if former not in (role, Role.EXPELLED):
+            raise EnrolmentError(f"{name} is a {former.value} already: choose another name")
+        members[name] = role
+        own = self._write(f"{name}.json5", self._session(name, router), 0o600)
+        self._write(_ROUTER, self._router_config(members, router), 0o644)
+        self._write_members(members)
+        return [own] if not router.is_tls else [own, *(self.path / f"{name}.{kind}" for kind in ("pem", "key"))]
+
+    def expel(self, name: str) -> None:
+        """Remove a member's rights, password and login. May be repeated, for example after the disk was full."""
+        members = self.members()
+        if name not in members:
+            present = [each for each, role in sorted(members.items()) if role is not Role.EXPELLED]
+            raise EnrolmentError(f"{name} is not a member; there are: {', '.join(present) or 'none'}")
+        self._write_members(members | {name: Role.EXPELLED})
+        passwords = self._passwords()
+        if passwords.pop(name, None) is not None:
+            self._write_passwords(passwords)
+        if name not in _RESERVED:
+            (self.path / f"{name}.json5").unlink(missing_ok=True)
+        self._write(_ROUTER, self._without(name), 0o644)
+
+    def _without(self, name: str) -> Json:
+        """The router's configuration without a member. The rest stays: it may have been edited."""
+        by_hand = (
+            f"{self.path / _ROUTER} is not as `fleet enroll` writes it: remove {name} from its access_control by hand"
+        )
+        try:
+            config: Json = json.loads(self._read(_ROUTER))
+            control = config["access_control"]
+            control["subjects"] = [each for each in control["subjects"] if each["id"] != name]
+            control["policies"] = [each for each in control["policies"] if each["subjects"] != [name]]
+            control["rules"] = [each for each in control["rules"] if each["id"] != _own_rule(name)]
+        except (ValueError, LookupError, TypeError) as error:
+            raise EnrolmentError(by_hand) from error
+        if json.dumps(name) in json.dumps([control["subjects"], control["policies"]]):
+            raise EnrolmentError(by_hand)
+        return config
+
+    def _router_config(self, members: Mapping[str, Role], router: FleetRouter) -> Json:
+        """Rules for each vehicle, nothing for unknown sessions."""
+        scheme = router.endpoint.partition("/")[0]
+        port = router.endpoint.rpartition(":")[2]
+        files = {"listen_certificate": "router.pem", "listen_private_key": "router.key"}
+        tls = self._tls(files) if router.is_tls else {}
+        return {
+            "mode": "router",
+            "listen": {"endpoints": [f"{scheme}/0.0.0.0:{port}"]},
+            "scouting": {"multicast": {"enabled": False}},
+            "timestamping": {"enabled": True},
+            "transport": {
+                "unicast": {"max_sessions": _MAX_SESSIONS, "accept_pending": _ACCEPT_PENDING},
+                "link": {"tcp": {"so_sndbuf": _BUFFER_BYTES, "so_rcvbuf": _BUFFER_BYTES}, **tls},
+                "auth": {} if router.is_tls else {"usrpwd": {"dictionary_file": str(self.path / _PASSWORDS)}},
+            },
+            "access_control": access_control(router.prefix, members, by_certificate=router.is_tls),
+        }
+
+    def _tls(self, files: Mapping[str, str]) -> Json:
+        files = {"root_ca_certificate": "ca.pem", **files}
+        paths = {setting: str(self.path / file) for setting, file in files.items()}
+        return {"protocols": ["tls"], "tls": {**paths, "enable_mtls": True, "close_link_on_expiration": True}}
+
+    def _session(self, name: str, router: FleetRouter) -> Json:
+        session: Json = {
+            "mode": "client",
+            "connect": {"endpoints": [router.endpoint]},
+            "scouting": {"multicast": {"enabled": False}},
+        }
+        if router.is_tls:
+            files = {"connect_certificate": f"{name}.pem", "connect_private_key": f"{name}.key"}
+            return session | {"transport": {"link": self._tls(files)}}
+        return session | {"transport": {"auth": {"usrpwd": {"user": name, "password": self._password(name)}}}}
+
+    def _password(self, name: str) -> str:
+        """The member's password; a new member gets a new one."""
+        known = self._passwords()
+        if name not in known:
+            known[name] = secrets.token_urlsafe(18)
+            self._write_passwords(known)
+        return known[name]
+
+    def _passwords(self) -> dict[str, str]:
+        return dict(line.split(":", 1) for line in self._read(_PASSWORDS).splitlines() if ":" in line)
+
+    def _write_passwords(self, passwords: Mapping[str, str]) -> None:
+        self._write_text(_PASSWORDS, "".join(f"{name}:{password}\n" for name, password in passwords.items()), 0o600)
+
+    def _write_members(self, members: Mapping[str, Role]) -> None:
+        self._write(_MEMBERS, {name: role.value for name, role in members.items()}, 0o644)
+
+    def _write(self, name: str, content: Json, mode: int) -> Path:
+        return self._write_text(name, json.dumps(content, indent=2) + "\n", mode)
+
+    def _write_text(self, name: str, text: str, mode: int) -> Path:
+        path = self.path / name
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            replace_file(path, text.encode(), mode)
+        except OSError as error:
+            raise EnrolmentError(f"{path} cannot be written: {reason(error)}") from error
+        return path
+
+    def _read(self, name: str) -> str:
+        """A file's text; empty if there is none yet."""
+        path = self.path / name
+        try:
+            return path.read_text()
+        except FileNotFoundError:
+            return ""
+        except (OSError, UnicodeDecodeError) as error:
+            raise EnrolmentError(f"{path} cannot be read: {reason(error)}") from error
+
+
+def _check_member(name: str) -> None:
+    """ZenohSettingsError, or EnrolmentError for a name that is fit for a vehicle, but not for its files and login."""
+    check_name("the name", name)
+    if name.lower() in _RESERVED:
+        raise EnrolmentError(f"{name!r} is the name of the fleet's own files: choose another name")
+    if ":" in name or name.startswith((".", "-")):
+        raise EnrolmentError(f"the name is {name!r}, but must be without a colon, and without a dot or dash in front")
+
+
+def access_control(prefix: str, members: Mapping[str, Role], *, by_certificate: bool) -> Json:
+    """Zenoh's access control; everything not listed is denied."""
+    everything = [
+        f"{prefix}/{each}" if each[0] == "*" and each[1] == "*" else f"{prefix}/*/{each}" for each in _EXPRESSIONS
+    ]
+    viewed = [f"{prefix}/{each}" for each in _VIEWED]
+    rules = [
+        _rule("everything", ["ingress", "egress"], [*_LISTEN, *_SPEAK], everything),
+        # A guest sends only queries; the router passes on only replies to it.
+        _rule("ask", ["ingress"], _LISTEN, viewed),
+        _rule("be answered", ["egress"], [*_LISTEN, *_SPEAK], viewed),
+        _rule("be asked", ["egress"], ["put", "delete", *_LISTEN], everything),
+    ]
+    by_role = {Role.PILOT: ["everything"], Role.GUEST: ["ask", "be answered"]}
+    policies = []
+    members = {name: role for name, role in members.items() if role is not Role.EXPELLED}
+    for name, role in members.items():
+        if role is Role.VEHICLE:
+            own = [f"{prefix}/{name}/{each}" for each in _EXPRESSIONS]
+            rules.append(
+                _rule(_own_rule(name), ["ingress"], [each for each in (*_LISTEN, *_SPEAK) if each != "query"], own)
+            )
+        allowed = by_role.get(role, ["be asked", _own_rule(name)])
+        policies.append({"subjects": [name], "rules": allowed})
+    key = "cert_common_names" if by_certificate else "usernames"
+    return {
+        "enabled": True,
+        "default_permission": "deny",
+        "rules": rules,
+        "subjects": [{"id": name, key: [name]} for name in members],
+        "policies": policies,
+    }
+
+
+def _own_rule(vehicle: str) -> str:
+    return f"vehicle {vehicle}"
+
+
+def _rule(name: str, flows: list[str], messages: list[str] | tuple[str, ...], expressions: list[str]) -> Json:
+    return {
+        "id": name,
+        "permission": "allow",
+        "flows": flows,
+        "messages": list(messages),
+        "key_exprs": expressions,
+    }

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The parts common to all fleet commands: the fleet's address, the choice of vehicles, and the session."""
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+import click
+import zenoh
+
+from fleet.conditions import FIELDS, parse_condition
+from fleet.session import DEFAULT_ENDPOINT, FleetError, open_session
+from payloads.names import DEFAULT_PREFIX, ZenohSettingsError, check_name
+from terminal.options import PATH
+from terminal.sentences import INTERRUPTED, fail
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+class FleetAddress(NamedTuple):
+    """The fleet's address in a daemon's settings. `connect`: endpoints; `config_file`: a zenoh configuration.
+
+    The `obj` of the command group is the function that reads it from a file; it raises ZenohSettingsError.
+    """
+
+    prefix: str = DEFAULT_PREFIX
+    connect: Sequence[str] = ()
+    config_file: Path | None = None
+
+
+def check_endpoint(_context: click.Context, option: click.Parameter, value: Any) -> Any:
+    """An option's callback: BadParameter if an endpoint does not have zenoh's form."""
+    for endpoint in value if option.multiple else [value]:
+        if re.fullmatch(r"[a-z]+/.+:[0-9]+", endpoint) is None:
+            raise click.BadParameter(f"{endpoint!r} is not an endpoint: write one like {DEFAULT_ENDPOINT}")
+    return value
+
+
+def address_options(command: F) -> F:
+    for option in (
+        click.option(
+            "--config", type=PATH, help="The daemon's configuration file; its [zenoh] table has the defaults."
+        ),
+        click.option("--prefix", help="First part of the vehicles' keys.", show_default="fleet"),
+        click.option("--zenoh-config", type=PATH, help="zenoh configuration file, for TLS, passwords and the like."),
+        click.option(
+            "--connect",
+            callback=check_endpoint,
+            metavar="ENDPOINT",
+            multiple=True,
+            show_default=DEFAULT_ENDPOINT,
+            help="Router, or one vehicle that listens; of several, the first that answers is used.",
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+vehicle_option = click.option(
+    "--vehicle", "names", metavar="NAME", multiple=True, help="Only this vehicle; may be repeated."
+)
+all_option = click.option("--all", "to_all", is_flag=True, help="Every vehicle that is alive.")
+
+
+def _conditions(_context: click.Context, _option: click.Parameter, texts: tuple[str, ...]) -> list[Any]:
+    try:
+        return [parse_condition(text) for text in texts]
+    except ValueError as error:
+        raise click.BadParameter(str(error)) from None
+
+
+where_option = click.option(
+    "--where",
+    "conditions",
+    metavar="CONDITION",
+    multiple=True,
+    callback=_conditions,
+    help=f"Only vehicles that match, as in armed=true, battery_v<10.5 or name=kite*; several must all match. "
+    f"Fields: {', '.join(FIELDS)}.",
+)
+
+
+@contextmanager
+def fleet_session(where: dict[str, Any]) -> Iterator[tuple[zenoh.Session, str]]:
+    """Join the fleet for one command. An error ends the program with one sentence, Ctrl-C silently.
+
+    `where`: the options for the fleet's address, which override the daemon's file.
+    """
+    read: Callable[[Path], FleetAddress] = click.get_current_context().obj
+    try:
+        usual = FleetAddress() if where["config"] is None else read(where["config"])
+        prefix = check_name("--prefix", where["prefix"] or usual.prefix)
+    except ZenohSettingsError as error:
+        raise click.UsageError(str(error)) from error
+    try:
+        with open_session(where["connect"] or usual.connect, where["zenoh_config"] or usual.config_file) as session:
+            yield session, prefix
+    except FleetError as error:
+        fail(str(error))
+    except KeyboardInterrupt:
+        raise SystemExit(INTERRUPTED) from None

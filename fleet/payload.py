@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Payloads received over zenoh, as plain data that is safe to print.
+
+They may come from any program, so nothing here raises: a value that is missing or of another type is None.
+"""
+
+from typing import Any
+
+import cbor2
+import zenoh
+
+from payloads.mission_data import Json
+from payloads.payload import decoded
+from protocols.plain_text import plain_text
+
+
+def decode(sample: zenoh.Sample | zenoh.ReplyError) -> Json | None:
+    """The object in a payload, JSON or CBOR by its encoding."""
+    try:
+        value = decoded(sample.payload.to_bytes(), str(sample.encoding))
+    except (ValueError, RecursionError, cbor2.CBORError):
+        return None
+    return value if isinstance(value, dict) else None
+
+
+def part(data: Json, *path: str) -> Any:
+    """data[path[0]][path[1]]..."""
+    value: Any = data
+    for key in path:
+        value = value.get(key) if isinstance(value, dict) else None
+    return value
+
+
+def text(data: Json, *path: str) -> str | None:
+    value = part(data, *path)
+    return plain_text(value) if isinstance(value, str) else None
+
+
+def number(data: Json, *path: str) -> float | None:
+    value = part(data, *path)
+    return value if isinstance(value, int | float) and not isinstance(value, bool) else None
+
+
+def whole(data: Json, *path: str) -> int | None:
+    value = part(data, *path)
+    return value if isinstance(value, int) and not isinstance(value, bool) else None
+
+
+def flag(data: Json, *path: str) -> bool | None:
+    value = part(data, *path)
+    return value if isinstance(value, bool) else None

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One mission to many vehicles at once, each independent of the others.
+
+`FleetPush` keeps the progress of each vehicle; `push` feeds it from zenoh.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Iterator
+from dataclasses import dataclass
+
+import zenoh
+
+from fleet.payload import decode, part, text, whole
+from fleet.roll_call import replies_of
+from fleet.session import NO_COMMANDS, ask_each
+from fleet.vehicle import BridgeId
+from payloads.keys import STATE, UPLOAD, full
+from payloads.mission_data import ACCEPTED, Json
+
+#: 146 records take 2 s at 115200 baud and half a minute at 9600; a bad line may double that.
+_PUSH_TIMEOUT_S = 120.0
+_STATE_TIMEOUT_S = 2.0
+_LOOK = "`naze-bridge fleet list` shows what it holds"
+_LOST = f"it or the router disconnected before the result was known; {_LOOK} when it is back"
+_TWO = "several bridges use this name, and the mission is for one: give each its own name (zenoh.vehicle)"
+_TOO_LATE = f"no result after {_PUSH_TIMEOUT_S:.0f} s; {_LOOK}"
+
+
+@dataclass(slots=True)
+class PushState:
+    """The progress of one vehicle. `records` of `total` are written; `error`: why it failed."""
+
+    vehicle: str
+    records: int = 0
+    total: int | None = None
+    result: Json | None = None
+    error: str | None = None
+    is_begun: bool = False
+
+    @property
+    def is_done(self) -> bool:
+        return self.result is not None or self.error is not None
+
+
+class FleetPush:
+    """Every vehicle's progress, by name. A name used by several bridges fails at once."""
+
+    def __init__(self, names: Iterable[str], bridges: Iterable[BridgeId]) -> None:
+        uses = Counter(bridge.vehicle for bridge in bridges)
+        self.vehicles = {name: PushState(name, error=_TWO if uses[name] > 1 else None) for name in names}
+
+    @property
+    def waiting(self) -> list[str]:
+        return [name for name, progress in self.vehicles.items() if not progress.is_done]
+
+    @property
+    def running(self) -> list[str]:
+        """The vehicles that were started and are not done."""
+        return [name for name in self.waiting if self.vehicles[name].is_begun]
+
+    @property
+    def failed(self) -> list[PushState]:
+        """The vehicles that are not known to hold the mission."""
+        return [progress for progress in self.vehicles.values() if progress.error is not None]
+
+    def begin(self, names: Iterable[str], *, staged: bool) -> Iterator[str]:
+        """Yield each vehicle whose push begins now; with `staged` no further one after a failure."""
+        for name in names:
+            if staged and (failed := self.failed):
+                for other in set(self.waiting) - set(self.running):
+                    self.vehicles[other].error = f"not started: {failed[0].vehicle} had failed"
+            if not self.vehicles[name].is_done:
+                self.vehicles[name].is_begun = True
+                yield name
+
+    def replied(self, vehicle: str, reply: Json | None) -> None:
+        """Take a reply: progress, or the result of an accepted mission."""
+        progress = self.vehicles[vehicle]
+        if progress.is_done or reply is None:
+            return
+        records, total = whole(reply, "progress"), whole(reply, "of")
+        if records is not None:
+            progress.records, progress.total = records, total
+        result = part(reply, "result")
+        if isinstance(result, dict):
+            if result.get("ack") == ACCEPTED:
+                progress.result = result
+            else:
+                progress.error = text(result, "text") or "this version does not understand its reply"
+
+    def refused(self, vehicle: str, error: Json | None) -> None:
+        """Take an error reply; None: zenoh's own, a timeout."""
+        progress = self.vehicles[vehicle]
+        if not progress.is_done:
+            progress.error = _TOO_LATE if error is None else text(error, "error") or "it gives no reason"
+
+    def ended(self, vehicle: str, *, is_alive: bool) -> None:
+        """Take the end of the replies; `is_alive` without any reply means that the command is switched off."""
+        progress = self.vehicles[vehicle]
+        if not progress.is_done:
+            progress.error = NO_COMMANDS if is_alive and progress.total is None else _LOST
+
+
+def push(
+    session: zenoh.Session,
+    prefix: str,
+    fleet: FleetPush,
+    bridges: Collection[BridgeId],
+    mission: bytes,
+    show: Callable[[FleetPush], None],
+    *,
+    staged: bool = False,
+) -> None:
+    """Send the mission to all and wait until each is done; `show` is called after every change.
+
+    `staged`: a tenth of the vehicles first, then the others; after a failure no other one is started.
+    """
+    show(fleet)
+    for stage in _stages(fleet.waiting, staged=staged):
+        begun = fleet.begin(stage, staged=staged)
+        for name, reply in ask_each(session, prefix, begun, UPLOAD.suffix, _PUSH_TIMEOUT_S, mission):
+            if reply is None:
+                if not fleet.vehicles[name].is_done:
+                    # Neither its token nor a storage's reply proves that it is alive.
+                    own = [bridge for bridge in bridges if bridge.vehicle == name]
+                    state = replies_of(session, full(prefix, name, STATE.suffix), own, _STATE_TIMEOUT_S)
+                    fleet.ended(name, is_alive=bool(state))
+            elif reply.ok is not None:
+                fleet.replied(name, decode(reply.ok))
+            elif reply.err is not None:
+                fleet.refused(name, decode(reply.err))
+            show(fleet)
+
+
+def _stages(names: list[str], *, staged: bool) -> list[list[str]]:
+    first = max(1, len(names) // 10) if staged else 0
+    return [names[:first], names[first:]]

@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`fleet push` and `fleet verify`: one mission for many vehicles."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import click
+import zenoh
+
+from fleet.conditions import Condition, matching
+from fleet.options import (
+    address_options,
+    all_option,
+    fleet_session,
+    json_option,
+    vehicle_option,
+    where_option,
+)
+from fleet.push import FleetPush, push
+from fleet.roll_call import alive, chosen, roll_call
+from fleet.session import FleetError
+from fleet.tables import (
+    dry_run_table,
+    progress_bars,
+    push_data,
+    push_summary,
+    push_table,
+    verify_table,
+)
+from fleet.trial import Trial, try_mission
+from fleet.vehicle import BridgeId
+from protocols.mission_file import MissionFileError, read_mission_file
+from terminal.mission_source import mission_bytes, shown_path
+from terminal.options import PATH
+from terminal.printing import print_json, print_table
+from terminal.sentences import INTERRUPTED, complain
+
+_UNREADABLE = 2
+_GOES_ON = "stopped; transfers in progress continue: `naze-bridge fleet verify` shows their results later"
+
+
+@click.command("push", short_help="Write a mission file to vehicles, and verify it.")
+@click.argument("file", type=PATH)
+@vehicle_option
+@all_option
+@where_option
+@click.option("--staged", is_flag=True, help="A tenth of the vehicles first, then the rest; stop at the first failure.")
+@click.option("--dry-run", is_flag=True, help="Show how each vehicle would store the mission; write nothing.")
+@address_options
+@json_option
+def push_mission(
+    file: Path,
+    names: tuple[str, ...],
+    to_all: bool,
+    conditions: list[Condition],
+    staged: bool,
+    dry_run: bool,
+    as_json: bool,
+    **where: Any,
+) -> None:
+    """Write a mission file to vehicles, each by its own rules, and verify it there.
+
+    A vehicle that fails does not stop the others, unless --staged. Exit code 0: all hold it (--dry-run: all would
+    accept it), 1: one does not, 2: the file is unreadable.
+    """
+    mission, item_count = _read(file, names, to_all)
+    with fleet_session(where) as (session, prefix):
+        bridges, meant = _meant(session, prefix, names, conditions)
+        if dry_run:
+            _show_trials(try_mission(session, prefix, meant, bridges, mission), as_json)
+            return
+        delivery, is_stopped = FleetPush(meant, bridges), False
+        try:
+            with progress_bars(item_count) as show:
+                push(session, prefix, delivery, bridges, mission, show, staged=staged)
+        except KeyboardInterrupt:
+            is_stopped = True
+    if as_json:
+        print_json(push_data(delivery))
+    else:
+        print_table(push_table(delivery))
+        click.echo(push_summary(delivery))
+    if is_stopped:
+        complain(_GOES_ON)
+        raise SystemExit(INTERRUPTED)
+    if delivery.failed:
+        raise SystemExit(1)
+
+
+@click.command("verify", short_help="Compare the missions on vehicles with a file.")
+@click.argument("file", type=PATH)
+@vehicle_option
+@all_option
+@where_option
+@address_options
+@json_option
+def verify_mission(
+    file: Path, names: tuple[str, ...], to_all: bool, conditions: list[Condition], as_json: bool, **where: Any
+) -> None:
+    """Compare the missions on vehicles with a file, by checksum, as stored under each vehicle's rules.
+
+    Exit code 0: all hold it, 1: one does not, 2: the file is unreadable.
+    """
+    mission, _ = _read(file, names, to_all)
+    with fleet_session(where) as (session, prefix):
+        bridges, meant = _meant(session, prefix, names, conditions)
+        trials = try_mission(session, prefix, meant, bridges, mission)
+    held = sum(trial.is_held is True for trial in trials)
+    if as_json:
+        print_json({"vehicles": [asdict(each) | {"is_held": each.is_held} for each in trials]})
+    else:
+        print_table(verify_table(trials))
+        click.echo(f"{held} of {len(trials)} vehicles hold the mission")
+    if held < len(trials):
+        raise SystemExit(1)
+
+
+def _read(file: Path, names: tuple[str, ...], to_all: bool) -> tuple[bytes, int]:
+    if bool(names) == to_all:
+        raise click.UsageError("specify the vehicles: --vehicle NAME, or --all")
+    try:
+        mission = mission_bytes(file)
+        return mission, len(read_mission_file(mission, shown_path(file)))
+    except MissionFileError as error:
+        complain(error)
+        raise SystemExit(_UNREADABLE) from error
+
+
+def _meant(
+    session: zenoh.Session, prefix: str, names: tuple[str, ...], conditions: list[Condition]
+) -> tuple[set[BridgeId], list[str]]:
+    """All bridges, and the names of the vehicles to serve."""
+    bridges = alive(session, prefix)
+    found = chosen(bridges, names, prefix)
+    if not conditions:
+        return bridges, found
+    like = {vehicle.name for vehicle in matching(roll_call(session, prefix), conditions)}
+    if not like & set(found):
+        raise FleetError(f"none of {len(found)} vehicles matches")
+    return bridges, [name for name in found if name in like]
+
+
+def _show_trials(trials: list[Trial], as_json: bool) -> None:
+    failed = sum(trial.error is not None for trial in trials)
+    if as_json:
+        print_json({"vehicles": [asdict(each) for each in trials], "failed": failed})
+    else:
+        print_table(dry_run_table(trials))
+        click.echo(f"{len(trials) - failed} of {len(trials)} vehicles would accept the mission; nothing was written")
+    if failed:
+        raise SystemExit(1)

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The zenoh session of `naze-bridge fleet`: a client of one router, or of one vehicle directly.
+
+Not a peer, because peers that have only a router in common do not see each other.
+"""
+
+import json
+import queue
+import subprocess
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import islice
+from pathlib import Path
+
+import zenoh
+
+from payloads.endpoints import connect_endpoints, endpoint_trouble, in_short, tls_files
+from payloads.keys import full
+from storage.os_error import reason
+
+DEFAULT_ENDPOINT = "tcp/localhost:7447"
+#: How many vehicles get a query at the same time: each such query may carry a mission file.
+AT_ONCE = 50
+#: For peers that do not speak zenoh; zenoh's own default is 10 s.
+_OPEN_TIMEOUT_MS = 3000
+_TRY = "import sys, zenoh; zenoh.init_log_from_env_or('error'); zenoh.open(zenoh.Config.from_json5(sys.stdin.read()))"
+_TIMEOUT_S = 6.0
+#: The log messages of zenoh 1.10 on either side of a rejected handshake.
+_REASONS = {
+    "reason INVALID": "the router accepts no more sessions: raise transport/unicast/max_sessions in its configuration",
+    "reason GENERIC": "the router does not accept this user and password",
+    "in response to an InitSyn": "the router requires a user and a password: give them in --zenoh-config",
+}
+
+
+class FleetError(Exception):
+    """A fleet command failed; one sentence."""
+
+
+def open_session(connect: Sequence[str] = (), config_file: Path | None = None) -> zenoh.Session:
+    """Open the session; FleetError if that fails. Of several endpoints the first to answer is used.
+
+    `config_file`: a zenoh configuration to start from, for TLS, passwords and the like.
+    """
+    config = _config(connect, config_file)
+    endpoints = connect_endpoints(config)
+    if not endpoints:
+        raise FleetError(f"{config_file} names no connect/endpoints: add them, or use --connect")
+    try:
+        return zenoh.open(config)
+    except zenoh.ZError as error:
+        trouble = _refusal(config) or endpoint_trouble(endpoints, tls_files(config))
+        raise FleetError(f"cannot join the fleet: {trouble}") from error
+
+
+#: Why a vehicle that is alive does not reply to a command.
+NO_COMMANDS = "accepts no commands: zenoh.commands is off there, or the router denies access"
+
+
+def ask_each(
+    session: zenoh.Session,
+    prefix: str,
+    names: Iterable[str],
+    suffix: str,
+    timeout_s: float,
+    payload: bytes | None = None,
+) -> Iterator[tuple[str, zenoh.Reply | None]]:
+    """Query vehicles individually, some at a time, and yield the replies of each as they arrive, then None.
+
+    Names are taken one by one, when there is room for another query.
+    """
+    replies: queue.SimpleQueue[tuple[str, zenoh.Reply | None]] = queue.SimpleQueue()
+
+    def start(name: str) -> None:
+        send_query(session, full(prefix, name, suffix), lambda reply: replies.put((name, reply)), timeout_s, payload)
+
+    waiting, running = iter(names), 0
+    while True:
+        for name in islice(waiting, AT_ONCE - running):
+            start(name)
+            running += 1
+        if not running:
+            return
+        name, reply = replies.get()
+        running -= reply is None
+        yield name, reply
+
+
+def send_query(
+    session: zenoh.Session,
+    selector: str,
+    replied: Callable[[zenoh.Reply | None], object],
+    timeout_s: float,
+    payload: bytes | None = None,
+) -> None:
+    """Send a query. `replied` is called on zenoh's threads: with each reply (vehicles may share a name), then None."""
+    session.get(
+        selector,
+        zenoh.handlers.Callback(replied, lambda: replied(None)),
+        target=zenoh.QueryTarget.ALL,
+        consolidation=zenoh.ConsolidationMode.NONE,
+        payload=payload,
+        timeout=timeout_s,
+    )
+
+
+def is_connected(session: zenoh.Session) -> bool:
+    """True if the router (or the one vehicle) is connected at this moment."""
+    return bool(session.info.routers_zid() or session.info.peers_zid())
+
+
+def _config(connect: Sequence[str], config_file: Path | None) -> zenoh.Config:
+    config = zenoh.Config() if config_file is None else _from_file(config_file)
+    endpoints = list(connect)
+    if not endpoints and config_file is None:
+        endpoints = [DEFAULT_ENDPOINT]
+    settings: dict[str, object] = {
+        "mode": "client",
+        "listen/endpoints": [],
+        "scouting/multicast/enabled": False,
+        "transport/unicast/open_timeout": _OPEN_TIMEOUT_MS,
+    }
+    if endpoints:
+        settings["connect/endpoints"] = endpoints
+    try:
+        for key, value in settings.items():
+            config.insert_json5(key, json.dumps(value))
+    except zenoh.ZError as error:
+        raise FleetError(f"zenoh rejects --connect {' --connect '.join(endpoints)}: {in_short(error)}") from error
+    return config
+
+
+def _from_file(path: Path) -> zenoh.Config:
+    try:
+        path.open("rb").close()  # zenoh's own message for a missing file is long
+        return zenoh.Config.from_file(str(path))
+    except OSError as error:
+        raise FleetError(f"{path} cannot be read: {reason(error)}") from error
+    except zenoh.ZError as error:
+        raise FleetError(f"{path} is not a zenoh configuration: {in_short(error)}") from error
+
+
+def _refusal(config: zenoh.Config) -> str | None:
+    """The router's reason, in one line; None if it gave none. Blocks for some seconds."""
+    try:
+        tried = subprocess.run(  # noqa: S603  # this Python, without any user input
+            [sys.executable, "-c", _TRY],
+            input=str(config),
+            capture_output=True,
+            text=True,
+            timeout=_TIMEOUT_S,
+            check=False,
+        )
+    except (subprocess.TimeoutExpired, OSError):
+        return None
+    return next((said for sign, said in _REASONS.items() if sign in tried.stdout), None)

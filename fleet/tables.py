@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The fleet, and the progress and result of a push to it, as tables for a terminal."""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+
+from rich import box
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, TaskID, TextColumn
+from rich.progress import Progress as Bars
+from rich.table import Table
+from rich.text import Text
+
+from bridge.model.finding import without_defaults
+from fleet.payload import text
+from fleet.push import FleetPush, PushState
+from fleet.trial import Trial
+from fleet.vehicle import FleetVehicle
+from payloads.mission_data import Json
+
+_UNKNOWN = "-"
+_ANSWERS = {
+    True: Text("yes", style="green"),
+    False: Text("no", style="bold red"),
+    None: Text("not known", style="yellow"),
+}
+
+
+#: Titles of columns whose cells are aligned to the right, and of those that may take several lines.
+_NUMBERS = ("Battery", "Latitude", "Longitude", "Height", "Heard", "Records")
+_FOLDED = ("Vehicle", "Details")
+
+
+def _table(*titles: str, caption: Text | None = None) -> Table:
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False, caption=caption, caption_justify="left")
+    for title in titles:
+        is_folded, is_number = title in _FOLDED, title in _NUMBERS
+        table.add_column(title, justify="right" if is_number else "left", no_wrap=not is_folded, overflow="fold")
+    return table
+
+
+def watch_table(rows: Sequence[tuple[FleetVehicle, float | None, str]]) -> Table:
+    """One row per bridge, each on one line of 80 columns: vehicle, age of its state, problem."""
+    table = _table("Vehicle", "Armed", "Battery", "Height", "Mission", "Heard", "Problem, or mode")
+    for column in (table.columns[0], table.columns[-1]):
+        column.no_wrap, column.overflow, column.max_width = True, "ellipsis", 20
+    for vehicle, age_s, problem in rows:
+        name, _, armed, battery, _, _, height, mission = _cells(vehicle)
+        age = Text(_UNKNOWN if age_s is None else f"{age_s:.0f} s")
+        last = Text(problem, style="yellow") if problem else Text(vehicle.mode or _UNKNOWN)
+        table.add_row(name, armed, battery, height, mission, age, last)
+    return table
+
+
+def fleet_table(fleet: Sequence[FleetVehicle]) -> Table:
+    caption = Text("".join(f"\n{line}" for line in complaints(fleet)), style="yellow")
+    titles = ("Vehicle", "Speaks", "Armed", "Battery", "Latitude", "Longitude", "Height", "Mission")
+    table = _table(*titles, caption=caption)
+    for vehicle in fleet:
+        table.add_row(*_cells(vehicle))
+    return table
+
+
+def complaints(fleet: Iterable[FleetVehicle]) -> list[str]:
+    """The problems of the fleet, a line each."""
+    lines = []
+    for vehicle in fleet:
+        if vehicle.bridges > 1:
+            lines.append(f"{vehicle.name}: {vehicle.bridges} bridges use this name; give each its own (zenoh.vehicle)")
+        if not vehicle.answers:
+            lines.append(f"{vehicle.name}: alive, but sends no state")
+    return list(dict.fromkeys(lines))
+
+
+def _cells(vehicle: FleetVehicle) -> list[Text]:
+    armed = {True: Text("ARMED", style="bold red"), False: Text("no"), None: Text(_UNKNOWN)}[vehicle.armed]
+    mission = _UNKNOWN
+    if vehicle.mission_count is not None:
+        mission = f"{vehicle.mission_count:3} {vehicle.mission_checksum}" if vehicle.mission_count else "none"
+    return [
+        Text(vehicle.name),
+        Text(vehicle.protocol or _UNKNOWN),
+        armed,
+        _number(vehicle.battery_v, ".1f", " V"),
+        _number(vehicle.lat_deg, ".5f"),
+        _number(vehicle.lon_deg, ".5f"),
+        _number(vehicle.height_m, ".0f", " m"),
+        Text(mission),
+    ]
+
+
+def _number(value: float | None, form: str, unit: str = "") -> Text:
+    return Text(_UNKNOWN if value is None else f"{value:{form}}{unit}")
+
+
+@contextmanager
+def progress_bars(item_count: int) -> Iterator[Callable[[FleetPush], None]]:
+    """Show the count of finished vehicles and a progress bar per transfer on standard error, if that is a terminal."""
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn())
+    console = Console(stderr=True)
+    with Bars(*columns, console=console, transient=True, disable=not console.is_terminal) as bars:
+        # First, because only the last lines are cut off if there are more than the terminal has.
+        whole_fleet = bars.add_task("")
+        tasks: dict[str, TaskID] = {}
+
+        def show(now: FleetPush) -> None:
+            count, failed = len(now.vehicles), len(now.failed)
+            title = f"Vehicles, {failed} failed" if failed else "Vehicles"
+            bars.update(whole_fleet, description=title, completed=count - len(now.waiting), total=count)
+            for name in tasks.keys() - now.running:
+                bars.remove_task(tasks.pop(name))
+            for name in now.running:
+                if name not in tasks:
+                    tasks[name] = bars.add_task(name)
+                progress = now.vehicles[name]
+                bars.update(tasks[name], completed=progress.records, total=progress.total or item_count)
+
+        yield show
+
+
+def push_table(fleet: FleetPush) -> Table:
+    table = _table("Vehicle", "Push", "Details")
+    for progress in fleet.vehicles.values():
+        table.add_row(Text(progress.vehicle), _result(progress), Text(_words(progress)))
+    return table
+
+
+def _result(progress: PushState) -> Text:
+    if progress.error is not None:
+        return Text("failed", style="bold red")
+    if progress.is_done:
+        return Text("verified", style="green")
+    return Text("in progress" if progress.is_begun else "not started", style="yellow")
+
+
+def dry_run_table(trials: Sequence[Trial]) -> Table:
+    """One row per vehicle, and below them the corrections, once for all vehicles that would hold the same records."""
+    corrections = {
+        trial.checksum: [finding.text() for finding in without_defaults(trial.findings)]
+        for trial in trials
+        if trial.is_taken
+    }
+    lines = [line for checksum, said in corrections.items() if said for line in ("", f"Stored as {checksum}:", *said)]
+    return _trial_table(trials, "Accepts it", lambda trial: (trial.is_taken, ""), "\n".join(lines))
+
+
+def verify_table(trials: Sequence[Trial]) -> Table:
+    """One row per vehicle: whether it holds the mission, and if not, what it holds instead."""
+    return _trial_table(trials, "Holds it", lambda trial: (trial.is_held, "" if trial.is_held else _held(trial)))
+
+
+def _held(trial: Trial) -> str:
+    if trial.held_count is None:
+        return "its mission is not known"
+    return f"holds {trial.held_count} records, {trial.held}" if trial.held_count else "holds no mission"
+
+
+def _trial_table(
+    trials: Sequence[Trial], question: str, answer: Callable[[Trial], tuple[bool | None, str]], caption: str = ""
+) -> Table:
+    table = _table("Vehicle", "Records", "Checksum", question, "Details", caption=Text(caption))
+    for trial in trials:
+        known, details = answer(trial)
+        count = "" if trial.count is None else str(trial.count)
+        said = Text(trial.error or details)
+        table.add_row(Text(trial.vehicle), count, trial.checksum or "", _ANSWERS[known], said)
+    return table
+
+
+def push_data(fleet: FleetPush) -> Json:
+    return {
+        "vehicles": [
+            {"vehicle": each.vehicle, "ok": each.result is not None, "error": each.error, "result": each.result}
+            for each in fleet.vehicles.values()
+        ],
+        "failed": len(fleet.failed),
+    }
+
+
+def push_summary(fleet: FleetPush) -> str:
+    count, failed = len(fleet.vehicles), len(fleet.failed)
+    held = sum(each.result is not None for each in fleet.vehicles.values())
+    return f"{held} of {count} vehicles hold the mission, verified" + (f"; {failed} failed" if failed else "")
+
+
+def _words(progress: PushState) -> str:
+    if progress.error is not None:
+        return progress.error
+    if progress.result is None:
+        return f"{progress.records} of {progress.total} records" if progress.total else ""
+    findings = progress.result.get("findings")
+    count = len(findings) if isinstance(findings, list) else 0
+    corrections = f"; {count} correction{'s' if count > 1 else ''}" if count else ""
+    return (text(progress.result, "text") or "") + corrections

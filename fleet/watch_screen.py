@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The output of `fleet watch`: a screen for a person, lines for a program."""
+
+import os
+import select
+import sys
+import termios
+import time
+import tty
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+
+import zenoh
+from rich.console import Console, Group
+from rich.live import Live
+from rich.text import Text
+
+from fleet.conditions import Condition
+from fleet.session import is_connected
+from fleet.tables import watch_table
+from fleet.vehicle import FleetVehicle, in_order
+from fleet.watch import Watch
+from terminal.printing import print_json
+
+_REFRESH_S = 0.5
+#: The slowest profile sends the state every 30 s; one may be lost.
+SILENT_S = 70.0
+#: Lines without a vehicle: counts, column titles and rule, the last line, and an empty one.
+_OTHER_LINES = 5
+_LINKED = ("MSP", "MAVLink")
+#: Rows that a key scrolls; pages are scrolled by `page` rows.
+_ROWS = {b"j": 1, b"\x1b[B": 1, b"k": -1, b"\x1b[A": -1}
+_PAGES = {b" ": 1, b"\x1b[6~": 1, b"b": -1, b"\x1b[5~": -1}
+
+
+@dataclass(frozen=True, slots=True)
+class ScreenRow:
+    """A vehicle on the screen; `age_s`: of its newest state, None if there is none."""
+
+    vehicle: FleetVehicle
+    age_s: float | None
+
+    @property
+    def problem(self) -> str:
+        """The reason why it needs attention; empty if it does not."""
+        if self.vehicle.bridges > 1:
+            return f"{self.vehicle.bridges} bridges use this name"
+        if not self.vehicle.answers:
+            return "sends no state"
+        if self.age_s is not None and self.age_s > SILENT_S:
+            return "silent"
+        return "" if self.vehicle.protocol in _LINKED else "no flight controller"
+
+
+def show_screen(seen: Watch, session: zenoh.Session, conditions: Sequence[Condition]) -> None:
+    """Draw the fleet until KeyboardInterrupt."""
+    console = Console(highlight=False)
+    top = 0
+    with _scrolling(), Live(console=console, auto_refresh=False, vertical_overflow="crop") as live:
+        while True:
+            page = max(console.height - _OTHER_LINES, 1)
+            rows = _rows(seen, conditions)
+            top = max(0, min(top, len(rows) - page))
+            seen.follow([row.vehicle.name for row in rows[top : top + page]])
+            live.update(screen(rows, top, page, is_connected=is_connected(session)), refresh=True)
+            top += _wait_for_scroll(_REFRESH_S, page)
+
+
+def screen(rows: Sequence[ScreenRow], top: int, page: int, *, is_connected: bool) -> Group | Text:
+    """The screen: counts, then armed vehicles, then those with problems, then the others."""
+    if not is_connected:
+        return Text("The router is gone; waiting for it. Ctrl-C ends.", style="red")
+    if not rows:
+        return Text("No such vehicle is alive. Ctrl-C ends.")
+    armed = sum(row.vehicle.armed is True for row in rows)
+    ill = sum(bool(row.problem) for row in rows)
+    head = f"{len(rows)} vehicles, {armed} armed, {ill} with problems"
+    shown = rows[top : top + page]
+    last = "Ctrl-C ends."
+    if len(shown) < len(rows):
+        last = f"{top + 1} to {top + len(shown)} of {len(rows)}; arrow keys and space scroll. {last}"
+    table = watch_table([(row.vehicle, row.age_s, row.problem) for row in shown])
+    return Group(Text(head, style="bold"), table, Text(last, style="dim"))
+
+
+def print_changes(seen: Watch, conditions: Sequence[Condition]) -> None:
+    """Print a line for each vehicle that appears, changes or disappears, until KeyboardInterrupt."""
+    seen.follow(["*"])
+    known: dict[str, FleetVehicle] = {}
+    while True:
+        now = {row.vehicle.session_id: row.vehicle for row in _rows(seen, conditions)}
+        for session_id, vehicle in now.items():
+            if known.get(session_id) != vehicle:
+                print_json({"time_s": round(time.time(), 3), "alive": True, **asdict(vehicle)})
+        for session_id in known.keys() - now.keys():
+            print_json({"time_s": round(time.time(), 3), "alive": False, "name": known[session_id].name})
+        known = now
+        time.sleep(_REFRESH_S)
+
+
+def _rows(seen: Watch, conditions: Sequence[Condition]) -> list[ScreenRow]:
+    fleet, ages_s = seen.look()
+    rows = [ScreenRow(vehicle, age_s) for vehicle, age_s in zip(fleet, ages_s, strict=True)]
+    rows = [row for row in rows if all(condition(row.vehicle) for condition in conditions)]
+    return sorted(rows, key=lambda row: (row.vehicle.armed is not True, not row.problem, in_order(row.vehicle.name)))
+
+
+@contextmanager
+def _scrolling() -> Iterator[None]:
+    """Deliver keys as they are pressed, if standard input is a terminal."""
+    if not sys.stdin.isatty():
+        yield
+        return
+    before = termios.tcgetattr(sys.stdin)
+    try:
+        tty.setcbreak(sys.stdin)
+        yield
+    finally:
+        termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
+
+
+def _wait_for_scroll(timeout_s: float, page: int) -> int:
+    """Wait for a key; the rows to scroll, 0 for none."""
+    if not sys.stdin.isatty():
+        select.select([], [], [], timeout_s)
+        return 0
+    ready, _, _ = select.select([sys.stdin], [], [], timeout_s)
+    key = os.read(sys.stdin.fileno(), 16) if ready else b""
+    return _ROWS.get(key, 0) + _PAGES.get(key, 0) * page

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Two mission lists side by side: as sent and as stored, or two that were sent."""
+
+import difflib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import zip_longest
+
+from bridge.model.finding import DROPPED, REJECTED, Finding, value_label, without_defaults
+from payloads.mission_data import Json, mission_findings, mission_items
+from protocols.mavlink.command import command_name
+from protocols.mission_item import MissionItem
+
+#: No flight controller holds more: a longer list was rejected.
+MAX_ROWS = 500
+
+_VALUES = ("command", "frame", "p1", "p2", "p3", "p4", "lat_e7", "lon_e7", "alt_m")
+
+
+@dataclass(frozen=True, slots=True)
+class ItemRow:
+    """An item on both sides, or on one. `kind`: same, changed, dropped, rejected, added or removed.
+
+    `changes`: why each value changed, by its name; without a reason between two lists that were sent.
+    """
+
+    kind: str
+    left: MissionItem | None
+    right: MissionItem | None
+    changes: Mapping[str, str]
+
+    def to_json(self) -> Json:
+        left, right = (None if item is None else shown(item) for item in (self.left, self.right))
+        return {"kind": self.kind, "left": left, "right": right, "changes": self.changes}
+
+
+def stored_mission(mission: Json) -> Json:
+    """A mission of the store (DaemonApi.show_mission) with rows that compare items as sent and as stored."""
+    received = mission["received"]
+    findings = mission_findings(received["findings"])
+    sent, stored = mission_items(received["items"]), mission_items(received["stored_items"])
+    return {
+        "number": mission["number"],
+        "received_at": received["received_at"],
+        "source": received["source"],
+        "verdict": received["verdict"],
+        "ack": received["ack"],
+        "outcome": mission["outcome"],
+        "detail": mission["detail"],
+        "checksum": received["checksum"],
+        "findings": [finding.text() for finding in without_defaults(findings)[:MAX_ROWS]],
+        "rows": [row.to_json() for row in sent_and_stored(sent[:MAX_ROWS], stored, findings, received["sent_seqs"])],
+        "rows_left_out": max(len(sent) - MAX_ROWS, 0),
+        "items": [shown(item) for item in (stored or sent)[:MAX_ROWS]],
+    }
+
+
+def checked_mission(items: Sequence[MissionItem], verdict: Json) -> Json:
+    """The verdict on a list, with rows like those of `stored_mission`. verdict: of DaemonApi.check."""
+    findings = mission_findings(verdict["findings"])
+    stored = mission_items(verdict["items"])
+    return {
+        "verdict": verdict["result"],
+        "findings": [finding.text() for finding in without_defaults(findings)],
+        "rows": [row.to_json() for row in sent_and_stored(items, stored, findings, verdict["sent_seqs"])],
+        "rows_left_out": 0,
+        "items": [shown(item) for item in (stored or items)],
+    }
+
+
+def sent_and_stored(
+    sent: Sequence[MissionItem],
+    stored: Sequence[MissionItem],
+    findings: Sequence[Finding],
+    sent_seqs: Sequence[int | None] = (),
+) -> list[ItemRow]:
+    """One row per item sent, and one per inserted item. `stored`: empty for a list that was rejected or cleared.
+
+    `sent_seqs`: the number as sent of each stored item. Missions of older releases lack them: taken to be in order.
+    A row with no change but filled-in defaults is "same"; its `changes` still hold their reasons.
+    """
+    dropped = {finding.seq: finding.why for finding in findings if finding.becomes == DROPPED}
+    rejected = {finding.seq: finding.why for finding in findings if finding.becomes == REJECTED}
+    reasons = {(finding.seq, finding.field): finding.why for finding in findings}
+    changed = {finding.seq for finding in without_defaults(findings)}
+    numbers = sent_seqs or [seq for seq in range(len(sent)) if seq not in dropped]
+    held_of: dict[int, MissionItem] = {}
+    inserted_before: dict[int | None, MissionItem] = {}
+    for held, number, following in zip(stored, numbers, [*numbers[1:], None], strict=False):
+        if number is None:
+            inserted_before[following] = held
+        else:
+            held_of[number] = held
+    rows = []
+    for seq, item in enumerate(sent):  # findings use the place in the list, not the item's seq
+        if inserted := inserted_before.get(seq):
+            rows.append(ItemRow("added", None, inserted, {}))
+        if seq in dropped:
+            rows.append(ItemRow("dropped", item, None, {"command": dropped[seq]}))
+        elif seq in rejected:
+            rows.append(ItemRow("rejected", item, None, {"command": rejected[seq]}))
+        elif seq in held_of:
+            changes = {name: why for name in _VALUES if (why := reasons.get((seq, name)))}
+            rows.append(ItemRow("changed" if seq in changed else "same", item, held_of[seq], changes))
+        else:
+            rows.append(ItemRow("same", item, None, {}))
+    return rows
+
+
+def difference(first: Sequence[MissionItem], second: Sequence[MissionItem]) -> list[ItemRow]:
+    """One row per item of either list; an item in only one of them has its own row."""
+    rows = []
+    for before, after in _pairs(first[:MAX_ROWS], second[:MAX_ROWS]):
+        if before is None or after is None:
+            rows.append(ItemRow("added" if before is None else "removed", before, after, {}))
+        else:
+            was, becomes = _key(before), _key(after)
+            changes = {name: "" for name, old, new in zip(_VALUES, was, becomes, strict=True) if old != new}
+            rows.append(ItemRow("changed" if changes else "same", before, after, changes))
+    return rows
+
+
+def shown(item: MissionItem) -> Json:
+    """An item for the page: numbers, None for values not given, the command's name and those of p1..p4."""
+    params = [value_label(item.command, name) for name in ("p1", "p2", "p3", "p4")]
+    values = dict(zip(_VALUES, _key(item), strict=True))
+    return {"seq": item.seq, "name": command_name(item.command), "params": params, **values}
+
+
+def _pairs(
+    first: Sequence[MissionItem], second: Sequence[MissionItem]
+) -> Iterator[tuple[MissionItem | None, MissionItem | None]]:
+    matcher = difflib.SequenceMatcher(None, list(map(_key, first)), list(map(_key, second)), autojunk=False)
+    for _, at, to, other_at, other_to in matcher.get_opcodes():
+        yield from zip_longest(first[at:to], second[other_at:other_to])
+
+
+def _key(item: MissionItem) -> tuple[float | None, ...]:
+    """An item's values without its number, comparable: values not given are equal."""
+    values = (getattr(item, name) for name in _VALUES)
+    return tuple(None if value is None or value != value else value for value in values)

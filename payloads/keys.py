@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every key of a vehicle, in one table; docs/zenoh.md has the same one.
+
+A key is `<prefix>/<vehicle>/<suffix>`: the prefix comes first, so that `fleet/*/v1/state` selects a whole fleet. The
+version is part of each suffix, so that a subscriber of version 1 never gets a payload that it would misread. Verbatim
+chunks (@) match no wildcard: a wildcard never sends a command, and a recorder of `fleet/**` does not become a MAVLink
+ground station.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+
+from bridge.model.vehicle_groups import Group
+
+#: The version of keys and payloads. A new field does not change it; a change that would mislead a reader raises it.
+VERSION = 1
+_V = f"v{VERSION}"
+
+
+class PayloadEncoding(Enum):
+    """The encoding of payloads."""
+
+    JSON = "json"
+    CBOR = "cbor"
+
+
+class SampleDelivery(Enum):
+    """The quality of service of a sample."""
+
+    DROP = "dropped rather than delayed"
+    RELIABLE = "reliable"
+    REPLY = "a reply to a query"
+
+
+class QueryKind(Enum):
+    """Queries of a kind share a limit. Guests send all but commands: a flood of theirs must not refuse a command."""
+
+    STATE = "answered from memory"
+    PAST = "answered from the disk"
+    COMMAND = "a command"
+
+
+@dataclass(frozen=True, slots=True)
+class ZenohKey:
+    """One key. `schema`: file name below schemas/, without its suffix; None: the payload is raw MAVLink.
+
+    `kept`: the number of samples kept for subscribers that lost some; 0: none. `encoding`: None for the one in the
+    settings.
+    """
+
+    suffix: str
+    schema: str | None
+    delivery: SampleDelivery
+    kept: int = 0
+    encoding: PayloadEncoding | None = None
+
+    @property
+    def is_published(self) -> bool:
+        return self.delivery is not SampleDelivery.REPLY and self is not MAVLINK_IN
+
+    @property
+    def query_kind(self) -> QueryKind:
+        if self in COMMAND_KEYS:
+            return QueryKind.COMMAND
+        return QueryKind.PAST if self.delivery is SampleDelivery.REPLY else QueryKind.STATE
+
+
+TELEMETRY = {group: ZenohKey(f"{_V}/telemetry/{group.value}", group.value, SampleDelivery.DROP) for group in Group}
+STATE = ZenohKey(f"{_V}/state", "state", SampleDelivery.DROP, kept=1)
+OVERVIEW = ZenohKey(f"{_V}/overview", "overview", SampleDelivery.DROP, encoding=PayloadEncoding.CBOR)
+EVENT = ZenohKey(f"{_V}/event", "event", SampleDelivery.RELIABLE, kept=256)
+HISTORY = ZenohKey(f"{_V}/history", "history", SampleDelivery.REPLY)
+MISSION_CURRENT = ZenohKey(f"{_V}/mission/current", "mission_current", SampleDelivery.RELIABLE, kept=1)
+MISSION_LIST = ZenohKey(f"{_V}/mission/list", "mission_list", SampleDelivery.REPLY)
+MISSION_REPORT = ZenohKey(f"{_V}/mission/report", "mission_report", SampleDelivery.RELIABLE, kept=16)
+MAVLINK_OUT = ZenohKey(f"@mavlink/{_V}/out", None, SampleDelivery.DROP)
+MAVLINK_IN = ZenohKey(f"@mavlink/{_V}/in", None, SampleDelivery.RELIABLE)
+
+
+COMMANDS = f"@cmd/{_V}"
+
+
+def _command(name: str) -> ZenohKey:
+    return ZenohKey(f"{COMMANDS}/{name}", "command_reply", SampleDelivery.REPLY, encoding=PayloadEncoding.JSON)
+
+
+UPLOAD = _command("mission/upload")
+CHECK = _command("mission/check")
+CLEAR = _command("mission/clear")
+RESTORE = _command("mission/restore")
+STATUS = _command("status")
+RATES = _command("rates")
+COMMAND_KEYS = (UPLOAD, CHECK, CLEAR, RESTORE, STATUS, RATES)
+
+KEYS = (
+    *TELEMETRY.values(),
+    STATE,
+    OVERVIEW,
+    EVENT,
+    HISTORY,
+    MISSION_CURRENT,
+    MISSION_LIST,
+    MISSION_REPORT,
+    MAVLINK_OUT,
+    MAVLINK_IN,
+    *COMMAND_KEYS,
+)
+
+#: A liveliness token: <prefix>/<vehicle>/v1/alive/<session id>.
+ALIVE = f"{_V}/alive"
+
+
+def full(prefix: str, vehicle: str, suffix: str) -> str:
+    return f"{prefix}/{vehicle}/{suffix}"
+
+
+def vehicle_in(key: object) -> str:
+    return str(key).split("/")[1]

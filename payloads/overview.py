@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A vehicle in 60 bytes, for programs that watch thousands: whole numbers only, always in CBOR."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from payloads.mission_data import Json
+
+#: Older values are left out: there are no ages to judge them by.
+_OLDEST_S = 10.0
+_GREATEST = 0xFFFFFFFF
+
+
+@dataclass(frozen=True, slots=True)
+class Overview:
+    """Made from the state. None: not known, or not heard for 10 s."""
+
+    link: Annotated[str, "as in link's state"]
+    armed: bool | None
+    mode: str | None
+    battery_cv: Annotated[int | None, "V * 100"]
+    lat_e7: Annotated[int | None, "degrees * 1e7"]
+    lon_e7: Annotated[int | None, "degrees * 1e7"]
+    height_m: Annotated[int | None, "above the launch point"]
+    mission_count: Annotated[int | None, "records, home included"]
+    mission_checksum: Annotated[int | None, "CRC-32 over the records"]
+
+    @property
+    def marks(self) -> object:
+        """The values whose change is sent at once."""
+        return self.link, self.armed, self.mode, self.mission_count, self.mission_checksum
+
+
+def overview_of(state: Json) -> Overview:
+    status, battery, position = (_fresh(state[group]) for group in ("status", "battery", "position"))
+    mission = state["mission"] or {}
+    checksum = mission.get("checksum")
+    return Overview(
+        link=state["link"]["state"],
+        armed=status.get("armed"),
+        mode=status.get("mode"),
+        battery_cv=_whole(battery.get("voltage_v"), 100),
+        lat_e7=_whole(position.get("lat_deg"), 1e7),
+        lon_e7=_whole(position.get("lon_deg"), 1e7),
+        height_m=_whole(position.get("height_m"), 1),
+        mission_count=mission.get("count"),
+        mission_checksum=None if checksum is None else int(checksum, 16),
+    )
+
+
+def state_of(overview: Json) -> Json:
+    """The parts of a state that an overview has; None where it has none. It may be foreign."""
+
+    def scaled(name: str, scale: float) -> float | None:
+        value = overview.get(name)
+        return value / scale if isinstance(value, int) and abs(value) <= _GREATEST else None
+
+    checksum = overview.get("mission_checksum")
+    return {
+        "time_s": overview.get("time_s"),
+        "link": {"state": overview.get("link")},
+        "status": {name: overview.get(name) for name in ("armed", "mode")},
+        "battery": {"voltage_v": scaled("battery_cv", 100)},
+        "position": {
+            "lat_deg": scaled("lat_e7", 1e7),
+            "lon_deg": scaled("lon_e7", 1e7),
+            "height_m": scaled("height_m", 1),
+        },
+        "mission": {
+            "count": overview.get("mission_count"),
+            "checksum": f"{checksum:08x}" if isinstance(checksum, int) and 0 <= checksum <= _GREATEST else None,
+        },
+    }
+
+
+def _fresh(group: Json) -> Json:
+    return group if group["age_s"] is not None and group["age_s"] <= _OLDEST_S else {}
+
+
+def _whole(value: float | None, scale: float) -> int | None:
+    return None if value is None else round(value * scale)

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Comparison of lists: no row is missing, and every difference has a reason."""
+
+import json
+import math
+from dataclasses import asdict, replace
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bridge.controllers.harakiri.check import HarakiriRules
+from bridge.missions.list_check import check_list
+from bridge.model.verdict import Result
+from payloads.comparison import MAX_ROWS, checked_mission, difference, sent_and_stored, stored_mission
+from payloads.mission_data import to_json, verdict_data
+from protocols.mission_item import MissionItem
+
+RULES = HarakiriRules(capacity=146, wp_radius_cm=200)
+numbers = st.one_of(st.sampled_from([0.0, 1.0, 0.5, 2.0, 15.0, 300.0, math.nan, math.inf]), st.floats(width=32))
+places = st.sampled_from([453838000, 84733000, 0, None])
+items = st.builds(
+    MissionItem,
+    seq=st.integers(0, 65535),
+    command=st.sampled_from([16, 16, 16, 18, 19, 20, 80, 197, 178]),
+    frame=st.sampled_from([0, 3, 6, 10]),
+    p1=numbers,
+    p2=numbers,
+    p3=numbers,
+    p4=numbers,
+    lat_e7=places,
+    lon_e7=places,
+    alt_m=st.one_of(st.sampled_from([0.0, 12.0, 18.5]), numbers),
+)
+HOME = MissionItem(0, 16, 0, 0.0, 2.0, 0.0, 0.0, 453838000, 84733000, 131.0)
+lists = st.lists(items, min_size=1, max_size=20).map(lambda each: [HOME, *each])
+#: Without the frame, which is a change only where the height is used.
+COMPARED = ("p1", "p2", "p3", "p4", "lat_e7", "lon_e7", "alt_m")
+
+
+@settings(deadline=None)
+@given(lists)
+def test_every_difference_has_a_reason(sent: list[MissionItem]) -> None:
+    verdict = check_list(sent, RULES)
+    rows = [row.to_json() for row in sent_and_stored(sent, verdict.items, verdict.findings, verdict.sent_seqs)]
+    assert [row["left"]["command"] for row in rows] == [item.command for item in sent]
+    if verdict.result is not Result.ACCEPTED:
+        assert all(row["right"] is None for row in rows)
+        return
+    stored = [row["right"] for row in rows if row["right"]]
+    assert [item["seq"] for item in stored] == list(range(len(verdict.items)))
+    for row in rows:
+        assert (row["right"] is None) == (row["kind"] == "dropped")
+        assert row["changes"] or row["kind"] == "same"
+        assert all(row["changes"].values())
+        for name in COMPARED if row["right"] else ():
+            same = (row["left"][name] or 0) == (row["right"][name] or 0)
+            assert same == (name not in row["changes"]), (name, row)
+
+
+@settings(deadline=None)
+@given(lists, lists)
+def test_a_difference_has_both_lists_in_order(first: list[MissionItem], second: list[MissionItem]) -> None:
+    rows = [row.to_json() for row in difference(first, second)]
+    for side, whole in (("left", first), ("right", second)):
+        assert [row[side]["command"] for row in rows if row[side]] == [item.command for item in whole]
+    to_json(rows)
+    assert {row.kind for row in difference(first, first)} == {"same"}
+
+
+def test_filled_in_defaults_are_no_changes_but_keep_their_reasons() -> None:
+    sent = [
+        replace(HOME, p2=0.0),
+        replace(HOME, seq=1, frame=3, p2=0.0, alt_m=20.0),
+        replace(HOME, seq=2, frame=3, p1=3.0),
+    ]
+    shown = checked_mission(sent, verdict_data(check_list(sent, RULES)))
+    assert [row["kind"] for row in shown["rows"]] == ["same", "same", "changed"]
+    assert [list(row["changes"]) for row in shown["rows"]] == [["p2"], ["p2"], ["p1"]]
+    assert len(shown["findings"]) == 1
+
+
+def test_a_finding_reads_as_in_the_messages_tab() -> None:
+    """Also after it was stored as JSON."""
+    sent = [HOME, replace(HOME, seq=1, frame=3, alt_m=0.0), replace(HOME, seq=2, frame=3)]
+    verdict = check_list(sent, RULES)
+    stored = json.loads(to_json(verdict_data(verdict)))
+    assert checked_mission(sent, stored)["findings"] == [finding.text() for finding in verdict.findings]
+    assert checked_mission(sent, stored)["findings"] == ["WP 1: Alt raised from 0 to 2 m (0 not allowed)"]
+
+
+def test_an_extra_item_is_one_extra_row() -> None:
+    route = [replace(HOME, seq=seq, lat_e7=453838000 + seq) for seq in range(9)]
+    kinds = [row.kind for row in difference(route, route[:4] + route[5:])]
+    assert kinds == ["same"] * 4 + ["removed"] + ["same"] * 4
+    changed = [*route[:8], replace(route[8], p2=7.0)]
+    assert difference(route, changed)[8].changes == {"p2": ""}
+
+
+def test_a_list_of_thousands_is_truncated_with_a_note() -> None:
+    """`push` accepts a megabyte of items; the refused list is stored."""
+    long = [asdict(replace(HOME, seq=seq)) for seq in range(5000)]
+    received = {
+        "received_at": 0.0, "source": "", "verdict": "REJECTED", "ack": "", "checksum": "",
+        "items": long, "stored_items": [], "findings": [], "sent_seqs": [],
+    }  # fmt: skip
+    shown = stored_mission({"number": 1, "received": received, "outcome": "REJECTED", "detail": ""})
+    assert (len(shown["rows"]), shown["rows_left_out"]) == (MAX_ROWS, 5000 - MAX_ROWS)
