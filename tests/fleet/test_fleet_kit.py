@@ -13,7 +13,7 @@ from service.settings import Settings
 from service.settings.addresses import parse_fc
 from service.settings.zenoh import ZenohSettings
 from service.web.metrics import Metrics
-from tests.support.programs import until
+from tests.support.programs import until_async
 from tests.support.zenoh_router import EXAMPLES
 
 _NAME = re.compile(r"\b(?:naze_bridge|process)_[a-z_]+")
@@ -39,6 +39,6 @@ async def test_every_metric_of_the_examples_exists(tmp_path: Path) -> None:
         assert all(sample.labels["vehicle"] == "kite" for family in families for sample in family.samples)
         return {sample.name for family in families for sample in family.samples}
 
-    await asyncio.to_thread(until, lambda: wanted() - _LATER <= names(), "all metrics of the dashboards")
+    await until_async(lambda: wanted() - _LATER <= names(), "all metrics of the dashboards")
     running.cancel()
     await asyncio.gather(running, return_exceptions=True)
