@@ -30,7 +30,7 @@ from bridge.bridge import Bridge
 from bridge.config import BridgeConfig
 from bridge.gcs.station import Peer
 from bridge.line.msp_link import byte_time_s
-from bridge.model.events import Level
+from bridge.model.events import BridgeEvent, FcFound
 from bridge.vehicle.telemetry_table import TELEMETRY
 from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import messages
@@ -167,16 +167,12 @@ def _p99(values: list[float]) -> float:
 
 def _noise() -> list[Figure]:
     chance = random.Random(_SEED)
-    events: list[str] = []
-
-    def log_event(_level: Level, event: str, /, **_facts: object) -> None:
-        events.append(event)
-
+    events: list[BridgeEvent] = []
     now = 0.0
-    bridge = Bridge(BridgeConfig((_BAUD,)), log_event, now)
+    bridge = Bridge(BridgeConfig((_BAUD,)), events.append, now)
     bridge.session.opened(now)
     ground, controller = Peer("udp", "noise"), Controller()
-    while "fc.found" not in events:
+    while not any(isinstance(event, FcFound) for event in events):
         now += 0.01
         bridge.tick(now)
         for data in bridge.take_fc_output():
@@ -202,7 +198,7 @@ def _noise() -> list[Figure]:
     growth_kb = (max(memory[-tenth:]) - max(memory[:tenth])) / 1000
     size = f"{_NOISE_BYTES / 1e6:.0f} MB of noise"
     return [
-        Figure(f"protocols found in {size}", events.count("fc.found"), "", None, 0),
+        Figure(f"protocols found in {size}", sum(isinstance(event, FcFound) for event in events), "", None, 0),
         Figure(f"attitudes made of {size}", false_frames, "", None, 0),
         Figure(f"memory gained over {size}", growth_kb, "kB", None, 64),
     ]

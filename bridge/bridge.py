@@ -25,7 +25,7 @@ from bridge.gcs.routes import Routes
 from bridge.gcs.station import Peer, Severity
 from bridge.line.runner import Runner
 from bridge.missions.mission_service import NO_LINK, EndingListener, MissionService, MissionTransfer
-from bridge.model.events import EventLog
+from bridge.model.events import Armed, Disarmed, Emit
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.vehicle import FlightState, Health, MissionLeg, Readiness
 from bridge.sharing.msp_sharing import MspSharing
@@ -51,24 +51,24 @@ class Bridge:
     def __init__(
         self,
         config: BridgeConfig,
-        log_event: EventLog,
+        emit: Emit,
         now: float,
         on_frames: FrameListener | None = None,
         on_ending: EndingListener = lambda _mission, _delivery: None,
     ) -> None:
         self._config = config
-        self._log_event = log_event
+        self._emit = emit
         self._was_armed = False
         #: The armed craft, for the BridgeConfig of a restarted bridge; it changes rarely. None: it is not armed.
         self.flight = config.flight
         self._announcer = LinkAnnouncer(now, was_found=self.flight is not None)
         incidents = count(1)
 
-        self.guard = Guard(config.links, log_event, passes_everything=config.passes_everything)
+        self.guard = Guard(config.links, emit, passes_everything=config.passes_everything)
         self.ground = Ground(
             config.sysid,
             config.compid,
-            log_event,
+            emit,
             self._newcomer,
             on_frames,
             self.guard.standing,
@@ -79,7 +79,7 @@ class Bridge:
             config.speeds,
             config.profiles,
             self.runner,
-            log_event,
+            emit,
             incidents,
             self._controller_changed,
             self._mavlink_received,
@@ -87,17 +87,17 @@ class Bridge:
             config.flight,
         )
         self.missions = MissionService(self.session.vehicle, self.runner, on_ending)
-        self.local = LocalMissions(self.missions, self.ground, log_event, incidents)
-        self.sharing = MspSharing(self.session, self.runner, self.missions, log_event, self._say_refused)
+        self.local = LocalMissions(self.missions, self.ground, emit, incidents)
+        self.sharing = MspSharing(self.session, self.runner, self.missions, emit, self._say_refused)
         self._vehicle = OwnVehicle(self.session, self.missions, self.ground, self._announcer, config.unix_time_s, now)
         #: The seal of the flight controller's settings.
         self.settings = SettingsSeal(
-            self.session, self.missions, self.ground, log_event, config.seals, lambda: self.transfer is not None
+            self.session, self.missions, self.ground, emit, config.seals, lambda: self.transfer is not None
         )
         self.sharing.on_change = self.settings.changed_here
         self.report = VehicleReporter(self.session, self.missions, self.ground, self.settings, self._vehicle.also_want)
-        self._uploads = MissionUploads(self.missions, self.ground, log_event, incidents, self._vehicle.let_read)
-        self._watch = MissionWatch(self.missions, self.ground, log_event)
+        self._uploads = MissionUploads(self.missions, self.ground, emit, incidents, self._vehicle.let_read)
+        self._watch = MissionWatch(self.missions, self.ground, emit)
         downloads = MissionDownloads(self.missions, self.ground)
         self._parameters = Parameters(self.missions, self.ground, config.sysid)
         actions = FcActions(self.session, self.missions, self.runner)
@@ -277,4 +277,4 @@ class Bridge:
         if armed:
             self.settings.armed()
         self.ground.record_flight(on=armed and not self.is_passing_through)
-        self._log_event("info", "vehicle.armed" if armed else "vehicle.disarmed")
+        self._emit(Armed() if armed else Disarmed())

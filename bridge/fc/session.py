@@ -16,7 +16,7 @@ from bridge.fc.states.pass_through import PassThrough
 from bridge.fc.states.searching import Searching
 from bridge.line.runner import Runner
 from bridge.model.autopilot import Autopilot
-from bridge.model.events import EventLog, Level
+from bridge.model.events import Emit, FcFound, FcInCommandLine, FcLost, FcSensed, PortLost
 from bridge.model.flight_memory import FlightMemory
 from protocols.mavlink.frame import MavlinkFrame
 
@@ -50,7 +50,7 @@ class FcSession:
         speeds: Sequence[int | None],
         profiles: Sequence[Profile],
         runner: Runner,
-        log_event: EventLog,
+        emit: Emit,
         incidents: Iterator[int],
         on_change: Callable[[FlightController | None, float], None],
         on_mavlink: Callable[[list[MavlinkFrame]], None],
@@ -61,7 +61,7 @@ class FcSession:
         #: The flight controller's readings, kept when it is lost.
         self.vehicle = self._port.vehicle
         self.polls = self._port.polls
-        self._log_event = log_event
+        self._emit = emit
         self._incidents = incidents
         #: From the port's opening or a loss until a flight controller is found.
         self._incident = ""
@@ -93,7 +93,7 @@ class FcSession:
             return
         self._handle(PortClosed(why), now)
         if why is not None:
-            self._log_event("warning", "fc.port_lost", why=why, incident=self._follow_incident())
+            self._emit(PortLost(why=why, incident=self._follow_incident()))
 
     def restart(self, why: str, now: float) -> None:
         """Forget the flight controller and search again, after a fault in the bridge itself."""
@@ -133,15 +133,20 @@ class FcSession:
         self.state = after(self._port, event, now)
         match event:
             case Found():
-                self._note("debug", "fc.sensed", event)
+                self._emit(
+                    FcSensed(
+                        speed_baud=event.speed,
+                        protocol=event.spoken.value,
+                        why=event.why,
+                        incident=self._follow_incident(),
+                    )
+                )
                 self._welcome(event, now)
             case Identified(found=found):
                 self._welcome(found, now)
         if self.state.trouble:
             self._on_change(None, now)
-            self._log_event(
-                "warning", "fc.in_command_line", speed_baud=self.state.speed, incident=self._follow_incident()
-            )
+            self._emit(FcInCommandLine(speed_baud=self.state.speed, incident=self._follow_incident()))
 
     def _leave(self, state: State, event: Event, now: float) -> None:
         """Forget the flight controller and end its conversations."""
@@ -150,20 +155,23 @@ class FcSession:
         if state.trouble or state.controller is not None:
             self._on_change(None, now)
         if state.controller is not None and isinstance(event, Lost):
-            self._log_event(
-                "warning", "fc.lost", why=event.why, speed_baud=state.speed, incident=self._follow_incident()
-            )
+            self._emit(FcLost(why=event.why, speed_baud=state.speed, incident=self._follow_incident()))
 
     def _welcome(self, found: Found, now: float) -> None:
         controller = self.state.controller
         if controller is not None:
-            self._note("info", "fc.found", found, name=controller.name, kind=controller.profile.name)
+            self._emit(
+                FcFound(
+                    speed_baud=found.speed,
+                    name=controller.name,
+                    kind=controller.profile.name,
+                    protocol=found.spoken.value,
+                    why=found.why,
+                    incident=self._follow_incident(),
+                )
+            )
             self._incident = ""
             self._on_change(controller, now)
-
-    def _note(self, level: Level, event: str, found: Found, **facts: str) -> None:
-        facts |= {"protocol": found.spoken.value, "why": found.why, "incident": self._follow_incident()}
-        self._log_event(level, event, speed_baud=found.speed, **facts)
 
     def _follow_incident(self) -> str:
         self._incident = self._incident or f"link-{next(self._incidents)}"

@@ -11,7 +11,7 @@ from bridge.gcs.guard import Signer, Standing
 from bridge.gcs.recent_texts import RecentTexts
 from bridge.gcs.station import RECORDER, Peer, Severity, Station
 from bridge.gcs.stations import Stations, displaced
-from bridge.model.events import EventLog
+from bridge.model.events import Emit, GcsFound, GcsSilent, GcsText
 from bridge.model.refusal import Refusal
 from protocols.mavlink.codec import FrameWriter, Packed, pack
 from protocols.mavlink.dialect import Message, messages
@@ -38,7 +38,7 @@ class Ground:
         self,
         sysid: int,
         compid: int,
-        log_event: EventLog,
+        emit: Emit,
         on_newcomer: Callable[[Peer], None],
         on_frames: FrameListener | None,
         standing: Callable[[Peer], Standing],
@@ -46,7 +46,7 @@ class Ground:
     ) -> None:
         self._sysid = sysid
         self._compid = compid
-        self._log_event = log_event
+        self._emit = emit
         self._on_newcomer = on_newcomer
         self._logs_flights = on_frames is not None
         self.on_frames = on_frames or _drop
@@ -117,7 +117,7 @@ class Ground:
         silent = self.stations.expire(now)
         for peer in silent:
             self._forget(peer)
-            self._log_event("info", "gcs.silent", peer=str(peer))
+            self._emit(GcsSilent(peer=str(peer)))
         return silent
 
     def _forget(self, peer: Peer) -> None:
@@ -161,7 +161,7 @@ class Ground:
             self._everyone = None
             self._on_newcomer(peer)
             if is_unknown:
-                self._log_event("info", "gcs.found", station=str(station))
+                self._emit(GcsFound(station=str(station)))
                 for notice in self.notices:
                     self.say(Severity.WARNING, notice, station)
 
@@ -283,7 +283,7 @@ class Ground:
 
     def _say(self, severity: Severity, text: str, peers: Sequence[Peer]) -> None:
         """Send a text in pieces that fit STATUSTEXT; a refusal only once per attempt."""
-        self._log_event("debug", "gcs.text", text=text)
+        self._emit(GcsText(text=text))
         if severity is Severity.ERROR:
             peers = self._texts.new_to(peers, text, self.now)
         if peers and self.is_recording and RECORDER not in peers:

@@ -12,7 +12,7 @@ from functools import partial
 from typing import NamedTuple
 
 from bridge.gcs.station import Peer, Station
-from bridge.model.events import EventLog
+from bridge.model.events import Emit, GcsRefused
 from protocols.mavlink.command import CommandResult
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
@@ -96,11 +96,9 @@ class Guard:
     `passes_everything`: an autopilot that speaks MAVLink itself gets all commands over open links, too.
     """
 
-    def __init__(
-        self, links: Mapping[str, LinkAccess], log_event: EventLog, *, passes_everything: bool = False
-    ) -> None:
+    def __init__(self, links: Mapping[str, LinkAccess], emit: Emit, *, passes_everything: bool = False) -> None:
         self._links = links
-        self._log_event = log_event
+        self._emit = emit
         self._passes_everything = passes_everything
         self._signed: set[Peer] = set()
         self._logged: dict[Peer, set[str]] = {}
@@ -169,7 +167,7 @@ class Guard:
             return False
         logged.add(refused.why)
         station = Station(peer, frame.sysid, frame.compid)
-        self._log_event("warning", "gcs.refused", station=str(station), message=_name(frame), why=refused.why)
+        self._emit(GcsRefused(station=str(station), message=_name(frame), why=refused.why))
         return True
 
     def _refuse(self, peer: Peer, frame: MavlinkFrame, why: str, *, is_forged: bool = False) -> GuardRefusal:

@@ -1,16 +1,240 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The bridge's log events; the service decides where they go."""
+"""What happened: the log prints these events, and other parts act on some of them. docs/events.md is for users."""
 
-from typing import Literal, Protocol
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from typing import ClassVar, Literal
 
 Level = Literal["debug", "info", "warning", "error"]
 
 
-class EventLog(Protocol):
-    """Logs one event: its name, and its facts by key (with the unit in the key).
+@dataclass(frozen=True, kw_only=True)
+class BridgeEvent:
+    """Its log line has its name, its level, and its fields as facts, with the unit in the key.
 
-    Related lines, of a link lost and found, an upload or a push, carry the same id as the fact `incident`.
+    >>> FcLost(why="no answer for 3 s", speed_baud=115200, incident="link-3").facts()
+    {'why': 'no answer for 3 s', 'speed_baud': 115200, 'incident': 'link-3'}
+
+    Related events, of a link lost and found, an upload or a push, have the same `incident`.
     """
 
-    def __call__(self, level: Level, event: str, /, **facts: object) -> None:
-        """Log the event."""
+    name_in_log: ClassVar[str]
+    level: Level = "info"
+
+    def facts(self) -> dict[str, object]:
+        return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "level"}
+
+
+#: Passes an event to everything that logs it or acts on it.
+Emit = Callable[[BridgeEvent], None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PortLost(BridgeEvent):
+    """The flight controller's port is gone; not if the bridge closed it itself."""
+
+    name_in_log = "fc.port_lost"
+    level: Level = "warning"
+    why: str
+    incident: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class FcSensed(BridgeEvent):
+    """A protocol was recognised."""
+
+    name_in_log = "fc.sensed"
+    level: Level = "debug"
+    speed_baud: int | None
+    protocol: str
+    why: str
+    incident: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class FcFound(BridgeEvent):
+    """The flight controller is identified."""
+
+    name_in_log = "fc.found"
+    speed_baud: int | None
+    name: str
+    kind: str
+    protocol: str
+    why: str
+    incident: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class FcInCommandLine(BridgeEvent):
+    """It cannot be used until the pilot types `exit` there."""
+
+    name_in_log = "fc.in_command_line"
+    level: Level = "warning"
+    speed_baud: int | None
+    incident: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class FcLost(BridgeEvent):
+    """It no longer replies, or speaks another protocol."""
+
+    name_in_log = "fc.lost"
+    level: Level = "warning"
+    why: str
+    speed_baud: int | None
+    incident: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Armed(BridgeEvent):
+    """The flight controller reports it."""
+
+    name_in_log = "vehicle.armed"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Disarmed(BridgeEvent):
+    """The flight controller reports it."""
+
+    name_in_log = "vehicle.disarmed"
+
+
+@dataclass(frozen=True, kw_only=True)
+class GcsFound(BridgeEvent):
+    """A ground station was heard for the first time."""
+
+    name_in_log = "gcs.found"
+    station: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class GcsSilent(BridgeEvent):
+    """A ground station was forgotten after a silence."""
+
+    name_in_log = "gcs.silent"
+    peer: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class GcsRefused(BridgeEvent):
+    """A peer may not do this; the first time for this reason."""
+
+    name_in_log = "gcs.refused"
+    level: Level = "warning"
+    station: str
+    message: str
+    why: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class GcsText(BridgeEvent):
+    """A text for ground stations."""
+
+    name_in_log = "gcs.text"
+    level: Level = "debug"
+    text: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShareRefused(BridgeEvent):
+    """A program's change was refused. At debug level if it repeats, as the next."""
+
+    name_in_log = "share.refused"
+    program: str
+    command: str
+    why: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShareUnanswered(BridgeEvent):
+    """A program's request got no answer in time."""
+
+    name_in_log = "share.unanswered"
+    program: str
+    command: str
+    why: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class UploadStarted(BridgeEvent):
+    """A ground station's first item is requested."""
+
+    name_in_log = "mission.upload_started"
+    station: str
+    count: int
+    incident: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class UploadEnded(BridgeEvent):
+    """The final ack of a complete list is sent; `mission` is its number in the store."""
+
+    name_in_log = "mission.upload_ended"
+    station: str
+    mission: int | None
+    ack: str
+    detail: str
+    incident: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class UploadRefused(BridgeEvent):
+    """An upload was refused or abandoned."""
+
+    name_in_log = "mission.refused"
+    level: Level = "warning"
+    station: str
+    ack: str
+    why: str
+    incident: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class StationMoved(BridgeEvent):
+    """An upload continues from another address."""
+
+    name_in_log = "mission.station_moved"
+    station: str
+    before: str
+    after: str
+    incident: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class PushStarted(BridgeEvent):
+    """A list from the command line, the page or zenoh is to be written."""
+
+    name_in_log = "mission.push_started"
+    source: str
+    count: int
+    incident: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class PushEnded(BridgeEvent):
+    """That list was written, or was not; `mission` is its number in the store."""
+
+    name_in_log = "mission.push_ended"
+    source: str
+    mission: int | None
+    ack: str
+    detail: str
+    incident: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class MissionChangedOnBoard(BridgeEvent):
+    """The flight controller's list changed, but not through the bridge."""
+
+    name_in_log = "mission.changed_on_board"
+    detail: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class SettingsChangedOnBoard(BridgeEvent):
+    """PIDs, modes, rates or MISC changed, but not through the bridge."""
+
+    name_in_log = "settings.changed_on_board"
+    level: Level = "warning"
+    detail: str
+    seal: str

@@ -19,7 +19,7 @@ from bridge.line.conversation import Conversation, LinkLost, Send, ask_status, r
 from bridge.line.msp_link import MspLink
 from bridge.line.runner import Runner
 from bridge.missions.mission_service import MissionService
-from bridge.model.events import EventLog, Level
+from bridge.model.events import Emit, Level, ShareRefused, ShareUnanswered
 from bridge.sharing.permission import ARMED, is_unknown_read, refusal, right_of
 from bridge.sharing.program import Program, WaitingRequest
 from protocols.msp.frame import Direction, MspFrame, frame_size
@@ -53,13 +53,13 @@ class MspSharing:
         session: FcSession,
         runner: Runner,
         missions: MissionService,
-        log_event: EventLog,
+        emit: Emit,
         tell: Callable[[str], None],
     ) -> None:
         self._session = session
         self._runner = runner
         self._missions = missions
-        self._log_event = log_event
+        self._emit = emit
         self._tell = tell
         self._programs: deque[Program] = deque()  # the next one to have a request forwarded first
         self._total = Shares(_TOTAL)
@@ -213,7 +213,7 @@ class MspSharing:
             program.answer(request, MspFrame(Direction.ERROR, request.frame.command))
             return
         level = self._level(program, name, why, now, is_change=True)
-        self._log_event(level, "share.refused", program=program.name, command=name, why=why)
+        self._emit(ShareRefused(level=level, program=program.name, command=name, why=why))
         if level == "warning":
             self._tell(f"{program.host}: {name} refused ({why})")
         self._disconnect(program, request)
@@ -224,7 +224,7 @@ class MspSharing:
         right = None if controller is None else right_of(request.frame, controller)
         name = f"command {request.frame.command}" if right is None else right.name
         level = self._level(program, name, why, now, is_change=False)
-        self._log_event(level, "share.unanswered", program=program.name, command=name, why=why)
+        self._emit(ShareUnanswered(level=level, program=program.name, command=name, why=why))
         self._disconnect(program, request)
 
     def _disconnect(self, program: Program, request: WaitingRequest) -> None:

@@ -10,7 +10,7 @@ from bridge.line.conversation import Conversation
 from bridge.missions.fc_mission_store import StoreReport
 from bridge.missions.list_check import check_list
 from bridge.missions.mission_service import DeliveryResult, HeldMission, MissionService
-from bridge.model.events import EventLog
+from bridge.model.events import Emit, PushEnded, PushStarted
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.refusal import Refusal
 from bridge.model.verdict import Result, Verdict
@@ -23,10 +23,10 @@ _WOULD_ERASE = Refusal(MissionResult.DENIED, "No item can be stored: this would 
 class LocalMissions:
     """Writes, reads and checks whole lists, by the same rules as uploads from ground stations."""
 
-    def __init__(self, missions: MissionService, ground: Ground, log_event: EventLog, incidents: Iterator[int]) -> None:
+    def __init__(self, missions: MissionService, ground: Ground, emit: Emit, incidents: Iterator[int]) -> None:
         self._missions = missions
         self._ground = ground
-        self._log_event = log_event
+        self._emit = emit
         self._incidents = incidents
 
     def push(
@@ -63,18 +63,19 @@ class LocalMissions:
             if arrived and isinstance(result, DeliveryResult):
                 severity = Severity.WARNING if result.is_lossy else Severity.NOTICE
                 self._ground.say(severity, f"{source}: {result.text}")
-            self._log_event(
-                "info" if result.ack is MissionResult.ACCEPTED else "warning",
-                "mission.push_ended",
-                source=source,
-                mission=result.number if isinstance(result, DeliveryResult) else None,
-                ack=result.ack.name,
-                detail=result.text,
-                incident=incident,
+            self._emit(
+                PushEnded(
+                    level="info" if result.ack is MissionResult.ACCEPTED else "warning",
+                    source=source,
+                    mission=result.number if isinstance(result, DeliveryResult) else None,
+                    ack=result.ack.name,
+                    detail=result.text,
+                    incident=incident,
+                )
             )
             on_done(result, arrived[0] if arrived else None)
 
-        self._log_event("info", "mission.push_started", source=source, count=len(items), incident=incident)
+        self._emit(PushStarted(source=source, count=len(items), incident=incident))
         refusal = self._missions.acquire(owner)
         if refusal is None:
             self._missions.run(conversation(), done, now)

@@ -9,7 +9,7 @@ from bridge.gcs.station import Severity
 from bridge.line.conversation import Conversation, LinkLost, conclude, find_pending, recall
 from bridge.missions.fc_mission_store import Loading
 from bridge.missions.mission_service import NO_LINK, HeldMission, MissionService
-from bridge.model.events import EventLog
+from bridge.model.events import Emit, MissionChangedOnBoard
 from bridge.model.mission_log import Outcome
 from bridge.model.refusal import Refusal
 
@@ -28,10 +28,10 @@ _NOT_LOADED = MissionChange("No mission is loaded: disarm to load the saved one"
 class MissionWatch:
     """Checks at the store's interval while no transfer runs; after a check that took longer, at once."""
 
-    def __init__(self, missions: MissionService, ground: Ground, log_event: EventLog) -> None:
+    def __init__(self, missions: MissionService, ground: Ground, emit: Emit) -> None:
         self._missions = missions
         self._ground = ground
-        self._log_event = log_event
+        self._emit = emit
         self._has_asked_store = False
         #: The mission store whose saved mission was last reported as not loaded.
         self._unloaded: object = None
@@ -115,4 +115,4 @@ class MissionWatch:
         if not isinstance(news, MissionChange):
             return
         self._ground.say(Severity.WARNING if news.is_warning else Severity.NOTICE, news.text)
-        self._log_event("warning" if news.is_warning else "info", "mission.changed_on_board", detail=news.text)
+        self._emit(MissionChangedOnBoard(level="warning" if news.is_warning else "info", detail=news.text))

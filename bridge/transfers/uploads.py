@@ -20,7 +20,7 @@ from bridge.line.conversation import Conversation
 from bridge.missions.fc_mission_store import StoreReport
 from bridge.missions.list_check import begin_check, check_count
 from bridge.missions.mission_service import OCCUPIED, DeliveryResult, MissionService, MissionTransfer, TransferStep
-from bridge.model.events import EventLog, Level
+from bridge.model.events import Emit, StationMoved, UploadEnded, UploadRefused, UploadStarted
 from bridge.model.finding import Finding
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.refusal import Refusal
@@ -65,13 +65,13 @@ class MissionUploads:
         self,
         missions: MissionService,
         ground: Ground,
-        log_event: EventLog,
+        emit: Emit,
         incidents: Iterator[int],
         let_read: Callable[[Peer], None],
     ) -> None:
         self._missions = missions
         self._ground = ground
-        self._log_event = log_event
+        self._emit = emit
         self._incidents = incidents
         self._flash = ground.flash
         self._uploads = UploadList()
@@ -280,7 +280,7 @@ class MissionUploads:
             case Turn():
                 self._uploads.begins_to_arrive(upload, now)
             case Ready():
-                self._note("mission.upload_started", upload, count=upload.count)
+                self._emit(UploadStarted(station=str(upload.station), count=upload.count, incident=upload.incident))
                 self._request(upload, now)
             case Ended(refusal):
                 self._refuse(upload, before, refusal, now)
@@ -296,8 +296,7 @@ class MissionUploads:
 
     def _supersede(self, upload: Upload, why: str, now: float) -> None:
         """Drop an upload without an answer: its station would attribute it to the transfer that it begins now."""
-        ack = MissionResult.OPERATION_CANCELLED
-        self._note("mission.refused", upload, "warning", ack=ack.name, why=f"superseded: {why}")
+        self._emit_refusal(upload, Refusal(MissionResult.OPERATION_CANCELLED, f"superseded: {why}"))
         self._forget(upload, now)
 
     def _is_for(self, upload: Upload, count: int, now: float) -> bool:
@@ -378,8 +377,16 @@ class MissionUploads:
         if upload in self._uploads:
             self._answer(upload, delivery.ack, now)
             self._handle(upload, Delivered(), now)
-        facts = {"mission": delivery.number, "ack": delivery.ack.name, "detail": delivery.text}
-        self._note("mission.upload_ended", upload, "info" if accepted else "warning", **facts)
+        self._emit(
+            UploadEnded(
+                level="info" if accepted else "warning",
+                station=str(upload.station),
+                mission=delivery.number,
+                ack=delivery.ack.name,
+                detail=delivery.text,
+                incident=upload.incident,
+            )
+        )
 
     def _refuse(self, upload: Upload, state: UploadState, refusal: Refusal, now: float) -> None:
         """Report the reason for the end of an upload; the received items are still stored."""
@@ -392,7 +399,7 @@ class MissionUploads:
         self._ground.say(Severity.ERROR, refusal.text, upload.station)
         self._let_read(upload.station.peer)
         self._answer(upload, refusal.ack, now)
-        self._note("mission.refused", upload, "warning", ack=refusal.ack.name, why=refusal.text)
+        self._emit_refusal(upload, refusal)
 
     # Ground stations.
 
@@ -404,7 +411,8 @@ class MissionUploads:
         if self._uploads.of(station) is None and not self.answers.was_said_to(station, now):
             for upload in self._uploads:
                 if self._ground.stations.has_moved(upload.station, station, now):
-                    self._note("mission.station_moved", upload, before=str(upload.station), after=str(station))
+                    before, after = str(upload.station), str(station)
+                    self._emit(StationMoved(station=before, before=before, after=after, incident=upload.incident))
                     upload.station = station
         return self._uploads.of(station)
 
@@ -433,8 +441,9 @@ class MissionUploads:
                 is_repeated=is_repeated,
             )
 
-    def _note(self, event: str, upload: Upload, level: Level = "info", **facts: object) -> None:
-        self._log_event(level, event, **{"station": str(upload.station)} | facts, incident=upload.incident)
+    def _emit_refusal(self, upload: Upload, refusal: Refusal) -> None:
+        station, ack = str(upload.station), refusal.ack.name
+        self._emit(UploadRefused(station=station, ack=ack, why=refusal.text, incident=upload.incident))
 
 
 def _cancelled(why: str) -> Refusal:

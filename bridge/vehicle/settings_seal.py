@@ -16,7 +16,7 @@ from bridge.gcs.ground import Ground
 from bridge.gcs.station import Severity
 from bridge.line.conversation import Conversation, LinkLost, ask, ask_surely
 from bridge.missions.mission_service import MissionService
-from bridge.model.events import EventLog
+from bridge.model.events import Emit, SettingsChangedOnBoard
 from bridge.model.settings import BoardId, ChangedPart, Seal, SealMemory, SettingsChange, SettingsState
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame, request
@@ -47,14 +47,14 @@ class SettingsSeal:
         session: FcSession,
         missions: MissionService,
         ground: Ground,
-        log_event: EventLog,
+        emit: Emit,
         memory: SealMemory,
         is_transferring: Callable[[], bool],
     ) -> None:
         self._session = session
         self._missions = missions
         self._ground = ground
-        self._log_event = log_event
+        self._emit = emit
         self._memory = memory
         self._is_transferring = is_transferring
         self._controller: FlightController | None = None
@@ -114,7 +114,7 @@ class SettingsSeal:
         self.state = replace(self.state, change=change)
         self._ground.say(Severity.WARNING, change.text(_MOST_TEXT))
         self._tell_newcomers(change.text(_MOST_TEXT))
-        self._log_event("warning", "settings.changed_on_board", detail=change.text(), seal=str(self.state.seal))
+        self._emit(SettingsChangedOnBoard(detail=change.text(), seal=str(self.state.seal)))
 
     def _tell_newcomers(self, text: str) -> None:
         """A board is mostly found before the first ground station connects. An empty text: no more."""

@@ -4,7 +4,7 @@
 import asyncio
 import time
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
@@ -18,7 +18,7 @@ from bridge.fc.states.searching import SPEEDS
 from bridge.gcs.guard import LinkAccess
 from bridge.line.conversation import StoreEffect
 from bridge.missions.mission_service import DeliveryResult
-from bridge.model.events import Level
+from bridge.model.events import Armed, BridgeEvent, Disarmed
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.vehicle_groups import Group
 from payloads.mission_data import Json
@@ -31,7 +31,7 @@ from service.links.msp_share import open_share
 from service.links.signing_state import SigningState
 from service.links.traffic import Traffic
 from service.machine.host import Host
-from service.machine.log_setup import warn_once
+from service.machine.log_setup import log_event, warn_once
 from service.machine.package import version
 from service.recording.tlog_recorder import TLOG_FOLDER, TlogRecorder
 from service.settings import PassThroughRule, Settings
@@ -47,7 +47,6 @@ _REST_INTERVAL_S = 0.02
 _TOO_EARLY_S = 0.01
 #: Frames are accepted over zenoh only if its transport is authenticated, or the owner waived that.
 _ZENOH = {"zenoh": LinkAccess(may_write=lambda _peer: True)}
-_FLIGHT = {"vehicle.armed": True, "vehicle.disarmed": False}
 
 _log = structlog.get_logger()
 
@@ -58,8 +57,8 @@ class Follower:
     def telemetry(self, groups: frozenset[Group]) -> None:
         """New values in these groups, which were requested with `bridge.report.watch`."""
 
-    def event(self, level: Level, event: str, facts: Mapping[str, object]) -> None:
-        """An event was logged."""
+    def happened(self, event: BridgeEvent) -> None:
+        """Something happened that the log has, too."""
 
     def mission_ended(self, mission: ArrivedMission, delivery: DeliveryResult) -> None:
         """A received mission was completed or rejected."""
@@ -99,7 +98,7 @@ class Daemon:
                 flight=self._flight.load(self._loop.time()),
                 seals=self._seals,
             ),
-            self._log_event,
+            self._happened,
             self._loop.time(),
             None if self._tlog is None else self._tlog.on_frames,
             self._mission_ended,
@@ -215,13 +214,13 @@ class Daemon:
         for follower in self._followers:
             follower.mission_ended(mission, delivery)
 
-    def _log_event(self, level: Level, event: str, /, **facts: object) -> None:
-        getattr(_log, level)(event, **facts)
-        if event in _FLIGHT and self._tlog is not None:
-            self._tlog.flies(is_flying=_FLIGHT[event])
-        self.fc.event(event)
+    def _happened(self, event: BridgeEvent) -> None:
+        log_event(event)
+        if self._tlog is not None and isinstance(event, Armed | Disarmed):
+            self._tlog.flies(is_flying=isinstance(event, Armed))
+        self.fc.happened(event)
         for follower in self._followers:
-            follower.event(level, event, facts)
+            follower.happened(event)
 
     def _cannot_store(self, why: str) -> None:
         self.store_trouble = why

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import structlog
 
 from bridge.bridge import Bridge
+from bridge.model.events import BridgeEvent, FcFound, FcInCommandLine, FcLost, PortLost
 from protocols.uart_capture import UartAction
 from service.links.fc_device import device_opener
 from service.links.fc_port import MOVED_ON, STOPPED, FcPort
@@ -114,12 +115,12 @@ class FcConnection:
             self._traffic.pieces_sent += 1
             self._traffic.bytes_sent += len(data)
 
-    def event(self, event: str) -> None:
+    def happened(self, event: BridgeEvent) -> None:
         if self._finder is not None:
-            self._finder.event(event)
-        if event == "fc.found":
+            self._finder.happened(event)
+        if isinstance(event, FcFound):
             self.found_at, self.lost_at = self._loop.time(), None
-        elif event in ("fc.lost", "fc.port_lost", "fc.in_command_line") and self.found_at is not None:
+        elif isinstance(event, FcLost | PortLost | FcInCommandLine) and self.found_at is not None:
             self.found_at, self.lost_at = None, self._loop.time()
 
     def _opened(self) -> None:

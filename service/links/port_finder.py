@@ -16,6 +16,7 @@ import serial
 import structlog
 
 from bridge.fc.port_listener import OtherDeviceWatch, PortListener
+from bridge.model.events import BridgeEvent, FcFound, FcInCommandLine, FcLost
 from service.links.fc_device import DEVICE_ERRORS, PortError, open_serial
 from service.links.port_holder import find_user
 from service.links.port_memory import PortMemory
@@ -89,16 +90,16 @@ class PortFinder:
         self._leave()
         self._memory.close()
 
-    def event(self, event: str) -> None:
+    def happened(self, event: BridgeEvent) -> None:
         """Remember the flight controller's port; wait for a lost one to come back."""
         if self._present is None:
             return
-        if event in ("fc.found", "fc.in_command_line"):
+        if isinstance(event, FcFound | FcInCommandLine):
             self._stop_waiting()
             self._watch = None
             self._passed.pop(self._present.path, None)
             self._memory.found_flight_controller(self._present.key)
-        elif event == "fc.lost":
+        elif isinstance(event, FcLost):
             self._watch = OtherDeviceWatch()
             self._wait(_RETURN_S)
 

@@ -16,7 +16,7 @@ from prometheus_client.registry import Collector
 from bridge.fc.session import TRANSITIONS
 from bridge.line.msp_link import BOUNDS_S, RoundTrips
 from bridge.missions.mission_service import DeliveryResult
-from bridge.model.events import Level
+from bridge.model.events import BridgeEvent, PushEnded, PushStarted, UploadEnded, UploadRefused, UploadStarted
 from bridge.model.mission_log import ArrivedMission
 from payloads.names import host_name
 from service.daemon.daemon import Daemon, Follower
@@ -30,8 +30,6 @@ _UPLOAD_S = (0.25, 0.5, 1, 2, 4, 8, 16, 32, 64)
 #: The followers' values that only grow.
 _COUNTED = {"zenoh_dropped"}
 _FIXES = {"none": 0, "2D": 2, "3D": 3}
-_BEGINS = {"mission.upload_started", "mission.push_started"}
-_ENDS = {"mission.upload_ended", "mission.refused", "mission.push_ended"}
 #: The transfers that are timed at once. An upload that its ground station replaces by another one never ends.
 _MOST_TIMED = 100
 
@@ -56,22 +54,21 @@ class Metrics(Follower):
             buckets=_UPLOAD_S,
             registry=self._registry,
         )
-        self._begun: dict[object, float] = {}
+        self._begun: dict[str, float] = {}
         daemon.add_follower(self)
 
     def render(self) -> bytes:
         return generate_latest(self._labelled)
 
-    def event(self, level: Level, event: str, facts: Mapping[str, object]) -> None:
-        self._events.labels(event, level).inc()
-        incident = facts.get("incident")
-        if event in _BEGINS:
-            self._begun[incident] = time.monotonic()
+    def happened(self, event: BridgeEvent) -> None:
+        self._events.labels(event.name_in_log, event.level).inc()
+        if isinstance(event, UploadStarted | PushStarted):
+            self._begun[event.incident] = time.monotonic()
             if len(self._begun) > _MOST_TIMED:
                 del self._begun[next(iter(self._begun))]
-        elif event in _ENDS and incident in self._begun:
-            elapsed_s = time.monotonic() - self._begun.pop(incident)
-            self._durations.labels(facts["ack"]).observe(elapsed_s)
+        elif isinstance(event, UploadEnded | UploadRefused | PushEnded) and event.incident in self._begun:
+            elapsed_s = time.monotonic() - self._begun.pop(event.incident)
+            self._durations.labels(event.ack).observe(elapsed_s)
 
     def mission_ended(self, mission: ArrivedMission, delivery: DeliveryResult) -> None:
         self._missions.labels(delivery.ack.name).inc()

@@ -2,22 +2,61 @@
 """Liveliness: the bridge's own token, other bridges that use its name by mistake, and connected sessions."""
 
 import asyncio
+from dataclasses import dataclass
 
 import zenoh
 
-from bridge.model.events import EventLog
+from bridge.model.events import BridgeEvent, Emit, Level
 from payloads.mission_data import Json
 from service.machine.threads import post
 
 RENAME = "give one of the two another zenoh.vehicle"
 
 
+@dataclass(frozen=True, kw_only=True)
+class NameTaken(BridgeEvent):
+    """Another bridge has the same vehicle name."""
+
+    name_in_log = "zenoh.name_taken"
+    level: Level = "warning"
+    vehicle: str
+    by: str
+    what: str = RENAME
+
+
+@dataclass(frozen=True, kw_only=True)
+class NameFree(BridgeEvent):
+    """No other bridge has the vehicle name any longer."""
+
+    name_in_log = "zenoh.name_free"
+    vehicle: str
+    was: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class SessionJoined(BridgeEvent):
+    """Another session is connected."""
+
+    name_in_log = "zenoh.joined"
+    neighbour: str
+    kind: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class SessionLeft(BridgeEvent):
+    """Its connection ended."""
+
+    name_in_log = "zenoh.left"
+    neighbour: str
+    kind: str
+
+
 class Liveliness:
     """Shows that the bridge is alive. `others`: sessions of other bridges with the same vehicle name."""
 
-    def __init__(self, vehicle: str, note: EventLog) -> None:
+    def __init__(self, vehicle: str, emit: Emit) -> None:
         self._vehicle = vehicle
-        self._note = note
+        self._emit = emit
         self._loop = asyncio.get_running_loop()
         self._own = ""
         self._token: zenoh.LivelinessToken | None = None
@@ -48,10 +87,10 @@ class Liveliness:
             return
         if is_there:
             self.others.add(peer_id)
-            self._note("warning", "zenoh.name_taken", vehicle=self._vehicle, by=peer_id, what=RENAME)
+            self._emit(NameTaken(vehicle=self._vehicle, by=peer_id))
         else:
             self.others.discard(peer_id)
-            self._note("info", "zenoh.name_free", vehicle=self._vehicle, was=peer_id)
+            self._emit(NameFree(vehicle=self._vehicle, was=peer_id))
 
     @property
     def is_alone(self) -> bool:
@@ -67,4 +106,4 @@ class Liveliness:
 
     def _joined(self, peer_id: str, kind: str, is_there: bool) -> None:
         (self._neighbours.add if is_there else self._neighbours.discard)(peer_id)
-        self._note("info", "zenoh.joined" if is_there else "zenoh.left", neighbour=peer_id, kind=kind)
+        self._emit((SessionJoined if is_there else SessionLeft)(neighbour=peer_id, kind=kind))

@@ -9,14 +9,14 @@ Anything that may wait takes the session's thread:
 """
 
 import asyncio
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 
 import structlog
 import zenoh
 
 from bridge.missions.mission_service import DeliveryResult, HeldMission
-from bridge.model.events import Level
+from bridge.model.events import BridgeEvent
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.vehicle_groups import Group
 from payloads import keys
@@ -27,6 +27,7 @@ from payloads.overview import overview_of
 from payloads.payload import Payloads, plain
 from service.daemon.api import DaemonApi
 from service.daemon.daemon import Daemon, Follower
+from service.machine.log_setup import log_event
 from service.recording.tlog_recorder import TLOG_FOLDER
 from service.settings.zenoh import ZenohSettings
 from service.settings.zenoh_config import make_config
@@ -63,7 +64,7 @@ class Node(Follower):
         clock = SampleClock(self._loop.time)
         self._payloads = Payloads(settings.encoding, clock.unix_s)
         self._publisher = Publisher(self._payloads, self._readers_changed)
-        self._presence = Liveliness(settings.vehicle, self._note)
+        self._presence = Liveliness(settings.vehicle, self._emit)
         self._mavlink = MavlinkLink(self._publisher, daemon.gcs, self._presence.others)
         self._data = VehicleData(settings.vehicle, daemon.bridge, self._presence.others, clock)
         self._queries = Queries(self._payloads, self._thread)
@@ -104,12 +105,12 @@ class Node(Follower):
         for group in groups:
             self._publish(group)
 
-    def event(self, level: Level, event: str, facts: Mapping[str, object]) -> None:
+    def happened(self, event: BridgeEvent) -> None:
         """Publish an event, and soon after it the changed state."""
-        body = self._payloads.head(keys.EVENT) | vehicle_data.event(level, event, facts)
+        body = self._payloads.head(keys.EVENT) | vehicle_data.event_data(event)
         self._history.add(body)
         self._thread.submit(lambda: self._publisher.put_raw(keys.EVENT, self._payloads.encode(keys.EVENT, body)))
-        if level != "debug":
+        if event.level != "debug":
             self._publish_soon()
 
     def mission_ended(self, mission: ArrivedMission, delivery: DeliveryResult) -> None:
@@ -136,9 +137,9 @@ class Node(Follower):
     def _name(self, suffix: str) -> str:
         return keys.full(self._settings.prefix, self._settings.vehicle, suffix)
 
-    def _note(self, level: Level, event: str, /, **facts: object) -> None:
-        getattr(_log, level)(event, **facts)
-        self.event(level, event, facts)
+    def _emit(self, event: BridgeEvent) -> None:
+        log_event(event)
+        self.happened(event)
 
     def _readers_changed(self, key: ZenohKey, is_read: bool) -> None:
         _log.debug("zenoh.readers", key=key.suffix, is_read=is_read)

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The plain data published at each key: the bodies of docs/zenoh.md's payloads."""
 
-from collections.abc import Mapping
 from dataclasses import asdict
 
 from bridge.bridge import Bridge
 from bridge.missions.mission_service import DeliveryResult, HeldMission
-from bridge.model.events import Level
+from bridge.model.events import BridgeEvent
 from bridge.model.mission_log import ArrivedMission
 from payloads.mission_data import Json, strict
 from payloads.payload import plain
@@ -42,15 +41,10 @@ def mission_current(held: HeldMission | None) -> Json:
     }
 
 
-def event(level: Level, name: str, facts: Mapping[str, object]) -> Json:
-    return {"level": level, "event": name, "facts": {key: _fact(value) for key, value in facts.items()}}
+def event_data(event: BridgeEvent) -> Json:
+    return {"level": event.level, "event": event.name_in_log, "facts": event.facts()}
 
 
 def mission_report(mission: ArrivedMission, delivery: DeliveryResult) -> Json:
     body: Json = strict(delivery_data(delivery, mission) | {"source": mission.source})
     return body
-
-
-def _fact(value: object) -> object:
-    plain_value = value is None or isinstance(value, str | int | float)
-    return strict(value) if plain_value else str(value)

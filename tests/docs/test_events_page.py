@@ -4,19 +4,25 @@
 import ast
 import re
 from collections import defaultdict
+from dataclasses import fields
 from pathlib import Path
+
+import pytest
+
+import service.zenoh_link.liveliness  # noqa: F401 - it has events of its own
+from bridge.model.events import BridgeEvent
 
 _REPOSITORY = Path(__file__).parents[2]
 _EVENT = re.compile(r"[a-z]+\.[a-z_]+")
-#: Functions called with an event's name as the first or second argument.
-_LEVELS = {"debug", "info", "warning", "error", "exception", "level"}
-_SPEAKERS = _LEVELS | {"log_event", "_log_event", "note", "_note", "_complain", "warn_once"}
+#: Functions called with a log line's name as the first or second argument.
+_SPEAKERS = {"debug", "info", "warning", "error", "exception", "level", "_complain", "warn_once"}
+_TYPED = {event.name_in_log: event for event in BridgeEvent.__subclasses__()}
 
 
-def _events_of_the_code() -> dict[str, set[str]]:
-    """The names of the facts of each event, as far as the call shows them."""
+def _lines_of_the_code() -> dict[str, set[str]]:
+    """The names of the facts of each plain log line, as far as the call shows them."""
     found: dict[str, set[str]] = defaultdict(set)
-    for file in [*_REPOSITORY.glob("service/**/*.py"), *_REPOSITORY.glob("bridge/**/*.py")]:
+    for file in _REPOSITORY.glob("service/**/*.py"):
         for node in ast.walk(ast.parse(file.read_text())):
             if not isinstance(node, ast.Call):
                 continue
@@ -30,19 +36,31 @@ def _events_of_the_code() -> dict[str, set[str]]:
     return found
 
 
-def _events_of_the_page() -> dict[str, set[str]]:
-    """The facts in the row of each event; events that share a row share them."""
+def _rows_of_the_page() -> dict[str, tuple[set[str], set[str]]]:
+    """The levels and facts in the row of each event; events that share a row share them."""
     rows = [line for line in (_REPOSITORY / "docs" / "events.md").read_text().splitlines() if line.startswith("| `")]
     cells = [row.split(" | ") for row in rows]
-    return {name: {*re.findall(r"\w+", row[-1])} for row in cells for name in re.findall(_EVENT, row[0])}
+    return {
+        name: ({*re.findall(r"\w+", row[1])}, {*re.findall(r"\w+", row[-1])})
+        for row in cells
+        for name in re.findall(_EVENT, row[0])
+    }
 
 
 def test_the_page_lists_the_events_of_the_code() -> None:
-    events = _events_of_the_code()
-    assert "mission.upload_ended" in events
-    assert events.keys() == _events_of_the_page().keys()
+    lines = _lines_of_the_code()
+    assert "daemon.started" in lines
+    assert lines.keys() | _TYPED.keys() == _rows_of_the_page().keys()
 
 
-def test_the_page_lists_the_facts_of_each_event() -> None:
-    page = _events_of_the_page()
-    assert {event: facts - page[event] for event, facts in _events_of_the_code().items() if facts - page[event]} == {}
+def test_the_page_lists_the_facts_of_each_plain_log_line() -> None:
+    page = _rows_of_the_page()
+    assert {line: facts - page[line][1] for line, facts in _lines_of_the_code().items() if facts - page[line][1]} == {}
+
+
+@pytest.mark.parametrize("name", _TYPED)
+def test_the_page_lists_the_level_and_the_facts_of_each_typed_event(name: str) -> None:
+    levels, facts = _rows_of_the_page()[name]
+    names = {field.name for field in fields(_TYPED[name])} - {"level"}
+    assert names <= facts
+    assert _TYPED[name].level in levels

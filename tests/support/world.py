@@ -31,7 +31,7 @@ from bridge.gcs.guard import LinkAccess
 from bridge.gcs.routes import MAX_DATAGRAM_SIZE
 from bridge.gcs.station import Peer
 from bridge.line.conversation import Conclude, FindPending, NoteReader, Recall, Save, StoreEffect
-from bridge.model.events import Level
+from bridge.model.events import BridgeEvent, Level
 from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission, RecalledMission
 from bridge.model.settings import SealMemory, SealsOfThisRun
 from bridge.model.verdict import SentSeqs
@@ -368,8 +368,8 @@ class World:
 
         self.after(self.store.delay_s, answer)
 
-    def _note(self, level: Level, event: str, /, **facts: object) -> None:
-        self.log_event.append(Event(self.now, level, event, facts))
+    def _note(self, event: BridgeEvent) -> None:
+        self.log_event.append(Event(self.now, event.level, event.name_in_log, event.facts()))
 
 
 def ready_world() -> World:

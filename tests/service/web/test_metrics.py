@@ -6,6 +6,7 @@ from pathlib import Path
 
 from prometheus_client.parser import text_string_to_metric_families
 
+from bridge.model.events import UploadEnded, UploadStarted
 from protocols.mission_item import MissionResult
 from service.daemon.daemon import Daemon
 from service.settings import Settings
@@ -84,7 +85,7 @@ async def test_prometheus_reads_the_counters_of_a_daemon(tmp_path: Path) -> None
 async def test_uploads_that_never_end_are_forgotten() -> None:
     metrics = Metrics(Daemon(Settings(parse_fc("sim:"))))
     for number in range(1000):
-        metrics.event("info", "mission.upload_started", {"incident": f"upload-{number}"})
-    metrics.event("info", "mission.upload_ended", {"incident": "upload-999", "ack": "ACCEPTED"})
+        metrics.happened(UploadStarted(station="1/1", count=3, incident=f"upload-{number}"))
+    metrics.happened(UploadEnded(station="1/1", mission=1, ack="ACCEPTED", detail="", incident="upload-999"))
     assert read(metrics)["mission_transfer_seconds_count", ("ACCEPTED",)] == 1
     assert len(metrics._begun) <= 100
