@@ -140,6 +140,7 @@ class ShareRefused(BridgeEvent):
     """A program's change was refused. At debug level if it repeats, as the next."""
 
     name_in_log = "share.refused"
+    level: Level = "warning"
     program: str
     command: str
     why: str
@@ -150,6 +151,7 @@ class ShareUnanswered(BridgeEvent):
     """A program's request got no answer in time."""
 
     name_in_log = "share.unanswered"
+    level: Level = "warning"
     program: str
     command: str
     why: str
@@ -194,7 +196,6 @@ class StationMoved(BridgeEvent):
     """An upload continues from another address."""
 
     name_in_log = "mission.station_moved"
-    station: str
     before: str
     after: str
     incident: str

@@ -412,7 +412,7 @@ class MissionUploads:
             for upload in self._uploads:
                 if self._ground.stations.has_moved(upload.station, station, now):
                     before, after = str(upload.station), str(station)
-                    self._emit(StationMoved(station=before, before=before, after=after, incident=upload.incident))
+                    self._emit(StationMoved(before=before, after=after, incident=upload.incident))
                     upload.station = station
         return self._uploads.of(station)
 
