@@ -213,7 +213,6 @@ def _reply(upload: Json, items: Json, findings: Json) -> Json:
         }
     )
     status = {"type": "object", "required": ["state"], "description": "as `naze-bridge status --json`"}
-    rates = _object({"rates_hz": {"type": "object", "additionalProperties": {"type": ["number", "null"]}}})
     count = {"type": "integer", "minimum": 0}
     error = {"type": "string", "description": "the reason, one sentence"}
     return {
@@ -221,7 +220,7 @@ def _reply(upload: Json, items: Json, findings: Json) -> Json:
         "title": "@cmd",
         "oneOf": [
             _object({"progress": count, "of": count}),
-            _object({"result": {"anyOf": [upload, check, status, rates]}}),
+            _object({"result": {"anyOf": [upload, check, status]}}),
             _object({"error": error, "result": upload}, required=("error",)),
         ],
     }

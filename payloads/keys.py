@@ -89,8 +89,7 @@ CHECK = _command("mission/check")
 CLEAR = _command("mission/clear")
 RESTORE = _command("mission/restore")
 STATUS = _command("status")
-RATES = _command("rates")
-COMMAND_KEYS = (UPLOAD, CHECK, CLEAR, RESTORE, STATUS, RATES)
+COMMAND_KEYS = (UPLOAD, CHECK, CLEAR, RESTORE, STATUS)
 
 KEYS = (
     *TELEMETRY.values(),

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One setting: its name, its meaning, how its value is read, and the problems of a wrong one."""
 
-import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -153,20 +152,3 @@ def several(wanted: str, parse: Callable[[object, Path], object], *, may_be_empt
         return tuple(parse(entry, folder) for entry in value)
 
     return Reader(read, str.split)
-
-
-def table(wanted: str, parse: Callable[[object], object]) -> Reader:
-    """A table of one line, {name = value}."""
-
-    def read(value: object, _folder: Path) -> object:
-        if not isinstance(value, dict):
-            raise _wrong(value, f"a table, {wanted}")
-        return parse(value)
-
-    def from_text(toml: str) -> object:
-        try:
-            return tomllib.loads(f"table = {toml}")["table"]
-        except tomllib.TOMLDecodeError:
-            return toml
-
-    return Reader(read, from_text)

@@ -9,12 +9,12 @@ from bridge.model.autopilot import Autopilot
 from payloads.keys import PayloadEncoding
 from payloads.names import check_name
 from service.settings.addresses import parse_fc
-from service.settings.key import Key, Unfit, choice, file_name, several, table, text, whole, yes_no
+from service.settings.key import Key, Unfit, choice, file_name, several, text, whole, yes_no
 from service.settings.settings import DEFAULT_GCS, LogLevel, PassThroughRule, Settings, TlogLimits
 from service.settings.share import parse_share
 from service.settings.web import WebSettings, parse_listen
 from service.settings.write_access import parse_link
-from service.settings.zenoh import I_KNOW, ZenohProfile, ZenohSettings, check_rates
+from service.settings.zenoh import I_KNOW, ZenohProfile, ZenohSettings
 
 _DEFAULT = Settings()
 _LIMITS = TlogLimits()
@@ -135,12 +135,6 @@ KEYS = (
         choice(ZenohProfile),
         "Data volume: full sends each sample; metered a group every 5 s, or 30 s if unchanged, but arming at once.",
         f'"{_ZENOH.profile.value}"',
-    ),
-    Key(
-        "zenoh.rates",
-        table("as in {attitude = 2, position = 1}", check_rates),
-        "Maximum rate of a telemetry group, or of state, Hz; 0: never. Overrides the profile.",
-        example="{attitude = 2, position = 1}",
     ),
     Key(
         "zenoh.connect",

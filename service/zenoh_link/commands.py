@@ -4,23 +4,18 @@
 import asyncio
 from collections.abc import Callable, Set
 
-from bridge.model.vehicle_groups import Group
 from payloads import keys
 from payloads.mission_data import ACCEPTED, MOST, Json
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
 from service.daemon.api import DaemonApi
-from service.settings.zenoh import STATE_NAME
 from service.zenoh_link.liveliness import RENAME
 from service.zenoh_link.queries import Answerer, QueryRefused, Question
-from service.zenoh_link.rates import MAX_REQUEST_HZ, MAX_REQUEST_S, SampleRates
 
 _PAYLOAD = "the query's payload"
 #: Larger files are read by the command line only, not alongside a running link: a mission that fits has about 20 KB.
 _MAX_BYTES = 1 << 18
 _MAX_ITEMS = 1000
-_USUAL_REQUEST_S = 60.0
-_RATE_NAMES = (*(group.value for group in Group), STATE_NAME)
 
 
 class CommandQueries:
@@ -29,10 +24,9 @@ class CommandQueries:
     They get each command, too, so none that changes a mission is obeyed.
     """
 
-    def __init__(self, api: DaemonApi, rates: SampleRates, others: Set[str]) -> None:
+    def __init__(self, api: DaemonApi, others: Set[str]) -> None:
         self._api = api
         self._others = others
-        self._rates = rates
         #: Parsing takes about 50 times the file's size in memory.
         self._one_at_a_time = asyncio.Lock()
         self.answerers: dict[keys.ZenohKey, Answerer] = {
@@ -41,7 +35,6 @@ class CommandQueries:
             keys.CLEAR: self._alone(self._clear),
             keys.RESTORE: self._alone(self._restore),
             keys.STATUS: self._status,
-            keys.RATES: self._raise_rates,
         }
 
     def _alone(self, answerer: Answerer) -> Answerer:
@@ -73,15 +66,6 @@ class CommandQueries:
     async def _status(self, _: Question) -> Json:
         return {"result": self._api.status()}
 
-    async def _raise_rates(self, question: Question) -> Json:
-        now = asyncio.get_running_loop().time()
-        for_s = _number(question, "for_s", MAX_REQUEST_S) or _USUAL_REQUEST_S
-        wanted = {name: _number(question, name, MAX_REQUEST_HZ) for name in _RATE_NAMES}
-        for name, rate_hz in wanted.items():
-            if rate_hz is not None:
-                self._rates.request(name, rate_hz, now + for_s)
-        return {"result": {"rates_hz": self._rates.describe(now)}}
-
     async def _items(self, question: Question) -> list[MissionItem]:
         """Parse the mission in the payload, with the formats, reader and messages of `naze-bridge check`."""
         if question.size > _MAX_BYTES:
@@ -97,20 +81,6 @@ class CommandQueries:
             held = f"{_PAYLOAD} holds {len(items)} items"
             raise QueryRefused(f"{held}, more than any flight controller stores: shorten it")
         return items
-
-
-def _number(question: Question, name: str, most: float) -> float | None:
-    """A parameter's number, greater than 0; None if it is not given."""
-    text = question.parameter(name)
-    if text is None:
-        return None
-    try:
-        number = float(text)
-    except ValueError:
-        number = 0.0
-    if not 0 < number <= most:
-        raise QueryRefused(f"{name} must be a number, more than 0 and at most {most:.0f}, as in rates?attitude=10")
-    return number
 
 
 def _progress_of(question: Question, count: int) -> Callable[[Json], None]:

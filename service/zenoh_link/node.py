@@ -29,7 +29,7 @@ from service.daemon.api import DaemonApi
 from service.daemon.daemon import Daemon, Follower
 from service.machine.log_setup import log_event
 from service.recording.tlog_recorder import TLOG_FOLDER
-from service.settings.zenoh import ZenohSettings
+from service.settings.zenoh import ZenohProfile, ZenohSettings
 from service.settings.zenoh_config import make_config
 from service.zenoh_link import vehicle_data
 from service.zenoh_link.answers import Answers
@@ -70,11 +70,11 @@ class Node(Follower):
         self._queries = Queries(self._payloads, self._thread)
         api = DaemonApi(daemon)
         state_dir = daemon.settings.state_dir
-        self._rates = SampleRates(settings.profile, settings.rates)
+        self._rates = SampleRates(is_metered=settings.profile is ZenohProfile.METERED)
         self._history = History(api, None if state_dir is None else state_dir / TLOG_FOLDER, clock.unix_s)
         self._answerers = Answers(self._data, daemon.bridge, api, self._history).answerers
         if settings.commands:
-            self._answerers |= CommandQueries(api, self._rates, self._presence.others).answerers
+            self._answerers |= CommandQueries(api, self._presence.others).answerers
         self._held: HeldMission | None = None
         self._pending_publish: asyncio.Handle | None = None
         self._tick: asyncio.TimerHandle | None = None

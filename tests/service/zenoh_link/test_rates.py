@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Publishing rates: limits, urgent changes, and requests that expire."""
+"""The metered profile: changes, urgent changes, and nothing that is nearly the same."""
 
 import pytest
 from hypothesis import given
@@ -7,8 +7,6 @@ from hypothesis import strategies as st
 
 from bridge.model import vehicle_groups
 from bridge.model.vehicle_groups import Attitude, Battery, Group, Position, Rc, Status
-from payloads.names import ZenohSettingsError
-from service.settings.zenoh import ZenohProfile, check_rates
 from service.zenoh_link.rates import SampleRates
 
 GAPS_S = st.lists(st.floats(0.01, 3.0), min_size=2, max_size=300)
@@ -26,31 +24,22 @@ def times_of(gaps_s: list[float]) -> list[float]:
     return times
 
 
-@given(GAPS_S, st.sampled_from([0.2, 1.0, 4.0, 10.0]))
-def test_the_limit_is_not_exceeded(gaps_s: list[float], limit_hz: float) -> None:
+@given(GAPS_S)
+def test_a_metered_group_is_sent_every_5_s_at_most(gaps_s: list[float]) -> None:
     times = times_of(gaps_s)
-    sent = sent_at(SampleRates(ZenohProfile.FULL, {"attitude": limit_hz}), times)
+    sent = sent_at(SampleRates(is_metered=True), times)
     assert sent[0] == times[0]
-    assert len(sent) <= 2 + (times[-1] - times[0]) * limit_hz
-
-
-def test_a_limit_is_reached_from_a_rate_that_is_no_multiple_of_it() -> None:
-    sent = sent_at(SampleRates(ZenohProfile.FULL, {"attitude": 4.0}), [number / 10 for number in range(1000)])
-    assert 395 <= len(sent) <= 401
+    assert len(sent) <= 2 + (times[-1] - times[0]) / 5
 
 
 @given(GAPS_S)
 def test_the_full_profile_limits_nothing(gaps_s: list[float]) -> None:
     times = times_of(gaps_s)
-    assert sent_at(SampleRates(ZenohProfile.FULL, {}), times) == times
-
-
-def test_a_rate_of_0_sends_nothing() -> None:
-    assert sent_at(SampleRates(ZenohProfile.METERED, {"attitude": 0.0}), [1.0, 20.0, 400.0]) == []
+    assert sent_at(SampleRates(is_metered=False), times) == times
 
 
 def test_arming_does_not_wait_on_a_metered_link() -> None:
-    rates = SampleRates(ZenohProfile.METERED, {})
+    rates = SampleRates(is_metered=True)
     assert rates.admits(Group.STATUS, Status(armed=False, mode="ACRO", cycle_time_us=3000), 0.0)
     assert not rates.admits(Group.STATUS, Status(armed=False, mode="ACRO", cycle_time_us=3050), 1.0)
     assert rates.held_back == {Group.STATUS}
@@ -62,7 +51,7 @@ def test_arming_does_not_wait_on_a_metered_link() -> None:
 
 
 def test_infrequent_groups_are_sent_together() -> None:
-    rates = SampleRates(ZenohProfile.METERED, {})
+    rates = SampleRates(is_metered=True)
     flying = {Group.ATTITUDE: Attitude(1.0), Group.POSITION: Position(height_m=1.0)}
     later = {Group.ATTITUDE: Attitude(9.0), Group.POSITION: Position(height_m=9.0)}
     assert all(rates.admits(group, sample, 3.0) for group, sample in flying.items())
@@ -84,7 +73,7 @@ def test_infrequent_groups_are_sent_together() -> None:
     ],
 )
 def test_a_metered_link_sends_changes(group: Group, first: object, nearly_the_same: object, different: object) -> None:
-    rates = SampleRates(ZenohProfile.METERED, {})
+    rates = SampleRates(is_metered=True)
     assert rates.admits(group, first, 30.0)
     same = [now for now in range(31, 80) if rates.admits(group, nearly_the_same, now, gathered=True)]
     assert same == [60]
@@ -95,27 +84,6 @@ def test_every_field_of_an_urgent_change_exists() -> None:
     """A renamed field would silently lose its effect."""
     for group in Group:
         sample = getattr(vehicle_groups, group.value.capitalize())(**({"state": "MSP"} if group is Group.LINK else {}))
-        rates = SampleRates(ZenohProfile.METERED, {})
+        rates = SampleRates(is_metered=True)
         assert rates.admits(group, sample, 0.0)
         assert not rates.admits(group, sample, 5.0, gathered=True)
-
-
-def test_a_request_raises_a_rate_for_a_while() -> None:
-    rates = SampleRates(ZenohProfile.METERED, {})
-    seconds = [float(number) for number in range(61)]
-    assert len(sent_at(rates, seconds)) == 13
-    rates.request("attitude", 1.0, until=130.0)
-    assert rates.describe(100.0)["attitude"] == 1.0
-    assert len(sent_at(rates, [100 + each for each in seconds])) == 30 + 7
-
-    rates = SampleRates(ZenohProfile.METERED, {})
-    rates.request("attitude", 1.0, until=130.0)
-    assert rates.describe(131.0)["attitude"] == 0.2
-    rates.request("attitude", 0.01, until=300.0)
-    assert rates.describe(140.0)["attitude"] == 0.2
-
-
-@pytest.mark.parametrize("rates", [{"altitude": 1}, {"rc": -1}, {"rc": True}, {"rc": "fast"}, {"rc": 1e9}])
-def test_an_invalid_rate_is_one_sentence(rates: dict[str, object]) -> None:
-    with pytest.raises(ZenohSettingsError, match=r"zenoh\.rates"):
-        check_rates(rates)
