@@ -83,12 +83,12 @@ def _attitude(vehicle: Vehicle, payload: bytes, controller: FlightController, no
         has_compass = health is not None and Sensor.COMPASS in health.sensors
         heading_deg = float(reply.heading_deg % 360)
         roll_deg, pitch_deg = reply.roll_ddeg / 10, -reply.pitch_ddeg / 10
-        rates = _rates_deg_s(vehicle, controller, now)
+        rates = _rates_deg_s(vehicle, now) if controller.profile.has_gyro_deg_s else None
         vehicle.hear(Orientation(now, Source.MSP, roll_deg, pitch_deg, heading_deg, has_compass, rates))
 
 
-def _rates_deg_s(vehicle: Vehicle, controller: FlightController, now: float) -> tuple[float, float, float] | None:
-    imu = vehicle.fresh(ImuSample, now, _RATES_STALE_S) if controller.profile.has_gyro_deg_s else None
+def _rates_deg_s(vehicle: Vehicle, now: float) -> tuple[float, float, float] | None:
+    imu = vehicle.fresh(ImuSample, now, _RATES_STALE_S)
     if imu is None:
         return None
     forward, left, up = imu.gyro

@@ -112,8 +112,9 @@ class FcSession:
 
     def take_output(self) -> list[bytes]:
         """The bytes to be written to the port at the state's `speed`."""
-        output, self._port.output = self._port.output, []
-        return output + self.state.take_output()
+        output = [*self._port.output]
+        self._port.output.clear()
+        return output
 
     def settle_telemetry(self) -> None:
         """Update the vehicle from the messages of a passed-through autopilot."""
@@ -151,6 +152,7 @@ class FcSession:
     def _leave(self, state: State, event: Event, now: float) -> None:
         """Forget the flight controller and end its conversations."""
         self.state = Closed(self._port, event, now)
+        self._port.output.clear()
         self._port.runner.link_down(now)
         if state.trouble or state.controller is not None:
             self._on_change(None, now)

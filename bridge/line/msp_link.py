@@ -12,11 +12,12 @@ from collections import deque
 from dataclasses import dataclass
 from enum import Enum, auto
 from math import inf
+from operator import attrgetter
 
 from bridge.line.conversation import Send
 from bridge.line.last_replies import LastReplies
 from protocols.frsky import FRSKY_SPEED
-from protocols.msp.command_line import is_clean
+from protocols.msp.command_line import EchoWatch, is_clean
 from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, request
 
@@ -53,6 +54,7 @@ _RESYNC_COMMANDS = (
 )
 #: Asks a board of any kind for a sign of life.
 PROBE = request(Msp.IDENT)
+_DEADLINE = attrgetter("deadline")
 RESYNC = b"".join(request(command) for command in _RESYNC_COMMANDS)
 RESYNC_REPLY_SIZE = sum(_REPLY_SIZES[command] for command in _RESYNC_COMMANDS)
 #: Replies come in order: the reply to this shows that earlier ones are lost. No other code may use this command.
@@ -142,11 +144,13 @@ class _Request:
 class MspLink:
     """One MSP line. `baud` is None where the line has no speed (TCP, the built-in simulator).
 
-    `owed`: bytes of earlier replies that may still arrive first.
+    `output`: gets the bytes to be written to the port, in order. `owed`: bytes of earlier replies that may still arrive
+    first.
     """
 
-    def __init__(self, baud: int | None, now: float, owed: int = 0) -> None:
+    def __init__(self, baud: int | None, output: list[bytes], now: float, owed: int = 0) -> None:
         self._baud = baud
+        self.output = output
         #: A byte's time on the line.
         self.byte_s = byte_time_s(baud)
         self._ring_size = _OUTSTANDING_BESIDE_FRSKY if baud == FRSKY_SPEED else MAX_OUTSTANDING_BYTES
@@ -157,7 +161,6 @@ class MspLink:
         if owed:
             left_ring_at = now + owed * self.byte_s
             self._sent.append(_Request(_NO_COMMAND, owed, now, left_ring_at, exclusive=False, reply=_Reply.LOST))
-        self._output: list[bytes] = []
         self._line_free_at = now
         #: The smoothed time from a request's last byte on the wire to its reply.
         self.round_trip_s = _FIRST_GUESS_S
@@ -178,6 +181,8 @@ class MspLink:
         #: From a request's last byte on the wire to its reply.
         self.round_trips = RoundTrips()
         self.replies = LastReplies()
+        #: Knows the requests that were sent.
+        self.echo = EchoWatch()
 
     @property
     def outstanding_bytes(self) -> int:
@@ -214,16 +219,10 @@ class MspLink:
         self._waiting.append(message)
         self._flush(now)
 
-    def take_output(self) -> list[bytes]:
-        """The bytes to be written to the port, in order."""
-        output, self._output = self._output, []
-        return output
-
     def receive(self, data: bytes, now: float) -> list[MspFrame]:
         """Take bytes from the port; return the replies, matched with their requests."""
         self._last_byte_at = now
-        frames = self.parser.feed(data)
-        return self._take(frames, now) if frames else frames
+        return self._take(self.parser.feed(data), now)
 
     def tick(self, now: float) -> list[MspFrame]:
         """Time out requests; return replies that were hidden behind a false header."""
@@ -254,7 +253,7 @@ class MspLink:
 
     def next_deadline(self) -> float:
         """The time of the next `tick`; infinity while nothing is pending."""
-        return min([self._follow_up_at, *[sent.deadline for sent in self._sent]])
+        return min(self._follow_up_at, *map(_DEADLINE, self._sent)) if self._sent else self._follow_up_at
 
     def _timeout_s(self) -> float:
         floor = max(MIN_TIMEOUT_S, self.receiver_timeout_s + 0.02 if self.receiver_timeout_s else 0.0)
@@ -315,16 +314,20 @@ class MspLink:
     def _write(self, data: bytes, now: float) -> None:
         self._line_free_at = max(self._line_free_at, now) + len(data) * self.byte_s
         self._follow_up_at = inf
-        self._output.append(data)
+        self.output.append(data)
+        self.echo.sent.append(data)
 
     def _take(self, frames: list[MspFrame], now: float) -> list[MspFrame]:
         """Match the replies; requests are our own, from a looped-back line."""
-        replies = [frame for frame in frames if frame.direction is not Direction.REQUEST]
-        for reply in replies:
-            self._settle(reply, now)
+        replies: list[MspFrame] = []
+        for frame in frames:
+            if frame.direction is not Direction.REQUEST:
+                self._settle(frame, now)
+                replies.append(frame)
         if replies:
             self.last_heard_at = now
-            self._flush(now)
+            if self._waiting or self._resync_due:
+                self._flush(now)
         return replies
 
     def _settle(self, reply: MspFrame, now: float) -> None:
@@ -342,12 +345,12 @@ class MspLink:
             overtaken = self._sent[:earlier]
             self.requests_lost += sum([sent.reply is _Reply.AWAITED and not sent.is_shared for sent in overtaken])
         del self._sent[: earlier + 1]
-        if oldest.kept and oldest.reply is _Reply.AWAITED and self._is_certain(oldest):
-            self.replies.heard(oldest.kept, reply, now)
         answered: _Request | None = oldest
         if oldest.reply is not _Reply.AWAITED:
             equal = (sent for sent in self._sent if sent.command == command and sent.reply is _Reply.AWAITED)
             answered = next(equal, None)
+        elif oldest.kept and (not self._sent or self._is_certain(oldest)):
+            self.replies.heard(oldest.kept, reply, now)
         if answered is None:
             return
         self._losses_in_a_row = 0

@@ -9,7 +9,7 @@ which separates old values from current ones; a lost link clears nothing.
 from collections.abc import Set
 from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 from bridge.model.airframe import Airframe
 from bridge.model.battery import LEAST_V, least_cells, remaining_percent
@@ -217,10 +217,17 @@ class GpsTime(Reading):
 ReadingT = TypeVar("ReadingT", bound=Reading)
 
 
+class _Last(Protocol):
+    def __call__(self, kind: type[ReadingT], /) -> ReadingT | None: ...
+
+
 class Vehicle:
     """The latest reading of each kind, and home."""
 
     def __init__(self) -> None:
+        self._readings: dict[type[Reading], Reading] = {}
+        #: The latest reading of a kind, however old: `last(Height)`.
+        self.last: _Last = self._readings.get  # type: ignore[assignment]
         self.forget()
 
     def forget(self) -> None:
@@ -232,7 +239,7 @@ class Vehicle:
         #: When any reading was last heard.
         self.heard_at: float | None = None
         self.track = GroundTrack()
-        self._readings: dict[type[Reading], Reading] = {}
+        self._readings.clear()
         #: The kinds of readings heard since the last `take_news`.
         self.news: set[type[Reading]] = set()
         self._cells = 1
@@ -336,10 +343,6 @@ class Vehicle:
         """Take UTC by GPS, seconds since 1970. Without it an autopilot counts from its start, and INAV reports 0."""
         if unix_s > _EARLIEST_UNIX_S:
             self.hear(GpsTime(now, source, unix_s))
-
-    def last(self, kind: type[ReadingT]) -> ReadingT | None:
-        """The latest reading of a kind, however old."""
-        return self._readings.get(kind)  # type: ignore[return-value]
 
     def fresh(self, kind: type[ReadingT], now: float, stale_s: float = STALE_S) -> ReadingT | None:
         """The latest reading of a kind, unless it is stale."""

@@ -130,12 +130,13 @@ class Moment:
 
     def fresh(self, kind: type[ReadingT]) -> ReadingT | None:
         """The latest reading of a kind, unless it is stale."""
-        return self.vehicle.fresh(kind, self.now, self.stale_s.get(kind, STALE_S))
+        reading = self.vehicle.last(kind)
+        return reading if reading and self.now <= reading.heard_at + self.stale_s.get(kind, STALE_S) else None
 
     def need(self, kind: type[ReadingT]) -> ReadingT:
         """The latest reading of a kind; Unknown if there is none or it is stale."""
-        reading = self.fresh(kind)
-        if reading is None:
+        reading = self.vehicle.last(kind)
+        if reading is None or self.now > reading.heard_at + self.stale_s.get(kind, STALE_S):
             raise Unknown
         return reading
 
@@ -246,13 +247,12 @@ def mission_item_reached(seq: int) -> Message:
 def attitude(at: Moment) -> Message:
     """ATTITUDE: radians, radians a second."""
     now = at.need(Orientation)
-    payload = _ATTITUDE.pack(
-        at.boot_ms,
-        math.radians(known(now.roll_deg)),
-        math.radians(known(now.pitch_deg)),
-        math.radians((now.heading_deg + 180) % 360 - 180),
-        *_rates(now),
-    )
+    if now.roll_deg is None or now.pitch_deg is None:
+        raise Unknown
+    heading_deg = (now.heading_deg + 180) % 360 - 180
+    angles = map(math.radians, (now.roll_deg, now.pitch_deg, heading_deg))
+    rates = _UNKNOWN_RATES if now.rates_deg_s is None else map(math.radians, now.rates_deg_s)
+    payload = _ATTITUDE.pack(at.boot_ms, *angles, *rates)
     return pack_payload(messages.MAVLINK_MSG_ID_ATTITUDE, payload)
 
 

@@ -77,7 +77,7 @@ class Line:
         self.resets = 0
         self.now = 0.0
         self._disturb = disturb
-        self._link = MspLink(_BAUD, self.now)
+        self._link = MspLink(_BAUD, [], self.now)
         self._link.receiver_timeout_s = info.inter_byte_timeout_ms / 1000
         self._runner = Runner()
         self._runner.link_up(self._link)
@@ -92,7 +92,9 @@ class Line:
         results: list[Any] = []
         self._runner.start(conversation, lambda result, _: results.append(result), self.now)
         for _ in range(200_000):
-            for frame in self._link.take_output():
+            requests = [*self._link.output]
+            self._link.output.clear()
+            for frame in requests:
                 self._carry(frame, to_board=True)
             if results:
                 return results[0]

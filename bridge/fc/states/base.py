@@ -82,6 +82,7 @@ class Port:
     on_mavlink: Callable[[list[MavlinkFrame]], None]
     polls: PollSchedule = field(default_factory=PollSchedule)
     vehicle: Vehicle = field(default_factory=Vehicle)
+    #: The bytes to be written to the port, in order.
     output: list[bytes] = field(default_factory=list)
     #: The speeds of the last two finds of the board, the older first: a Harakiri that arms may change its speed,
     #: and disarmed it comes back.
@@ -154,10 +155,6 @@ class State(ABC):
     @abstractmethod
     def deadline(self) -> float:
         """The time of the next `tick`; infinity only while the port is closed."""
-
-    def take_output(self) -> list[bytes]:
-        """The bytes to be written after `port.output`, in order."""
-        return []
 
     def unanswered(self) -> PendingReplies:
         """Replies that may still arrive: a stalled board sends them all at once when it resumes."""

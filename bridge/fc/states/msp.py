@@ -13,7 +13,6 @@ from bridge.line.msp_link import MspLink, PendingReplies
 from bridge.model.refusal import Refusal
 from protocols.frsky import FRSKY_SPEED
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter, is_disarmed_heartbeat
-from protocols.msp.command_line import EchoWatch
 from protocols.msp.frame import MspFrame
 
 #: The same while bytes arrive that are not MSP: it was armed, and sends telemetry now. On a slow line a Harakiri's
@@ -41,9 +40,10 @@ class MspLine(State):
         self.link = link
         self.found = found
         self._foreign = _ForeignBytes(link)
-        self._echo = EchoWatch()
         #: The event that ends this state, once a conversation has found it.
         self._end: Event | None = None
+        #: After this long without a reply the board is gone.
+        self._longest_silence_s = MSP_SILENCE_S
 
     @property
     def bad_checksums(self) -> int | None:
@@ -51,54 +51,51 @@ class MspLine(State):
 
     def receive(self, data: bytes, now: float) -> Event | None:
         frames = self.link.receive(data, now)
-        for frame in frames:
-            self.take_frame(frame, now)
-        self.is_mid_frame = not (frames or self._foreign.size)
         if frames:
-            if self._foreign.size:
+            for frame in frames:
+                self._take(frame, now)
+            self.is_mid_frame = False
+            if self.link.parser.skipped_bytes > self._foreign.skipped_before:
                 self._foreign = _ForeignBytes(self.link)
             return self._end
+        self.is_mid_frame = not self._foreign.size
         self._foreign.note(data)
-        self._echo.feed(data)
-        if self._echo.is_echo():
+        echo = self.link.echo
+        echo.feed(data)
+        if echo.is_echo():
             return Found(Spoken.CLI, self.speed, "it echoes requests that it answered before")
         return self._end
 
     def tick(self, now: float) -> Event | None:
         """Give up on lost requests, and on a silent board."""
         for frame in self.link.tick(now):
-            self.take_frame(frame, now)
+            self._take(frame, now)
         return self._end or self._silence(now)
 
     def deadline(self) -> float:
         if self._end is not None:
             return 0.0
-        return min(self.link.next_deadline(), self._silent_since() + self._silence_s)
-
-    def take_output(self) -> list[bytes]:
-        requests = self.link.take_output()
-        self._echo.sent.extend(requests)
-        return requests
+        return min(self.link.next_deadline(), self._silent_since() + self._silence_s())
 
     def unanswered(self) -> PendingReplies:
         return self.link.unanswered()
 
-    def take_frame(self, frame: MspFrame, now: float) -> None:
-        # Most replies are telemetry's.
+    def _take(self, frame: MspFrame, now: float) -> None:
+        """Replies belong to a conversation, to a poll, or to both."""
         if frame.command in self.port.runner.awaited_replies:
             self.port.runner.received(frame, now)
+        if self.controller is not None and frame.command in self.port.polls.commands:
+            self.port.polls.answered(frame)
+            hear_msp(self.port.vehicle, frame, self.controller, now)
 
     def _silent_since(self) -> float:
         return self.link.last_heard_at
 
-    @property
     def _silence_s(self) -> float:
-        longest_s = MSP_SILENCE_S if self.controller is None else self.controller.profile.silence_s
-        if not self._is_foreign:
-            return longest_s
-        return min(_FOREIGN_SILENCE_S + _BYTES_BEFORE_CHANGE * self.link.byte_s, longest_s)
+        if self.link.parser.skipped_bytes == self._foreign.skipped_before or not self._is_foreign():
+            return self._longest_silence_s
+        return min(_FOREIGN_SILENCE_S + _BYTES_BEFORE_CHANGE * self.link.byte_s, self._longest_silence_s)
 
-    @property
     def _is_foreign(self) -> bool:
         """True if more bytes arrived than damaged replies could explain."""
         surplus = self._foreign.size - _FOREIGN_SIZE
@@ -107,13 +104,13 @@ class MspLine(State):
     def _silence(self, now: float) -> Event | None:
         """Leave MSP when it is no longer answered: for MAVLink if that is heard instead, else to search."""
         since = self._silent_since()
-        if now < since + _FOREIGN_SILENCE_S or now < since + self._silence_s:
+        if now < since + _FOREIGN_SILENCE_S or now < since + self._silence_s():
             return None
         heard = self._foreign.mavlink
         if heard is not None:
             return Found(self.port.mavlink_of(heard), self.speed, "heard where MSP was answered before", heard)
         # At a much lower speed than the telemetry's, the port reads only a few wrong bytes, or none.
-        why = "the incoming data is no longer MSP" if self._is_foreign else f"no answer for {self._silence_s} s"
+        why = "the incoming data is no longer MSP" if self._is_foreign() else f"no answer for {self._silence_s()} s"
         # A board that was armed at the speed of FrSky telemetry has disarmed, and is back at its former, good speed.
         has_disarmed = self.speed == FRSKY_SPEED and self.port.vehicle.armed
         return Lost(why, () if has_disarmed else _ARMED_SPEEDS, self.unanswered())
@@ -126,7 +123,8 @@ class Identifying(MspLine):
     is_searching = True
 
     def __init__(self, port: Port, event: Found, now: float) -> None:
-        super().__init__(port, event, MspLink(event.speed, now, event.pending.size(event.speed, now)), now)
+        owed = event.pending.size(event.speed, now)
+        super().__init__(port, event, MspLink(event.speed, port.output, now, owed), now)
         self._give_up_at = now + _IDENTIFY_TIMEOUT_S
         port.runner.link_up(self.link)
         self._task = port.runner.start(_identify(port.profiles), self._identified, now)
@@ -161,6 +159,7 @@ class Polling(MspLine):
     def __init__(self, port: Port, event: Identified, now: float) -> None:
         super().__init__(port, event.found, event.link, now)
         self.controller = controller = event.controller
+        self._longest_silence_s = controller.profile.silence_s
         port.met_family = controller.profile.family
         if controller.info is not None:
             self.link.receiver_timeout_s = controller.info.inter_byte_timeout_ms / 1000
@@ -170,13 +169,6 @@ class Polling(MspLine):
         port.meet(controller)
         self._check_interval_s = _FIRST_CHECK_S
         self._check_at = now + _FIRST_CHECK_S if isinstance(controller.profile.missions, Refusal) else inf
-
-    def take_frame(self, frame: MspFrame, now: float) -> None:
-        """Replies belong to a conversation, to a poll, or to both."""
-        super().take_frame(frame, now)
-        if frame.command in self.port.polls.commands:
-            self.port.polls.answered(frame)
-            hear_msp(self.port.vehicle, frame, self.controller, now)
 
     def tick(self, now: float) -> Event | None:
         event = super().tick(now)
@@ -205,12 +197,12 @@ class _ForeignBytes:
     def __init__(self, link: MspLink) -> None:
         self.mavlink: MavlinkFrame | None = None
         self._parser = link.parser
-        self._skipped_before = link.parser.skipped_bytes
+        self.skipped_before = link.parser.skipped_bytes
         self._splitter = MavlinkSplitter()
 
     @property
     def size(self) -> int:
-        return self._parser.skipped_bytes - self._skipped_before
+        return self._parser.skipped_bytes - self.skipped_before
 
     def note(self, data: bytes) -> None:
         for frame in self._splitter.feed(data) if self.size else ():

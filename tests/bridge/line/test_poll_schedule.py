@@ -33,7 +33,7 @@ class Line:
         self.now = 0.0
         self.schedule = PollSchedule()
         self.schedule.begin(baud, turn_s=turn_s)
-        self.link = MspLink(baud, 0.0)
+        self.link = MspLink(baud, [], 0.0)
         self.asked: list[tuple[float, int]] = []
         self.answer = answer
         self.beside_missions = False
@@ -51,7 +51,9 @@ class Line:
             self._settle(self.link.tick(self.now))
             self.schedule.ask(self.link, self.now, beside_missions=self.beside_missions)
             assert self.link.outstanding_bytes <= MAX_OUTSTANDING_BYTES
-            for data in self.link.take_output():
+            requests = [*self.link.output]
+            self.link.output.clear()
+            for data in requests:
                 for frame in MspParser().feed(data):
                     self._take(frame.command)
         return Counter(command for _, command in self.asked[before:])
