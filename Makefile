@@ -85,7 +85,7 @@ real-board: $(VENV)/.test-ready
 
 soak: $(VENV)/.test-ready
 	STORE_KILLS=200 STORE_DAMAGES=300 $(BIN)/python -m pytest --timeout 0 \
-	    tests/storage/test_store_durability.py tests/storage/test_store_budget.py
+	    tests/storage/test_store_durability.py tests/storage/test_salvage.py
 	SOAK_MINUTES=$(or $(MINUTES),30) $(BIN)/python -m pytest tests/e2e/test_soak.py $(ARGS)
 
 fuzz: $(VENV)/.test-ready

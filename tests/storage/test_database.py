@@ -136,35 +136,6 @@ def test_a_missing_end_is_noticed_or_harmless(path: Path, sound: Path, missing: 
         assert_works(store)
 
 
-def test_a_damaged_mission_does_not_hide_the_others(path: Path, sound: Path) -> None:
-    records = mission(3, items=40).records
-    assert sound.read_bytes().count(records[:160]) == 1
-    path.write_bytes(sound.read_bytes().replace(records[:160], b"?" + records[1:160]))
-    with open_store(path, NOW).store as store:
-        with pytest.raises(StoreError, match=r"mission 3 in .* was damaged on the disk"):
-            store.get(3)
-        assert len(store.list(99)) == MISSIONS
-        other = store.get(4)
-        assert other is not None
-        assert other.received == mission(4, items=40)
-
-
-@pytest.mark.parametrize("rotten", [b"\xff", b"U"])
-def test_a_damaged_row_does_not_hide_the_list(path: Path, sound: Path, rotten: bytes) -> None:
-    source = mission(3).source.encode()
-    path.write_bytes(sound.read_bytes().replace(source, rotten + source[1:]))
-    with open_store(path, NOW).store as store:
-        assert [summary.number for summary in store.list(99) if summary.outcome == DAMAGED] == [3]
-        assert {summary.source for summary in store.list(99)} == {
-            "",
-            *(ALL[number].source for number in ALL if number != 3),
-        }
-        with pytest.raises(StoreError, match=r"mission 3 in .* was damaged on the disk"):
-            store.get(3)
-        with pytest.raises(StoreError, match=r"mission 3 in .* was damaged on the disk"):
-            store.conclude(3, "VERIFIED", "", 2.0)
-
-
 @pytest.fixture
 def killed(path: Path, sound: Path) -> bytes:
     """Leave the files of a killed process, a main file and a log with further commits; return the log."""
@@ -286,3 +257,32 @@ def test_an_added_view_is_not_damage(path: Path, sound: Path) -> None:
     with opened.store as store:
         assert opened.set_aside is None
         assert len(store.list(99)) == MISSIONS
+
+
+def test_a_damaged_mission_does_not_hide_the_others(path: Path, sound: Path) -> None:
+    records = mission(3, items=40).records
+    assert sound.read_bytes().count(records[:160]) == 1
+    path.write_bytes(sound.read_bytes().replace(records[:160], b"?" + records[1:160]))
+    with open_store(path, NOW).store as store:
+        with pytest.raises(StoreError, match=r"mission 3 in .* was damaged on the disk"):
+            store.get(3)
+        assert len(store.list(99)) == MISSIONS
+        other = store.get(4)
+        assert other is not None
+        assert other.received == mission(4, items=40)
+
+
+@pytest.mark.parametrize("rotten", [b"\xff", b"U"])
+def test_a_damaged_row_does_not_hide_the_list(path: Path, sound: Path, rotten: bytes) -> None:
+    source = mission(3).source.encode()
+    path.write_bytes(sound.read_bytes().replace(source, rotten + source[1:]))
+    with open_store(path, NOW).store as store:
+        assert [summary.number for summary in store.list(99) if summary.outcome == DAMAGED] == [3]
+        assert {summary.source for summary in store.list(99)} == {
+            "",
+            *(ALL[number].source for number in ALL if number != 3),
+        }
+        with pytest.raises(StoreError, match=r"mission 3 in .* was damaged on the disk"):
+            store.get(3)
+        with pytest.raises(StoreError, match=r"mission 3 in .* was damaged on the disk"):
+            store.conclude(3, "VERIFIED", "", 2.0)

@@ -8,21 +8,15 @@ from itertools import pairwise
 
 import pytest
 
-from bridge.controllers.harakiri import profile as harakiri
-from bridge.vehicle.telemetry_table import TELEMETRY
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.commands import Msp
 from protocols.msp.frame import MspParser
 from simulator.board.flight import FlightState
-from simulator.board.options import Faults, SimOptions, Tree
+from simulator.board.options import Faults, SimOptions
 from tests.support.conversations import waypoints
 from tests.support.world import GroundStation, World
 
 m = messages
-ALL_SPEEDS = (115200, 57600, 38400, 19200, 9600, 4800, 2400, 1200)
-#: Bytes of each of Harakiri's telemetry requests and its reply.
-ROUND_TRIPS = {104: 28, 101: 23, 102: 30, 105: 28, 106: 26, 108: 20, 109: 18, 110: 17, 113: 42, 118: 25}
-ANGLE, BARO, GPS_HOME, GPS_HOLD, GPS_AUTO = 1 << 0, 1 << 2, 1 << 6, 1 << 7, 1 << 8
 
 
 def flown(seconds: float, *, baud: int = 115200, faults: Faults | None = None) -> tuple[World, GroundStation]:
@@ -139,122 +133,7 @@ def test_the_sticks_are_in_arducopters_order() -> None:
     assert (raw.port, raw.chan3_raw, raw.chan4_raw, raw.rssi) == (0, 1450, 1500, channels.rssi)
 
 
-def test_values_without_a_mavlink_field_are_sent_as_named_values() -> None:
-    _, station = flown(20)
-    named = {message.name: message.value for message in station.messages("NAMED_VALUE_INT", "NAMED_VALUE_FLOAT")}
-    assert (named["cycle_us"], named["i2c_err"]) == (3000, 0)
-    assert named["home_m"] == pytest.approx(41, abs=3)  # after 20 s on the circle
-    assert 180 <= named["home_deg"] <= 270
-
-
-def test_no_ground_station_shows_a_false_alarm() -> None:
-    """MAVProxy shows "fence breach" without the fence bit, Mission Planner "SAFE" without the motor bit."""
-    _, station = flown(3)
-    status = station.messages("SYS_STATUS")[-1]
-    present, health = status.onboard_control_sensors_present, status.onboard_control_sensors_health
-    assert present == status.onboard_control_sensors_enabled
-    assert health & present == present
-    assert present & m.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
-    assert health & m.MAV_SYS_STATUS_GEOFENCE
-    assert not present & m.MAV_SYS_STATUS_GEOFENCE
-    for bit in ("RC_RECEIVER", "3D_GYRO", "3D_ACCEL", "3D_MAG", "ABSOLUTE_PRESSURE", "GPS"):
-        assert present & getattr(m, f"MAV_SYS_STATUS_SENSOR_{bit}")
-    assert status.errors_count1 == status.errors_count2 == 0  # Mission Planner: "InternalError"
-
-
-@pytest.mark.parametrize(
-    ("boxes", "custom_mode", "stabilized"),
-    [
-        (0, 1, False),
-        (ANGLE, 0, True),
-        (1 << 1, 0, True),
-        (ANGLE | BARO, 2, True),
-        (ANGLE | BARO | GPS_HOLD, 5, True),
-        (ANGLE | BARO | GPS_HOME, 6, True),
-        (ANGLE | BARO | GPS_AUTO | GPS_HOLD, 3, True),
-        (1 << 9 | 1 << 3, 1, False),
-    ],
-)
-def test_the_switches_determine_the_mode(boxes: int, custom_mode: int, stabilized: bool) -> None:
-    _, station = flown(1.5, faults=Faults(boxes=boxes))
-    send_heartbeat = station.messages("HEARTBEAT")[-1]
-    assert send_heartbeat.custom_mode == custom_mode
-    assert bool(send_heartbeat.base_mode & m.MAV_MODE_FLAG_STABILIZE_ENABLED) is stabilized
-    assert send_heartbeat.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED
-
-
-@pytest.mark.parametrize(("switch", "position"), [("armed", False), ("boxes", 5)])
-def test_arming_and_modes_are_reported_at_once(switch: str, position: int) -> None:
-    world, station = flown(5.2)
-    station.take()
-    setattr(world.faults, switch, position)
-    world.run(0.3)
-    heartbeat = station.messages("HEARTBEAT")[-1]
-    assert heartbeat.custom_mode == (2 if switch == "boxes" else 0)
-    assert bool(heartbeat.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED) is (switch == "boxes")
-
-
-def test_a_disarmed_craft_is_on_the_ground() -> None:
-    world, station = flown(3)
-    assert station.take("EXTENDED_SYS_STATE")[-1].landed_state == m.MAV_LANDED_STATE_IN_AIR
-    world.faults.armed = False
-    world.run(3)
-    assert station.messages("EXTENDED_SYS_STATE")[-1].landed_state == m.MAV_LANDED_STATE_ON_GROUND
-
-
-def test_home_is_the_place_and_altitude_of_arming() -> None:
-    _, station = flown(30)
-    home = station.messages("HOME_POSITION")[-1]
-    assert (home.latitude, home.longitude) == (453838000, 84733000)
-    assert home.altitude == pytest.approx(131_000, abs=1000)
-
-
-@pytest.mark.parametrize("tree", Tree)
-def test_home_before_arming_is_the_position(tree: Tree) -> None:
-    """HarakiriWebstore1 reports an unknown home as 190 degrees, TestCode3 as 0."""
-    world = World(SimOptions(tree=tree), speeds=(115200,))
-    world.wait_ready()
-    station = listening(world)
-    world.run(3)
-    home = station.messages("HOME_POSITION")[-1]
-    assert (home.latitude, home.longitude) == (453838000, 84733000)
-
-
 # The line is not overloaded.
-
-
-@pytest.mark.parametrize("baud", ALL_SPEEDS)
-def test_telemetry_takes_only_its_share_of_the_line(baud: int) -> None:
-    world, station = flown(2, baud=baud)
-    for row in TELEMETRY:
-        station.send(m.MAVLink_command_long_message(1, 1, 511, 0, row.msgid, 10_000, 0, 0, 0, 0, 0))
-    world.run(10)
-    world.written.clear()
-    station.take()
-    world.run(30)
-    bytes_per_s = sum(count * ROUND_TRIPS[command] for command, count in polls(world).items()) / 30
-    burst = 0.6 * 0.05 / 30
-    assert 0.45 * baud / 10 < bytes_per_s <= (0.6 + burst) * baud / 10
-    world.assert_line_was_clean()
-    assert world.naze.counters.max_outstanding_reply_bytes <= 224
-    for_others = {Msp.SERVO, Msp.COMP_GPS, Msp.DEBUG}
-    assert set(polls(world)) == {poll.command for poll in harakiri.PATCHED.polls} - for_others
-
-
-@pytest.mark.parametrize(("baud", "attitude_hz", "position_hz", "status_hz"), [
-    (115200, 25, 5, 4), (57600, 25, 5, 4), (19200, 25, 5, 4),
-    (9600, 14, 2.8, 4), (2400, 2.8, 0.5, 1.5), (1200, 0.9, 0.25, 0.7),
-])  # fmt: skip
-def test_default_rates_depend_on_the_line_speed(
-    baud: int, attitude_hz: float, position_hz: float, status_hz: float
-) -> None:
-    world, station = flown(5, baud=baud)
-    station.take()
-    world.written.clear()
-    world.run(30)
-    assert rate_hz(station, "ATTITUDE", 30) == pytest.approx(attitude_hz, rel=0.2)
-    assert rate_hz(station, "GPS_RAW_INT", 30) == pytest.approx(position_hz, rel=0.35)
-    assert polls(world)[Msp.STATUS] / 30 == pytest.approx(status_hz, rel=0.2)
 
 
 def test_an_unanswered_address_gets_ten_a_second_until_the_craft_arms() -> None:
@@ -352,21 +231,3 @@ def test_noise_gives_neither_telemetry_nor_a_flight_controller() -> None:
     }
     world.power_on()
     world.wait_ready()
-
-
-@pytest.mark.parametrize("baud", [1200, 2400, 4800])
-def test_on_a_slow_line_combined_messages_keep_the_rate_of_their_polls(baud: int) -> None:
-    world, station = flown(10, baud=baud)
-    station.received.clear()
-    world.run(40)
-    fixes = len(station.messages("GPS_RAW_INT"))
-    assert fixes >= 40 / 5 - 2
-    for name in ("GLOBAL_POSITION_INT", "VFR_HUD"):
-        assert fixes - 2 <= len(station.messages(name)) <= fixes + 2, name
-    # Missing values become unknown as soon as the loss is noticed.
-    world.faults.hang = True
-    send_heartbeat(station)
-    world.run(12)
-    station.received.clear()
-    world.run(5)
-    assert {status.voltage_battery for status in station.messages("SYS_STATUS")} == {65535}

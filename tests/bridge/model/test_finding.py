@@ -96,34 +96,12 @@ def test_no_value_is_reported_as_changed_to_itself() -> None:
     assert [each.text() for each in verdict.findings] == ["Home: no Lat/Long sent, GPS position used"]
 
 
-def test_equal_findings_are_one_line_and_warnings_come_first() -> None:
-    items = [item(WAYPOINT, p1=3)] * 4 + [item(SPEED)] * 3 + [item(WAYPOINT, frame=0), item(WAYPOINT, p2=0)]
-    verdict = check_list(mission(*items), HarakiriRules())
-    assert summary(10, verdict) == "7 of 10 stored: 3 dropped, 1 Alt now relative"
-    assert finding_lines(verdict.findings) == [
-        (News.WARNING, "3 items: DO_CHANGE_SPEED dropped, not supported"),
-        (News.WARNING, "WP 8: Alt flown above home, not above sea level"),
-        (News.NOTICE, "4 items: Delay changed from 3 to 1 (0 = fly through, 1 = brake; to hold use LOITER_TIME)"),
-    ]
-
-
 def test_a_filled_in_default_is_not_reported() -> None:
     """Mission Planner sends no radius for home, and 0 for an empty field."""
     verdict = check_list([replace(HOME, p2=0.0), item(WAYPOINT, p2=0.0), item(TIME, p2=math.nan)], HarakiriRules())
     assert {each.news for each in verdict.findings} == {News.NONE}
     assert summary(3, verdict) is None
     assert finding_lines(verdict.findings) == []
-
-
-def test_at_most_ten_lines_are_sent() -> None:
-    verdict = check_list(mission(*(item(WAYPOINT, p1=number) for number in range(2, 40))), HarakiriRules())
-    lines = finding_lines(verdict.findings)
-    assert len(lines) == 11
-    assert lines[-1][1] == "and 28 more: see the status page or naze-bridge missions show"
-
-
-def test_a_list_with_every_item_dropped_is_a_warning() -> None:
-    assert summary(2, check_list(mission(item(SPEED)), HarakiriRules())) == "Mission erased: no command left"
 
 
 def test_a_list_without_home_reports_its_first_item_as_home() -> None:

@@ -286,33 +286,6 @@ def test_the_mixer_determines_the_type(mixer: int, mav_type: int) -> None:
     assert make.heartbeat(at(vehicle)).type == mav_type
 
 
-@pytest.mark.parametrize(
-    ("who", "active", "copter_mode", "plane_mode", "rover_mode"),
-    [
-        (INAV, ("ANGLE",), 0, 2, 0),
-        (INAV, ("ANGLE", "NAV ALTHOLD"), 2, 6, 0),
-        (INAV, ("NAV ALTHOLD", "NAV POSHOLD"), 5, 12, 5),
-        (INAV, ("NAV RTH", "NAV POSHOLD"), 6, 11, 11),
-        (INAV, ("NAV WP", "ANGLE"), 3, 10, 10),
-        (INAV, (), 1, 4, 0),
-        (BETAFLIGHT, ("GPS RESCUE", "ANGLE"), 6, 11, 11),
-        (BETAFLIGHT, ("ALT HOLD",), 2, 6, 0),
-        (HARAKIRI, ("BARO", "ANGLE"), 2, 6, 0),
-    ],
-)
-def test_the_active_boxes_determine_the_mode(
-    who: FlightController, active: tuple[str, ...], copter_mode: int, plane_mode: int, rover_mode: int
-) -> None:
-    flags = sum(1 << who.boxes.index(name) for name in ("ARM", *active))
-    copter, plane, rover, boat = Airframe.QUADROTOR, Airframe.FIXED_WING, Airframe.ROVER, Airframe.BOAT
-    for kind, mode in ((copter, copter_mode), (plane, plane_mode), (rover, rover_mode), (boat, rover_mode)):
-        state = with_replies(Vehicle(), who, STATUS=status(flags=flags))
-        state.airframe = kind
-        beat = make.heartbeat(at(state))
-        assert (beat.custom_mode, beat.system_status) == (mode, m.MAV_STATE_ACTIVE)
-        assert state.armed
-
-
 def test_body_rates_come_from_inavs_gyro() -> None:
     """INAV's axes are forward, left and up; MAVLink's are forward, right and down."""
     turning = struct.pack("<9h", 0, 0, 512, 90, 45, -30, 0, 0, 0)

@@ -6,42 +6,19 @@ import json
 import math
 import os
 import pty
-import socket
 import stat
 import subprocess
-import sys
-from collections.abc import Iterator
-from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from threading import Thread
 from typing import Any
 
 import pytest
 
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import Command
-from storage.mission_store import open_store
 from terminal.mission_source import save_mission
-from tests.support.benches import Starter
 from tests.support.plan import HOME, PlanRow, judge, plain_plan, plan_text, records_of, waypoint
 from tests.support.programs import Daemon, run_naze_bridge
-from tests.support.sample_missions import mission as sample_mission
-
-
-@pytest.fixture(scope="module")
-def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
-    """A daemon with its built-in simulated Naze."""
-    with ExitStack() as stack:
-        daemon = Starter(tmp_path_factory.mktemp("cli"), stack).daemon("sim:")
-        daemon.wait()
-        yield daemon
-
-
-@pytest.fixture
-def start_in(tmp_path: Path) -> Iterator[Starter]:
-    with ExitStack() as stack:
-        yield Starter(tmp_path, stack)
 
 
 def ask(daemon: Daemon, *arguments: str | Path, **options: object) -> subprocess.CompletedProcess[str]:
@@ -68,9 +45,6 @@ def strict(text: str) -> Any:
 def write_plan(path: Path, plan: list[PlanRow]) -> Path:
     path.write_text(plan_text(plan))
     return path
-
-
-_READING = (("list",), ("show", "2"), ("diff", "1", "2"))
 
 
 # -- output -----------------------------------------------------------------------------------------
@@ -135,10 +109,6 @@ def test_a_list_that_is_too_long_is_refused_without_a_table(daemon: Daemon, tmp_
     assert "no flight controller stores such a long mission" in refused.stderr
 
 
-def test_an_unreadable_file_gives_exit_status_2(daemon: Daemon, tmp_path: Path) -> None:
-    assert_one_sentence(ask(daemon, "push", tmp_path / "none"), 2, "none", "No such file")
-
-
 def test_unset_values_are_null_in_json(daemon: Daemon, tmp_path: Path) -> None:
     plan = [replace(row, p1=math.nan, p4=math.nan) for row in plain_plan(4, start=30)]
     file = write_plan(tmp_path / "plan", plan)
@@ -153,30 +123,6 @@ def test_unset_values_are_null_in_json(daemon: Daemon, tmp_path: Path) -> None:
     again = strict(ask(daemon, "missions", "restore", str(number), "--json").stdout)
     assert again["sent"] == delivery["sent"]
     assert strict(ask(daemon, "missions", "diff", str(number), str(again["mission"]), "--json").stdout)["equal"]
-
-
-def test_a_checksum_looks_the_same_everywhere(daemon: Daemon, tmp_path: Path) -> None:
-    number = strict(ask(daemon, "push", write_plan(tmp_path / "plan", plain_plan(5)), "--json").stdout)["mission"]
-    assert {
-        strict(ask(daemon, "pull", "--json").stdout)["checksum"],
-        strict(ask(daemon, "status", "--json").stdout)["mission_checksum"],
-        strict(ask(daemon, "missions", "list", "--limit", "1", "--json").stdout)[0]["checksum"],
-        strict(ask(daemon, "missions", "show", str(number), "--json").stdout)["received"]["checksum"],
-    } == {daemon.pull()["checksum"]}
-
-
-def test_tables_fit_and_have_no_trailing_spaces(daemon: Daemon, tmp_path: Path) -> None:
-    far = replace(waypoint(1), lat=-45.3838, lng=-178.4733, alt=1000.5, p1=400.5)
-    plan = [HOME, replace(far, command=Command.NAV_LOITER_TIME), far, PlanRow(Command.NAV_RETURN_TO_LAUNCH, alt=15)]
-    file = write_plan(tmp_path / "plan", plan)
-    number = strict(ask(daemon, "push", file, "--json").stdout)["mission"]
-    for arguments in (["push", file], ["pull"], ["missions", "show", str(number)], ["missions", "list"]):
-        lines = ask(daemon, *arguments).stdout.splitlines()
-        assert len(lines) > 2, arguments
-        assert [line for line in lines if len(line) > 80 or line != line.rstrip()] == []
-        if arguments[0] in ("push", "pull"):
-            assert sum("RETURN_TO_LAUNCH" in line for line in lines) == 1
-            assert sum("1000" in line and "-178.4733000" in line for line in lines) == 2
 
 
 # -- pull into a file ----------------------------------------------------------------------------------------
@@ -254,141 +200,29 @@ def test_pull_into_standard_output_is_a_mission_file(daemon: Daemon) -> None:
     assert ask(daemon, "pull", "-", "--json").returncode == 2
 
 
-# -- with and without a daemon ---------------------------------------------------------------------------------
+def test_an_unreadable_file_gives_exit_status_2(daemon: Daemon, tmp_path: Path) -> None:
+    assert_one_sentence(ask(daemon, "push", tmp_path / "none"), 2, "none", "No such file")
 
 
-def test_a_missing_daemon_is_one_sentence(tmp_path: Path) -> None:
-    assert_one_sentence(run_naze_bridge("status", "--state-dir", tmp_path), 1, str(tmp_path), "naze-bridge run")
+def test_a_checksum_looks_the_same_everywhere(daemon: Daemon, tmp_path: Path) -> None:
+    number = strict(ask(daemon, "push", write_plan(tmp_path / "plan", plain_plan(5)), "--json").stdout)["mission"]
+    assert {
+        strict(ask(daemon, "pull", "--json").stdout)["checksum"],
+        strict(ask(daemon, "status", "--json").stdout)["mission_checksum"],
+        strict(ask(daemon, "missions", "list", "--limit", "1", "--json").stdout)[0]["checksum"],
+        strict(ask(daemon, "missions", "show", str(number), "--json").stdout)["received"]["checksum"],
+    } == {daemon.pull()["checksum"]}
 
 
-def test_stored_missions_are_read_without_a_daemon(start_in: Starter, tmp_path: Path) -> None:
-    daemon = start_in.daemon("sim:")
-    daemon.wait()
-    first, second = plain_plan(5), [*plain_plan(4), waypoint(9)]
-    for plan in (first, second):
-        assert ask(daemon, "push", write_plan(tmp_path / "plan", plan)).returncode == 0
-    with_daemon = {words: ask(daemon, "missions", *words).stdout for words in _READING}
-    daemon.end()
-    assert {words: ask(daemon, "missions", *words).stdout for words in _READING} == with_daemon
-    difference = with_daemon["diff", "1", "2"].splitlines()
-    assert [line for line in difference if "->" in line and "WAYPOINT" in line]
-    assert "no daemon answers" in ask(daemon, "missions", "restore", "1").stderr
-    restored = ask(daemon, "missions", "restore", "1", "--fc", "sim")
-    assert restored.stdout.endswith("ACCEPTED: Mission verified: 5 records\n"), restored
-    assert_one_sentence(run_naze_bridge("missions", "list", "--state-dir", tmp_path), 1, "no missions are stored")
-
-
-def test_a_file_name_cannot_act_on_the_terminal(daemon: Daemon, tmp_path: Path) -> None:
-    file = write_plan(tmp_path / "Süd\x1b[2J\x9b2J\u202e\nwest", plain_plan(3))
-    assert ask(daemon, "push", file, "--json").returncode == 0
-    number = strict(ask(daemon, "missions", "list", "--json").stdout)[0]["number"]
-    for words in (("list",), ("show", str(number))):
-        shown = ask(daemon, "missions", *words).stdout
-        assert "push of Süd[2J2J west" in " ".join(shown.split())
-        assert shown.replace("\n", "").isprintable()
-    file.write_text("no plan")
-    refused = ask(daemon, "push", file)
-    assert refused.stderr.rstrip("\n").isprintable()
-
-
-def test_a_store_of_a_service_that_was_taken_over_cannot_act_on_the_terminal(tmp_path: Path) -> None:
-    with open_store(tmp_path / "missions.db", 0.0).store as store:
-        number = store.add(replace(sample_mission(1), source="\x1b[2J\x9b2Jpush"))
-        store.conclude(number, "VERIFIED\x1b[2J", "\u202edetail", 0.0)
-    for words in (("list",), ("show", str(number))):
-        shown = run_naze_bridge("missions", *words, "--state-dir", tmp_path)
-        assert shown.stdout.replace("\n", "").isprintable(), shown
-
-
-def test_a_daemon_that_was_taken_over_cannot_act_on_the_terminal(tmp_path: Path) -> None:
-    answers = [b'{"error": "\\u001b[2J\\u009b2J"}', b"[" * 100_000, b"[]", b"\xff", b"{}"]
-    with socket.socket(socket.AF_UNIX) as listening:
-        listening.bind(str(tmp_path / "control.sock"))
-        listening.listen()
-
-        def answer_all() -> None:
-            for answer in answers:
-                with listening.accept()[0] as client:
-                    client.recv(4096)
-                    client.sendall(answer + b"\n")
-
-        answering = Thread(target=answer_all)
-        answering.start()
-        for _ in answers:
-            ended = run_naze_bridge("status", "--state-dir", tmp_path)
-            assert_one_sentence(ended, 1)
-            assert ended.stderr.rstrip("\n").isprintable()
-        answering.join()
-
-
-def test_status_shows_the_flight_controller_and_the_address(daemon: Daemon) -> None:
-    lines = dict(line.split("  ", 1) for line in ask(daemon, "status").stdout.splitlines())
-    assert ", firmware 2.1.1, on sim:, MSP" in lines["Flight controller"]
-    assert ", for " in lines["Flight controller"]
-    assert "disarmed" in lines["Vehicle"]
-    assert lines["Settings"].strip() in ("not read yet", f"seal {(daemon.status() or {})['settings_seal']}")
-    assert lines["Connect to"].strip() == f"UDP 127.0.0.1, port {daemon.port}"
-
-
-@pytest.mark.parametrize(
-    ("words", "hint"),
-    [
-        (["psuh"], "did you mean 'push'?"),
-        (["missions", "lst"], "did you mean 'list'?"),
-        (["fleet", "wacth"], "did you mean 'watch'?"),
-        (["status", "--jsn"], "Did you mean"),
-    ],
-)
-def test_a_misspelt_word_gets_a_suggestion(words: list[str], hint: str) -> None:
-    ended = run_naze_bridge(*words)
-    assert ended.returncode == 2
-    assert ended.stderr.startswith("naze-bridge: ")
-    assert hint in ended.stderr
-
-
-def test_the_list_of_commands_imports_none_of_them() -> None:
-    program = "import sys; from service.cli.main import main\ntry: main(['-h'])\nfinally: print(*sys.modules)"
-    printed = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False).stdout
-    assert "Commands:" in printed
-    assert not {"asyncio", "rich", "pymavlink", "structlog"} & set(printed.split())
-
-
-def test_another_users_daemon_is_reported_as_such(daemon: Daemon) -> None:
-    """As root, the daemon's directory is root's; otherwise it is the tester's own with no permissions."""
-    as_nobody = (
-        "import os; from service.cli.main import main; import service.cli.status, service.settings;"
-        "os.geteuid() or os.setuid(65534); main(prog_name='naze-bridge')"
-    )
-    daemon.state_dir.chmod(0)
-    try:
-        ended = subprocess.run(
-            [sys.executable, "-c", as_nobody, "status", "--state-dir", str(daemon.state_dir)],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-    finally:
-        daemon.state_dir.chmod(0o755)
-    assert_one_sentence(ended, 1, "no permission", "sudo", "group", str(daemon.state_dir))
-
-
-def test_missions_needs_a_daemon() -> None:
-    ended = run_naze_bridge("missions", "list", "--fc", "sim:")
-    assert ended.returncode == 2
-    assert "No such option" in ended.stderr
-
-
-def test_a_missing_mission_is_one_sentence(daemon: Daemon) -> None:
-    for wrong in (["show", "99999999999999999999"], ["list", "--limit", "99999999999999999999"], ["show", "-1"]):
-        ended = ask(daemon, "missions", *wrong)
-        assert ended.returncode == 2, ended
-        assert "Traceback" not in ended.stderr
-    assert_one_sentence(ask(daemon, "missions", "show", "2147483647"), 1, "there is no mission 2147483647")
-
-
-def test_an_empty_store_is_said_to_be_empty(tmp_path: Path) -> None:
-    with ExitStack() as stack:
-        daemon = Starter(tmp_path, stack).daemon("sim:")
-        daemon.wait_up()
-        assert ask(daemon, "missions", "list").stdout == "No mission has been received yet.\n"
-        assert strict(ask(daemon, "missions", "list", "--json").stdout) == []
+def test_tables_fit_and_have_no_trailing_spaces(daemon: Daemon, tmp_path: Path) -> None:
+    far = replace(waypoint(1), lat=-45.3838, lng=-178.4733, alt=1000.5, p1=400.5)
+    plan = [HOME, replace(far, command=Command.NAV_LOITER_TIME), far, PlanRow(Command.NAV_RETURN_TO_LAUNCH, alt=15)]
+    file = write_plan(tmp_path / "plan", plan)
+    number = strict(ask(daemon, "push", file, "--json").stdout)["mission"]
+    for arguments in (["push", file], ["pull"], ["missions", "show", str(number)], ["missions", "list"]):
+        lines = ask(daemon, *arguments).stdout.splitlines()
+        assert len(lines) > 2, arguments
+        assert [line for line in lines if len(line) > 80 or line != line.rstrip()] == []
+        if arguments[0] in ("push", "pull"):
+            assert sum("RETURN_TO_LAUNCH" in line for line in lines) == 1
+            assert sum("1000" in line and "-178.4733000" in line for line in lines) == 2

@@ -111,18 +111,6 @@ def test_a_path_too_long_for_a_socket_is_one_sentence(tmp_path: Path) -> None:
     assert str(state) in sentence
 
 
-def test_the_command_line_finds_the_service(start: Starter, tmp_path: Path) -> None:
-    """Users cannot read systemd's state directory; the socket is in the runtime directory."""
-    runtime = tmp_path / "run"
-    runtime.mkdir()
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("RUNTIME_DIRECTORY", str(runtime))
-        daemon = start.daemon("sim:")
-        patch.setenv("XDG_STATE_HOME", str(tmp_path / "a home without a daemon"))
-        until(lambda: run_naze_bridge("status").returncode == 0, "a reply to the status request")
-    assert not (daemon.state_dir / "control.sock").exists()
-
-
 def test_actions_of_the_command_line_are_logged(start: Starter) -> None:
     daemon = start.daemon("sim:")
     daemon.wait()

@@ -13,8 +13,6 @@ import pytest
 from service.daemon import store_worker
 from service.daemon.api import DaemonApi
 from service.daemon.store_worker import StoreWorker
-from service.web import telemetry_logs
-from service.web.telemetry_logs import TelemetryLogs
 from service.zenoh_link import log_reader
 from service.zenoh_link.history import History
 from storage.store_error import StoreError
@@ -42,17 +40,6 @@ async def test_the_mission_store(monkeypatch: pytest.MonkeyPatch) -> None:
         await store.ask(lambda store: store.list(1))
     hangs.set()
     store.close()
-
-
-async def test_the_logs_of_the_page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(telemetry_logs, "_TIMEOUT_S", 0.5)  # the first request has begun by then
-    logs = TelemetryLogs(tmp_path)
-    with hung_file(tmp_path / LOG):
-        with pytest.raises(TimeoutError, match=HANGS):
-            await logs.read(LOG, 0)
-        with pytest.raises(TimeoutError, match=HANGS):
-            await logs.list()
-    logs.close()
 
 
 async def test_the_history_over_zenoh(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

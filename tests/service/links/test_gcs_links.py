@@ -4,100 +4,20 @@
 import asyncio
 import socket
 import threading
-from collections.abc import Iterator, Mapping
-from contextlib import ExitStack
 
 import pytest
 
 from bridge.gcs.station import Peer
-from bridge.gcs.stations import displaced
 from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import messages as m
 from service.links import tcp_link, udp_link
 from service.links.fc_device import device_opener
-from service.links.gcs_links import GcsLink, LinkError, open_link
-from service.settings.addresses import AddressError, GcsAddress, TcpFc, parse_fc, parse_gcs, split_gcs
+from service.links.gcs_links import LinkError, open_link
+from service.settings.addresses import TcpFc, parse_fc, parse_gcs
+from tests.support.links import Links, RecordedEvents, received
 from tests.support.programs import TIMEOUT_S, free_port, until_async
 
 FRAME = bytes.fromhex("fe09000101000000000002030000030346f1")
-
-
-class RecordedEvents:
-    """Records a link's events and its default peers."""
-
-    def __init__(self) -> None:
-        self.received: list[tuple[Peer, bytes]] = []
-        self.default_peers: dict[Peer, bool] = {}
-        self.gone: list[Peer] = []
-
-    def gcs_data(self, peer: Peer, data: bytes, *, datagram: bool) -> None:
-        self.received.append((peer, data))
-
-    def gcs_gone(self, peer: Peer) -> None:
-        self.gone.append(peer)
-
-    def displaced(self, peers: Mapping[Peer, float]) -> Peer:
-        return displaced(peers)
-
-    def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
-        self.default_peers[peer] = until_answered
-
-    def remove_default_peer(self, peer: Peer) -> None:
-        del self.default_peers[peer]
-
-
-class Links:
-    """Opens links and sockets that are closed after the test."""
-
-    def __init__(self) -> None:
-        self.events = RecordedEvents()
-        self._stack = ExitStack()
-
-    def open(self, text: str) -> GcsLink:
-        link = open_link(parse_gcs(text), self.events)
-        self._stack.callback(link.close)
-        return link
-
-    def udp(self, host: str = "127.0.0.1") -> socket.socket:
-        family = socket.AF_INET6 if ":" in host else socket.AF_INET
-        client = self._stack.enter_context(socket.socket(family, socket.SOCK_DGRAM))
-        client.bind((host, 0))
-        client.setblocking(False)
-        return client
-
-    def tcp(self, port: int, host: str = "127.0.0.1") -> socket.socket:
-        client = self._stack.enter_context(socket.create_connection((host, port)))
-        client.setblocking(False)
-        return client
-
-    def close(self) -> None:
-        self._stack.close()
-
-
-@pytest.fixture
-def links() -> Iterator[Links]:
-    links = Links()
-    yield links
-    links.close()
-
-
-async def received(end: socket.socket, size: int = 4096) -> bytes:
-    async with asyncio.timeout(TIMEOUT_S):
-        return await asyncio.get_running_loop().sock_recv(end, size)
-
-
-@pytest.mark.parametrize("host", ["127.0.0.1", "::1"])
-async def test_udpin_answers_to_the_senders_address(links: Links, host: str) -> None:
-    port = free_port(socket.SOCK_DGRAM, host)
-    link = links.open(f"udpin:{f'[{host}]' if ':' in host else host}:{port}")
-    clients = [links.udp(host) for _ in range(2)]
-    for client in clients:
-        client.sendto(FRAME, (host, port))
-    await until_async(lambda: len(links.events.received) == 2, "both datagrams")
-    for (peer, data), client in zip(links.events.received, clients, strict=True):
-        assert data == FRAME
-        link.send(peer, str(peer).encode())
-        assert await received(client) == str(peer).encode()
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "::1"])
@@ -192,26 +112,6 @@ async def test_localhost_is_resolved(links: Links) -> None:
     assert await received(client) == FRAME
 
 
-async def test_a_network_that_is_down_loses_only_the_datagram(links: Links) -> None:
-    link = links.open(f"udpin:127.0.0.1:{free_port(socket.SOCK_DGRAM)}")
-    client = links.udp()
-    for unreachable in (("192.0.2.1", 14550), ("255.255.255.255", 14550), ("127.0.0.1", 0)):
-        # From a socket bound to loopback: ENETUNREACH or EINVAL; EACCES; EINVAL.
-        link.send(Peer(link.name, unreachable), FRAME)
-    link.send(Peer(link.name, client.getsockname()), bytes(70000))
-    link.send(Peer(link.name, client.getsockname()), FRAME)
-    assert await received(client) == FRAME
-
-
-async def test_datagrams_to_a_closed_port_block_nothing(links: Links) -> None:
-    link = links.open(f"udpin:127.0.0.1:{free_port(socket.SOCK_DGRAM)}")
-    deaf, client = links.udp(), links.udp()
-    for _ in range(5000):
-        link.send(Peer(link.name, deaf.getsockname()), bytes(280))
-    link.send(Peer(link.name, client.getsockname()), FRAME)
-    assert await received(client) == FRAME
-
-
 async def test_a_client_above_the_limit_displaces_another(links: Links) -> None:
     port = free_port(socket.SOCK_STREAM)
     links.open(f"tcpin:127.0.0.1:{port}")
@@ -253,81 +153,6 @@ async def test_clients_that_do_not_read_are_disconnected_after_a_round(links: Li
         link.send(peer, ack)
         assert not links.events.gone
     await until_async(lambda: links.events.gone == [peer], "the end")
-
-
-@pytest.mark.parametrize(
-    ("text", "host", "port"),
-    [
-        ("udpin:[::]:14550", "::", 14550),
-        ("tcpin:[::1]:5760", "::1", 5760),
-        ("udpout:pc.local:1", "pc.local", 1),
-    ],
-)
-def test_addresses_are_written_like_they_are_read(text: str, host: str, port: int) -> None:
-    address = parse_gcs(text)
-    assert (address.host, address.port, str(address)) == (host, port, text)
-    assert isinstance(address, GcsAddress)
-
-
-@pytest.mark.parametrize(
-    ("text", "meant"),
-    [
-        ("UDPIN:14550", "udpin:0.0.0.0:14550"),
-        ("udp:14550", "udpin:0.0.0.0:14550"),
-        ("udp://:14550", "udpin:0.0.0.0:14550"),
-        ("udpin://0.0.0.0:14550", "udpin:0.0.0.0:14550"),
-        ("udps:0.0.0.0:14550", "udpin:0.0.0.0:14550"),
-        ("udpc:pc.local:14550", "udpout:pc.local:14550"),
-        ("udpout:pc.local,14550", "udpout:pc.local:14550"),
-        ("udpb:192.168.4.255:14560", "udpbcast:192.168.4.255:14560"),
-        ("tcp:0.0.0.0:5760", "tcpin:0.0.0.0:5760"),
-        ("tcpin:5760", "tcpin:0.0.0.0:5760"),
-    ],
-)
-def test_other_programs_notations_are_accepted(text: str, meant: str) -> None:
-    assert str(parse_gcs(text)) == meant
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("udp:192.168.4.20:14550", "write udpout:192.168.4.20:14550 to send there, udpin:0.0.0.0:14550 to listen"),
-        ("tcp:192.168.4.20:5760", "write tcpin:0.0.0.0:5760 to listen"),
-        ("udpin", "use udpin:0.0.0.0:14550"),
-        ("udpout:14550", "needs a host and a port"),
-        ("/dev/ttyUSB0:57600", "is not a ground station connection: use udpin"),
-    ],
-)
-def test_ambiguous_connections_are_explained(text: str, words: str) -> None:
-    with pytest.raises(AddressError) as caught:
-        parse_gcs(text)
-    assert words in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("text", "meant"),
-    [
-        ("AUTO", "auto"),
-        ("sim", "sim:"),
-        ("SIM:", "sim:"),
-        ("/dev/ttyAMA0:57600", "/dev/ttyAMA0,57600"),
-        ("serial:/dev/ttyAMA0:57600", "/dev/ttyAMA0,57600"),
-        ("serial:///dev/ttyAMA0", "/dev/ttyAMA0"),
-        ("/dev/serial/by-path/pci-0:1:1.0-port0", "/dev/serial/by-path/pci-0:1:1.0-port0"),
-        ("tcp://127.0.0.1:5760", "tcp:127.0.0.1:5760"),
-    ],
-)
-def test_other_programs_notations_of_flight_controllers_are_accepted(text: str, meant: str) -> None:
-    assert str(parse_fc(text)) == meant
-
-
-def test_one_value_may_have_several_links() -> None:
-    assert split_gcs("udpin:14550,tcpin:5760 udpout:pc,14551") == ["udpin:14550", "tcpin:5760", "udpout:pc,14551"]
-
-
-def test_ipv6_without_brackets_is_explained() -> None:
-    with pytest.raises(AddressError, match=r"brackets, as in \[::1\]:5760"):
-        parse_gcs("udpin:::1:14550")
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "::1", "localhost"])

@@ -2,24 +2,13 @@
 """Settings from files, drop-ins, environment and flags, and messages about invalid ones."""
 
 import os
-import tomllib
 from pathlib import Path
 
 import pytest
 
-from generators.config_sample import page, sample
 from service.settings import Settings, SettingsError, load_settings
 from service.settings.passphrase import new_passphrase
-from service.settings.table import KEYS
 from tests.support.programs import run_naze_bridge
-
-REPOSITORY = Path(__file__).parents[3]
-
-
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    (tmp_path / "conf.d").mkdir()
-    return tmp_path
 
 
 def load(folder: Path, text: str, **drop_ins: str) -> Settings:
@@ -114,63 +103,6 @@ def test_a_value_in_place_of_a_table_is_an_error(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ('gcs = ["udpin:0.0.0.0:14550", "udpin:127.0.0.1:14550"]', "would both listen on UDP port 14550"),
-        ('gcs = ["tcpin:[::]:5760", "tcpin:[::]:5760"]', "would both listen on TCP port 5760"),
-        (
-            'gcs = ["tcpin:0.0.0.0:5760"]\nshare = [{address = "tcpin:127.0.0.1:5760"}]',
-            "gcs tcpin:0.0.0.0:5760 and share tcpin:127.0.0.1:5760 would both listen on TCP port 5760",
-        ),
-        ('gcs = ["tcpin:0.0.0.0:7447"]\n[zenoh]\nlisten = ["tcp/0.0.0.0:7447"]', "zenoh.listen tcp/0.0.0.0:7447"),
-        ('gcs = ["udpin:0.0.0.0:7447"]\n[zenoh]\nlisten = ["quic/0.0.0.0:7447"]', "UDP port 7447: change one"),
-        ('gcs = ["udpout:10.0.0.1:9", "tcpin:[::]:5", "udpout:10.0.0.1:9"]', "is listed 2 times: remove the others"),
-    ],
-)
-def test_one_port_used_twice_is_an_error(folder: Path, text: str, words: str) -> None:
-    (found,) = problems(folder, text)
-    assert found.startswith("naze.toml:1: ")
-    assert words in found
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        'gcs = ["udpin:0.0.0.0:14550", "tcpin:0.0.0.0:14550"]',
-        'gcs = ["udpin:127.0.0.1:14550", "udpin:127.0.0.2:14550"]',
-        'gcs = ["udpin:0.0.0.0:14550", "udpin:[::]:14550"]',
-        'gcs = ["udpout:127.0.0.1:14550", "udpin:0.0.0.0:14550"]',
-    ],
-)
-def test_ports_that_do_not_conflict_are_accepted(folder: Path, text: str) -> None:
-    assert len(load(folder, text).gcs) == 2
-
-
-@pytest.mark.parametrize(
-    ("fc", "more", "words"),
-    [
-        ("tcp:127.0.0.1:5760", 'gcs = ["tcpin:0.0.0.0:5760"]', "would connect to itself"),
-        ("tcp:localhost:5760", 'gcs = ["tcpin:0.0.0.0:5760"]', "would connect to itself"),
-        ("tcp:127.0.0.1:8080", "[web]", "fc tcp:127.0.0.1:8080 is web.listen 127.0.0.1:8080"),
-        ("/dev/ttyUSB0,57600", 'record_uart = "/dev/ttyUSB0"', "is the flight controller's port: name a file"),
-    ],
-)
-def test_a_flight_controller_port_with_another_use_is_an_error(folder: Path, fc: str, more: str, words: str) -> None:
-    config = folder / "naze.toml"
-    config.write_text(f'fc = "{fc}"\n{more}')
-    with pytest.raises(SettingsError) as caught:
-        load_settings(config, None, (), folder)
-    (problem,) = caught.value.problems
-    assert words in str(problem)
-
-
-def test_the_same_port_number_on_another_host_is_accepted(folder: Path) -> None:
-    config = folder / "naze.toml"
-    config.write_text('fc = "tcp:192.168.4.9:5760"\ngcs = ["tcpin:0.0.0.0:5760"]')
-    assert str(load_settings(config, None, (), folder).fc) == "tcp:192.168.4.9:5760"
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
         ('"zenoh.prefix" = "x"', """'"zenoh.prefix"' is not a setting; did you mean 'zenoh.prefix'?"""),
         ("sysid = 0x" + "f" * 8000, "sysid is far too large, but must be 1..255"),
         (f'log_level = "{"x" * 100_000}"', "xxx', but must be "),
@@ -249,23 +181,3 @@ def test_check_config_warns_of_a_weak_key_and_does_not_quote_it(folder: Path) ->
     assert "setup --new-key" in warning
     key.write_text(f"{new_passphrase()}\n")
     assert run_naze_bridge("run", "--check-config", "--config", config).stderr == ""
-
-
-def test_the_sample_is_up_to_date_and_has_the_defaults(folder: Path) -> None:
-    checked_in = (REPOSITORY / "systemd" / "config.toml").read_text()
-    assert checked_in == sample(), "run make config-sample"
-    assert load(folder, checked_in) == load(folder, "")
-
-
-def test_every_line_of_the_sample_is_valid(folder: Path) -> None:
-    lines = [line.removeprefix("#") for line in sample().splitlines() if line and not line.startswith("# ")]
-    text = "\n".join(line for line in lines if not line.startswith("config_file"))
-    assert load(folder, text).zenoh is not None
-    tables = tomllib.loads("\n".join(lines))
-    named = {name for name, value in tables.items() if not isinstance(value, dict)}
-    named |= {f"{table}.{name}" for table, inner in tables.items() if isinstance(inner, dict) for name in inner}
-    assert named == {key.name for key in KEYS}
-
-
-def test_the_page_has_every_setting() -> None:
-    assert page() in (REPOSITORY / "docs" / "configuration.md").read_text(), "run make config-sample"

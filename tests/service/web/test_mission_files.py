@@ -1,13 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Mission files and telemetry logs over HTTP, with and without the token."""
 
+import asyncio
+from collections.abc import Awaitable, Callable
 from http.client import HTTPConnection
+from typing import Any, cast
 
 import pytest
+from starlette.requests import Request
+from structlog.testing import capture_logs
 
+from payloads.mission_data import Json
+from protocols.mission_item import MissionItem
+from service.daemon.api import DaemonApi
+from service.web import mission_files
 from service.web.access import MAX_FILE
-from service.web.telemetry_logs import PIECE, TelemetryLogs
-from tests.support.plan import plain_plan
+from service.web.mission_files import MissionFiles, MissionWriter, Progress
+from tests.support.plan import plain_plan, plan_text
 from tests.support.programs import TIMEOUT_S
 from tests.support.web_bench import EXAMPLE, Answer, WebBench
 
@@ -65,33 +74,41 @@ def test_a_bad_file_gets_one_sentence(lasting_web: WebBench, body: bytes, kind: 
     assert lasting_web.ask("/api/state").status == 200
 
 
-def test_logs_need_the_token(lasting_web: WebBench) -> None:
-    folder = lasting_web.daemon.state_dir / "logs"
-    folder.mkdir(exist_ok=True)
-    contents = bytes(range(256)) * (PIECE // 128)
-    (folder / "2026-01-02 03-04-05.tlog").write_bytes(contents)
-    (folder / "secret").write_bytes(b"other")
-    path = "/api/logs/2026-01-02%2003-04-05.tlog"
-    for url in ("/api/logs", path):
-        assert lasting_web.ask(url).status == 403
-    proof = {"Authorization": f"Bearer {lasting_web.token}"}
-    listed = lasting_web.ask("/api/logs", **proof).data["logs"]
-    assert {"name": "2026-01-02 03-04-05.tlog", "size": len(contents)} in listed
-    assert "secret" not in [log["name"] for log in listed]
-    first = lasting_web.ask(path, **proof).body
-    assert first == contents[:PIECE]
-    assert first + lasting_web.ask(f"{path}?start={PIECE}", **proof).body == contents
-    for name in ("secret", "..%2Fweb-token", "2026-01-02%2003-04-06.tlog"):
-        assert lasting_web.ask(f"/api/logs/{name}", **proof).status == 404
+async def test_an_unexpected_error_ends_the_write_with_a_sentence() -> None:
+    async def fail(_progress: Progress) -> Json:
+        raise KeyError("ack")
+
+    writer = MissionWriter()
+    with capture_logs() as events:
+        writer.begin("field.waypoints", fail)
+        for _ in range(5):
+            await asyncio.sleep(0)
+    assert writer.state is not None
+    assert (writer.state["done"], writer.state["ok"]) == (True, False)
+    assert writer.state["text"] == "The daemon failed during the write; see its log."
+    assert [event["event"] for event in events] == ["web.failed"]
 
 
-async def test_without_a_state_directory_there_are_no_logs() -> None:
-    logs = TelemetryLogs(None)
-    assert await logs.list() == {"logs": []}
-    logs.close()
+class Api:
+    async def check(self, items: list[MissionItem]) -> Json:
+        return {"count": len(items)}
 
 
-def test_the_history_of_the_serial_line_is_served(lasting_web: WebBench) -> None:
-    history = lasting_web.ask("/api/link").data
-    assert history["interval_s"] == 2
-    assert set(history["samples"][0]) == {"round_trip_ms", "lost", "damaged"}
+def request(receive: Callable[[], Awaitable[Any]]) -> Request:
+    headers = [(b"content-type", b"application/octet-stream")]
+    return Request({"type": "http", "method": "POST", "query_string": b"", "headers": headers}, receive)
+
+
+async def test_a_check_does_not_wait_for_a_slow_upload(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def never() -> Any:
+        await asyncio.Event().wait()
+
+    async def whole() -> Any:
+        return {"type": "http.request", "body": plan_text(plain_plan(5)).encode(), "more_body": False}
+
+    monkeypatch.setattr(mission_files, "checked_mission", lambda _items, verdict: verdict)
+    files = MissionFiles(cast("DaemonApi", Api()), MissionWriter())
+    slow = asyncio.create_task(files.check(request(never)))
+    await asyncio.sleep(0)
+    assert (await asyncio.wait_for(files.check(request(whole)), TIMEOUT_S))["count"] > 0
+    slow.cancel()

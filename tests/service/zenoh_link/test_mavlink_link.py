@@ -5,10 +5,16 @@ import asyncio
 from typing import Any, cast
 
 import zenoh
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from protocols.mavlink.codec import MavlinkDecoder
+from protocols.mavlink.frame import MavlinkSplitter
 from service.daemon.gcs_connections import GcsConnections
 from service.zenoh_link.mavlink_link import MavlinkLink
 from service.zenoh_link.publisher import Publisher
+from tests.support.benches import Starter
+from tests.support.programs import until
+from tests.support.zenoh_bench import I_KNOW, Reader, endpoint, key, session, zenoh_bench
 
 HEARTBEAT = bytes.fromhex("fe09000101000000000002030000030346f1")
 
@@ -36,3 +42,46 @@ async def test_frames_are_dropped_while_another_bridge_has_the_same_name() -> No
     link._arrived(cast("zenoh.Sample", Sample()))
     await asyncio.sleep(0)
     assert events.received == [HEARTBEAT]
+
+
+def test_mavlink_is_published_while_subscribed_and_received(start: Starter) -> None:
+    where = endpoint()
+    bench = zenoh_bench(start, f'listen = ["{where}"]\nmavlink_in = true\ncommands_without_authentication = "I know"')
+    decoder = MavlinkDecoder()
+    with session(connect=where) as opened:
+        reader = Reader(opened, key("@mavlink/v1/out"))
+        until(lambda: len(reader.samples) > 30, "frames")
+        frames = [frame for each in reader.samples for frame in MavlinkSplitter().feed(each.payload.to_bytes())]
+        numbers = [frame.seq for frame in frames]
+        assert numbers == [(numbers[0] + place) % 256 for place in range(len(numbers))]
+        assert all(decoder.decode(frame) for frame in frames)
+        speaker = mavlink.MAVLink(None, srcSystem=254, srcComponent=190)
+        opened.put(key("@mavlink/v1/in"), b"\xfd\xff no MAVLink" * 9)
+        opened.put(key("@mavlink/v1/in"), bytes(mavlink.MAVLink_mission_request_list_message(1, 1, 0).pack(speaker)))
+
+        def answered() -> bool:
+            return any(
+                frame.msgid == mavlink.MAVLINK_MSG_ID_MISSION_COUNT
+                for each in reader.samples[:]
+                for frame in MavlinkSplitter().feed(each.payload.to_bytes())
+            )
+
+        until(answered, "the answer")
+        status = bench.daemon.status()
+        assert status is not None
+        assert status["ground_stations"] == ["zenoh @mavlink/v1/out"]
+
+
+def test_incoming_mavlink_is_off_by_default(start: Starter) -> None:
+    where = endpoint()
+    bench = zenoh_bench(start, f'listen = ["{where}"]\n{I_KNOW}')
+    with session(connect=where) as opened:
+        reader = Reader(opened, key("@mavlink/v1/out"))
+        until(lambda: reader.samples, "a frame")
+        speaker = mavlink.MAVLink(None, srcSystem=254, srcComponent=190)
+        opened.put(key("@mavlink/v1/in"), bytes(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(speaker)))
+        seen = len(reader.samples)
+        until(lambda: len(reader.samples) > seen + 20, "more frames")
+        status = bench.daemon.status()
+        assert status is not None
+        assert status["ground_stations"] == []

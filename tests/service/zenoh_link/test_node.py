@@ -5,29 +5,20 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
-from functools import partial
+from contextlib import contextmanager
 from pathlib import Path
 
-import pytest
-from pymavlink.dialects.v20 import ardupilotmega as mavlink
-
-from payloads.keys import COMMANDS
-from protocols.mavlink.codec import MavlinkDecoder
-from protocols.mavlink.frame import MavlinkSplitter
 from tests.support.benches import Bench, Starter
-from tests.support.plan import judge, plain_plan, plan_text, records_of
+from tests.support.plan import judge, plain_plan, records_of
 from tests.support.programs import until
 from tests.support.zenoh_bench import (
     I_KNOW,
-    VEHICLE,
     Reader,
     ask,
     ask_surely,
     endpoint,
     key,
     session,
-    write_config,
     zenoh_bench,
 )
 from tests.support.zenoh_router import Router, running_router
@@ -138,86 +129,3 @@ def test_a_stalled_subscriber_delays_nothing(start: Starter) -> None:
         bench.board.assert_unharmed()
         assert bench.daemon.end() == 0
     assert "Traceback" not in bench.daemon.printed
-
-
-@pytest.mark.parametrize("behind_a_router", [False, True])
-def test_two_vehicles_with_one_name_both_report_it(start: Starter, tmp_path: Path, *, behind_a_router: bool) -> None:
-    where = endpoint()
-    with ExitStack() as stack:
-        if behind_a_router:
-            stack.enter_context(running_router(tmp_path, where))
-        first = zenoh_bench(start, f'{"connect" if behind_a_router else "listen"} = ["{where}"]\n{I_KNOW}')
-        opened = stack.enter_context(session(connect=where))
-        reader = Reader(opened)
-        reader.wait("state", lambda state: state["others_of_this_name"] == 0)
-        first.daemon.push(plain_plan(5))
-        before = first.board.records()
-        second_directory = tmp_path / "second"
-        second_directory.mkdir()
-        config = write_config(second_directory, f'connect = ["{where}"]')
-        second = Starter(second_directory, stack).daemon("sim:", options=("--config", str(config)))
-        for daemon in (first.daemon, second):
-            taken = until(partial(daemon.has_logged, "zenoh.name_taken"), "a log entry about the other vehicle")
-            assert taken["vehicle"] == VEHICLE
-        reader.wait("state", lambda state: state["others_of_this_name"] == 1)
-        until(lambda: reader.events("zenoh.name_taken"), "the event")
-        status = first.daemon.status()
-        assert status is not None
-        assert status["zenoh_others_of_this_name"] == 1
-        for command in ("mission/upload", "mission/clear", "mission/restore?number=1"):  # both would obey it
-            payload = plan_text(plain_plan(7)).encode() if command == "mission/upload" else None
-            (refused,) = ask(opened, f"{COMMANDS}/{command}", payload)
-            assert "another bridge has the same vehicle name" in refused["error"]
-        assert first.board.records() == before
-        second.end(signal.SIGKILL)
-        until(lambda: first.daemon.has_logged("zenoh.name_free"), "the end of that")
-
-
-def test_mavlink_is_published_while_subscribed_and_received(start: Starter) -> None:
-    where = endpoint()
-    bench = zenoh_bench(start, f'listen = ["{where}"]\nmavlink_in = true\ncommands_without_authentication = "I know"')
-    decoder = MavlinkDecoder()
-    with session(connect=where) as opened:
-        reader = Reader(opened, key("@mavlink/v1/out"))
-        until(lambda: len(reader.samples) > 30, "frames")
-        frames = [frame for each in reader.samples for frame in MavlinkSplitter().feed(each.payload.to_bytes())]
-        numbers = [frame.seq for frame in frames]
-        assert numbers == [(numbers[0] + place) % 256 for place in range(len(numbers))]
-        assert all(decoder.decode(frame) for frame in frames)
-        speaker = mavlink.MAVLink(None, srcSystem=254, srcComponent=190)
-        opened.put(key("@mavlink/v1/in"), b"\xfd\xff no MAVLink" * 9)
-        opened.put(key("@mavlink/v1/in"), bytes(mavlink.MAVLink_mission_request_list_message(1, 1, 0).pack(speaker)))
-
-        def answered() -> bool:
-            return any(
-                frame.msgid == mavlink.MAVLINK_MSG_ID_MISSION_COUNT
-                for each in reader.samples[:]
-                for frame in MavlinkSplitter().feed(each.payload.to_bytes())
-            )
-
-        until(answered, "the answer")
-        status = bench.daemon.status()
-        assert status is not None
-        assert status["ground_stations"] == ["zenoh @mavlink/v1/out"]
-
-
-def test_incoming_mavlink_is_off_by_default(start: Starter) -> None:
-    where = endpoint()
-    bench = zenoh_bench(start, f'listen = ["{where}"]\n{I_KNOW}')
-    with session(connect=where) as opened:
-        reader = Reader(opened, key("@mavlink/v1/out"))
-        until(lambda: reader.samples, "a frame")
-        speaker = mavlink.MAVLink(None, srcSystem=254, srcComponent=190)
-        opened.put(key("@mavlink/v1/in"), bytes(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(speaker)))
-        seen = len(reader.samples)
-        until(lambda: len(reader.samples) > seen + 20, "more frames")
-        status = bench.daemon.status()
-        assert status is not None
-        assert status["ground_stations"] == []
-
-
-def test_a_failed_connection_is_reported_with_its_reason(start: Starter) -> None:
-    where = endpoint()
-    bench = zenoh_bench(start, f'connect = ["{where}"]')
-    alone = until(lambda: bench.daemon.has_logged("zenoh.alone"), "a log entry about it")
-    assert alone["why"] == f"{where}: no router is running there (connection refused)"

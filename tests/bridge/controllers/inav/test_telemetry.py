@@ -20,8 +20,6 @@ from tests.bridge.controllers.nav.test_mission_store import plan
 from tests.support.conversations import Upload
 from tests.support.world import GroundStation, World
 
-PREARM = messages.MAV_SYS_STATUS_PREARM_CHECK
-RC_LINK, NOT_LEVEL = 1 << 18, 1 << 8
 FAILSAFE, PLANE_FAILSAFE = (1 << boxes.index(27) for boxes in (BOXES["9.1.0"], PLANE_BOXES))
 
 
@@ -110,16 +108,6 @@ def test_the_boards_time_is_known_once_its_gps_has_it(unix_s: float) -> None:
     assert (time is not None) == bool(unix_s)
     if time is not None:
         assert time.unix_s - unix_s == pytest.approx(time.heard_at, abs=0.1)
-
-
-def test_arming_blockers_are_reported_when_they_change() -> None:
-    board, world, station = introduced(faults=Faults(boxes=0, arming_blockers=RC_LINK | NOT_LEVEL))
-    assert station.messages("SYS_STATUS")[-1].onboard_control_sensors_health & PREARM == 0
-    assert [text for text in station.texts() if "Arm" in text] == ["PreArm: not level, no RC link"]
-    board.faults.arming_blockers = 0
-    world.run(3)
-    assert station.messages("SYS_STATUS")[-1].onboard_control_sensors_health & PREARM
-    assert [text for text in station.texts() if "Arm" in text][1:] == ["PreArm: ready"]
 
 
 def test_loading_a_mission_during_identification_does_not_hide_the_board() -> None:

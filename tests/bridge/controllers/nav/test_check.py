@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.items import home_item, items_from_records
 from bridge.controllers.nav.rules import ENDLESS_S, inav_profile, multiwii_profile
-from bridge.missions.list_check import check_count, check_list
-from bridge.model.finding import DROPPED, REJECTED, News
+from bridge.missions.list_check import check_list
+from bridge.model.finding import DROPPED, News
 from bridge.model.verdict import Result, Verdict
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.mission_messages import item_from_float_message
@@ -133,114 +133,6 @@ def test_a_landing_without_a_position_after_rtl_is_merged_into_it() -> None:
     assert findings_for(WP, rtl, land) == [(3, "command", 21, DROPPED)]
 
 
-def test_speeds_are_stored_in_the_legs_and_shown_as_items() -> None:
-    sent = (WP, speed(7.5), WP, item(C.NAV_LOITER_TIME, p1=5), item(C.DO_SET_ROI), speed(3), item(C.NAV_LAND))
-    records = kept(*sent)
-    assert [(r.action, r.p1, r.p2) for r in records] == [(1, 0, 0), (1, 750, 0), (3, 5, 750), (5, 0, 0), (8, 300, 0)]
-    verdict = verdict_on(*sent)
-    assert verdict.findings == ()
-    assert list(verdict.items[1:]) == [replace(it, seq=n) for n, it in enumerate(sent, 1)]
-
-
-def test_a_speed_can_return_to_the_default() -> None:
-    sent = (speed(7), WP, speed(-2), WP)
-    assert [record.p1 for record in kept(*sent)] == [700, 0]
-    assert [shown.p2 for shown in verdict_on(*sent).items if shown.command == C.DO_CHANGE_SPEED] == [7, -2]
-
-
-def test_lost_parts_of_a_speed_are_reported() -> None:
-    assert findings_for(speed(0.1, 0, 50), WP) == [
-        (1, "p3", 50, 0),
-        (1, "p1", 0, 1),
-        (1, "p2", 0.1, 0.5),
-    ]
-    assert findings_for(WP, speed(5), item(C.NAV_RETURN_TO_LAUNCH, at=False)) == [(2, "command", 178, DROPPED)]
-    assert findings_for(speed(1e30), WP) == [(1, "p2", 1e30, 327.67)]
-
-
-def test_a_jump_target_is_renumbered_for_the_flight_controller() -> None:
-    sent = (WP, speed(5), WP, item(C.NAV_TAKEOFF, at=False, alt_m=5.0), WP, jump(3), WP)
-    records = kept(*sent)
-    assert records[3] == NavRecord(A.JUMP, p1=2, p2=2)
-    verdict = verdict_on(*sent)
-    assert [shown.p1 for shown in verdict.items if shown.command == C.DO_JUMP] == [3]
-
-
-def test_a_warning_for_legs_at_which_a_multiwii_stops() -> None:
-    """Waypoints 400 m apart: only the jump back is too long. A heading change in between is not a leg."""
-    second, third = (replace(WP, lat_e7=LAT + 36_000 * place) for place in (1, 2))
-    yaw = item(C.CONDITION_YAW, at=False, p1=90.0)
-    legs = (WP, second, yaw, third, jump(1), third)
-    assert findings_for(*legs, rules=MULTIWII) == [(5, "lat_e7", 0, 0)]
-    assert findings_for(*legs) == []
-
-
-def test_a_warning_for_legs_that_a_multiwii_ends_at_a_region_of_interest() -> None:
-    """By default within 1 m of it, and a craft strays by 5 m."""
-
-    def north(metres: float, command: int = C.NAV_WAYPOINT, east: float = 0.0) -> MissionItem:
-        return item(command, lat_e7=LAT + round(metres * 90), lon_e7=LON + round(east * 128))
-
-    def warned(*items: MissionItem, rules: NavRules = MULTIWII) -> list[int | None]:
-        return [finding.seq for finding in verdict_on(*items, rules=rules).findings if finding.news is News.WARNING]
-
-    roi, aside, none = north(50, C.NAV_ROI), north(50, C.NAV_ROI, east=7), item(C.DO_SET_ROI_NONE, at=False)
-    assert warned(north(0), roi, north(100), north(200)) == [3]
-    assert warned(north(0), north(50, C.NAV_ROI, east=5), north(100)) == [3]
-    assert warned(north(0), aside, north(100)) == []
-    assert warned(north(0), roi, north(100), rules=INAV) == []
-    assert warned(north(0), roi, none, north(100)) == []
-    assert warned(north(0), roi, item(C.CONDITION_YAW, at=False, p1=90), north(100)) == []
-    assert warned(roi, north(50)) == [2]
-    # After the jump, the ROI is in force on the earlier legs, too.
-    assert warned(north(0), north(100), roi, north(120), north(140), jump(1), north(160)) == [2, 6]
-    assert warned(north(0), north(100), roi, north(120), north(140), none, jump(1), north(160)) == []
-
-
-def test_a_jump_to_a_merged_or_dropped_item_goes_to_the_next() -> None:
-    assert kept(WP, speed(5), WP, WP, jump(2, -1))[3] == NavRecord(A.JUMP, p1=2, p2=-1, flag=LAST)
-    takeoff = item(C.NAV_TAKEOFF, at=False, alt_m=5.0)
-    assert kept(takeoff, WP, WP, jump(1))[2].p1 == 1
-    assert findings_for(takeoff, WP, WP, jump(1))[-1] == (4, "p1", 1, 2)
-
-
-def test_a_jump_may_go_forward_on_inav_and_only_back_on_multiwii() -> None:
-    forward = (WP, jump(4), WP, WP)
-    assert kept(*forward)[1].p1 == 4
-    assert verdict_on(*forward, rules=MULTIWII).ack is MissionResult.INVALID_PARAM1
-    assert kept(WP, jump(1), rules=MULTIWII)[1].p1 == 1
-
-
-@pytest.mark.parametrize(
-    "items",
-    [
-        (WP, WP, jump(0)),
-        (WP, WP, jump(-1)),
-        (WP, WP, jump(4)),
-        (WP, WP, jump(math.nan)),
-        (WP, WP, jump(1.5)),
-        (WP, WP, jump(1e30)),
-        (WP, WP, jump(2)),
-        (WP, WP, jump(3)),
-        (WP, jump(3), WP),
-        (jump(3), WP, WP),
-        (item(C.DO_SET_ROI), WP, WP, jump(1)),
-        (WP, item(C.NAV_RETURN_TO_LAUNCH, at=False), WP, WP, jump(2)),
-        (WP, WP, jump(4), item(206)),
-    ],
-)
-def test_a_jump_that_blocks_arming_or_crashes_inav_rejects_the_list(items: tuple[MissionItem, ...]) -> None:
-    verdict = verdict_on(*items)
-    assert (verdict.result, verdict.ack) == (Result.REJECTED, MissionResult.INVALID_PARAM1)
-    assert verdict.findings[-1].becomes == REJECTED
-
-
-@pytest.mark.parametrize("target", [0, -1, -32768])
-def test_a_jump_that_crashes_cannot_even_be_encoded(target: int) -> None:
-    with pytest.raises(UnsafeRecord):
-        encode_set_wp(2, NavRecord(A.JUMP, p1=target))
-
-
 @pytest.mark.parametrize("number", [0, 255, -1])
 def test_home_and_the_hold_position_cannot_be_written(number: int) -> None:
     with pytest.raises(UnsafeRecord):
@@ -271,13 +163,6 @@ def test_a_list_that_cannot_be_flown_is_rejected(items: tuple[MissionItem, ...],
     assert (verdict.result, verdict.ack, verdict.records) == (Result.REJECTED, ack, ())
 
 
-def test_the_capacity_comes_from_the_flight_controller() -> None:
-    assert len(kept(*(WP,) * 120)) == 120
-    assert len(kept(*(speed(5), WP, speed(6), WP) * 60)) == 120
-    assert check_count(242, INAV) is not None
-    assert check_count(180, MULTIWII) is not None
-
-
 def test_home_is_not_a_record() -> None:
     for lat in (0, None, LAT, 2**31 - 1):
         verdict = check_list([replace(HOME, lat_e7=lat), WP], INAV, (11, 22))
@@ -287,71 +172,13 @@ def test_home_is_not_a_record() -> None:
     assert check_list([item(C.NAV_LAND), WP], INAV).ack is MissionResult.INVALID
 
 
-def test_multiwii_has_an_endless_hold_an_rtl_height_and_no_speeds() -> None:
-    sent = (WP, item(C.NAV_LOITER_UNLIM), item(C.NAV_RETURN_TO_LAUNCH, at=False, alt_m=30.0))
-    verdict = verdict_on(*sent, rules=MULTIWII)
-    assert verdict.findings == ()
-    assert [(r.action, r.alt_cm) for r in verdict.records] == [(1, 5000), (2, 5000), (4, 3000)]
-    assert list(verdict.items[1:]) == [replace(it, seq=n) for n, it in enumerate(sent, 1)]
-    assert findings_for(speed(5), WP, rules=MULTIWII) == [(1, "command", 178, DROPPED)]
-    assert findings_for(replace(WP, frame=0), rules=MULTIWII) == [(1, "frame", 0, 3)]
-
-
 # -- flown differently than it reads ---------------------------------------------------------------------------
 
 RTL, RTL_LANDS = (item(C.NAV_RETURN_TO_LAUNCH, at=False, p1=p1) for p1 in (0.0, 1.0))
 
 
-@pytest.mark.parametrize("rules", [INAV, MULTIWII])
-def test_items_after_an_rtl_are_dropped(rules: NavRules) -> None:
-    assert [r.action for r in kept(WP, WP, RTL_LANDS, WP, WP, rules=rules)] == [1, 1, 4]
-    assert findings_for(WP, RTL, WP, WP, rules=rules) == [(3, "command", 16, DROPPED), (4, "command", 16, DROPPED)]
-    # Unless a jump leads there.
-    over = (WP, WP, WP, jump(1), WP) if rules is MULTIWII else (WP, jump(4), RTL, WP, WP)
-    assert findings_for(*over, rules=rules) == []
-
-
-def test_an_rtl_whose_ending_the_last_item_would_change_is_rejected_on_inav() -> None:
-    over = (WP, jump(5), WP, RTL_LANDS, WP, WP)
-    assert verdict_on(*over).ack is MissionResult.INVALID_PARAM1
-    assert [r.p1 for r in kept(*(RTL if it is RTL_LANDS else it for it in over)) if r.action == A.RTH] == [0]
-    assert verdict_on(*over[:-2], speed(5), WP, WP).result is Result.ACCEPTED
-
-
-def test_a_jump_to_the_first_record_as_the_last_one_means_hover() -> None:
-    """INAV stores the target as an index, 0."""
-    assert verdict_on(WP, jump(5), WP, RTL, WP, WP, jump(1)).result is Result.ACCEPTED
-    assert verdict_on(WP, jump(5), WP, RTL_LANDS, WP, WP, jump(1)).result is Result.REJECTED
-    assert verdict_on(WP, jump(5), WP, RTL_LANDS, WP, WP, WP, jump(5)).result is Result.ACCEPTED
-
-
 def test_an_rtl_as_first_item_leaves_nothing_to_fly() -> None:
     assert verdict_on(RTL, WP, WP).ack is MissionResult.INVALID
-
-
-@pytest.mark.parametrize(
-    "last", [item(C.NAV_ROI), item(C.DO_SET_ROI_NONE, at=False), item(C.CONDITION_YAW, at=False, p1=90)]
-)
-def test_trailing_turns_are_dropped_on_multiwii(last: MissionItem) -> None:
-    assert kept(WP, WP, last, rules=MULTIWII) == kept(WP, WP, rules=MULTIWII)
-    assert [(f.seq, f.becomes, f.news) for f in verdict_on(WP, WP, last, rules=MULTIWII).findings] == [
-        (3, DROPPED, News.WARNING)
-    ]
-    assert len(kept(WP, WP, last)) == 3
-
-
-def test_nested_jumps_are_rejected_on_multiwii_but_successive_ones_are_not() -> None:
-    assert verdict_on(WP, WP, jump(1), WP, jump(1), rules=MULTIWII).ack is MissionResult.INVALID_PARAM1
-    assert len(kept(WP, WP, jump(1), WP, WP, jump(4), rules=MULTIWII)) == 6
-    assert len(kept(WP, WP, WP, jump(1), WP, WP, jump(1))) == 7
-
-
-@pytest.mark.parametrize(("seconds", "held"), [(65, 65), (66, 65), (70000, 65)])
-def test_multiwii_holds_at_most_65_s(seconds: float, held: int) -> None:
-    for sent in (item(C.NAV_LOITER_TIME, p1=seconds), replace(WP, p1=seconds)):
-        verdict = verdict_on(WP, sent, WP, rules=MULTIWII)
-        assert verdict.records[1].p1 == held
-        assert [f.news for f in verdict.findings] == ([] if seconds == held else [News.WARNING])
 
 
 def test_an_unused_height_may_have_any_value() -> None:
@@ -372,29 +199,6 @@ def test_unused_fields_are_reported_only_if_something_is_lost() -> None:
     assert [f.news for f in verdict_on(WP, item(C.NAV_RETURN_TO_LAUNCH, p3=1.0, alt_m=0.0)).findings] == [News.NONE] * 3
     assert news(replace(WP, p2=2.0)) == [News.NOTICE]
     assert news(item(C.NAV_LOITER_TURNS, p1=3)) == [News.NOTICE, News.WARNING]
-
-
-def test_legs_after_a_jump_keep_their_own_speeds_which_is_reported() -> None:
-    sent = (WP, WP, speed(5), WP, WP, jump(1))
-    verdict = verdict_on(*sent)
-    assert [(f.seq, f.was, f.becomes, f.news) for f in verdict.findings] == [(6, 1, 1, News.WARNING)]
-    shown = [(it.command, it.p1, it.p2) for it in verdict.items[1:]]
-    assert shown == [(178, 1, -2), (16, 0, 0), (16, 0, 0), (178, 1, 5), (16, 0, 0), (16, 0, 0), (177, 1, 2)]
-    again = check_list(verdict.items, INAV)
-    assert (again.records, again.findings) == (verdict.records, ())
-    assert findings_for(WP, speed(5), WP, WP, WP, jump(2)) == []
-    assert findings_for(speed(5), WP, WP, WP, jump(2)) == []
-
-
-def test_any_record_of_another_planner_is_shown() -> None:
-    records = [
-        NavRecord(99, 1, 2, 3),
-        NavRecord(A.JUMP, p1=77),
-        NavRecord(A.WAYPOINT, p1=-5),
-        NavRecord(A.SET_HEAD, p1=400),
-    ]
-    shown = items_from_records(records, home_item(None))
-    assert [(it.command, it.p1) for it in shown] == [(16, 0), (0, 99), (177, 0), (16, 0), (197, 0)]
 
 
 MANY = 250
@@ -527,33 +331,3 @@ def test_another_planners_list_is_written_back_unchanged(before: list[NavRecord]
     held = (*before, replace(last, flag=LAST))
     again = check_list(items_from_records(held, home_item((LAT, LON))), NavRules(inav_profile(), held))
     assert (again.result, again.findings, again.records) == (Result.ACCEPTED, (), held)
-
-
-@pytest.mark.parametrize(
-    ("record", "lost"),
-    [
-        (NavRecord(A.WAYPOINT, LAT, LON, 3000, p3=2), "user actions (1)"),
-        (NavRecord(A.WAYPOINT, LAT, LON, 3000, flag=FLY_HOME), "fly home (1)"),
-        (NavRecord(A.LAND, LAT, LON, 3000, p2=120, p3=1), "ground elevation (1)"),
-        (NavRecord(A.WAYPOINT, 0, 0, 3000, flag=FLY_HOME), ""),
-        (NavRecord(A.WAYPOINT, LAT, LON, 3000, p3=1), ""),
-    ],
-)
-def test_losses_of_a_changed_leg_are_reported(record: NavRecord, lost: str) -> None:
-    held = (NavRecord(A.WAYPOINT, LAT, LON, 2000), record, NavRecord(A.RTH, flag=LAST))
-    items = list(items_from_records(held, home_item((LAT, LON))))
-    items[2] = replace(items[2], alt_m=40.0)
-    verdict = check_list(items, NavRules(inav_profile(), held))
-    expected = [(News.WARNING, f"Lost with the old list, as no MAVLink item can show it: {lost}")] if lost else []
-    assert [(finding.news, finding.text()) for finding in verdict.findings] == expected
-    assert verdict.records[1].alt_cm == 4000
-    assert (verdict.records[1].p3 >> 1, verdict.records[1].flag) == (0, 0)
-
-
-@pytest.mark.parametrize(("p3", "copy"), [(0, "a copy"), (2, "a copy without its user actions (2)")])
-def test_losses_in_the_copy_of_an_erased_mission_are_reported(p3: int, copy: str) -> None:
-    leg = NavRecord(A.WAYPOINT, LAT, LON, 2000, p3=p3)
-    other = (leg, replace(leg, flag=LAST))
-    home, *legs = items_from_records([NavRecord(A.WAYPOINT, LAT, LON, 3000)] * 119, home_item((LAT, LON)))
-    (finding,) = check_list([home, *legs], NavRules(inav_profile(), others=(other,))).findings
-    assert finding.text() == f"Mission of 2 records does not fit next to it: erased, {copy} is kept on the Pi"

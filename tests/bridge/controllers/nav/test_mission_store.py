@@ -7,21 +7,16 @@ from dataclasses import replace
 
 import pytest
 
-from bridge.controllers import other
-from bridge.controllers.inav import profile as inav
-from bridge.controllers.multiwii import profile as multiwii
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile
-from bridge.fc.profile import Profile
 from bridge.missions.list_check import check_list
 from bridge.model.mission_log import Outcome
 from bridge.model.vehicle import Power
-from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from protocols.msp.nav import LAST, Nav, NavAction
 from tests.support.conversations import Download, Upload, clear_message, count_message, waypoints
-from tests.support.fake_inav import FakeInav, FakeMultiwii, lossy, nav_config
+from tests.support.fake_inav import FakeInav, FakeMultiwii, lossy
 from tests.support.world import GroundStation, Radio, World
 
 RULES = NavRules(inav_profile())
@@ -47,17 +42,6 @@ def found(peer: FakeInav) -> tuple[World, GroundStation]:
     return world, GroundStation(world)
 
 
-@pytest.mark.parametrize(
-    ("make", "kind", "capacity"), [(FakeInav, inav.PROFILE, 120), (FakeMultiwii, multiwii.PROFILE, 60)]
-)
-def test_the_board_is_recognised_by_its_answers(make: Callable[[], FakeInav], kind: Profile, capacity: int) -> None:
-    world, _ = found(make())
-    assert world.kind is kind
-    assert world.bridge.session.state.controller is not None
-    assert world.bridge.session.state.controller.capacity == capacity
-    assert world.bridge.session.vehicle.armed is False
-
-
 def test_a_written_list_is_saved_and_reads_as_sent() -> None:
     inav = FakeInav()
     world, station = found(inav)
@@ -81,23 +65,6 @@ def test_each_record_is_read_before_the_next_is_sent() -> None:
     assert [mission[n].payload[0] for n in written] == list(range(1, 30))
     for n in written:
         assert (mission[n + 1].command, mission[n + 1].payload[0]) == (Nav.WP, mission[n].payload[0])
-
-
-def test_multiwii_holds_a_return_home_until_the_list_is_complete() -> None:
-    multiwii = FakeMultiwii()
-    world, station = found(multiwii)
-    first = plan(20)
-    assert Upload(station, first).run() is ACCEPTED
-    assert multiwii.flown == packed(first)
-    multiwii.drop = lambda frame: "request" if frame.command == Nav.SET_WP and frame.payload[0] == 9 else ""
-    upload = Upload(station, plan(15, 1), tries=60)
-    seen: set[int] = set()
-    while not upload.is_over:
-        world.run(0.01)
-        seen.add(len(multiwii.flown))
-    assert upload.result is DENIED
-    # At any moment it would have flown the old list or a return home.
-    assert seen <= {19, 1}
 
 
 def test_a_record_that_is_not_stored_is_noticed_and_the_old_list_restored() -> None:
@@ -180,43 +147,6 @@ def test_after_arming_during_a_transfer_the_last_record_is_not_sent() -> None:
     assert len(inav.records) < 59
     assert any("armed during the write" in text for text in station.texts())
     assert world.bridge.missions.held is None
-
-
-def test_a_multiwiis_own_limits_are_warned_of_and_read_for_each_list() -> None:
-    multiwii = FakeMultiwii()
-    _, station = found(multiwii)
-    sent = plan(10)
-    sent[5] = replace(sent[5], lat_e7=453848000)  # 110 m away
-    sent[6] = replace(sent[6], command=201, lon_e7=84734000)  # a ROI, 11 m away
-    assert Upload(station, sent).run() is ACCEPTED
-    assert not [text for text in station.texts() if "WP" in text]
-    multiwii.answers = {**multiwii.answers, 122: nav_config(60, 100, 25, wp_radius=900)}
-    assert Upload(station, sent).run() is ACCEPTED
-    texts = " ".join(station.texts())
-    assert "WP 9: flown at 25 m" in texts
-    assert "WP 4: flown" not in texts
-    assert "WP 5: 100 m or more from the waypoint before: the mission stops there" in texts
-    assert "WP 4: 100 m" not in texts
-    assert "WP 7: passes the ROI at less than 14 m: the board may end this leg there" in texts
-
-
-def test_a_multiwii_that_arms_during_a_read_gets_no_write() -> None:
-    """Not even the one that clears the record in RAM, although telemetry has not noticed arming yet."""
-    multiwii = FakeMultiwii()
-    world, station = found(multiwii)
-    assert Upload(station, plan(10)).run() is ACCEPTED
-    honest = multiwii.read
-
-    def read(number: int) -> bytes:
-        if number and not multiwii.armed:
-            multiwii.armed = True
-            multiwii.commands.clear()
-        return honest(number)
-
-    multiwii.read = read  # type: ignore[method-assign]
-    world.run(3)
-    assert multiwii.armed
-    assert Nav.SET_WP not in multiwii.commands
 
 
 def test_a_save_that_fails_is_reported() -> None:
@@ -328,36 +258,6 @@ def test_a_reply_for_home_is_not_taken_for_a_written_record() -> None:
     assert inav.writes == 39
 
 
-@pytest.mark.parametrize("name", [b"BTFL", b"CLFL", b"INAV"])
-def test_other_firmware_is_telemetry_only(name: bytes) -> None:
-    board = FakeInav()
-    board.answers = {1: b"\0\1\x2a", 2: name, 119: bytes((0, 1, 2)), 116: b"ARM;ANGLE;"}
-    board.answer = lambda frame: (  # type: ignore[method-assign]
-        bytes(6) + b"\1\0\0\0\0" if frame.command == 101 else board.answers.get(frame.command)
-    )
-    world, station = found(board)
-    assert world.kind is other.OTHER_MSP
-    world.run(1)
-    assert world.bridge.session.vehicle.armed is True
-    assert Upload(station, plan(5)).run() is MissionResult.UNSUPPORTED
-    assert any("stores no missions" in text for text in station.texts())
-    assert not {Nav.SET_WP, Nav.SAVE, Nav.LOAD} & set(board.commands)
-
-
-def test_the_arm_box_of_a_betaflight_whose_box_names_exceed_a_frame() -> None:
-    board = FakeInav()
-    board.answers = {2: b"BTFL", 119: bytes((0, 1, 46, 11))}
-    board.answer = lambda frame: (  # type: ignore[method-assign]
-        bytes(6) + b"\5\0\0\0\0" if frame.command == 101 else board.answers.get(frame.command)
-    )
-    world, station = found(board)
-    station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
-    world.run(3)
-    beat = station.messages("HEARTBEAT")[-1]
-    assert beat.base_mode & messages.MAV_MODE_FLAG_SAFETY_ARMED
-    assert beat.custom_mode == 6
-
-
 def test_a_crashing_record_is_not_written_back() -> None:
     """Another program left a JUMP to 0; the next push fails, and the old list cannot be restored."""
     inav = FakeInav()
@@ -389,27 +289,6 @@ def test_a_save_whose_reply_is_lost_is_repeated() -> None:
     _, station = found(inav)
     assert Upload(station, plan(10)).run() is ACCEPTED
     assert inav.saves == 2
-
-
-@pytest.mark.parametrize("erased", [bytes(19) + b"\xfe", b"\xff" * 20])
-def test_reading_a_multiwii_ends_at_an_erased_record(erased: bytes) -> None:
-    multiwii = FakeMultiwii()
-    multiwii.erased = erased
-    multiwii.places[1] = packed(plan(9))[0]
-    world, station = found(multiwii)
-    assert Download(station).run()[1:] == []
-    asked = [frame for _, _, data in world.written for frame in MspParser().feed(data) if frame.command == Nav.WP]
-    assert {frame.payload[0] for frame in asked} == {0, 1, 2}
-
-
-def test_records_that_a_multiwii_already_holds_are_not_written() -> None:
-    multiwii = FakeMultiwii()
-    _, station = found(multiwii)
-    assert Upload(station, plan(20)).run() is ACCEPTED
-    written = multiwii.writes
-    assert Upload(station, plan(20)).run() is ACCEPTED
-    # Only the return home for the time of the check, and the first record again.
-    assert multiwii.writes == written + 2
 
 
 def test_if_the_first_record_is_lost_the_old_list_is_reported_kept() -> None:

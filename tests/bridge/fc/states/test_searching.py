@@ -10,22 +10,17 @@ from bridge.controllers import other
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.fc.states.base import Closed
 from bridge.fc.states.searching import SPEEDS, Searching
-from bridge.model.airframe import Airframe
 from protocols.mavlink.dialect import messages
 from protocols.msp.frame import request
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from tests.support.fake_controllers import (
-    HARAKIRI_CAPABILITY,
     Loopback,
     MavlinkOnly,
-    MspFake,
     QuietLine,
-    ident,
 )
 from tests.support.world import World
 
 ALL_SPEEDS = sorted(set(SPEEDS), reverse=True)
-BOXES = b"ANGLE;HORIZON;BARO;MAG;CAMSTAB;ARM;GPS HOME;GPS HOLD;"
 
 
 def verdict(world: World) -> bool:
@@ -117,90 +112,6 @@ def test_a_board_is_found_within_3_s_of_the_ports_return(baud: int) -> None:
         world.assert_line_was_clean()
 
 
-@pytest.mark.parametrize("extension", [True, False])
-@pytest.mark.parametrize("baud", ALL_SPEEDS)
-def test_a_board_is_found_within_3_s_of_booting_after_any_power_cycle(baud: int, extension: bool) -> None:
-    draw = random.Random(baud)
-    for _ in range(8):
-        boot_s = draw.choice((0.5, 1.0, 2.0, 3.5))
-        world = World(SimOptions(baud=baud, boot_ms=boot_s * 1000), Faults(extension=extension))
-        world.wait_until(verdict, 10)
-        world.run(draw.random() * draw.choice((0.2, 4)))
-        world.power_off()
-        world.run(draw.choice((0.001, draw.random() * 3, draw.random() * 12)))
-        world.power_on()
-        world.run(boot_s)
-        began = world.now
-
-        def answers(world: World, began: float = began) -> bool:
-            link = world.bridge.session.state.link
-            return link is not None and link.last_heard_at > began
-
-        assert world.wait_until(answers, 20) <= 3
-        world.wait_ready()
-        world.assert_line_was_clean()
-
-
-def test_the_board_is_found_after_random_power_and_port_losses() -> None:
-    for seed in range(12):
-        world = World(SimOptions(boot_ms=800), seed=seed)
-        draw = random.Random(seed)
-        plugged = powered = True
-        for _ in range(12):
-            world.run(draw.random() * draw.choice((0.05, 0.5, 3)))
-            match draw.randrange(4):
-                case 0:
-                    world.unplug() if plugged else world.plug()
-                    plugged = not plugged
-                case 1:
-                    world.power_off() if powered else world.power_on()
-                    powered = not powered
-                case 2:
-                    world.faults.hang = not world.faults.hang
-                case _:
-                    world.push([])
-        world.faults.hang = False
-        if not plugged:
-            world.plug()
-        if not powered:
-            world.power_on()
-        world.run(0.8)
-        # Time to notice that the board was lost.
-        world.run(2.0)
-        world.wait_until(lambda w: w.kind is harakiri.PATCHED, 3)
-
-
-@pytest.mark.parametrize(
-    ("protocol", "baud"),
-    [
-        # At 9600 baud the board's own MAVLink telemetry exceeds the line's capacity.
-        (TelemetryProtocol.MAVLINK, 115200),
-        (TelemetryProtocol.MAVLINK, 57600),
-        (TelemetryProtocol.MAVLINK_57600, 115200),
-        (TelemetryProtocol.MAVLINK_57600, 57600),
-        (TelemetryProtocol.MAVLINK_57600, 9600),
-    ],
-)
-def test_the_bridge_follows_to_mavlink_on_arming_and_back(protocol: TelemetryProtocol, baud: int) -> None:
-    world = World(SimOptions(baud=baud, tele_prot=protocol))
-    world.wait_ready()
-    for _ in range(2):
-        world.faults.armed = True
-        assert world.wait_until(lambda w: w.kind is harakiri.MAVLINK, 20) <= 8
-        world.run(1.2)
-        assert reports_armed(world) is True
-        world.run(6)
-        assert world.kind is harakiri.MAVLINK
-        world.faults.armed = False
-        assert world.wait_until(lambda w: w.kind is harakiri.PATCHED, 20) <= 8
-        world.run(0.5)
-        assert reports_armed(world) is False
-        world.run(3)
-    names = [event.name for event in world.log_event if event.name.startswith("vehicle.")]
-    assert names == ["vehicle.armed", "vehicle.disarmed"] * 2
-    world.assert_line_was_clean()
-
-
 @pytest.mark.parametrize("protocol", [TelemetryProtocol.MAVLINK, TelemetryProtocol.MAVLINK_57600])
 def test_a_board_that_is_armed_from_the_start_is_found(protocol: TelemetryProtocol) -> None:
     world = World(SimOptions(tele_prot=protocol), Faults(armed=True))
@@ -225,73 +136,6 @@ def test_frsky_telemetry_while_armed_is_ignored() -> None:
     world.wait_until(lambda w: w.bridge.session.state.speed == 115200 and w.kind is harakiri.PATCHED, 8)
     assert {event.facts["protocol"] for event in world.events("fc.found")} == {"MSP"}
     world.assert_line_was_clean()
-
-
-@pytest.mark.parametrize("extension", [True, False])
-@pytest.mark.parametrize("rate", [1e-4, 1e-3])
-def test_bit_errors_delay_identification_but_never_change_it(rate: float, extension: bool) -> None:
-    kind = harakiri.PATCHED if extension else harakiri.UNPATCHED
-    found = 0
-    for seed in range(120):
-        faults = Faults(bit_error_rate=rate, extension=extension)
-        world = World(SimOptions(seed=seed), faults, speeds=(115200,))
-        world.run_until(lambda w: w.kind is not None, 8)
-        controller = world.bridge.session.state.controller
-        if controller is None:
-            continue
-        found += 1
-        assert controller.profile is kind
-        assert controller.arm_bit == 5
-        assert controller.airframe is Airframe.QUADROTOR
-        if controller.info is not None:
-            assert (controller.info.capacity, controller.info.wp_radius_cm) == (146, 200)
-    assert found >= 110
-
-
-def test_lost_bytes_delay_identification_but_never_change_it() -> None:
-    for seed in range(60):
-        world = World(SimOptions(seed=seed), Faults(lost_byte_rate=3e-3), speeds=(115200,))
-        world.wait_until(lambda w: w.kind is not None, 20)
-        assert world.kind is harakiri.PATCHED
-
-
-OTHERS: dict[str, Callable[[], MspFake]] = {
-    "MultiWii": lambda: MspFake({100: ident(241, 1 << 4), 116: BOXES, 101: bytes(11)}),
-    "Baseflight": lambda: MspFake({100: ident(230, HARAKIRI_CAPABILITY), 116: BOXES + b"GTUNE;", 101: bytes(11)}),
-    "no GTUNE": lambda: MspFake({100: ident(211, HARAKIRI_CAPABILITY), 116: BOXES, 101: bytes(11)}),
-    "capability": lambda: MspFake({100: ident(211, 0), 116: BOXES + b"GTUNE;", 101: bytes(11)}),
-    "INAV": lambda: MspFake({1: bytes((0, 2, 5)), 2: b"INAV", 116: BOXES, 101: bytes(11)}),
-    "no boxes": lambda: MspFake({2: b"BTFL", 101: bytes(11)}),
-    "long boxes": lambda: MspFake({2: b"INAV", 116: (BOXES * 5)[:255], 101: bytes(11)}),
-}
-
-
-@pytest.mark.parametrize("name", OTHERS)
-def test_similar_firmware_is_not_mistaken_for_harakiri(name: str) -> None:
-    fake = OTHERS[name]()
-    world = World(peer=fake)
-    world.wait_until(lambda w: w.is_found, 3)
-    assert world.kind in (other.OTHER_MSP, other.OLD_MULTIWII)
-    world.run(10)
-    assert world.kind in (other.OTHER_MSP, other.OLD_MULTIWII)
-    # These command numbers may mean something else to other firmware.
-    assert not {190, 191, 192, 193, 194, 195, 196} & set(fake.asked)
-
-
-def test_firmware_that_ignores_unknown_requests_is_not_identified() -> None:
-    world = World(peer=MspFake({100: ident(240, 0), 116: BOXES, 101: bytes(11)}, silent_on_unknown=True))
-    world.run(20)
-    assert world.kind is None
-
-
-def test_the_arm_box_is_found_by_its_name() -> None:
-    for boxes in (b"ARM;ANGLE;", b"ANGLE;ARM;HORIZON;", b"ANGLE;HORIZON;ARM"):
-        flags = 1 << boxes.split(b";").index(b"ARM")
-        status = bytes(6) + flags.to_bytes(4, "little") + b"\0"
-        world = World(peer=MspFake({100: ident(241, 0), 2: b"MWII", 116: boxes, 101: status}))
-        world.wait_until(lambda w: w.is_found, 3)
-        world.run(1)
-        assert world.bridge.session.vehicle.armed is True
 
 
 @pytest.mark.parametrize("version", [1, 2])

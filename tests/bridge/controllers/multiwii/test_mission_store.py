@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Missions to a MultiWii with navigation: nothing half-written can be flown."""
+
+from dataclasses import replace
+
+import pytest
+
+from protocols.msp.frame import MspParser
+from protocols.msp.nav import Nav
+from tests.bridge.controllers.nav.test_mission_store import ACCEPTED, DENIED, found, packed, plan
+from tests.support.conversations import Download, Upload
+from tests.support.fake_inav import FakeMultiwii, nav_config
+
+
+def test_multiwii_holds_a_return_home_until_the_list_is_complete() -> None:
+    multiwii = FakeMultiwii()
+    world, station = found(multiwii)
+    first = plan(20)
+    assert Upload(station, first).run() is ACCEPTED
+    assert multiwii.flown == packed(first)
+    multiwii.drop = lambda frame: "request" if frame.command == Nav.SET_WP and frame.payload[0] == 9 else ""
+    upload = Upload(station, plan(15, 1), tries=60)
+    seen: set[int] = set()
+    while not upload.is_over:
+        world.run(0.01)
+        seen.add(len(multiwii.flown))
+    assert upload.result is DENIED
+    # At any moment it would have flown the old list or a return home.
+    assert seen <= {19, 1}
+
+
+def test_a_multiwiis_own_limits_are_warned_of_and_read_for_each_list() -> None:
+    multiwii = FakeMultiwii()
+    _, station = found(multiwii)
+    sent = plan(10)
+    sent[5] = replace(sent[5], lat_e7=453848000)  # 110 m away
+    sent[6] = replace(sent[6], command=201, lon_e7=84734000)  # a ROI, 11 m away
+    assert Upload(station, sent).run() is ACCEPTED
+    assert not [text for text in station.texts() if "WP" in text]
+    multiwii.answers = {**multiwii.answers, 122: nav_config(60, 100, 25, wp_radius=900)}
+    assert Upload(station, sent).run() is ACCEPTED
+    texts = " ".join(station.texts())
+    assert "WP 9: flown at 25 m" in texts
+    assert "WP 4: flown" not in texts
+    assert "WP 5: 100 m or more from the waypoint before: the mission stops there" in texts
+    assert "WP 4: 100 m" not in texts
+    assert "WP 7: passes the ROI at less than 14 m: the board may end this leg there" in texts
+
+
+def test_a_multiwii_that_arms_during_a_read_gets_no_write() -> None:
+    """Not even the one that clears the record in RAM, although telemetry has not noticed arming yet."""
+    multiwii = FakeMultiwii()
+    world, station = found(multiwii)
+    assert Upload(station, plan(10)).run() is ACCEPTED
+    honest = multiwii.read
+
+    def read(number: int) -> bytes:
+        if number and not multiwii.armed:
+            multiwii.armed = True
+            multiwii.commands.clear()
+        return honest(number)
+
+    multiwii.read = read  # type: ignore[method-assign]
+    world.run(3)
+    assert multiwii.armed
+    assert Nav.SET_WP not in multiwii.commands
+
+
+@pytest.mark.parametrize("erased", [bytes(19) + b"\xfe", b"\xff" * 20])
+def test_reading_a_multiwii_ends_at_an_erased_record(erased: bytes) -> None:
+    multiwii = FakeMultiwii()
+    multiwii.erased = erased
+    multiwii.places[1] = packed(plan(9))[0]
+    world, station = found(multiwii)
+    assert Download(station).run()[1:] == []
+    asked = [frame for _, _, data in world.written for frame in MspParser().feed(data) if frame.command == Nav.WP]
+    assert {frame.payload[0] for frame in asked} == {0, 1, 2}
+
+
+def test_records_that_a_multiwii_already_holds_are_not_written() -> None:
+    multiwii = FakeMultiwii()
+    _, station = found(multiwii)
+    assert Upload(station, plan(20)).run() is ACCEPTED
+    written = multiwii.writes
+    assert Upload(station, plan(20)).run() is ACCEPTED
+    # Only the return home for the time of the check, and the first record again.
+    assert multiwii.writes == written + 2

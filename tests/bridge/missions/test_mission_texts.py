@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The lines sent for a checked list: few, worst first, equal ones joined."""
+
+from bridge.controllers.harakiri.check import HarakiriRules
+from bridge.missions.list_check import check_list
+from bridge.missions.mission_texts import finding_lines, summary
+from bridge.model.finding import News
+from tests.support.rule_items import SPEED, WAYPOINT, item, mission
+
+
+def test_equal_findings_are_one_line_and_warnings_come_first() -> None:
+    items = [item(WAYPOINT, p1=3)] * 4 + [item(SPEED)] * 3 + [item(WAYPOINT, frame=0), item(WAYPOINT, p2=0)]
+    verdict = check_list(mission(*items), HarakiriRules())
+    assert summary(10, verdict) == "7 of 10 stored: 3 dropped, 1 Alt now relative"
+    assert finding_lines(verdict.findings) == [
+        (News.WARNING, "3 items: DO_CHANGE_SPEED dropped, not supported"),
+        (News.WARNING, "WP 8: Alt flown above home, not above sea level"),
+        (News.NOTICE, "4 items: Delay changed from 3 to 1 (0 = fly through, 1 = brake; to hold use LOITER_TIME)"),
+    ]
+
+
+def test_at_most_ten_lines_are_sent() -> None:
+    verdict = check_list(mission(*(item(WAYPOINT, p1=number) for number in range(2, 40))), HarakiriRules())
+    lines = finding_lines(verdict.findings)
+    assert len(lines) == 11
+    assert lines[-1][1] == "and 28 more: see the status page or naze-bridge missions show"
+
+
+def test_a_list_with_every_item_dropped_is_a_warning() -> None:
+    assert summary(2, check_list(mission(item(SPEED)), HarakiriRules())) == "Mission erased: no command left"

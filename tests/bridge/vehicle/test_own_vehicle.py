@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The vehicle that ground stations see: modes and arming at once, home, no false alarms."""
+
+import pytest
+
+from simulator.board.options import Faults, SimOptions, Tree
+from tests.bridge.fc.test_msp_telemetry import flown, listening, m
+from tests.support.world import World
+
+ANGLE, BARO, GPS_HOME, GPS_HOLD, GPS_AUTO = 1 << 0, 1 << 2, 1 << 6, 1 << 7, 1 << 8
+
+
+def test_values_without_a_mavlink_field_are_sent_as_named_values() -> None:
+    _, station = flown(20)
+    named = {message.name: message.value for message in station.messages("NAMED_VALUE_INT", "NAMED_VALUE_FLOAT")}
+    assert (named["cycle_us"], named["i2c_err"]) == (3000, 0)
+    assert named["home_m"] == pytest.approx(41, abs=3)  # after 20 s on the circle
+    assert 180 <= named["home_deg"] <= 270
+
+
+def test_no_ground_station_shows_a_false_alarm() -> None:
+    """MAVProxy shows "fence breach" without the fence bit, Mission Planner "SAFE" without the motor bit."""
+    _, station = flown(3)
+    status = station.messages("SYS_STATUS")[-1]
+    present, health = status.onboard_control_sensors_present, status.onboard_control_sensors_health
+    assert present == status.onboard_control_sensors_enabled
+    assert health & present == present
+    assert present & m.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
+    assert health & m.MAV_SYS_STATUS_GEOFENCE
+    assert not present & m.MAV_SYS_STATUS_GEOFENCE
+    for bit in ("RC_RECEIVER", "3D_GYRO", "3D_ACCEL", "3D_MAG", "ABSOLUTE_PRESSURE", "GPS"):
+        assert present & getattr(m, f"MAV_SYS_STATUS_SENSOR_{bit}")
+    assert status.errors_count1 == status.errors_count2 == 0  # Mission Planner: "InternalError"
+
+
+@pytest.mark.parametrize(
+    ("boxes", "custom_mode", "stabilized"),
+    [
+        (0, 1, False),
+        (ANGLE, 0, True),
+        (1 << 1, 0, True),
+        (ANGLE | BARO, 2, True),
+        (ANGLE | BARO | GPS_HOLD, 5, True),
+        (ANGLE | BARO | GPS_HOME, 6, True),
+        (ANGLE | BARO | GPS_AUTO | GPS_HOLD, 3, True),
+        (1 << 9 | 1 << 3, 1, False),
+    ],
+)
+def test_the_switches_determine_the_mode(boxes: int, custom_mode: int, stabilized: bool) -> None:
+    _, station = flown(1.5, faults=Faults(boxes=boxes))
+    send_heartbeat = station.messages("HEARTBEAT")[-1]
+    assert send_heartbeat.custom_mode == custom_mode
+    assert bool(send_heartbeat.base_mode & m.MAV_MODE_FLAG_STABILIZE_ENABLED) is stabilized
+    assert send_heartbeat.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED
+
+
+@pytest.mark.parametrize(("switch", "position"), [("armed", False), ("boxes", 5)])
+def test_arming_and_modes_are_reported_at_once(switch: str, position: int) -> None:
+    world, station = flown(5.2)
+    station.take()
+    setattr(world.faults, switch, position)
+    world.run(0.3)
+    heartbeat = station.messages("HEARTBEAT")[-1]
+    assert heartbeat.custom_mode == (2 if switch == "boxes" else 0)
+    assert bool(heartbeat.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED) is (switch == "boxes")
+
+
+def test_a_disarmed_craft_is_on_the_ground() -> None:
+    world, station = flown(3)
+    assert station.take("EXTENDED_SYS_STATE")[-1].landed_state == m.MAV_LANDED_STATE_IN_AIR
+    world.faults.armed = False
+    world.run(3)
+    assert station.messages("EXTENDED_SYS_STATE")[-1].landed_state == m.MAV_LANDED_STATE_ON_GROUND
+
+
+def test_home_is_the_place_and_altitude_of_arming() -> None:
+    _, station = flown(30)
+    home = station.messages("HOME_POSITION")[-1]
+    assert (home.latitude, home.longitude) == (453838000, 84733000)
+    assert home.altitude == pytest.approx(131_000, abs=1000)
+
+
+@pytest.mark.parametrize("tree", Tree)
+def test_home_before_arming_is_the_position(tree: Tree) -> None:
+    """HarakiriWebstore1 reports an unknown home as 190 degrees, TestCode3 as 0."""
+    world = World(SimOptions(tree=tree), speeds=(115200,))
+    world.wait_ready()
+    station = listening(world)
+    world.run(3)
+    home = station.messages("HOME_POSITION")[-1]
+    assert (home.latitude, home.longitude) == (453838000, 84733000)

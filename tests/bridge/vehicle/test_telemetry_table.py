@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The rates of telemetry messages: defaults by line speed, and those of the polls behind them."""
+
+import pytest
+
+from bridge.controllers.harakiri import profile as harakiri
+from bridge.vehicle.telemetry_table import TELEMETRY
+from protocols.msp.commands import Msp
+from tests.bridge.fc.test_msp_telemetry import flown, m, polls, rate_hz, send_heartbeat
+
+ALL_SPEEDS = (115200, 57600, 38400, 19200, 9600, 4800, 2400, 1200)
+
+
+#: Bytes of each of Harakiri's telemetry requests and its reply.
+ROUND_TRIPS = {104: 28, 101: 23, 102: 30, 105: 28, 106: 26, 108: 20, 109: 18, 110: 17, 113: 42, 118: 25}
+
+
+@pytest.mark.parametrize("baud", ALL_SPEEDS)
+def test_telemetry_takes_only_its_share_of_the_line(baud: int) -> None:
+    world, station = flown(2, baud=baud)
+    for row in TELEMETRY:
+        station.send(m.MAVLink_command_long_message(1, 1, 511, 0, row.msgid, 10_000, 0, 0, 0, 0, 0))
+    world.run(10)
+    world.written.clear()
+    station.take()
+    world.run(30)
+    bytes_per_s = sum(count * ROUND_TRIPS[command] for command, count in polls(world).items()) / 30
+    burst = 0.6 * 0.05 / 30
+    assert 0.45 * baud / 10 < bytes_per_s <= (0.6 + burst) * baud / 10
+    world.assert_line_was_clean()
+    assert world.naze.counters.max_outstanding_reply_bytes <= 224
+    for_others = {Msp.SERVO, Msp.COMP_GPS, Msp.DEBUG}
+    assert set(polls(world)) == {poll.command for poll in harakiri.PATCHED.polls} - for_others
+
+
+@pytest.mark.parametrize(("baud", "attitude_hz", "position_hz", "status_hz"), [
+    (115200, 25, 5, 4), (57600, 25, 5, 4), (19200, 25, 5, 4),
+    (9600, 14, 2.8, 4), (2400, 2.8, 0.5, 1.5), (1200, 0.9, 0.25, 0.7),
+])  # fmt: skip
+def test_default_rates_depend_on_the_line_speed(
+    baud: int, attitude_hz: float, position_hz: float, status_hz: float
+) -> None:
+    world, station = flown(5, baud=baud)
+    station.take()
+    world.written.clear()
+    world.run(30)
+    assert rate_hz(station, "ATTITUDE", 30) == pytest.approx(attitude_hz, rel=0.2)
+    assert rate_hz(station, "GPS_RAW_INT", 30) == pytest.approx(position_hz, rel=0.35)
+    assert polls(world)[Msp.STATUS] / 30 == pytest.approx(status_hz, rel=0.2)
+
+
+@pytest.mark.parametrize("baud", [1200, 2400, 4800])
+def test_on_a_slow_line_combined_messages_keep_the_rate_of_their_polls(baud: int) -> None:
+    world, station = flown(10, baud=baud)
+    station.received.clear()
+    world.run(40)
+    fixes = len(station.messages("GPS_RAW_INT"))
+    assert fixes >= 40 / 5 - 2
+    for name in ("GLOBAL_POSITION_INT", "VFR_HUD"):
+        assert fixes - 2 <= len(station.messages(name)) <= fixes + 2, name
+    # Missing values become unknown as soon as the loss is noticed.
+    world.faults.hang = True
+    send_heartbeat(station)
+    world.run(12)
+    station.received.clear()
+    world.run(5)
+    assert {status.voltage_battery for status in station.messages("SYS_STATUS")} == {65535}

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The machine: clock, disk, state directory, store."""
+
+import os
+import sqlite3
+from contextlib import closing
+from datetime import UTC, datetime
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from service.cli.doctor.machine import check_clock, check_database, check_disk
+from storage.mission_store import open_store
+from tests.support.doctor import assert_note, assert_ok, assert_problem
+from tests.support.faulty_machine import FaultyMachine
+
+NOW = datetime(2026, 11, 21, 12, tzinfo=UTC)
+
+
+def test_a_wrong_clock_is_a_problem(pi: FaultyMachine) -> None:
+    assert_ok(check_clock(pi, NOW), "set by the network")
+    assert_problem(check_clock(pi, datetime(1970, 1, 1, tzinfo=UTC)), "1970-01-01", "sudo date --set")
+    pi.path("/run/systemd/timesync/synchronized").unlink()
+    assert_note(check_clock(pi, NOW), "not set by the network")
+    pi.runs(12, "/usr/sbin/chronyd")
+    assert_ok(check_clock(pi, NOW), "kept by chronyd")
+
+
+def test_a_nearly_full_disk_is_a_problem(tmp_path: Path) -> None:
+    state = tmp_path / "not made yet" / "state"
+    assert_ok(check_disk(state, lambda _: 1 << 30), "1024 MB free")
+    assert_problem(check_disk(state, lambda _: 10 << 20), "10 MB free", "remove unneeded files")
+
+
+def test_an_unusable_state_directory_is_a_problem(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").touch()
+    assert_problem(check_disk(tmp_path / "file" / "state"), f"{tmp_path}/file is a file", "name another state_dir")
+    monkeypatch.setattr(os, "access", lambda _path, _mode: False)
+    assert_note(check_disk(tmp_path), "no permission to write to")
+    monkeypatch.setattr(os, "statvfs", lambda _path: SimpleNamespace(f_flag=os.ST_RDONLY))
+    assert_problem(check_disk(tmp_path, lambda _: 1 << 30), "on a disk that is read-only", "remount,rw")
+
+
+def test_a_damaged_store_is_a_problem(tmp_path: Path) -> None:
+    path = tmp_path / "missions.db"
+    assert_ok(check_database(tmp_path), "none stored yet")
+    open_store(path, 0).store.close()
+    assert_ok(check_database(tmp_path), "0 stored")
+    with closing(sqlite3.connect(path)) as database:
+        database.execute("DROP TABLE missions")
+    assert_problem(check_database(tmp_path), "is damaged: no such table", "restart the bridge")
+    path.write_bytes(b"rubbish" * 1000)
+    assert_problem(check_database(tmp_path), "is damaged: file is not a database", "restart the bridge")
+    path.rename(tmp_path / "missions.db.corrupt-20261121-120000")
+    none, aside = check_database(tmp_path)
+    assert_ok(none, "none stored yet")
+    assert_note(aside, "corrupt-20261121-120000")
+
+
+def test_a_store_of_a_service_that_was_taken_over_does_no_harm(tmp_path: Path) -> None:
+    """Its file names are part of a command for root, its contents of texts on root's terminal."""
+    (tmp_path / "missions.db.corrupt-$(reboot)1").touch()
+    assert_ok(check_database(tmp_path), "none stored yet")
+    path = tmp_path / "missions.db"
+    os.mkfifo(path)
+    assert_problem(check_database(tmp_path), "not a regular file", "move it away")
+    path.unlink()
+    path.symlink_to("/etc/passwd")
+    assert_problem(check_database(tmp_path), "not a regular file", "move it away")
+    path.unlink()
+    with closing(sqlite3.connect(path)) as database:
+        database.execute('CREATE TABLE "a\x1b[2J" (a NOT NULL)')
+        database.execute('CREATE VIEW missions AS SELECT 1 FROM "b\x1b[2J"')
+    (found,) = check_database(tmp_path)
+    assert_problem(found, "is damaged: ", "restart the bridge")
+    assert found.found.isprintable()

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Telemetry logs over HTTP."""
+
+from pathlib import Path
+
+import pytest
+
+from service.web import telemetry_logs
+from service.web.telemetry_logs import PIECE, TelemetryLogs
+from tests.service.daemon.test_store_worker import HANGS, LOG, hung_file
+from tests.support.web_bench import WebBench
+
+pytest_plugins = ("tests.support.web_fixtures",)
+
+
+def test_logs_need_the_token(lasting_web: WebBench) -> None:
+    folder = lasting_web.daemon.state_dir / "logs"
+    folder.mkdir(exist_ok=True)
+    contents = bytes(range(256)) * (PIECE // 128)
+    (folder / "2026-01-02 03-04-05.tlog").write_bytes(contents)
+    (folder / "secret").write_bytes(b"other")
+    path = "/api/logs/2026-01-02%2003-04-05.tlog"
+    for url in ("/api/logs", path):
+        assert lasting_web.ask(url).status == 403
+    proof = {"Authorization": f"Bearer {lasting_web.token}"}
+    listed = lasting_web.ask("/api/logs", **proof).data["logs"]
+    assert {"name": "2026-01-02 03-04-05.tlog", "size": len(contents)} in listed
+    assert "secret" not in [log["name"] for log in listed]
+    first = lasting_web.ask(path, **proof).body
+    assert first == contents[:PIECE]
+    assert first + lasting_web.ask(f"{path}?start={PIECE}", **proof).body == contents
+    for name in ("secret", "..%2Fweb-token", "2026-01-02%2003-04-06.tlog"):
+        assert lasting_web.ask(f"/api/logs/{name}", **proof).status == 404
+
+
+async def test_without_a_state_directory_there_are_no_logs() -> None:
+    logs = TelemetryLogs(None)
+    assert await logs.list() == {"logs": []}
+    logs.close()
+
+
+async def test_the_logs_of_the_page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(telemetry_logs, "_TIMEOUT_S", 0.5)  # the first request has begun by then
+    logs = TelemetryLogs(tmp_path)
+    with hung_file(tmp_path / LOG):
+        with pytest.raises(TimeoutError, match=HANGS):
+            await logs.read(LOG, 0)
+        with pytest.raises(TimeoutError, match=HANGS):
+            await logs.list()
+    logs.close()
