@@ -26,7 +26,7 @@ class ListIdentity:
 
 
 def pack_records(records: Iterable[MissionRecord]) -> bytes:
-    return b"".join(record.pack() for record in records)
+    return b"".join([record.pack() for record in records])
 
 
 def identify(records: Sequence[MissionRecord]) -> ListIdentity:

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from enum import Enum
 
 from bridge.fc.session import FcSession
-from bridge.line.conversation import Conversation, LinkLost, Pause, ask, ask_status, receive, send
+from bridge.line.conversation import Conversation, LinkLost, Pause, Receive, ask, ask_status, send
 from bridge.line.runner import Runner
 from bridge.missions.mission_service import MissionService
 from protocols.msp.commands import Msp, MspAction
-from protocols.msp.frame import Direction, request
+from protocols.msp.frame import Direction, MspFrame, request
 from protocols.msp.telemetry import RAW_IMU_SIZE, STATUS_SIZE, Sensor, decode_raw_imu
 from protocols.rights.effect import Effect
 from protocols.rights.msp import msp_right
@@ -133,14 +133,14 @@ def _act(action: FcAction, arm_mask: int) -> Conversation[ActionResult]:
             return ActionResult.ARMED
         if action.needs & ~status.sensors:
             return ActionResult.NO_SENSOR
-    yield from send(request(action.command), action.command, 0, exclusive=True)
-    reply = yield from receive(action.command)
+    awaited = frozenset((action.command,))
+    asked = send(request(action.command), action.command, 0, exclusive=True)
+    reply: MspFrame | None = yield Receive(awaited, asked)
     asks = 0
     while reply is None and asks < _ASKS_AFTER_ACTION:
         # A flash write may still stall it. It replies in order: STATUS first means that the action's reply is lost.
         asks += 1
-        yield from send(request(Msp.STATUS), Msp.STATUS, STATUS_SIZE)
-        reply = yield from receive(action.command, Msp.STATUS)
+        reply = yield Receive(awaited | {Msp.STATUS}, send(request(Msp.STATUS), Msp.STATUS, STATUS_SIZE))
     if reply is None or reply.command != action.command:
         return ActionResult.NO_ANSWER
     return ActionResult.DONE if reply.direction is Direction.REPLY else ActionResult.REFUSED

@@ -57,9 +57,10 @@ class Send:
 
 @dataclass(frozen=True, slots=True)
 class Receive:
-    """Wait for the next reply to one of `commands`. Answer: the frame, or None on timeout."""
+    """Send `request`, if any; wait for the next reply to one of `commands`. Answer: the frame, or None on timeout."""
 
     commands: frozenset[int]
+    request: Send | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,29 +125,24 @@ Effect = TimeLimit | Send | Receive | Transmit | Await | Pause | Save | Conclude
 StoreEffect = Save | Conclude | Recall | NoteReader | FindPending
 
 _MAX_ASKS = 5
+_STATUS = request(Msp.STATUS)
 
 T = TypeVar("T")
 Conversation = Generator[Effect, Any, T]
 
 
-def send(frame: bytes, command: int, reply_payload: int, *, exclusive: bool = False) -> Conversation[None]:
-    """Send a request whose reply has `reply_payload` payload bytes."""
-    yield Send(frame, command, frame_size(command, reply_payload), exclusive)
-
-
-def receive(*commands: int) -> Conversation[MspFrame | None]:
-    """Wait for a reply to one of `commands`; None on timeout."""
-    answer: MspFrame | None = yield Receive(frozenset(commands))
-    return answer
+def send(frame: bytes, command: int, reply_payload: int, *, exclusive: bool = False) -> Send:
+    """Make a Send of a request whose reply has `reply_payload` payload bytes."""
+    return Send(frame, command, frame_size(command, reply_payload), exclusive)
 
 
 def ask(
     frame: bytes, command: int, reply_payload: int, *, tries: int = 3, exclusive: bool = False, is_kept: bool = False
 ) -> Conversation[MspFrame | None]:
     """Send a request and wait for its reply, with retries; None if none was answered."""
+    question = Send(frame, command, frame_size(command, reply_payload), exclusive, is_kept)
     for _ in range(tries):
-        yield Send(frame, command, frame_size(command, reply_payload), exclusive, is_kept)
-        reply = yield from receive(command)
+        reply: MspFrame | None = yield Receive(frozenset((command,)), question)
         if reply is not None:
             return reply
     return None
@@ -172,7 +168,7 @@ def ask_surely(
 
 def ask_status(*, tries: int = 3) -> Conversation[StatusReport | None]:
     """STATUS as of now, which telemetry may not show yet; None if it was not answered."""
-    reply = yield from ask(request(Msp.STATUS), Msp.STATUS, STATUS_SIZE, tries=tries)
+    reply = yield from ask(_STATUS, Msp.STATUS, STATUS_SIZE, tries=tries)
     return None if reply is None else decode_status(reply.payload)
 
 

@@ -54,7 +54,7 @@ _RESYNC_COMMANDS = (
 )
 #: Asks a board of any kind for a sign of life.
 PROBE = request(Msp.IDENT)
-_DEADLINE = attrgetter("deadline")
+_DEADLINE, _REPLY_SIZE = attrgetter("deadline"), attrgetter("reply_size")
 RESYNC = b"".join(request(command) for command in _RESYNC_COMMANDS)
 RESYNC_REPLY_SIZE = sum(_REPLY_SIZES[command] for command in _RESYNC_COMMANDS)
 #: Replies come in order: the reply to this shows that earlier ones are lost. No other code may use this command.
@@ -186,7 +186,7 @@ class MspLink:
 
     @property
     def outstanding_bytes(self) -> int:
-        return sum([sent.reply_size for sent in self._sent])
+        return sum(map(_REPLY_SIZE, self._sent))
 
     def unanswered(self) -> PendingReplies:
         pending = PendingReplies()
@@ -247,9 +247,14 @@ class MspLink:
 
     def reply_deadline(self, commands: frozenset[int], now: float) -> float:
         """When a reply to one of `commands` counts as lost."""
-        awaited = [sent for sent in self._sent if sent.command in commands and sent.reply is _Reply.AWAITED]
-        queued = any(message.command in commands for message in self._waiting)
-        return max([sent.deadline for sent in awaited], default=now + self._timeout_s() if queued else now)
+        latest = 0.0
+        for sent in self._sent:
+            if sent.command in commands and sent.reply is _Reply.AWAITED:
+                latest = max(latest, sent.deadline)
+        if latest:
+            return latest
+        is_queued = any(message.command in commands for message in self._waiting)
+        return now + self._timeout_s() if is_queued else now
 
     def next_deadline(self) -> float:
         """The time of the next `tick`; infinity while nothing is pending."""

@@ -187,7 +187,9 @@ class Runner:
                     case Transmit(packed) if self._transmit:
                         answer = self._transmit(packed)
                         continue
-                    case Receive(commands) if self._link:
+                    case Receive(commands, request) if self._link:
+                        if request is not None:
+                            self._link.send(request, now)
                         deadline = self._link.reply_deadline(commands, now)
                         self.awaited_replies = commands
                     case Await(_, seconds) if self._transmit:

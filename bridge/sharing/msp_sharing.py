@@ -15,7 +15,7 @@ from bridge.fc.profile import FlightController
 from bridge.fc.session import FcSession
 from bridge.gcs.budget import Shares, TokenBucket
 from bridge.gcs.cost import Rate
-from bridge.line.conversation import Conversation, LinkLost, Send, ask_status, receive
+from bridge.line.conversation import Conversation, LinkLost, Receive, Send, ask_status
 from bridge.line.msp_link import MspLink
 from bridge.line.runner import Runner
 from bridge.missions.mission_service import MissionService
@@ -272,6 +272,6 @@ def _carry(request: WaitingRequest, reply_size: int, arm_bit: int | None) -> Con
         if status.box_flags >> arm_bit & 1:
             return ARMED
     is_read = not request.is_change
-    yield Send(request.asked, command, reply_size, exclusive=not is_read, is_kept=is_read, is_shared=True)
-    reply = yield from receive(command)
+    asked = Send(request.asked, command, reply_size, exclusive=not is_read, is_kept=is_read, is_shared=True)
+    reply: MspFrame | None = yield Receive(frozenset((command,)), asked)
     return reply or _NO_REPLY

@@ -5,6 +5,7 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
+from itertools import filterfalse
 from typing import Any, NamedTuple
 
 from protocols.mission_record import ListIdentity, pack_records
@@ -45,6 +46,9 @@ class ReplyStatus(IntEnum):
     FLASH = 10
     BAD_REQUEST = 11
     BAD_RECORD = 12
+
+
+_LAST_STATUS = max(ReplyStatus)
 
 
 class InfoFlag(IntFlag):
@@ -205,7 +209,7 @@ def decode_radius(payload: bytes) -> Radius | None:
 
 def _reply(layout: struct.Struct, payload: bytes) -> tuple[Any, ...] | None:
     """The status and the other fields; None if the payload is too short or the status unknown."""
-    if len(payload) < layout.size or payload[0] > max(ReplyStatus):
+    if len(payload) < layout.size or payload[0] > _LAST_STATUS:
         return None
     status, *fields = layout.unpack_from(payload)
     return ReplyStatus(status), *fields
@@ -217,23 +221,18 @@ def find_mask(body: bytes, fixed_xor: int) -> int | None:
     `body` has an even length; `fixed_xor` is the XOR of the frame's other checksummed bytes (size and command).
     None if there is no such mask, which cannot happen for bodies of up to 83 bytes.
     """
-    present = set(body)
+    unfit = {*HAZARDS}
     checksum_without_mask = fixed_xor
     for byte in body:
         checksum_without_mask ^= byte
-    for mask in range(256):
-        if (
-            mask not in HAZARDS
-            and checksum_without_mask ^ mask not in HAZARDS
-            and all(hazard ^ mask not in present for hazard in HAZARDS)
-        ):
-            return mask
-    return None
+    for hazard in HAZARDS:
+        unfit.update(apply_mask(body, hazard), (checksum_without_mask ^ hazard,))
+    return next(filterfalse(unfit.__contains__, range(256)), None)
 
 
 def apply_mask(body: bytes, mask: int) -> bytes:
     """XOR every byte of `body` with `mask`; the same call removes the mask."""
-    return bytes(byte ^ mask for byte in body)
+    return (int.from_bytes(body) ^ int.from_bytes(bytes((mask,)) * len(body))).to_bytes(len(body))
 
 
 def _masked_request(command: MissionCommand, body: bytes) -> bytes | None:
@@ -280,10 +279,10 @@ class Chunk:
     frame: bytes
 
 
-def encode_chunk(records: Sequence[WpRecord], first: int, most: int) -> Chunk:
-    """Encode the largest clean CHUNK of at most `most` records (15 fit a frame) from `first` on."""
-    for count in range(min(most, MAX_CHUNK_RECORDS, len(records) - first), 0, -1):
-        body = struct.pack("<H", first) + pack_records(records[first : first + count])
+def encode_chunk(packed: bytes, first: int, most: int) -> Chunk:
+    """Encode the largest clean CHUNK of at most `most` of the `packed` records (15 fit a frame) from `first` on."""
+    for count in range(min(most, MAX_CHUNK_RECORDS, len(packed) // RECORD_SIZE - first), 0, -1):
+        body = first.to_bytes(2, "little") + packed[first * RECORD_SIZE : (first + count) * RECORD_SIZE]
         frame = _masked_request(MissionCommand.CHUNK, body)
         if frame is not None:
             return Chunk(first, count, frame)

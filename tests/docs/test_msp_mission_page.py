@@ -19,8 +19,8 @@ def exchange() -> list[str]:
     """Push the two records to a simulated Naze; return every frame as "companion -> ..." or "... <-"."""
     bench = Bench()
     records = [HOME, WAYPOINT]
-    chunk_1 = ext.encode_chunk(records, 0, 15)
-    chunk_2 = ext.encode_chunk(records, chunk_1.first + chunk_1.count, 15)
+    chunk_1 = ext.encode_chunk(pack_records(records), 0, 15)
+    chunk_2 = ext.encode_chunk(pack_records(records), chunk_1.first + chunk_1.count, 15)
     requests = [
         ext.INFO_REQUEST,
         ext.encode_begin(identify(records)),

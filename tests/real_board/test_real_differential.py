@@ -3,7 +3,7 @@
 
 import random
 
-from protocols.mission_record import identify
+from protocols.mission_record import identify, pack_records
 from protocols.msp.frame import MspFrame, request
 from protocols.msp.mission import (
     ABORT_REQUEST,
@@ -66,7 +66,7 @@ def requests(dice: random.Random, records: list[WpRecord]) -> list[bytes]:
         request(dice.choice((1, 99, 189, 197, 209, 253)), dice.choice((b"", b"\r\r\r###RRR"))),
         INFO_REQUEST,
         encode_begin(identity),
-        encode_chunk(records, first, 15).frame if first < len(records) else INFO_REQUEST,
+        encode_chunk(pack_records(records), first, 15).frame if first < len(records) else INFO_REQUEST,
         encode_commit(identity),
         ABORT_REQUEST,
         encode_read(dice.choice((0, 3, 39)), dice.choice((1, 6))),

@@ -26,7 +26,7 @@ from tests.support.walks import TracedDaemon, WakeUp, Walk, measure, run_traced
 CEILINGS = {
     "attitude": Walk(calls=61, returns=22, files=22),
     "item": Walk(calls=162, returns=70, files=27),
-    "ack": Walk(calls=873, returns=408, files=43),
+    "ack": Walk(calls=735, returns=355, files=43),
     "arming": Walk(calls=133, returns=55, files=29),
 }
 #: A walk may be this much shorter than its ceiling.

@@ -3,7 +3,7 @@
 
 from collections.abc import Sequence
 
-from protocols.mission_record import identify
+from protocols.mission_record import identify, pack_records
 from protocols.msp.frame import MspFrame, MspParser
 from protocols.msp.mission import (
     ReplyStatus,
@@ -80,7 +80,7 @@ class WireBench:
         progress = self.progress(encode_begin(identify(records)))
         while progress.next < len(records):
             assert progress.status is ReplyStatus.OK
-            progress = self.progress(encode_chunk(records, progress.next, 15).frame)
+            progress = self.progress(encode_chunk(pack_records(records), progress.next, 15).frame)
 
     def push(self, records: Sequence[WpRecord]) -> Stored:
         """A complete upload; returns the reply to COMMIT."""

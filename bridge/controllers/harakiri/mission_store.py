@@ -5,6 +5,7 @@ from abc import ABC
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import TypeVar
+from zlib import crc32
 
 from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.controllers.harakiri.rules import items_from_records
@@ -14,11 +15,12 @@ from bridge.line.conversation import (
     LinkLost,
     OutOfTime,
     Pause,
+    Receive,
+    Send,
     Stopped,
     TimeLimit,
     ask,
     ask_surely,
-    receive,
     send,
 )
 from bridge.missions.fc_mission_store import (
@@ -32,7 +34,7 @@ from bridge.missions.fc_mission_store import (
 )
 from bridge.model.vehicle import Vehicle
 from protocols.mission_item import MissionItem
-from protocols.mission_record import ListIdentity, identify
+from protocols.mission_record import ListIdentity, identify, pack_records
 from protocols.msp import mission as ext
 from protocols.msp.frame import FRAME_OVERHEAD, MspFrame
 from protocols.msp.mission import (
@@ -74,6 +76,9 @@ _FAILURES = {
     ReplyStatus.BAD_RECORD: PushFailure.REFUSED,
     ReplyStatus.FLASH: PushFailure.FLASH,
 }
+
+_TRANSFER_REPLIES = frozenset((MissionCommand.CHUNK, MissionCommand.COMMIT))
+_READ_REPLIES = frozenset((MissionCommand.READ,))
 
 AnswerT = TypeVar("AnswerT", Staged, Radius)
 
@@ -118,7 +123,8 @@ class HarakiriMissions(HarakiriStore):
 
     def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Conversation[PushResult]:
         """Write the list: BEGIN, CHUNKs in a window, COMMIT; verified by the checksum over the flash."""
-        wanted = identify(records)
+        packed = pack_records(records)
+        wanted = ListIdentity(len(records), crc32(packed))
         failure = PushFailure.NO_ANSWER
         self._may_be_stored = False
         yield TimeLimit(_PUSH_S, 2 * len(records) * (RECORD_SIZE + FRAME_OVERHEAD))
@@ -132,7 +138,7 @@ class HarakiriMissions(HarakiriStore):
                         if unchanged:
                             return PushResult(None, unchanged=True)
                         continue
-                    yield from self._transfer(records, begun, progress)
+                    yield from self._transfer(packed, wanted, begun, progress)
                     return PushResult(None)
                 except PushFailed as failed:
                     failure = failed.failure
@@ -219,15 +225,16 @@ class HarakiriMissions(HarakiriStore):
             yield Pause(_BUSY_INTERVAL_S)
             waited_s += _BUSY_INTERVAL_S
 
-    def _transfer(self, records: Sequence[WpRecord], begun: Staged, progress: PushProgress) -> Conversation[None]:
+    def _transfer(
+        self, packed: bytes, wanted: ListIdentity, begun: Staged, progress: PushProgress
+    ) -> Conversation[None]:
         """Keep the window full and send COMMIT right after the last chunk: the line never waits for a reply.
 
         After a loss, continue at the first record that the flight controller lacks. It answers INCOMPLETE to a COMMIT
         that arrives before the lost chunk.
         """
-        wanted = identify(records)
-        total = len(records)
-        acked = sent = self._confirmed(records, begun)
+        total = wanted.count
+        acked = sent = _confirmed(packed, begun)
         in_flight: list[int] = []  # first record of each unanswered chunk
         stale = 0  # chunks sent after a lost one, which will still be answered
         committing = False
@@ -235,22 +242,23 @@ class HarakiriMissions(HarakiriStore):
         vain = 0
         while True:
             while sent < total and len(in_flight) + stale < self.info.chunk_window:
-                chunk = ext.encode_chunk(records, sent, most)
-                yield from send(chunk.frame, MissionCommand.CHUNK, _SHORT_REPLY_SIZE)
+                chunk = ext.encode_chunk(packed, sent, most)
+                yield send(chunk.frame, MissionCommand.CHUNK, _SHORT_REPLY_SIZE)
                 in_flight.append(sent)
                 sent += chunk.count
+            commit: Send | None = None
             if sent == total and not committing:
                 # While a chunk may have to be repeated, COMMIT must not block the line.
                 frame = ext.encode_commit(wanted)
-                yield from send(frame, MissionCommand.COMMIT, _SHORT_REPLY_SIZE, exclusive=acked == total)
+                commit = send(frame, MissionCommand.COMMIT, _SHORT_REPLY_SIZE, exclusive=acked == total)
                 committing = self._may_be_stored = True
-            reply = yield from receive(MissionCommand.CHUNK, MissionCommand.COMMIT)
+            reply: MspFrame | None = yield Receive(_TRANSFER_REPLIES, commit)
             answer = None if reply is None else _decode_answer(reply)
             behind = 0
             if isinstance(answer, Staged):
                 if answer.status not in (ReplyStatus.OK, ReplyStatus.SEQUENCE):
                     raise _again(answer.status)
-                confirmed = self._confirmed(records, answer)
+                confirmed = _confirmed(packed, answer)
                 if confirmed > acked:
                     acked = confirmed
                     stale = vain = 0
@@ -306,9 +314,9 @@ class HarakiriMissions(HarakiriStore):
             while waiting and in_flight < _READS_IN_FLIGHT:
                 first = waiting.pop(0)
                 frame = ext.encode_read(first, step)
-                yield from send(frame, MissionCommand.READ, 3 + step * RECORD_SIZE)
+                yield send(frame, MissionCommand.READ, 3 + step * RECORD_SIZE)
                 in_flight += 1
-            reply = yield from receive(MissionCommand.READ)
+            reply: MspFrame | None = yield Receive(_READ_REPLIES)
             answer = None if reply is None else ext.decode_records(reply.payload)
             if answer is None:
                 vain += 1
@@ -326,11 +334,13 @@ class HarakiriMissions(HarakiriStore):
                 parts[answer.first] = answer.records
         return tuple(record for first in missing for record in parts[first])
 
-    def _confirmed(self, records: Sequence[WpRecord], answer: Staged) -> int:
-        """The number of correct records on the flight controller; restarts if it has other ones."""
-        if answer.next > len(records) or identify(records[: answer.next]).checksum != answer.checksum:
-            raise PushFailed(PushFailure.NO_ANSWER, is_final=False)
-        return answer.next
+
+def _confirmed(packed: bytes, answer: Staged) -> int:
+    """The number of correct records on the flight controller; restarts if it has other ones."""
+    size = answer.next * RECORD_SIZE
+    if size > len(packed) or crc32(packed[:size]) != answer.checksum:
+        raise PushFailed(PushFailure.NO_ANSWER, is_final=False)
+    return answer.next
 
 
 def _decode_answer(reply: MspFrame) -> Staged | Stored | None:

@@ -15,7 +15,7 @@ from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.items import home_item, item_seqs, items_from_records
 from bridge.controllers.nav.rules import NavProfile
 from bridge.fc.profile import FlightController
-from bridge.line.conversation import Conversation, LinkLost, Stopped, ask, ask_status, receive, send
+from bridge.line.conversation import Conversation, LinkLost, Receive, Send, Stopped, ask, ask_status, send
 from bridge.missions.fc_mission_store import (
     FcMissionStore,
     PushFailed,
@@ -27,7 +27,7 @@ from bridge.missions.fc_mission_store import (
 )
 from bridge.model.vehicle import Vehicle
 from protocols.mission_item import MissionItem
-from protocols.msp.frame import Direction
+from protocols.msp.frame import Direction, MspFrame
 from protocols.msp.nav import (
     LAST,
     WP_SIZE,
@@ -43,6 +43,7 @@ from protocols.msp.nav import (
 #: The replacement for an empty list, which cannot be written.
 NOTHING = (NavRecord(NavAction.RTH, flag=LAST),)
 _TRIES = 5
+_WP = frozenset((Nav.WP,))
 #: A list is compared within this many checks, a quarter of a second each if the board answers fast enough.
 _CHECKS = 6
 #: Other changes, and transfers, have to wait until a check ends.
@@ -213,9 +214,10 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
     def read(self, number: int) -> Conversation[NavRecord | None]:
         """Read one record; ignores replies about other ones (telemetry polls home)."""
         for _ in range(_TRIES):
-            yield from send(encode_read_wp(number), Nav.WP, WP_SIZE)
+            asked: Send | None = send(encode_read_wp(number), Nav.WP, WP_SIZE)
             while True:
-                reply = yield from receive(Nav.WP)
+                reply: MspFrame | None = yield Receive(_WP, asked)
+                asked = None
                 if reply is None:
                     break
                 answer = decode_wp(reply.payload)

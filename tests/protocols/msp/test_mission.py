@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from protocols.mission_record import ListIdentity
+from protocols.mission_record import ListIdentity, pack_records
 from protocols.msp.frame import MspFrame, MspParser
 from protocols.msp.mission import (
     ABORT_REQUEST,
@@ -89,7 +89,7 @@ def test_any_list_can_be_sent_in_chunks(wanted: Sequence[WpRecord], data: st.Dat
     most = data.draw(st.integers(1, 15))
     sent: list[WpRecord] = []
     while len(sent) < len(wanted):
-        chunk = encode_chunk(wanted, len(sent), most)
+        chunk = encode_chunk(pack_records(wanted), len(sent), most)
         assert 1 <= chunk.count <= most
         body = body_of(chunk.frame, MissionCommand.CHUNK)
         assert int.from_bytes(body[:2], "little") == chunk.first == len(sent)

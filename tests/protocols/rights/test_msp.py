@@ -8,7 +8,7 @@ import pytest
 from bridge.controllers.inav.telemetry import INAV_POLLS
 from bridge.line.msp_link import PROBE, RESYNC
 from bridge.line.poll_schedule import BOX_POLL, NAV_POLL, POLLS
-from protocols.mission_record import ListIdentity
+from protocols.mission_record import ListIdentity, pack_records
 from protocols.msp.commands import Msp, MspAction
 from protocols.msp.frame import MspFrame, MspParser, request
 from protocols.msp.inav import MIXER
@@ -83,7 +83,7 @@ CHANGES: list[tuple[Iterable[Firmware], bytes]] = [
     (MISSIONS, encode_begin(LIST)),
     (MISSIONS, encode_commit(LIST)),
     (MISSIONS, encode_radius(300)),
-    *((MISSIONS, encode_chunk(RECORDS, 0, most).frame) for most in range(1, MAX_CHUNK_RECORDS + 1)),
+    *((MISSIONS, encode_chunk(pack_records(RECORDS), 0, most).frame) for most in range(1, MAX_CHUNK_RECORDS + 1)),
 ]
 
 

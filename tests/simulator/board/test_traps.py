@@ -3,7 +3,7 @@
 
 import pytest
 
-from protocols.mission_record import identify
+from protocols.mission_record import identify, pack_records
 from protocols.msp.frame import request
 from protocols.msp.mission import INFO_REQUEST, decode_info, encode_begin, encode_chunk
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
@@ -108,7 +108,7 @@ def test_a_reset_is_silent_for_two_seconds_and_loses_the_ram() -> None:
     bench = Bench()
     records = mission(20)
     bench.progress(encode_begin(identify(records)))
-    bench.progress(encode_chunk(records, 0, 15).frame)
+    bench.progress(encode_chunk(pack_records(records), 0, 15).frame)
     bench.run(4.1)
     assert bench.naze.protocol is Protocol.AUTOSENSE
     bench.send(b"RRR")

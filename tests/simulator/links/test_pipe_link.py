@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 import serial
 
-from protocols.mission_record import identify
+from protocols.mission_record import identify, pack_records
 from protocols.msp.frame import MspFrame, MspParser, request
 from protocols.msp.mission import INFO_REQUEST, decode_info, encode_begin, encode_chunk, encode_commit
 from simulator.links.pipe_link import SimLink
@@ -159,7 +159,7 @@ def test_the_flash_survives_a_kill(start: Callable[..., Simulator], tmp_path: Pa
         assert ask(port, encode_begin(identify(records))) is not None
         first = 0
         while first < len(records):
-            chunk = encode_chunk(records, first, 15)
+            chunk = encode_chunk(pack_records(records), first, 15)
             assert ask(port, chunk.frame) is not None
             first += chunk.count
         assert ask(port, encode_commit(identify(records))) is not None

@@ -152,8 +152,8 @@ def test_begin_stalls_for_the_erase_and_commit_does_not() -> None:
     bench.progress(encode_begin(identify(mission(2))))
     assert bench.now - before < 0.010, "the slot is blank"
     before = bench.now
-    bench.progress(encode_chunk(mission(2), 0, 1).frame)
-    bench.progress(encode_chunk(mission(2), 1, 1).frame)
+    bench.progress(encode_chunk(pack_records(mission(2)), 0, 1).frame)
+    bench.progress(encode_chunk(pack_records(mission(2)), 1, 1).frame)
     bench.stored(encode_commit(identify(mission(2))))
     assert bench.now - before < 0.030
 
@@ -174,7 +174,7 @@ def test_a_window_of_two_chunks_fills_the_line() -> None:
     start, first, outstanding, following = bench.now, 0, 0, 0
     while following < len(records):
         while outstanding < 2 and first < len(records):
-            chunk = encode_chunk(records, first, 15)
+            chunk = encode_chunk(pack_records(records), first, 15)
             bench.send(chunk.frame)
             first, outstanding = first + chunk.count, outstanding + 1
         answer = bench.next_frame()
@@ -191,7 +191,7 @@ def test_a_window_of_two_chunks_fills_the_line() -> None:
 def test_begin_of_the_same_list_continues_and_of_another_starts_again() -> None:
     bench, records = Bench(), mission(20)
     bench.progress(encode_begin(identify(records)))
-    standing = bench.progress(encode_chunk(records, 0, 15).frame)
+    standing = bench.progress(encode_chunk(pack_records(records), 0, 15).frame)
     assert standing == Staged(ReplyStatus.OK, 15, identify(records[:15]).checksum)
     assert bench.progress(encode_begin(identify(records))) == standing
     assert bench.progress(encode_begin(identify(mission(20, 1)))) == Staged(ReplyStatus.OK, 0, 0)
@@ -200,17 +200,17 @@ def test_begin_of_the_same_list_continues_and_of_another_starts_again() -> None:
 def test_a_repeated_chunk_is_ignored_and_its_reply_has_the_progress() -> None:
     bench, records = Bench(), mission(20)
     bench.progress(encode_begin(identify(records)))
-    standing = bench.progress(encode_chunk(records, 0, 10).frame)
-    assert bench.progress(encode_chunk(records, 0, 10).frame) == standing
-    assert bench.progress(encode_chunk(records, 5, 10).frame) == standing
+    standing = bench.progress(encode_chunk(pack_records(records), 0, 10).frame)
+    assert bench.progress(encode_chunk(pack_records(records), 0, 10).frame) == standing
+    assert bench.progress(encode_chunk(pack_records(records), 5, 10).frame) == standing
 
 
 def test_a_chunk_beyond_the_next_is_a_gap() -> None:
     bench, records = Bench(), mission(20)
     bench.progress(encode_begin(identify(records)))
-    bench.progress(encode_chunk(records, 0, 3).frame)
+    bench.progress(encode_chunk(pack_records(records), 0, 3).frame)
     expected = Staged(ReplyStatus.SEQUENCE, 3, identify(records[:3]).checksum)
-    assert bench.progress(encode_chunk(records, 5, 3).frame) == expected
+    assert bench.progress(encode_chunk(pack_records(records), 5, 3).frame) == expected
 
 
 def test_a_repeated_commit_and_abort_succeed() -> None:
@@ -227,7 +227,7 @@ def test_a_repeated_commit_and_abort_succeed() -> None:
 
 def test_chunk_and_commit_need_a_transfer() -> None:
     bench, records = Bench(), mission(4)
-    assert bench.progress(encode_chunk(records, 0, 4).frame) == Staged(ReplyStatus.NO_TRANSFER, 0, 0)
+    assert bench.progress(encode_chunk(pack_records(records), 0, 4).frame) == Staged(ReplyStatus.NO_TRANSFER, 0, 0)
     assert bench.stored(encode_commit(identify(records))) == Stored(ReplyStatus.NO_TRANSFER, NOTHING)
 
 
@@ -235,11 +235,11 @@ def test_five_seconds_of_silence_end_a_transfer() -> None:
     bench, records = Bench(), mission(4)
     bench.progress(encode_begin(identify(records)))
     bench.run(4.8)
-    assert bench.progress(encode_chunk(records, 0, 1).frame).status is ReplyStatus.OK
+    assert bench.progress(encode_chunk(pack_records(records), 0, 1).frame).status is ReplyStatus.OK
     for flags in (InfoFlag.TRANSFER_OPEN, InfoFlag.TRANSFER_OPEN, InfoFlag(0)):
         bench.run(1.8)
         assert info(bench).flags == flags
-    assert bench.progress(encode_chunk(records, 1, 1).frame).status is ReplyStatus.NO_TRANSFER
+    assert bench.progress(encode_chunk(pack_records(records), 1, 1).frame).status is ReplyStatus.NO_TRANSFER
 
 
 def test_a_list_over_the_capacity_is_refused() -> None:
@@ -251,9 +251,9 @@ def test_a_list_over_the_capacity_is_refused() -> None:
 def test_commit_of_an_incomplete_list_keeps_the_transfer() -> None:
     bench, records = Bench(), mission(7)
     bench.progress(encode_begin(identify(records)))
-    bench.progress(encode_chunk(records, 0, 3).frame)
+    bench.progress(encode_chunk(pack_records(records), 0, 3).frame)
     assert bench.stored(encode_commit(identify(records))) == Stored(ReplyStatus.INCOMPLETE, NOTHING)
-    assert bench.progress(encode_chunk(records, 3, 4).frame).status is ReplyStatus.OK
+    assert bench.progress(encode_chunk(pack_records(records), 3, 4).frame).status is ReplyStatus.OK
     assert bench.stored(encode_commit(identify(records))).status is ReplyStatus.OK
 
 
@@ -263,17 +263,17 @@ def test_a_list_with_another_checksum_is_not_committed() -> None:
     records = mission(4, 1)
     announced = ListIdentity(4, identify(records).checksum ^ 1)
     bench.progress(encode_begin(announced))
-    bench.progress(encode_chunk(records, 0, 4).frame)
+    bench.progress(encode_chunk(pack_records(records), 0, 4).frame)
     assert bench.stored(encode_commit(announced)) == Stored(ReplyStatus.CHECKSUM, identify(mission(3)))
-    assert bench.progress(encode_chunk(records, 0, 4).frame).status is ReplyStatus.NO_TRANSFER
+    assert bench.progress(encode_chunk(pack_records(records), 0, 4).frame).status is ReplyStatus.NO_TRANSFER
 
 
 def test_a_record_with_an_unknown_command_drops_the_transfer() -> None:
     bench = Bench()
     records = [*mission(3), WpRecord(1, 2, 3, 0, 0, 2, 0, 8)]
     bench.progress(encode_begin(identify(records)))
-    assert bench.progress(encode_chunk(records, 0, 4).frame) == Staged(ReplyStatus.BAD_RECORD, 0, 0)
-    assert bench.progress(encode_chunk(records, 0, 3).frame).status is ReplyStatus.NO_TRANSFER
+    assert bench.progress(encode_chunk(pack_records(records), 0, 4).frame) == Staged(ReplyStatus.BAD_RECORD, 0, 0)
+    assert bench.progress(encode_chunk(pack_records(records), 0, 3).frame).status is ReplyStatus.NO_TRANSFER
 
 
 def test_failing_flash_drops_the_transfer_and_keeps_the_list() -> None:
@@ -286,7 +286,7 @@ def test_failing_flash_drops_the_transfer_and_keeps_the_list() -> None:
         elif failing == "chunk":
             bench.progress(encode_begin(identify(records)))
             bench.naze.faults.flash_failures = 1
-            status = bench.progress(encode_chunk(records, 0, 3).frame).status
+            status = bench.progress(encode_chunk(pack_records(records), 0, 3).frame).status
         else:
             bench.stage(records)
             bench.naze.faults.flash_failures = 1
@@ -305,13 +305,13 @@ def test_arming_drops_the_transfer_and_refuses_writes_but_not_reads() -> None:
     bench.run(0.01)
     assert info(bench).flags == InfoFlag.ARMED
     assert bench.progress(encode_begin(identify(mission(4, 1)))).status is ReplyStatus.ARMED
-    assert bench.progress(encode_chunk(mission(4, 1), 0, 4).frame).status is ReplyStatus.ARMED
+    assert bench.progress(encode_chunk(pack_records(mission(4, 1)), 0, 4).frame).status is ReplyStatus.ARMED
     assert bench.stored(encode_commit(identify(records))).status is ReplyStatus.ARMED
     assert bench.payload(encode_radius(300)) == struct.pack("<BH", ReplyStatus.ARMED, 200)
     assert bench.pull() == records
     bench.naze.faults.armed = False
     bench.run(0.01)
-    assert bench.progress(encode_chunk(mission(4, 1), 0, 4).frame).status is ReplyStatus.NO_TRANSFER
+    assert bench.progress(encode_chunk(pack_records(mission(4, 1)), 0, 4).frame).status is ReplyStatus.NO_TRANSFER
 
 
 def test_a_short_arming_drops_the_transfer_too() -> None:
@@ -320,7 +320,7 @@ def test_a_short_arming_drops_the_transfer_too() -> None:
     for armed in (True, False):
         bench.naze.faults.armed = armed
         bench.run(0.01)
-    assert bench.progress(encode_chunk(mission(4), 0, 4).frame).status is ReplyStatus.NO_TRANSFER
+    assert bench.progress(encode_chunk(pack_records(mission(4)), 0, 4).frame).status is ReplyStatus.NO_TRANSFER
 
 
 @pytest.mark.parametrize("busy", [False, True])
@@ -354,7 +354,7 @@ def test_a_chunk_with_too_many_records_is_a_bad_request() -> None:
     small = Bench(SimOptions(chunk_records=4))
     for board, status in ((bench, ReplyStatus.OK), (small, None)):
         board.progress(encode_begin(identify(records)))
-        answer = board.ask(encode_chunk(records, 0, 10).frame, timeout=0.3)
+        answer = board.ask(encode_chunk(pack_records(records), 0, 10).frame, timeout=0.3)
         assert (answer and answer.payload[0]) == status
 
 
@@ -433,7 +433,7 @@ def test_a_power_cut_at_any_flash_operation_leaves_the_old_list_or_the_new_one(o
         bench.send(encode_begin(identify(new)))
         for index in range(20):
             bench.run(0.2)
-            bench.send(encode_chunk(new, index, 1).frame)
+            bench.send(encode_chunk(pack_records(new), index, 1).frame)
         bench.run(0.2)
         bench.send(encode_commit(identify(new)))
         bench.run(0.2)
@@ -485,7 +485,7 @@ def test_a_persistent_client_gets_a_list_through_a_bad_line(seed: int, size: int
         if not standing.flags & InfoFlag.TRANSFER_OPEN:
             bench.ask(encode_begin(identity), timeout=0.5)
         elif standing.staged < size:
-            bench.ask(encode_chunk(records, standing.staged, 15).frame, timeout=0.1)
+            bench.ask(encode_chunk(pack_records(records), standing.staged, 15).frame, timeout=0.1)
         else:
             bench.ask(encode_commit(identity), timeout=0.2)
     assert bench.naze.stored == pack_records(records)
