@@ -15,9 +15,9 @@ from dataclasses import replace
 from itertools import count
 from math import inf
 
-from bridge.config import BridgeConfig
+from bridge.config import BridgeConfig, PassThroughRule
 from bridge.fc.actions import FcActions
-from bridge.fc.profile import FlightController, Spoken
+from bridge.fc.profile import FlightController, RuleSettings, Spoken
 from bridge.fc.session import FcSession
 from bridge.gcs.ground import FrameListener, Ground
 from bridge.gcs.guard import Guard
@@ -56,7 +56,7 @@ class Bridge:
         on_frames: FrameListener | None = None,
         on_ending: EndingListener = lambda _mission, _delivery: None,
     ) -> None:
-        self._config = config
+        self._config, owner = config, config.settings
         self._emit = emit
         self._was_armed = False
         #: The armed craft, for the BridgeConfig of a restarted bridge; it changes rarely. None: it is not armed.
@@ -64,9 +64,9 @@ class Bridge:
         self._announcer = LinkAnnouncer(now, was_found=self.flight is not None)
         incidents = count(1)
 
-        self.guard = Guard(config.links, emit, passes_everything=config.passes_everything)
+        self.guard = Guard(config.links, emit, passes_everything=owner.pass_through is PassThroughRule.EVERYTHING)
         self.ground = Ground(
-            config.sysid,
+            owner.sysid,
             config.compid,
             emit,
             self._newcomer,
@@ -83,7 +83,7 @@ class Bridge:
             incidents,
             self._controller_changed,
             self._mavlink_received,
-            config.autopilot,
+            owner.autopilot,
             config.flight,
         )
         self.missions = MissionService(self.session.vehicle, self.runner, on_ending)
@@ -99,13 +99,19 @@ class Bridge:
         self._uploads = MissionUploads(self.missions, self.ground, emit, incidents, self._vehicle.let_read)
         self._watch = MissionWatch(self.missions, self.ground, emit)
         downloads = MissionDownloads(self.missions, self.ground)
-        self._parameters = Parameters(self.missions, self.ground, config.sysid)
+        self._parameters = Parameters(self.missions, self.ground, owner.sysid)
         actions = FcActions(self.session, self.missions, self.runner)
         self._calibration = Calibration(self.ground, self.runner, self._announcer)
         commands = CommandService(self.ground, self._vehicle, actions, self.session, self._calibration, config.version)
         router = MessageRouter(self.ground, self._uploads, downloads, self._parameters, commands, self._vehicle)
         self._incoming = Incoming(
-            self.guard, self.ground, router, self._parameters, self.session.send_mavlink, config.sysid, config.compid
+            self.guard,
+            self.ground,
+            router,
+            self._parameters,
+            self.session.send_mavlink,
+            owner.sysid,
+            config.compid,
         )
 
     # The flight controller's side.
@@ -228,7 +234,8 @@ class Bridge:
             self._announcer.lost(now if vehicle.heard_at is None else vehicle.heard_at)
             return
         missions = controller.profile.missions
-        store = missions if isinstance(missions, Refusal) else missions(controller, vehicle, self._config.rules)
+        rules = RuleSettings(self._config.settings.takeoff_max_m)
+        store = missions if isinstance(missions, Refusal) else missions(controller, vehicle, rules)
         # On a port that was opened since, an armed board may be another one.
         self.missions.use(store, now, is_same_board=self.session.met_family == controller.profile.family)
         self._say(self._announcer.found(controller, now))

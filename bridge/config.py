@@ -3,14 +3,47 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import Enum
+from typing import Annotated
 
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
 from bridge.controllers.table import PROFILES
-from bridge.fc.profile import Profile, RuleSettings
+from bridge.fc.profile import Profile
 from bridge.gcs.guard import LinkAccess
 from bridge.model.autopilot import Autopilot
 from bridge.model.flight_memory import FlightMemory
 from bridge.model.settings import SealMemory, SealsOfThisRun
+
+
+class PassThroughRule(Enum):
+    """The messages that an autopilot in pass-through gets over links without a key or a list of writers."""
+
+    MISSIONS = "missions"
+    EVERYTHING = "everything"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BridgeSettings:
+    """The owner's settings of the bridge.
+
+    A field is all that a setting needs: service/settings/table.py derives its key, reader and documentation from it.
+    """
+
+    sysid: Annotated[int, range(1, 256), "MAVLink system id of the vehicle, 1..255."] = 1
+    takeoff_max_m: Annotated[
+        int,
+        range(2, 256),
+        "Maximum take-off altitude of a mission, metres, 2..255; a higher one is lowered to it.",
+    ] = TAKEOFF_MAX_M
+    autopilot: Annotated[
+        Autopilot,
+        'The sender of MAVLink on the port: "auto" detects it, "harakiri" is translated, "other" is passed through.',
+    ] = Autopilot.AUTO
+    pass_through: Annotated[
+        PassThroughRule,
+        "Messages for an autopilot in pass-through from links with neither key_file nor writers: "
+        '"missions" (and parameters and requests), or "everything": arming, modes and control, too.',
+    ] = PassThroughRule.MISSIONS
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,20 +51,16 @@ class BridgeConfig:
     """The configuration of one bridge. `speeds`: of the port, baud; (None,) if it has no speed.
 
     `version`: of the bridge itself. `unix_time_s`: the time of day at a monotonic time, None if unknown.
-    `links`: access rules by link name; every station may write over other links. `passes_everything`: an autopilot
-    that speaks MAVLink itself gets commands over those other links, too. `flight`: of the craft that a former bridge
-    left armed. `seals`: of the settings of the boards seen before.
+    `links`: access rules by link name; every station may write over other links. `flight`: of the craft that a former
+    bridge left armed. `seals`: of the settings of the boards seen before.
     """
 
     speeds: Sequence[int | None]
-    sysid: int = 1
+    settings: BridgeSettings = BridgeSettings()  # frozen
     compid: int = 1
-    rules: RuleSettings = field(default_factory=lambda: RuleSettings(TAKEOFF_MAX_M))
-    autopilot: Autopilot = Autopilot.AUTO
     profiles: Sequence[Profile] = PROFILES
     links: Mapping[str, LinkAccess] = field(default_factory=dict)
     version: str = ""
     unix_time_s: Callable[[float], float | None] = lambda _now: None
-    passes_everything: bool = False
     flight: FlightMemory | None = None
     seals: SealMemory = field(default_factory=SealsOfThisRun)

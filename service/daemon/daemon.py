@@ -13,7 +13,6 @@ import structlog
 
 from bridge.bridge import Bridge
 from bridge.config import BridgeConfig
-from bridge.fc.profile import RuleSettings
 from bridge.fc.states.searching import SPEEDS
 from bridge.gcs.guard import LinkAccess
 from bridge.line.conversation import StoreEffect
@@ -34,7 +33,7 @@ from service.machine.host import Host
 from service.machine.log_setup import log_event, warn_once
 from service.machine.package import version
 from service.recording.tlog_recorder import TLOG_FOLDER, TlogRecorder
-from service.settings import PassThroughRule, Settings
+from service.settings import Settings
 from service.settings.addresses import AutoFc, FcAddress, GcsAddress, SerialFc
 from storage.os_error import reason
 
@@ -88,13 +87,10 @@ class Daemon:
         self.bridge = Bridge(
             BridgeConfig(
                 _speeds(settings.fc),
-                sysid=settings.sysid,
-                rules=RuleSettings(settings.takeoff_max_m),
-                autopilot=settings.autopilot,
+                settings,
                 links={**self._signing.links, **_ZENOH},
                 version=version(),
                 unix_time_s=lambda now: time.time() - self._loop.time() + now,
-                passes_everything=settings.pass_through is PassThroughRule.EVERYTHING,
                 flight=self._flight.load(self._loop.time()),
                 seals=self._seals,
             ),

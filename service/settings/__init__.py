@@ -3,11 +3,10 @@
 
 from service.settings.key import SettingsError
 from service.settings.load import default_state_dir, load_settings, takeoff_limit_m
-from service.settings.settings import DEFAULT_GCS, PassThroughRule, Settings, TlogLimits
+from service.settings.settings import DEFAULT_GCS, Settings, TlogLimits
 
 __all__ = [
     "DEFAULT_GCS",
-    "PassThroughRule",
     "Settings",
     "SettingsError",
     "TlogLimits",

@@ -9,8 +9,22 @@ from reprlib import Repr
 from typing import NamedTuple
 
 ENVIRONMENT_PREFIX = "NAZE_BRIDGE_"
+#: In a field's annotation: a reload applies the setting.
+LIVE = object()
 _repr = Repr()
 _repr.maxstring = _repr.maxother = _repr.maxlong = 80
+
+
+class Default(str):
+    """In a field's annotation: the default, as in the file, if it is not that of the field."""
+
+    __slots__ = ()
+
+
+class Example(str):
+    """In a field's annotation: a value for the sample file, because there is no default to show."""
+
+    __slots__ = ()
 
 
 class Unfit(ValueError):

@@ -12,7 +12,7 @@ from service.settings.addresses import GcsAddress, SerialFc, parse_gcs, split_gc
 from service.settings.config_files import Given, nearest, read_files
 from service.settings.key import ENVIRONMENT_PREFIX, Problem, SettingsError, Unfit
 from service.settings.ports import port_conflicts
-from service.settings.settings import DEFAULT_GCS, Settings, TlogLimits
+from service.settings.settings import DEFAULT_GCS, Settings
 from service.settings.table import KEYS
 from service.settings.web import WebSettings
 from service.settings.write_access import WriteAccess
@@ -57,7 +57,7 @@ def load_settings(
     given, values = _read(config, flags, problems)
     links: Sequence[tuple[GcsAddress, WriteAccess]] = values.get("gcs", ())
     addresses = _named_links(gcs, problems) or [address for address, _ in links] or [parse_gcs(DEFAULT_GCS)]
-    tlog = _tlog_limits(values, given, problems)
+    problems += _tlog_problems(values, given)
     zenoh = ZenohSettings(**_table("zenoh", values)) if "zenoh" in given else None
     web = WebSettings(**_table("web", values)) if "web" in given else None
     fc, record_to = values.get("fc"), values.get("record_uart")
@@ -76,7 +76,6 @@ def load_settings(
         # A link that is also given by a flag keeps the file's access rules.
         "access": {str(address): access for address, access in links if not access.is_open},
         "state_dir": values.get("state_dir") or default_state_dir(),
-        "tlog": tlog,
         "zenoh": zenoh,
         "web": web,
     }
@@ -146,16 +145,11 @@ def _named_links(gcs: Sequence[str], problems: list[Problem]) -> list[GcsAddress
     return links
 
 
-def _tlog_limits(values: dict[str, Any], given: Mapping[str, Given], problems: list[Problem]) -> TlogLimits | None:
-    default = TlogLimits()
-    file_mb = values.get("tlog_file_mb", default.file_size >> 20)
-    total_mb = values.get("tlog_total_mb", max(default.total_size >> 20, 2 * file_mb))
-    if total_mb < 2 * file_mb:
-        text = f"tlog_total_mb is {total_mb}, but must be {2 * file_mb} or more: twice tlog_file_mb"
-        problems.append(Problem(given["tlog_total_mb"].where, text))
-    if not values.get("record_tlog", True):
-        return None
-    return TlogLimits(file_mb << 20, total_mb << 20, values.get("tlog_days", default.days))
+def _tlog_problems(values: Mapping[str, Any], given: Mapping[str, Given]) -> Iterator[Problem]:
+    total_mb, least_mb = values.get("tlog_total_mb"), 2 * values.get("tlog_file_mb", Settings().tlog_file_mb)
+    if total_mb is not None and total_mb < least_mb:
+        text = f"tlog_total_mb is {total_mb}, but must be {least_mb} or more: twice tlog_file_mb"
+        yield Problem(given["tlog_total_mb"].where, text)
 
 
 def _table(table: str, values: Mapping[str, Any]) -> dict[str, Any]:

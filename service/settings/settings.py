@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The settings of a daemon."""
+"""The settings of a daemon: every key of the configuration file but those of its tables."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import Enum, StrEnum
+from enum import StrEnum
 from pathlib import Path
+from typing import Annotated
 
-from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
-from bridge.model.autopilot import Autopilot
-from service.settings.addresses import AutoFc, FcAddress, GcsAddress
-from service.settings.share import ShareSettings
+from bridge.config import BridgeSettings
+from service.settings.addresses import AutoFc, FcAddress, GcsAddress, parse_fc
+from service.settings.key import LIVE, Default, Example, several, text
+from service.settings.share import ShareSettings, parse_share
 from service.settings.web import WebSettings
-from service.settings.write_access import WriteAccess
+from service.settings.write_access import WriteAccess, parse_link
 from service.settings.zenoh import ZenohSettings
 
 DEFAULT_GCS = "udpin:0.0.0.0:14550"
@@ -35,32 +36,77 @@ class TlogLimits:
     days: int = 30
 
 
-class PassThroughRule(Enum):
-    """The messages that an autopilot in pass-through gets over links without a key or a list of writers."""
-
-    MISSIONS = "missions"
-    EVERYTHING = "everything"
+_TLOG = TlogLimits()
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
-    """The settings of a daemon. Without `state_dir` nothing is stored; `tlog` None: telemetry is not recorded.
+class Settings(BridgeSettings):
+    """The settings of a daemon. Without `state_dir` nothing is stored.
 
     `access`: write permission per link, by its address as text; links not in it are open. `zenoh` None: not used.
     `web` None: no status page.
     """
 
-    fc: FcAddress = AutoFc()  # noqa: RUF009  # frozen
-    gcs: Sequence[GcsAddress] = ()
-    state_dir: Path | None = None
-    sysid: int = 1
-    takeoff_max_m: int = TAKEOFF_MAX_M
-    tlog: TlogLimits | None = None
-    record_uart: Path | None = None
-    autopilot: Autopilot = Autopilot.AUTO
-    pass_through: PassThroughRule = PassThroughRule.MISSIONS
+    fc: Annotated[
+        FcAddress,
+        text(parse=parse_fc),
+        "The flight controller: auto looks for it on the header's UART and on USB; /dev/ttyAMA0 (detects the speed), "
+        "/dev/ttyUSB0,57600 (baud), tcp:HOST:PORT, or sim for a simulated one.",
+    ] = AutoFc()  # noqa: RUF009  # frozen
+    gcs: Annotated[
+        Sequence[GcsAddress],
+        several(f'as in ["{DEFAULT_GCS}"]', parse_link, may_be_empty=False),
+        "Links to ground stations: udpin:ADDR:PORT, udpout:HOST:PORT, udpbcast:ADDR:PORT, tcpin:ADDR:PORT. As a table, "
+        '{address = "udpin:0.0.0.0:14550", key_file = "gcs.key", writers = ["192.168.4.0/24"]}, a link limits who may '
+        "write.",
+        Default(f'["{DEFAULT_GCS}"]'),
+        LIVE,
+    ] = ()
+    state_dir: Annotated[
+        Path | None,
+        "Folder for stored missions and telemetry logs. By default systemd's StateDirectory, else "
+        "~/.local/state/naze-bridge.",
+        Example('"/var/lib/naze-bridge"'),
+    ] = None
+    share: Annotated[
+        Sequence[ShareSettings],
+        several('as in [{address = "tcpin:127.0.0.1:5761"}]', parse_share),
+        "Ports on which INAV Configurator, MultiWiiConf or mwp may speak MSP through the bridge; also as [[share]] "
+        "tables. write = true lets them change settings while the craft is disarmed: MSP has no password, so anyone "
+        "who reaches the port can.",
+        Example('[{address = "tcpin:127.0.0.1:5761", write = false}]'),
+    ] = ()
+    record_tlog: Annotated[bool, "Record telemetry, for replay in Mission Planner."] = True
+    tlog_file_mb: Annotated[int, range(1, 1025), "Size of one telemetry log, megabytes, 1..1024."] = (
+        _TLOG.file_size >> 20
+    )
+    tlog_total_mb: Annotated[
+        int,
+        range(2, (1 << 20) + 1),
+        "Size of all telemetry logs together, megabytes, at least twice tlog_file_mb; the oldest are deleted.",
+    ] = _TLOG.total_size >> 20
+    tlog_days: Annotated[int, range(1, 3651), "How long a telemetry log without a flight is kept, days, 1..3650."] = (
+        _TLOG.days
+    )
+    record_uart: Annotated[
+        Path | None,
+        "File for a recording of the traffic with the flight controller, for a bug report. Off by default.",
+        Example('"/var/lib/naze-bridge/naze.uart"'),
+    ] = None
+    log_level: Annotated[LogLevel, "Minimum level of logged events: debug, info, warning or error.", LIVE] = (
+        LogLevel.INFO
+    )
     access: Mapping[str, WriteAccess] = field(default_factory=dict)
-    share: Sequence[ShareSettings] = ()
-    zenoh: ZenohSettings | None = None
-    web: WebSettings | None = None
-    log_level: LogLevel = LogLevel.INFO
+    zenoh: Annotated[
+        ZenohSettings | None,
+        "Eclipse zenoh: telemetry and missions for subscribers anywhere, off without this table.",
+    ] = None
+    web: Annotated[WebSettings | None, "The status page, off without this table."] = None
+
+    @property
+    def tlog(self) -> TlogLimits | None:
+        """None: telemetry is not recorded. There is always room for two logs."""
+        if not self.record_tlog:
+            return None
+        total_mb = max(self.tlog_total_mb, 2 * self.tlog_file_mb)
+        return TlogLimits(self.tlog_file_mb << 20, total_mb << 20, self.tlog_days)

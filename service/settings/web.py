@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The `[web]` table of the configuration file."""
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 from service.settings.addresses import host_port, parse_host_port
+from service.settings.key import Example, Unfit, file_name, several, text
 
 _FORMS = 'write "0.0.0.0:8080" for the whole network, "127.0.0.1:8080" for this machine only'
 
@@ -20,15 +23,35 @@ class ListenAddress:
         return host_port(self.host, self.port)
 
 
+def parse_listen(given: str) -> ListenAddress:
+    """Read "HOST:PORT"; AddressError gives the reason."""
+    return ListenAddress(*parse_host_port(given, given, _FORMS))
+
+
+def _host_name(entry: object, _folder: Path) -> str:
+    if not isinstance(entry, str) or re.fullmatch(r"[A-Za-z0-9-]+(\.[A-Za-z0-9-]+)*", entry) is None:
+        raise Unfit(f'holds {entry!r}, which is not a host name: write one like "naze-1.example.ts.net"')
+    return entry.lower()
+
+
 @dataclass(frozen=True, slots=True)
 class WebSettings:
-    """`hosts`: further names of this machine. `token_file` None: `web-token` in the state directory."""
+    """The settings of the status page."""
 
-    listen: ListenAddress = ListenAddress()
-    hosts: tuple[str, ...] = ()
-    token_file: Path | None = None
-
-
-def parse_listen(text: str) -> ListenAddress:
-    """Read "HOST:PORT"; AddressError gives the reason."""
-    return ListenAddress(*parse_host_port(text, text, _FORMS))
+    listen: Annotated[
+        ListenAddress,
+        text('"HOST:PORT"', parse_listen),
+        "Address of the status page: 0.0.0.0:8080 for the whole network, 127.0.0.1:8080 for this machine only.",
+    ] = ListenAddress()
+    hosts: Annotated[
+        tuple[str, ...],
+        several('as in ["naze-1.example.ts.net"]', _host_name),
+        "Full names by which browsers may open the page; addresses and local names always work.",
+    ] = ()
+    token_file: Annotated[
+        Path | None,
+        file_name(in_config_folder=True),
+        "File with the token for writing missions and fetching logs, created if it is missing. By default web-token in"
+        " state_dir.",
+        Example('"/etc/naze-bridge/web-token"'),
+    ] = None

@@ -3,10 +3,13 @@
 
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import partial
 from pathlib import Path
+from typing import Annotated
 
 from payloads.keys import PayloadEncoding
-from payloads.names import DEFAULT_PREFIX, host_name
+from payloads.names import DEFAULT_PREFIX, check_name, host_name
+from service.settings.key import Example, Unfit, file_name, several, text
 
 #: The value that allows commands without authentication.
 I_KNOW = "I know"
@@ -19,21 +22,56 @@ class ZenohProfile(Enum):
     METERED = "metered"
 
 
+def _endpoint(entry: object, _folder: Path) -> str:
+    if not isinstance(entry, str) or "/" not in entry:
+        raise Unfit(f'holds {entry!r}, which is not an endpoint: write one like "tcp/192.168.4.1:7447"')
+    return entry
+
+
 @dataclass(frozen=True, slots=True)
 class ZenohSettings:
     """The `[zenoh]` table. Endpoints are in zenoh's form: "tcp/192.168.4.1:7447".
 
     `config_file`: a zenoh configuration file; the bridge's defaults complete it.
-    `commands`: True if @cmd is answered; without authentication only if `commands_without_authentication` is "I know".
     """
 
-    prefix: str = DEFAULT_PREFIX
-    vehicle: str = field(default_factory=host_name)
-    encoding: PayloadEncoding = PayloadEncoding.JSON
-    profile: ZenohProfile = ZenohProfile.FULL
-    connect: tuple[str, ...] = ()
-    listen: tuple[str, ...] = ()
-    config_file: Path | None = None
-    commands: bool = False
-    commands_without_authentication: str = ""
-    mavlink_in: bool = False
+    prefix: Annotated[str, text(parse=partial(check_name, "zenoh.prefix")), "First chunk of all zenoh keys."] = (
+        DEFAULT_PREFIX
+    )
+    vehicle: Annotated[
+        str,
+        text(parse=partial(check_name, "zenoh.vehicle")),
+        "This vehicle's name, the second chunk; unique within a fleet. By default the host's name.",
+        Example('"naze-1"'),
+    ] = field(default_factory=host_name)
+    encoding: Annotated[PayloadEncoding, "Encoding of payloads: json or cbor."] = PayloadEncoding.JSON
+    profile: Annotated[
+        ZenohProfile,
+        "Data volume: full sends each sample; metered a group every 5 s, or 30 s if unchanged, but arming at once.",
+    ] = ZenohProfile.FULL
+    connect: Annotated[
+        tuple[str, ...],
+        several('as in ["tcp/192.168.4.1:7447"]', _endpoint),
+        "Endpoints to join: a router or other peers.",
+    ] = ()
+    listen: Annotated[
+        tuple[str, ...],
+        several('as in ["tcp/0.0.0.0:7447"]', _endpoint),
+        "Endpoints on which to accept other sessions.",
+    ] = ()
+    config_file: Annotated[
+        Path | None,
+        file_name(in_config_folder=True),
+        "A zenoh configuration file, for TLS, passwords, access control, namespace.",
+        Example('"zenoh.json5"'),
+    ] = None
+    commands: Annotated[
+        bool, "Allow writing and clearing missions over zenoh; the transport must be authenticated."
+    ] = False
+    commands_without_authentication: Annotated[
+        str,
+        text(f'"{I_KNOW}", or omitted'),
+        f'"{I_KNOW}": accept commands without authentication, from anyone who reaches the session.',
+        Example(f'"{I_KNOW}"'),
+    ] = ""
+    mavlink_in: Annotated[bool, "Accept raw MAVLink frames over zenoh, under the same condition as commands."] = False

@@ -15,7 +15,7 @@ from typing import Any
 from pymavlink.dialects.v20 import all as every_message
 
 from bridge.bridge import Bridge
-from bridge.config import BridgeConfig
+from bridge.config import BridgeConfig, BridgeSettings, PassThroughRule
 from bridge.controllers import other
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.controllers.inav import profile as inav
@@ -167,9 +167,9 @@ class World:
         self._lateness_s = 0.0
         self._config = BridgeConfig(
             speeds,
+            BridgeSettings(pass_through=PassThroughRule.EVERYTHING) if passes_everything else BridgeSettings(),
             links=links or {},
             profiles=profiles,
-            passes_everything=passes_everything,
             seals=seals or SealsOfThisRun(),
         )
         self._on_frames = on_frames

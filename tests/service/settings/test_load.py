@@ -89,8 +89,8 @@ encodings = "json"
         "naze.toml:8: 'takeof_max_m' is not a setting; did you mean 'takeoff_max_m'?",
         "naze.toml:11: 'zenoh.encodings' is not a setting; did you mean 'zenoh.encoding'?",
         "naze.toml:4: 'tcpin:0.0.0.0' needs a host and a port: use udpin:0.0.0.0:14550",
-        "naze.toml:3: sysid is 300, but must be 1..255 (MAVLink system id of the vehicle",
         "conf.d/late.toml:1: tlog_days is 'all', but must be a whole number, 1..3650 (How long",
+        "naze.toml:3: sysid is 300, but must be 1..255 (MAVLink system id of the vehicle",
         "naze.toml:10: zenoh.vehicle is 'a/b', with '/' in it: make a name of letters, digits and dashes",
     ]
     assert [line[: len(words)] for line, words in zip(lines, wanted, strict=True)] == wanted

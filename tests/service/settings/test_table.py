@@ -2,9 +2,11 @@
 """The sample file and the page have every setting."""
 
 import tomllib
+from dataclasses import fields
 from pathlib import Path
 
 from generators.config_sample import page, sample
+from service.settings import Settings
 from service.settings.table import KEYS
 from tests.service.settings.test_load import load
 
@@ -29,3 +31,9 @@ def test_every_line_of_the_sample_is_valid(folder: Path) -> None:
 
 def test_the_page_has_every_setting() -> None:
     assert page() in (REPOSITORY / "docs" / "configuration.md").read_text(), "run make config-sample"
+
+
+def test_every_key_has_a_field_and_a_meaning() -> None:
+    names = {field.name for field in fields(Settings)}
+    assert {key.name.partition(".")[0] for key in KEYS} == names - {"access"}
+    assert all(key.meaning.endswith(".") for key in KEYS)
