@@ -39,12 +39,12 @@ def strict(value: Any) -> Any:
     return value
 
 
-def plain(value: Any) -> Any:
+def printable(value: Any) -> Any:
     """Make the texts in plain data safe to print: a daemon or store that was taken over may hold anything."""
     if isinstance(value, dict):
-        return {key: plain(each) for key, each in value.items()}
+        return {key: printable(each) for key, each in value.items()}
     if isinstance(value, list):
-        return [plain(each) for each in value]
+        return [printable(each) for each in value]
     return plain_text(value) if isinstance(value, str) else value
 
 

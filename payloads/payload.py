@@ -14,7 +14,7 @@ from payloads import compact
 from payloads.keys import COMMAND_KEYS, OVERVIEW, VERSION, PayloadEncoding, ZenohKey
 from payloads.mission_data import Json, to_json
 
-_write_any = json.JSONEncoder(separators=(",", ":"), allow_nan=False).encode
+_write_json = json.JSONEncoder(separators=(",", ":"), allow_nan=False).encode
 _SCALARS = frozenset((float, int, str, bool, type(None)))
 _ENCODINGS = {
     PayloadEncoding.JSON: zenoh.Encoding.APPLICATION_JSON,
@@ -53,7 +53,7 @@ class Payloads:
         """Encode a payload. May be called on any thread."""
         if (key.encoding or self._encoding) is PayloadEncoding.CBOR and key.schema is not None:
             return compact.dumps(key.schema, body)
-        return _to_json(body)
+        return _write_json(body).encode()
 
     def _envelope(self, key: ZenohKey, seq: int) -> Json:
         time_s = self._clock()
@@ -91,22 +91,3 @@ def _plain_value(value: Any) -> Any:
 def _layout(kind: Hashable) -> tuple[tuple[str, ...], Callable[[Any], tuple[Any, ...]]]:
     names = tuple(each.name for each in fields(kind))  # type: ignore[arg-type]
     return names, attrgetter(*names)
-
-
-def _to_json(body: Json) -> bytes:
-    """Write numbers without json's encoder: called rarely, with cold caches, it would take a third of the put."""
-    parts = []
-    for name, value in body.items():
-        write = _WRITERS.get(type(value), _write_any)
-        parts.append(f'"{name}":{write(value)}')
-    return f"{{{','.join(parts)}}}".encode()
-
-
-#: JSON's form where it equals Python's: telemetry groups have no NaN, and all others went through `strict`. Names are
-#: our own and need no quoting.
-_WRITERS: dict[type, Callable[[Any], str]] = {
-    float: repr,
-    int: repr,
-    bool: lambda value: str(value).lower(),
-    type(None): lambda _: "null",
-}

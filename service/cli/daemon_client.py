@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import click
 
-from payloads.mission_data import Json, plain
+from payloads.mission_data import Json, printable
 from service.daemon.client import ControlError, Interrupted, NoDaemonError, ask_daemon
 from service.settings import SettingsError, default_state_dir
 from service.settings.addresses import AddressError, parse_fc
@@ -122,5 +122,5 @@ def _read_store(state_dir: Path | None, request: Json) -> Json:
         raise ControlError(f"no missions are stored in {' or '.join(map(str, folders))}: use --state-dir")
     with read_store(path) as store:
         is_list = request["do"] == "missions"
-        answer: Json = plain(listed(store, request["limit"]) if is_list else shown(store, request["number"]))
+        answer: Json = printable(listed(store, request["limit"]) if is_list else shown(store, request["number"]))
         return answer

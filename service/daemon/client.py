@@ -13,7 +13,7 @@ from pathlib import Path
 from tempfile import gettempdir
 from zlib import crc32
 
-from payloads.mission_data import Json, plain, to_json
+from payloads.mission_data import Json, printable, to_json
 from service.settings import SettingsError, default_state_dir
 
 #: The request for the bridge's status.
@@ -69,7 +69,7 @@ def ask_daemon(state_dir: Path | None, request: Json, progress: Callable[[int], 
 
 def _answer(line: str) -> Json:
     try:
-        answer: Json = plain(json.loads(line))
+        answer: Json = printable(json.loads(line))
         if _ANSWERS & answer.keys():
             return answer
     except (ValueError, AttributeError, RecursionError):
