@@ -32,7 +32,7 @@ from bridge.sharing.msp_sharing import MspSharing
 from bridge.transfers.downloads import MissionDownloads
 from bridge.transfers.local_missions import LocalMissions
 from bridge.transfers.mission_watch import MissionWatch
-from bridge.transfers.uploads import STOPPED, MissionUploads
+from bridge.transfers.uploads import FC_LOST, STOPPED, MissionUploads
 from bridge.vehicle.calibration import Calibration
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.link_announcer import LinkAnnouncer
@@ -172,7 +172,7 @@ class Bridge:
         self.runner.tick(now)
         if self.sharing.due < inf:
             self.sharing.serve(now)
-        if self._uploads.is_active:
+        if now >= self._uploads.due:
             self._uploads.tick(now)
         if now >= self._watch.due:
             self._watch.tick(now)
@@ -193,7 +193,7 @@ class Bridge:
             self.session.state.deadline(),
             self.runner.due,
             self.sharing.due,
-            self._uploads.next_deadline() if self._uploads.is_active else inf,
+            self._uploads.due,
             self.ground.stations.due,
             self._announcer.due,
             self._calibration.due,
@@ -229,8 +229,7 @@ class Bridge:
         if controller is None:
             trouble = self.session.state.trouble
             self.missions.use(Refusal(MissionResult.DENIED, trouble) if trouble else NO_LINK, now, is_same_board=True)
-            if self._uploads.is_active:
-                self._uploads.link_lost(now)
+            self._uploads.end(FC_LOST, now)
             self._announcer.lost(now if vehicle.heard_at is None else vehicle.heard_at)
             return
         missions = controller.profile.missions
@@ -279,9 +278,8 @@ class Bridge:
             # Unknown is not a change: a Harakiri that arms may fall silent first.
             return
         self._was_armed = armed
-        if armed and self._uploads.is_active:
-            self._uploads.end(ARMED, now)
         if armed:
+            self._uploads.end(ARMED, now)
             self.settings.armed()
         self.ground.record_flight(on=armed and not self.is_passing_through)
         self._emit(Armed() if armed else Disarmed())

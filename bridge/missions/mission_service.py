@@ -113,6 +113,8 @@ class MissionService:
         #: The mission store of the current flight controller, or the reply to every attempt.
         self.fc_store: AnyFcMissionStore | Refusal = NO_LINK
         self._owner: object | None = None
+        #: Called when a transfer has ended, and another may begin.
+        self.on_released: Callable[[], None] = lambda: None
         self._closed = False
         #: False until the current flight controller's list was read, and after an interrupted push.
         self.is_settled = False
@@ -212,8 +214,9 @@ class MissionService:
         self._closed = True
 
     def release(self, owner: object) -> None:
-        if self._owner == owner:
+        if self._owner is owner:
             self._owner = None
+            self.on_released()
 
     def preflight(self) -> Conversation[StoreReport | Refusal]:
         """Ask the flight controller if it can take a list now."""

@@ -31,14 +31,16 @@ _ONLY_MISSIONS = "Fences and rally points are not stored here"
 _UNKNOWN_UPLOAD = Refusal(MissionResult.OPERATION_CANCELLED, "Unknown upload: write it again")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class _Answer:
-    """The MISSION_ACK that ended an upload of `count` items. It answers a repeated Cancel until `cancelled_until`."""
+    """The MISSION_ACK that ended an upload of `count` items. It answers a Cancel until `cancelled_until`."""
 
     ack: MissionResult
     count: int
     until: float
     cancelled_until: float
+    #: When to send the ack again, or the reason for a refusal.
+    again: list[tuple[float, str | None]]
 
     @property
     def is_refusal(self) -> bool:
@@ -56,8 +58,6 @@ class UploadAnswers:
         self._ground = ground
         self._let_read = let_read
         self._answers: dict[Station, _Answer] = {}  # oldest first
-        #: To be sent later: the reason for a refusal, or the final ack again.
-        self._later: list[tuple[float, Station, str | None]] = []
         #: Those that know that only missions are stored.
         self._informed: set[Peer] = set()
         #: The time of the next `tick`; infinity if nothing is to be sent later.
@@ -76,18 +76,22 @@ class UploadAnswers:
         is_cancelled: bool = False,
         is_repeated: bool = False,
     ) -> None:
-        """Send the final MISSION_ACK; `is_cancelled`: the station had cancelled the upload of `count` items.
+        """Send the final MISSION_ACK of an upload of `count` items; 0 for a clear.
 
-        `is_repeated`: send it again until the station sends another mission message.
+        A Cancel after a refusal, or after one that came too late (`is_cancelled`), gets the same answer: it must not
+        clear the mission. `is_repeated`: send it again until the station sends another mission message.
         """
         self._forget_old(now)
         self._answers.pop(station, None)
-        self._answers[station] = _Answer(ack, count, now + _MEMORY_S, now + _CANCEL_S if is_cancelled else now)
+        cancel_s = _CANCEL_S if count and (is_cancelled or ack is not MissionResult.ACCEPTED) else 0.0
+        again: list[tuple[float, str | None]] = []
+        if is_repeated and count:
+            again = [(now + later_s, None) for later_s in _ACK_AGAIN_S]
+        self._answers[station] = _Answer(ack, count, now + _MEMORY_S, now + cancel_s, again)
+        self.due = min(self.due, *(at for at, _ in again), inf)
         if len(self._answers) >= 2 * _MOST:
             self._forget_strangers()
         self._ground.mission_ack(station, ack, mission_type)
-        if is_repeated:
-            self._set_later([*self._later, *((now + later_s, station, None) for later_s in _ACK_AGAIN_S)])
 
     def report(self, station: Station, verdict: Verdict[Any], delivery: DeliveryResult) -> None:
         """Report everything to the sender, and the change on the aircraft to other ground stations.
@@ -116,27 +120,29 @@ class UploadAnswers:
 
     def remind(self, station: Station, text: str, now: float) -> None:
         """Repeat the reason for a refusal that the station may not have noticed."""
-        self._set_later([*self._later, *((now + later_s, station, text) for later_s in _REMINDERS_S)])
+        if (answer := self._answers.get(station)) is not None:
+            answer.again = [(now + later_s, text) for later_s in _REMINDERS_S]
+            self.due = min(self.due, answer.again[0][0])
 
     def went_on(self, station: Station) -> None:
         """The station has sent another mission message: it has the final ack, or does not wait for it."""
-        if self._later:
-            self._set_later([later for later in self._later if later[1:] != (station, None)])
+        if (answer := self._answers.get(station)) is not None:
+            answer.again = [again for again in answer.again if again[1] is not None]
 
     def tick(self, now: float) -> None:
         """Send what is due."""
-        for due, station, text in self._later:
-            if now < due:
-                continue
-            if text is not None:
-                self._ground.say(Severity.ERROR, text, station)
-            elif station in self._answers:
-                self._ground.mission_ack(station, self._answers[station].ack)
-        self._set_later([later for later in self._later if now < later[0]])
-
-    def _set_later(self, later: list[tuple[float, Station, str | None]]) -> None:
-        self._later = later
-        self.due = min((due for due, _, _ in later), default=inf)
+        if now < self.due:
+            return
+        for station, answer in self._answers.items():
+            for due, text in answer.again:
+                if now < due:
+                    continue
+                if text is not None:
+                    self._ground.say(Severity.ERROR, text, station)
+                else:
+                    self._ground.mission_ack(station, answer.ack)
+            answer.again = [again for again in answer.again if now < again[0]]
+        self.due = min((due for answer in self._answers.values() for due, _ in answer.again), default=inf)
 
     # After the end.
 
@@ -171,7 +177,6 @@ class UploadAnswers:
 
     def forget(self, station: Station) -> bool:
         """The ground station has begun a new upload. True if the answer to its former one was remembered."""
-        self._set_later([later for later in self._later if later[1] != station])
         return self._answers.pop(station, None) is not None
 
     def was_said_to(self, station: Station, now: float) -> bool:
