@@ -272,11 +272,12 @@ class MissionService:
             return (yield from self._conclude(number, Outcome.FAILED, fc_store.ack, fc_store.text))
         if not (yield from self._copy_erased(fc_store, verdict.records)):
             return (yield from self._conclude(number, Outcome.FAILED, MissionResult.DENIED, _NO_COPY))
-        pending = PendingMission(number, identify(verdict.records), None if self.held is None else self.held.identity)
+        identity, before = identify(verdict.records), None if self.held is None else self.held.identity
+        pending = PendingMission(number, identity, before)
         result = yield from self._push(fc_store, arrived, progress)
         if result.failure is not None:
             return (yield from self._not_written(result.failure, pending))
-        self.held = self._held_now(arrived)
+        self.held = self._held_now(arrived, identity)
         lossy = summary(len(arrived.items), verdict)
         text = lossy or _verified_text(verdict, unchanged=result.unchanged)
         delivery = yield from self._conclude(number, Outcome.VERIFIED, MissionResult.ACCEPTED, text)
@@ -286,10 +287,9 @@ class MissionService:
         change = "Mission erased" if is_erased else f"New mission, {len(verdict.items)} items"
         return replace(delivery, is_lossy=lossy is not None or is_erased, change=change)
 
-    def _held_now(self, arrived: ArrivedMission) -> HeldMission:
+    def _held_now(self, arrived: ArrivedMission, identity: ListIdentity) -> HeldMission:
         """The list that was just written."""
-        verdict = arrived.verdict
-        identity, before = identify(verdict.records), self.held
+        verdict, before = arrived.verdict, self.held
         sent_seqs = {} if before is None or before.identity != identity else {**before.sent_seqs}
         sent_seqs.pop(arrived.sender, None)
         if arrived.sender and is_renumbered(verdict.sent_seqs):

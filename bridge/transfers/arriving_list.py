@@ -65,7 +65,7 @@ class ArrivingList:
 
     @property
     def received(self) -> tuple[MissionItem, ...]:
-        return tuple(self.items[seq] for seq in sorted(self.items))
+        return tuple(map(self.items.__getitem__, sorted(self.items)))
 
     @property
     def missing(self) -> int:

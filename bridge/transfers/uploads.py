@@ -197,8 +197,9 @@ class MissionUploads:
         self.due = min(self.due, self._queue.due(now), self.answers.due)
 
     def _wake(self) -> None:
-        """An upload may have its turn."""
-        self.due = 0.0
+        """Perhaps an upload may go on at once."""
+        if self._queue.within(Waiting, Complete):
+            self.due = 0.0
 
     # State changes of an upload.
 
@@ -239,7 +240,6 @@ class MissionUploads:
         before = upload.state
         after = TRANSITIONS[type(before)][type(event)]
         assert after is not Fixed.NEVER, f"{event} in {before}"
-        self._wake()
         if isinstance(after, type):
             upload.state = after(upload, event, now)
         elif after is Fixed.END:
@@ -263,6 +263,8 @@ class MissionUploads:
                 self._emit_refusal(upload, Refusal(MissionResult.OPERATION_CANCELLED, f"superseded: {why}"))
             case Ended(refusal):
                 self._refuse(upload, refusal, now)
+        self.due = min(self.due, upload.state.due, self.answers.due)
+        self._wake()
 
     def _end(self, uploads: list[Upload], refusal: Refusal, now: float) -> None:
         for upload in uploads:

@@ -1033,6 +1033,22 @@ def test_a_count_of_0_during_an_upload_cancels_it(sent: int) -> None:
     assert world.stored == ()
 
 
+@pytest.mark.parametrize("late_s", [0.1, 2.9])
+def test_a_cancel_that_crosses_a_refusal_erases_nothing(late_s: float) -> None:
+    world, station = holding()
+    items = waypoints(8)
+    items[5] = replace(items[5], command=21)  # LAND must be last
+    receiving(world, station, items, 6)
+    world.run(0.1)
+    station.take()
+    world.run(late_s)
+    station.take()
+    station.send(count_message(0))
+    world.run(1)
+    assert acks(station) == [A.INVALID]
+    assert world.stored == OLD_RECORDS
+
+
 def test_a_repeated_count_of_0_does_not_cancel_the_clear() -> None:
     world, station = holding()
     second = GroundStation(world, "second", sysid=254)
