@@ -35,7 +35,7 @@ class Ready(Event):
     check: ListCheck
 
 
-class Closed(Event):
+class SenderFinished(Event):
     """The ground station considers its list written: "Write Fast" ends so even if items were lost."""
 
 
@@ -147,7 +147,7 @@ class Closing(Receiving):
     seconds = 0.3
     seems_written = True
 
-    def __init__(self, upload: "Upload", event: Closed, now: float) -> None:
+    def __init__(self, upload: "Upload", event: SenderFinished, now: float) -> None:
         UploadState.__init__(self, upload, event, now)
         assert isinstance(upload.state, Receiving)
         self.list, missing = upload.state.list, upload.state.list.missing
@@ -243,16 +243,16 @@ class Fixed(Enum):
 
 _Row = tuple[type[UploadState] | Fixed, ...]
 _NEVER, _STAYS, _END = Fixed.NEVER, Fixed.STAYS, Fixed.END
-_EVENTS = Turn, Ready, Arrived, Closed, Delivered, Ended, Cancelled, Replaced
+_EVENTS = Turn, Ready, Arrived, SenderFinished, Delivered, Ended, Cancelled, Replaced
 _WRITING = _NEVER, _NEVER, _NEVER, _NEVER, _END, _END
 # fmt: off
 _ROWS: Mapping[type[UploadState], _Row] = {
-    #            Turn        Ready      Arrived   Closed   Delivered Ended Cancelled Replaced
-    Waiting:    (Asking,     _NEVER,    Complete, _NEVER,  _NEVER,   _END, _END,     _END),
-    Asking:     (_NEVER,     Receiving, _NEVER,   _NEVER,  _NEVER,   _END, _END,     _END),
-    Receiving:  (_NEVER,     _NEVER,    Complete, Closing, _NEVER,   _END, _END,     _END),
-    Closing:    (_NEVER,     _NEVER,    Complete, _STAYS,  _NEVER,   _END, _END,     _END),
-    Complete:   (Delivering, _NEVER,    _NEVER,   _STAYS,  _NEVER,   _END, _END,     _END),
+    #           Turn        Ready      Arrived   SenderFinished Delivered Ended Cancelled Replaced
+    Waiting:   (Asking,     _NEVER,    Complete, _NEVER,        _NEVER,   _END, _END,     _END),
+    Asking:    (_NEVER,     Receiving, _NEVER,   _NEVER,        _NEVER,   _END, _END,     _END),
+    Receiving: (_NEVER,     _NEVER,    Complete, Closing,       _NEVER,   _END, _END,     _END),
+    Closing:   (_NEVER,     _NEVER,    Complete, _STAYS,        _NEVER,   _END, _END,     _END),
+    Complete:  (Delivering, _NEVER,    _NEVER,   _STAYS,        _NEVER,   _END, _END,     _END),
     #                                    Cancelled                Replaced
     Delivering:              (*_WRITING, DeliveringDespiteCancel, DeliveringUnanswered),
     DeliveringDespiteCancel: (*_WRITING, _STAYS,                  DeliveringUnanswered),

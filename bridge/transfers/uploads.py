@@ -33,7 +33,6 @@ from bridge.transfers.upload_states import (
     Arrived,
     Asking,
     Cancelled,
-    Closed,
     Complete,
     Delivered,
     Delivering,
@@ -45,6 +44,7 @@ from bridge.transfers.upload_states import (
     Ready,
     Receiving,
     Replaced,
+    SenderFinished,
     Turn,
     Upload,
     Waiting,
@@ -159,7 +159,7 @@ class MissionUploads:
         if result != MissionResult.ACCEPTED:
             self._handle(upload, Ended(_cancelled(f"cancelled (result {result})")), now)
         elif upload.state.received:
-            self._handle(upload, Closed(), now)
+            self._handle(upload, SenderFinished(), now)
 
     def reads(self, station: Station, now: float) -> None:
         """The ground station reads the mission: its silent upload ends without an ack, which it would misunderstand."""
