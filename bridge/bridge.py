@@ -278,8 +278,9 @@ class Bridge:
             # Unknown is not a change: a Harakiri that arms may fall silent first.
             return
         self._was_armed = armed
-        if armed:
+        if armed and self._uploads.due < inf:
             self._uploads.end(ARMED, now)
+        if armed:
             self.settings.armed()
         self.ground.record_flight(on=armed and not self.is_passing_through)
         self._emit(Armed() if armed else Disarmed())

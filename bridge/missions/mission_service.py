@@ -214,9 +214,10 @@ class MissionService:
         self._closed = True
 
     def release(self, owner: object) -> None:
+        """A transfer has ended, whether or not it had the lock."""
         if self._owner is owner:
             self._owner = None
-            self.on_released()
+        self.on_released()
 
     def preflight(self) -> Conversation[StoreReport | Refusal]:
         """Ask the flight controller if it can take a list now."""

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One upload: its states from MISSION_COUNT to the final MISSION_ACK, their events and transitions."""
+"""Uploads: their states from MISSION_COUNT to the final MISSION_ACK, the events, and whose turn it is."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum, auto
 from math import inf
 
-from bridge.gcs.station import Station
+from bridge.gcs.station import Peer, Station
 from bridge.missions.list_check import ListCheck
 from bridge.missions.mission_service import OCCUPIED
 from bridge.model.refusal import Refusal
-from bridge.transfers.arriving_list import ArrivingList, Reply, WholeList
+from bridge.transfers.arriving_list import ArrivingList, WholeList
 from protocols.mission_item import MissionItem, MissionResult
 
 #: After a station's next MISSION_COUNT, items of its former list may still arrive for this long.
@@ -18,6 +18,12 @@ _FORMER_ITEMS_S = 2.0
 #: QGroundControl reports a failed write 1.5 s after its last item, unless that is requested again; MAVSDK after 2.5 s.
 #: Writing 120 records to an INAV takes 2.4 s. Twice in that time, in case one request is lost.
 _NO_ANSWER_S = 0.6
+#: After this long with lists arriving, an upload does not wait for its turn: a slow or silent ground station would lock
+#: out the others. A pause ends that.
+_ALONE_S = 4.0
+_PAUSE_S = 3.0
+#: Nor does it if more than this many are running or waiting.
+_MOST_IN_TURN = 4
 
 
 class Event:
@@ -77,7 +83,11 @@ class UploadState:
     seems_written = False
 
     def __init__(self, _upload: "Upload", _event: Event, now: float) -> None:
-        self.deadline = now + self.seconds
+        self._began_at = now
+
+    @property
+    def deadline(self) -> float:
+        return self._began_at + self.seconds
 
     @property
     def received(self) -> tuple[MissionItem, ...]:
@@ -126,15 +136,12 @@ class Receiving(UploadState):
         return self.list.received
 
     @property
+    def deadline(self) -> float:
+        return max(self._began_at, self.list.progress_at) + self.seconds
+
+    @property
     def due(self) -> float:
         return min(self.deadline, self.list.request.due)
-
-    def take(self, item: MissionItem, now: float) -> WholeList | Reply:
-        before = len(self.list.items)
-        taken = self.list.take(item, now)
-        if len(self.list.items) > before:
-            self.deadline = max(self.deadline, now + self.seconds)
-        return taken
 
     def repeats(self, now: float) -> tuple[int, ...]:
         self.list.request.lost(now)
@@ -261,3 +268,53 @@ _ROWS: Mapping[type[UploadState], _Row] = {
 # fmt: on
 #: State -> event -> next state. A clear asks for nothing first: it waits, and is complete.
 TRANSITIONS = {state: dict(zip(_EVENTS, row, strict=True)) for state, row in _ROWS.items()}
+
+
+class UploadQueue:
+    """The uploads in the order of their MISSION_COUNT."""
+
+    def __init__(self) -> None:
+        self.uploads: list[Upload] = []
+        #: When lists began to arrive without a pause, and when the last upload ended.
+        self._arriving_since = self._last_end = -inf
+
+    def of(self, station: Station) -> Upload | None:
+        """The newest upload of a ground station: one may wait behind another that is being written."""
+        for upload in reversed(self.uploads):
+            if upload.station == station:
+                return upload
+        return None
+
+    def within(self, *states: type[UploadState]) -> list[Upload]:
+        return [upload for upload in self.uploads if isinstance(upload.state, states)]
+
+    def undelivered(self) -> list[Upload]:
+        return [upload for upload in self.uploads if not isinstance(upload.state, Delivering)]
+
+    def least_worth(self, has_standing: Callable[[Peer], bool]) -> Upload:
+        """The upload to end if too many run: a stranger's, one without items, the oldest."""
+
+        def worth(upload: Upload) -> tuple[bool, bool, float]:
+            return has_standing(upload.station.peer), bool(upload.state.received), upload.state.deadline
+
+        return min(self.undelivered(), key=worth)
+
+    def remove(self, upload: Upload, now: float) -> None:
+        self._last_end = now
+        self.uploads.remove(upload)
+
+    def due(self, now: float) -> float:
+        """When an upload's state is due, or a waiting one may go on although others are arriving."""
+        turn = self._arriving_since + _ALONE_S
+        times = [upload.state.due for upload in self.uploads]
+        return min([*times, turn] if now < turn and self.within(Waiting) else times, default=inf)
+
+    def begins_to_arrive(self, upload: Upload, now: float) -> None:
+        """An upload's turn has come."""
+        if self.within(Asking, Receiving) == [upload] and now >= self._last_end + _PAUSE_S:
+            self._arriving_since = now
+
+    def must_wait(self, now: float) -> bool:
+        """True while the list of another upload is arriving as it should."""
+        is_early = now < self._arriving_since + _ALONE_S and len(self.uploads) <= _MOST_IN_TURN
+        return is_early and bool(self.within(Asking, Receiving, Complete))

@@ -27,7 +27,6 @@ from bridge.model.refusal import Refusal
 from bridge.model.verdict import CLEARED_LIST, Result, Verdict
 from bridge.transfers.arriving_list import Reply, WholeList
 from bridge.transfers.upload_answers import UploadAnswers
-from bridge.transfers.upload_queue import UploadQueue
 from bridge.transfers.upload_states import (
     TRANSITIONS,
     Arrived,
@@ -47,6 +46,7 @@ from bridge.transfers.upload_states import (
     SenderFinished,
     Turn,
     Upload,
+    UploadQueue,
     Waiting,
 )
 from protocols.mavlink.dialect import messages
@@ -140,7 +140,7 @@ class MissionUploads:
             text = f"WP {item.seq} is beyond the {upload.count} items announced"
             self._ground.refuse(station, Refusal(MissionResult.INVALID_SEQUENCE, text))
         else:
-            taken = state.take(item, now)
+            taken = state.list.take(item, now)
             if taken is Reply.REQUEST:
                 self._request(upload, now, state.list.wanted)
             elif taken is Reply.START_AGAIN:
@@ -171,12 +171,14 @@ class MissionUploads:
 
     def end(self, refusal: Refusal, now: float) -> None:
         """End the uploads not yet delivered: the craft was armed, the flight controller lost, or the bridge stops."""
-        self._end(self._queue.undelivered(), refusal, now)
+        for upload in self._queue.undelivered():
+            self._handle(upload, Ended(refusal), now)
 
     def peer_gone(self, peer: Peer, now: float) -> None:
         """A ground station's connection is closed: its uploads end without waiting for the timeout."""
-        gone = [upload for upload in self._queue.undelivered() if upload.station.peer == peer]
-        self._end(gone, _cancelled("ended: disconnected"), now)
+        for upload in self._queue.undelivered():
+            if upload.station.peer == peer:
+                self._handle(upload, Ended(_cancelled("ended: disconnected")), now)
 
     def tick(self, now: float) -> None:
         """Repeat requests and answers, end states at their deadlines, continue the uploads whose turn has come."""
@@ -184,7 +186,7 @@ class MissionUploads:
         for upload in [*self._queue.uploads]:
             state = upload.state
             if now >= state.deadline:
-                self._end([upload], state.timeout, now)
+                self._handle(upload, Ended(state.timeout), now)
             elif now >= state.due:
                 self._request(upload, now, *state.repeats(now))
         self.answers.tick(now)
@@ -197,7 +199,7 @@ class MissionUploads:
         self.due = min(self.due, self._queue.due(now), self.answers.due)
 
     def _wake(self) -> None:
-        """Perhaps an upload may go on at once."""
+        """A transfer has ended: perhaps an upload may go on at once."""
         if self._queue.within(Waiting, Complete):
             self.due = 0.0
 
@@ -214,12 +216,13 @@ class MissionUploads:
             return
         upload = Upload(station, count, f"upload-{next(self._incidents)}", mission_type, now, follows=follows)
         self._queue.uploads.append(upload)
-        self._wake()
+        self.due = 0.0
         armed = self._missions.armed_refusal()
         if armed is not None:
-            self._end([upload], armed, now)
+            self._handle(upload, Ended(armed), now)
         elif len(self._queue.uploads) > _MOST_UPLOADS:
-            self._end([self._queue.least_worth(self._ground.has_standing)], _cancelled("ended: too many at once"), now)
+            ended = self._queue.least_worth(self._ground.has_standing)
+            self._handle(ended, Ended(_cancelled("ended: too many at once")), now)
 
     def _turn(self, upload: Upload, now: float) -> Event | None:
         """The event that continues an upload, None if it must wait for others."""
@@ -237,11 +240,15 @@ class MissionUploads:
         return Arrived(WholeList((), CLEARED_LIST)) if is_clear else Turn()
 
     def _handle(self, upload: Upload, event: Event, now: float) -> None:
+        """Change the state of an upload, unless it has ended meanwhile."""
+        if upload not in self._queue.uploads:
+            return
         before = upload.state
         after = TRANSITIONS[type(before)][type(event)]
         assert after is not Fixed.NEVER, f"{event} in {before}"
         if isinstance(after, type):
             upload.state = after(upload, event, now)
+            self.due = 0.0 if after is Complete else min(self.due, upload.state.due)
         elif after is Fixed.END:
             self._queue.remove(upload, now)
             self._missions.release(upload)
@@ -263,13 +270,7 @@ class MissionUploads:
                 self._emit_refusal(upload, Refusal(MissionResult.OPERATION_CANCELLED, f"superseded: {why}"))
             case Ended(refusal):
                 self._refuse(upload, refusal, now)
-        self.due = min(self.due, upload.state.due, self.answers.due)
-        self._wake()
-
-    def _end(self, uploads: list[Upload], refusal: Refusal, now: float) -> None:
-        for upload in uploads:
-            if upload in self._queue.uploads:
-                self._handle(upload, Ended(refusal), now)
+        self.due = min(self.due, self.answers.due)
 
     def _asked(self, answer: StoreReport | Refusal, now: float) -> None:
         """The flight controller has answered whether it can take a list."""
@@ -307,7 +308,7 @@ class MissionUploads:
 
     def _delivered(self, upload: Upload, verdict: Verdict[Any], delivery: DeliveryResult | Refusal, now: float) -> None:
         if isinstance(delivery, Refusal):
-            self._end([upload], delivery, now)
+            self._handle(upload, Ended(delivery), now)
             return
         accepted = delivery.ack is MissionResult.ACCEPTED
         if verdict.result is not Result.REJECTED and accepted and not delivery.change:
@@ -348,8 +349,11 @@ class MissionUploads:
 
         Not if it was answered at this address: then it has announced another list, and lists must never be mixed.
         """
-        found = self._queue.of(station)
-        if found is None and not self.answers.was_said_to(station, now):
+        for upload in reversed(self._queue.uploads):
+            if upload.station == station:
+                return upload
+        found = None
+        if not self.answers.was_said_to(station, now):
             for upload in self._queue.uploads:
                 if self._ground.stations.has_moved(upload.station, station, now):
                     before, after = str(upload.station), str(station)

@@ -15,7 +15,6 @@ from bridge.gcs.stations import MAX_PEERS
 from bridge.transfers import upload_states
 from bridge.transfers import uploads as uploads_module
 from bridge.transfers.upload_answers import UploadAnswers
-from bridge.transfers.upload_queue import UploadQueue
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import MissionResult
@@ -221,7 +220,7 @@ def test_made_up_ids_do_not_cancel_a_pilot_on_a_slow_radio() -> None:
 
 def test_of_too_many_uploads_the_oldest_without_standing_ends() -> None:
     pilot, *strangers = (Station(Peer("udp", (f"10.0.0.{number}", 14550)), 255, 190) for number in range(4))
-    uploads = UploadQueue()
+    uploads = upload_states.UploadQueue()
     for at, station in enumerate((pilot, *strangers)):
         uploads.uploads.append(upload_states.Upload(station, 9, "", 0, at))
     assert uploads.least_worth(lambda peer: peer == pilot.peer).station == strangers[0]
