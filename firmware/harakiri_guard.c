@@ -2,6 +2,7 @@
 #include "harakiri_guard.h"
 
 #include "board.h"
+#include "harakiri_config.h"
 #include "mw.h"
 
 /* The commands that change something, and MSP_WP; numbers and sizes as in evaluateCommand() (serial.c). */
@@ -45,7 +46,7 @@ bool GuardAccepts(uint8_t command, uint8_t size)
     case MAG_CALIBRATION:
     case RESET_CONF:
     case EEPROM_WRITE:
-        return size == 0 && !MotorsMayRun();
+        return size == 0 && !MotorsMayRun() && ConfigSpendWrite();
     default:
         return true;
     }

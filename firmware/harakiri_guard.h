@@ -16,7 +16,8 @@
  * False for a request that must be refused with an error reply:
  *   - a command that reads its payload, with a payload of another size;
  *   - a command without payload that calibrates, resets the settings or writes the flash, with a payload;
- *   - while the motors may run, any of the latter.
+ *   - any of the latter while the motors may run, or when it would write the configuration and the write budget is spent
+ *     (ConfigSpendWrite()).
  * Every other request passes, unknown commands too: Harakiri answers those with an error itself.
  */
 bool GuardAccepts(uint8_t command, uint8_t size);

@@ -17,6 +17,9 @@
  */
 void MissionLoad(void);
 
+/* At the start: make the list in cfg the stored one, because a build without the slots has stored it later. */
+void MissionImport(void);
+
 /*
  * Call it before the configuration is written: stores the list in cfg if it has changed. Does nothing while armed. A write
  * during a MAVLink upload ends the upload, and the stored list stays.
@@ -30,13 +33,13 @@ void MissionStore(void);
 bool MissionUploaded(void);
 
 /*
- * Once per main loop. Arming ends a MAVLink upload, and the stored list stays. With FEATURE_PASS, whose main loop does not serve scheduled writes of the configuration, it writes them
- * while the throttle is down.
+ * Once per main loop. Arming ends a MAVLink upload, and the stored list stays. With FEATURE_PASS, whose main loop does not
+ * serve scheduled writes of the configuration, it writes them while the throttle is down.
  */
 void MissionPoll(void);
 
-/* The patch adds this to baseflight_mavlink.c: end a running MAVLink upload. True if there was one. */
-bool MissionEndUpload(void);
+/* Take a write of the configuration that a companion asks for from the core's budget. False if it is spent. */
+bool MissionSpendWrite(void);
 
 /* nm_handle() on the receive buffer. */
 int MissionRequest(uint8_t command, uint8_t *buffer, uint8_t size);

@@ -5,51 +5,9 @@
 #include <stddef.h>
 #include <string.h>
 
-#define SEAL 0x0000u /* differs from every erased or partly programmed state */
-
-enum { MAGIC_AT = 0, COUNT_AT = 2, SEQUENCE_AT = 4, CHECKSUM_AT = 8, HEADER_CHECKSUM_AT = 12, SEAL_AT = 16, HEADER_SIZE = 18 };
-
 enum { COMMAND_AT = 15, LAST_COMMAND = 7 }; /* in a record */
 
 enum { INFO_SIZE = 24, LIST_SIZE = 7, ABORT_SIZE = 1, READ_SIZE = 3, RADIUS_SIZE = 3 }; /* of replies, READ's without records */
-
-static uint16_t get16(const uint8_t *from)
-{
-    return (uint16_t)(from[0] | (unsigned)from[1] << 8);
-}
-
-static uint32_t get32(const uint8_t *from)
-{
-    return get16(from) | (uint32_t)get16(from + 2) << 16;
-}
-
-static void put16(uint8_t *to, uint16_t value)
-{
-    to[0] = (uint8_t)value;
-    to[1] = (uint8_t)(value >> 8);
-}
-
-static void put32(uint8_t *to, uint32_t value)
-{
-    put16(to, (uint16_t)value);
-    put16(to + 2, (uint16_t)(value >> 16));
-}
-
-/* Continue a CRC-32 whose value so far is `checksum` (initially 0). Half a byte at a time: 64 bytes of table. */
-static uint32_t crc32(uint32_t checksum, const uint8_t *data, uint32_t length)
-{
-    static const uint32_t table[16] = {
-        0x00000000u, 0x1DB71064u, 0x3B6E20C8u, 0x26D930ACu, 0x76DC4190u, 0x6B6B51F4u, 0x4DB26158u, 0x5005713Cu,
-        0xEDB88320u, 0xF00F9344u, 0xD6D6A3E8u, 0xCB61B38Cu, 0x9B64C2B0u, 0x86D3D2D4u, 0xA00AE278u, 0xBDBDF21Cu,
-    };
-    uint32_t crc = ~checksum;
-    while (length--) {
-        crc ^= *data++;
-        crc = crc >> 4 ^ table[crc & 15u];
-        crc = crc >> 4 ^ table[crc & 15u];
-    }
-    return ~crc;
-}
 
 static bool same(nm_list_t one, nm_list_t other)
 {
@@ -58,89 +16,50 @@ static bool same(nm_list_t one, nm_list_t other)
 
 /* ---- slots ------------------------------------------------------------------------------------------------------------ */
 
-static uint16_t slot_offset(uint8_t slot)
-{
-    return (uint16_t)(slot * NM_SLOT_SIZE);
-}
-
-static const uint8_t *slot_flash(const nm_t *m, uint8_t slot)
-{
-    return m->board->flash(m->self) + slot_offset(slot);
-}
+static const ns_slot_t slots[NM_SLOTS] = {
+    {0, NM_SLOT_PAGES, 0, NM_RECORDS_OFFSET, NM_RECORD_SIZE, NM_CAPACITY},
+    {NM_SLOT_PAGES, NM_SLOT_PAGES, 0, NM_RECORDS_OFFSET, NM_RECORD_SIZE, NM_CAPACITY},
+};
 
 static uint8_t unused_slot(const nm_t *m)
 {
     return m->slot == 0 ? 1 : 0;
 }
 
-static uint32_t checksum_in_slot(const nm_t *m, uint8_t slot, uint16_t count)
+static const uint8_t *slot_flash(const nm_t *m, uint8_t slot)
 {
-    return crc32(0, slot_flash(m, slot) + NM_RECORDS_OFFSET, count * NM_RECORD_SIZE);
+    return ns_header(&m->board->flash, m->self, &slots[slot]);
 }
 
-static bool slot_valid(const nm_t *m, uint8_t slot)
+static uint32_t checksum_in_slot(const nm_t *m, uint8_t slot, uint16_t count)
 {
-    const uint8_t *header = slot_flash(m, slot);
-    return get16(header + MAGIC_AT) == NM_MAGIC && get16(header + SEAL_AT) == SEAL &&
-           get16(header + COUNT_AT) <= NM_CAPACITY &&
-           get32(header + HEADER_CHECKSUM_AT) == crc32(0, header, HEADER_CHECKSUM_AT) &&
-           get32(header + CHECKSUM_AT) == checksum_in_slot(m, slot, get16(header + COUNT_AT));
+    return nm_crc32(0, slot_flash(m, slot) + NM_RECORDS_OFFSET, count * NM_RECORD_SIZE);
 }
 
 static void use_slot(nm_t *m, uint8_t slot)
 {
-    const uint8_t *header = slot_flash(m, slot);
     m->slot = slot;
-    m->sequence = get32(header + SEQUENCE_AT);
-    m->stored.count = get16(header + COUNT_AT);
-    m->stored.checksum = get32(header + CHECKSUM_AT);
+    m->sequence = ns_sequence(&m->board->flash, m->self, &slots[slot]);
+    m->stored.count = ns_count(&m->board->flash, m->self, &slots[slot]);
+    m->stored.checksum = ns_checksum(&m->board->flash, m->self, &slots[slot]);
 }
 
-static bool blank(const uint8_t *bytes, uint16_t length)
-{
-    while (length--)
-        if (*bytes++ != 0xFF)
-            return false;
-    return true;
-}
-
-/* Erase pages that are not blank, the header's first: a cut must not leave an old header with half erased records. */
 static bool erase_slot(const nm_t *m, uint8_t slot)
 {
-    for (uint8_t page = 0; page < NM_SLOT_PAGES; page++) {
-        const uint8_t *bytes = slot_flash(m, slot) + page * NM_PAGE_SIZE;
-        if (blank(bytes, NM_PAGE_SIZE))
-            continue;
-        if (!m->board->erase(m->self, (uint8_t)(slot * NM_SLOT_PAGES + page)) || !blank(bytes, NM_PAGE_SIZE))
-            return false;
-    }
-    return true;
+    return ns_erase(&m->board->flash, m->self, &slots[slot]);
 }
 
-static bool program(const nm_t *m, uint8_t slot, uint16_t at, const uint8_t *data, uint16_t length)
+static bool program(const nm_t *m, uint16_t at, const uint8_t *data, uint16_t length)
 {
-    return m->board->program(m->self, (uint16_t)(slot_offset(slot) + at), data, length) &&
-           memcmp(slot_flash(m, slot) + at, data, length) == 0;
+    return ns_program(&m->board->flash, m->self, &slots[unused_slot(m)], at, data, length);
 }
 
 /* Make the other slot, whose records are complete, the one in use. */
 static bool seal_slot(nm_t *m, nm_list_t list)
 {
     const uint8_t slot = unused_slot(m);
-    uint8_t header[HEADER_SIZE];
-    put16(header + MAGIC_AT, NM_MAGIC);
-    put16(header + COUNT_AT, list.count);
-    put32(header + SEQUENCE_AT, m->sequence + 1);
-    put32(header + CHECKSUM_AT, list.checksum);
-    put32(header + HEADER_CHECKSUM_AT, crc32(0, header, HEADER_CHECKSUM_AT));
-    put16(header + SEAL_AT, SEAL);
-    if (!program(m, slot, 0, header, SEAL_AT))
+    if (!ns_seal(&m->board->flash, m->self, &slots[slot], list.count, m->sequence + 1))
         return false;
-    if (!program(m, slot, SEAL_AT, header + SEAL_AT, HEADER_SIZE - SEAL_AT)) {
-        /* A seal that reads wrong now might read right at the next start: invalidate the slot. */
-        (void)m->board->erase(m->self, (uint8_t)(slot * NM_SLOT_PAGES));
-        return false;
-    }
     use_slot(m, slot);
     return true;
 }
@@ -162,8 +81,7 @@ static nm_status_t may_write(const nm_t *m)
     return m->board->write_pending(m->self) ? NM_BUSY : NM_OK;
 }
 
-/* Take a write from the budget. */
-static bool spend_write(nm_t *m)
+bool nm_spend_write(nm_t *m)
 {
     if (m->writes_left == 0)
         return false;
@@ -175,9 +93,9 @@ static bool spend_write(nm_t *m)
 static nm_status_t clear_slot(nm_t *m)
 {
     const uint8_t slot = unused_slot(m);
-    if (blank(slot_flash(m, slot), NM_SLOT_SIZE))
+    if (ns_blank(slot_flash(m, slot), NM_SLOT_SIZE))
         return NM_OK;
-    if (!spend_write(m))
+    if (!nm_spend_write(m))
         return NM_BUSY;
     return erase_slot(m, slot) ? NM_OK : NM_FLASH;
 }
@@ -185,8 +103,8 @@ static nm_status_t clear_slot(nm_t *m)
 static nm_list_t get_list(const uint8_t *body)
 {
     nm_list_t list;
-    list.count = get16(body);
-    list.checksum = get32(body + 2);
+    list.count = ns_get16(body);
+    list.checksum = ns_get32(body + 2);
     return list;
 }
 
@@ -223,7 +141,7 @@ static nm_status_t begin(nm_t *m, const uint8_t *body)
 
 static nm_status_t chunk(nm_t *m, const uint8_t *body, uint8_t length)
 {
-    const uint16_t first = get16(body);
+    const uint16_t first = ns_get16(body);
     const uint8_t *records = body + 2;
     const uint16_t bytes = (uint16_t)(length - 2u);
     const uint16_t count = (uint16_t)(bytes / NM_RECORD_SIZE);
@@ -244,12 +162,12 @@ static nm_status_t chunk(nm_t *m, const uint8_t *body, uint8_t length)
             return NM_BAD_RECORD;
         }
     }
-    if (!program(m, unused_slot(m), at, records, bytes)) {
+    if (!program(m, at, records, bytes)) {
         m->open = false;
         return NM_FLASH;
     }
     m->staged.count = (uint16_t)(m->staged.count + count);
-    m->staged.checksum = crc32(m->staged.checksum, slot_flash(m, unused_slot(m)) + at, bytes);
+    m->staged.checksum = nm_crc32(m->staged.checksum, slot_flash(m, unused_slot(m)) + at, bytes);
     return NM_OK;
 }
 
@@ -275,9 +193,9 @@ static nm_status_t commit(nm_t *m, const uint8_t *body)
 
 static nm_status_t set_radius(nm_t *m, const uint8_t *body)
 {
-    const uint16_t radius = get16(body);
+    const uint16_t radius = ns_get16(body);
     const nm_status_t allowed = may_write(m);
-    if ((radius ^ get16(body + 2)) != 0xFFFF)
+    if ((radius ^ ns_get16(body + 2)) != 0xFFFF)
         return NM_BAD_REQUEST;
     if (allowed != NM_ARMED && radius == m->board->radius(m->self))
         return NM_OK;
@@ -285,7 +203,7 @@ static nm_status_t set_radius(nm_t *m, const uint8_t *body)
         return allowed;
     if (radius > NM_MAX_RADIUS_CM)
         return NM_RANGE;
-    if (!spend_write(m))
+    if (!nm_spend_write(m))
         return NM_BUSY;
     m->board->set_radius(m->self, radius);
     return NM_OK;
@@ -296,8 +214,8 @@ static nm_status_t set_radius(nm_t *m, const uint8_t *body)
 static int reply_list(uint8_t *reply, nm_status_t status, nm_list_t list)
 {
     reply[0] = (uint8_t)status;
-    put16(reply + 1, list.count);
-    put32(reply + 3, list.checksum);
+    ns_put16(reply + 1, list.count);
+    ns_put32(reply + 3, list.checksum);
     return LIST_SIZE;
 }
 
@@ -325,22 +243,22 @@ static int reply_info(const nm_t *m, uint8_t *reply)
     reply[3] = NM_CHUNK_RECORDS;
     reply[4] = NM_CHUNK_WINDOW;
     reply[5] = NM_READ_RECORDS;
-    put16(reply + 6, NM_CAPACITY);
-    put16(reply + 8, m->stored.count);
-    put32(reply + 10, m->stored.checksum);
-    put16(reply + 14, m->board->radius(m->self));
-    put16(reply + 16, NM_BYTE_TIMEOUT_MS);
-    put16(reply + 18, m->open ? m->staged.count : 0);
-    put32(reply + 20, m->sequence);
+    ns_put16(reply + 6, NM_CAPACITY);
+    ns_put16(reply + 8, m->stored.count);
+    ns_put32(reply + 10, m->stored.checksum);
+    ns_put16(reply + 14, m->board->radius(m->self));
+    ns_put16(reply + 16, NM_BYTE_TIMEOUT_MS);
+    ns_put16(reply + 18, m->open ? m->staged.count : 0);
+    ns_put32(reply + 20, m->sequence);
     return INFO_SIZE;
 }
 
 static int reply_read(const nm_t *m, uint8_t *reply, const uint8_t *body, uint8_t length)
 {
     const bool well_formed = length == 4 && body[2] != 0 && body[3] == 0;
-    const uint16_t first = well_formed ? get16(body) : 0;
+    const uint16_t first = well_formed ? ns_get16(body) : 0;
     uint16_t count = body[2];
-    put16(reply + 1, first);
+    ns_put16(reply + 1, first);
     if (!well_formed || first >= m->stored.count) {
         reply[0] = well_formed ? NM_RANGE : NM_BAD_REQUEST;
         return READ_SIZE;
@@ -365,7 +283,7 @@ static int reply_abort(nm_t *m, uint8_t *reply, uint8_t length)
 static int reply_radius(const nm_t *m, uint8_t *reply, nm_status_t status)
 {
     reply[0] = (uint8_t)status;
-    put16(reply + 1, m->board->radius(m->self));
+    ns_put16(reply + 1, m->board->radius(m->self));
     return RADIUS_SIZE;
 }
 
@@ -424,8 +342,8 @@ void nm_start(nm_t *m, const nm_board_t *board, void *self)
     m->writes_left = NM_WRITE_BURST;
     m->credited_ms = board->millis(self);
     for (uint8_t slot = 0; slot < NM_SLOTS; slot++) {
-        const uint32_t sequence = get32(slot_flash(m, slot) + SEQUENCE_AT);
-        if (slot_valid(m, slot) && (m->slot == NM_SLOTS || sequence - m->sequence < 0x80000000u))
+        const uint32_t sequence = ns_sequence(&board->flash, self, &slots[slot]);
+        if (ns_valid(&board->flash, self, &slots[slot]) && (m->slot == NM_SLOTS || sequence - m->sequence < 0x80000000u))
             use_slot(m, slot);
     }
 }
@@ -449,11 +367,11 @@ nm_status_t nm_store(nm_t *m, const uint8_t *records, uint16_t count)
     if (count > NM_CAPACITY)
         return NM_NO_SPACE;
     list.count = count;
-    list.checksum = crc32(0, records, bytes);
+    list.checksum = nm_crc32(0, records, bytes);
     if (is_stored(m, list))
         return NM_SAME;
     m->open = false;
-    if (!erase_slot(m, unused_slot(m)) || !program(m, unused_slot(m), NM_RECORDS_OFFSET, records, bytes) || !seal_slot(m, list))
+    if (!erase_slot(m, unused_slot(m)) || !program(m, NM_RECORDS_OFFSET, records, bytes) || !seal_slot(m, list))
         return NM_FLASH;
     return NM_OK;
 }

@@ -7,30 +7,20 @@
  * state, one nm_t (48 bytes on a 32 bit target). It calls the board through an nm_board_t.
  *
  * THE FLASH
- *   NM_PAGES pages of NM_PAGE_SIZE bytes, two slots of NM_SLOT_PAGES each, written in turn. A slot is a header and, from
- *   NM_RECORDS_OFFSET on, 16 byte records:
+ *   NM_PAGES pages of NM_PAGE_SIZE bytes, two slots of NM_SLOT_PAGES each (naze_slots.h), written in turn. A slot's header is
+ *   at its beginning; its records of 16 bytes begin at NM_RECORDS_OFFSET. The sequence is 1 for the first list ever written,
+ *   and one more for each.
  *
- *       0  u16  magic, NM_MAGIC
- *       2  u16  count of records
- *       4  u32  sequence: 1 for the first list ever written, incremented for each
- *       8  u32  CRC-32 of the records
- *      12  u32  CRC-32 of the 12 bytes before
- *      16  u16  seal, 0000: programmed last, after all else has been read back
- *
- *   A slot is valid only if all of this and the CRC over its records is right; of two valid slots, the later sequence is in use
- *   (serial number arithmetic). The slot in use is never touched: BEGIN erases the other one, CHUNK programs its records
- *   directly, COMMIT its header and then the seal. So a power cut at any moment leaves the complete old or new list, and
- *   staging needs no RAM. Every program and erase operation is verified by reading back.
+ *   Of two valid slots, the later sequence is in use. The slot in use is never touched: BEGIN erases the other one, CHUNK
+ *   programs its records directly, COMMIT its header and then the seal. So a power cut at any moment leaves the complete old
+ *   or new list, and staging needs no RAM.
  *
  *   Wear: a list costs at most one erase of one slot, so 10,000 erase cycles last for 20,000 different lists. Pages that
  *   read blank are not erased, and a list that is already stored is not written again. nm_t.sequence (INFO's last field)
  *   counts the lists written.
  *
- *   Weak bits: a page whose erase was cut short can read blank, and a bit of it can change later. nm_start() then finds the
- *   wrong CRC and takes the older list.
- *
- *   A companion in a loop must not wear out the flash: BEGINs that need an erase and RADIUS requests that change the
- *   configuration share a budget of NM_WRITE_BURST writes after a reset and one more every NM_WRITE_INTERVAL_MS, up to
+ *   A companion in a loop must not wear out the flash: BEGINs that need an erase and requests that write the
+ *   configuration (nm_spend_write()) share a budget of NM_WRITE_BURST writes after a reset and one more every NM_WRITE_INTERVAL_MS, up to
  *   NM_WRITE_BURST again. With the budget spent they return NM_BUSY, and INFO reports it (flag bit 3). At that rate 10,000
  *   erases take 34 days of continuous power. nm_store() is not limited: it must not lose a list.
  *
@@ -50,6 +40,8 @@
 #ifndef NAZE_MISSION_H
 #define NAZE_MISSION_H
 
+#include "naze_slots.h"
+
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -66,14 +58,13 @@
 #define NM_WRITE_BURST 250u    /* flash writes that requests may cause in a row: more than a day of testing missions needs */
 #define NM_WRITE_INTERVAL_MS 300000u /* ... and the interval at which one more is allowed */
 
-#define NM_PAGE_SIZE 1024u
+#define NM_PAGE_SIZE NS_PAGE_SIZE
 #define NM_SLOT_PAGES 3u
 #define NM_SLOT_SIZE (NM_SLOT_PAGES * NM_PAGE_SIZE)
 #define NM_SLOTS 2u
 #define NM_PAGES (NM_SLOTS * NM_SLOT_PAGES)
 #define NM_FLASH_SIZE (NM_PAGES * NM_PAGE_SIZE)
 #define NM_RECORDS_OFFSET 32u
-#define NM_MAGIC 0x4D4Eu /* "NM" */
 
 /* The largest payload either way: a full CHUNK is 1 mask + 2 first + 15 records. nm_handle()'s buffer must hold it. */
 #define NM_BUFFER_SIZE (1u + 2u + NM_CHUNK_RECORDS * NM_RECORD_SIZE)
@@ -108,13 +99,7 @@ typedef enum {
 
 /* The board's functions. `self` is the pointer given to nm_start(), for the board's own use. */
 typedef struct {
-    /* Erase page 0..NM_PAGES-1 to FF. False if the flash controller reported an error; the core verifies in any case. */
-    bool (*erase)(void *self, uint8_t page);
-    /* Program `length` (even) bytes at the even `offset` 0..NM_FLASH_SIZE-1, half-word by half-word, in ascending order. */
-    bool (*program)(void *self, uint16_t offset, const uint8_t *data, uint16_t length);
-    /* The address at which NM_FLASH_SIZE bytes of flash can be read. Keep its value from the optimizer (volatile): it may move
-       a read of a known address across the register accesses that erase a page there. */
-    const uint8_t *(*flash)(void *self);
+    ns_flash_t flash; /* NM_PAGES pages */
     /* A counter of milliseconds that may wrap at 2^32. */
     uint32_t (*millis)(void *self);
     bool (*armed)(void *self);
@@ -167,6 +152,9 @@ int nm_handle(nm_t *m, uint8_t command, uint8_t *buffer, uint8_t size);
  * change nothing.
  */
 nm_status_t nm_store(nm_t *m, const uint8_t *records, uint16_t count);
+
+/* Take a flash write from the budget. False if it is spent. */
+bool nm_spend_write(nm_t *m);
 
 /* The stored list's nm_t.stored.count records, in flash. NULL if there has never been a list. */
 const uint8_t *nm_records(const nm_t *m);

@@ -145,7 +145,7 @@ static void list_changed(void *self, const uint8_t *records, uint16_t count)
     s->changes++;
 }
 
-static const nm_board_t board = {erase, program, flash, now_ms, armed, write_pending, radius, set_radius, list_changed};
+static const nm_board_t board = {{erase, program, flash}, now_ms, armed, write_pending, radius, set_radius, list_changed};
 
 void sim_init(sim_t *s)
 {

@@ -1,17 +1,22 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * Tests of harakiri_guard.c, and of harakiri_mission.c: the list in cfg, the list in the flash slots and the copy in the
- * configuration. This file stands in for Harakiri: it makes the calls that the patches make.
+ * Tests of harakiri_guard.c, of harakiri_mission.c (the list in cfg, the list in the flash slots and the copy in the
+ * configuration) and of harakiri_config.c (power cuts while the configuration is written, and other builds in between). This file stands in for Harakiri: it makes the calls that the patches make.
  */
 #include "harakiri_guard.c"
 #include "harakiri_mission.c"
+#include "harakiri_config.h"
 #include "reference.h"
 
+#include <setjmp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/mman.h>
 
 #define FLASH_START 0x08000000u
+#define VERSION 34
+#define OLD 0x11 /* the byte of a configuration of settings */
+#define NEW 0x22
 #define FLASH_END (FLASH_WRITE_ADDR + FLASH_PAGES_FORCONFIG * FLASH_PAGE_SIZE)
 
 config_t cfg;
@@ -22,6 +27,10 @@ uint32_t ScheduleEEPROMwriteMS;
 static uint32_t now;
 static bool pass, upload_open, unlocked;
 static unsigned config_writes;
+
+static unsigned operations, cut_at; /* flash operations so far, and the one at which the power is cut; 0: never */
+static uint32_t seed = 1;
+static jmp_buf lost;
 
 #define CHECK(condition) check((condition), #condition, __LINE__)
 
@@ -37,7 +46,7 @@ static void check(bool condition, const char *what, int line)
 
 static uint8_t *at(uint32_t address)
 {
-    CHECK(address >= MISSION_FLASH_ADDR && address < FLASH_END); /* the program must not be written to */
+    CHECK(address >= CONFIG_STAGED_ADDR && address < FLASH_END); /* the program must not be written to */
     return (uint8_t *)(uintptr_t)address;
 }
 
@@ -56,10 +65,25 @@ void FLASH_ClearFlag(uint32_t flags)
     (void)flags;
 }
 
+static uint32_t random_bits(void)
+{
+    seed ^= seed << 13;
+    seed ^= seed >> 17;
+    seed ^= seed << 5;
+    return seed;
+}
+
 FLASH_Status FLASH_ErasePage(uint32_t address)
 {
+    uint8_t *page = at(address);
     CHECK(unlocked && address % FLASH_PAGE_SIZE == 0);
-    memset(at(address), 0xFF, FLASH_PAGE_SIZE);
+    if (++operations == cut_at) {
+        const uint32_t kind = random_bits() % 4;
+        for (unsigned i = 0; i < FLASH_PAGE_SIZE; i++)
+            page[i] = (uint8_t)(page[i] | (kind == 0 ? 0 : kind == 1 ? 0xFF : kind == 2 ? random_bits() : random_bits() % 2 * 0xFF));
+        longjmp(lost, 1);
+    }
+    memset(page, 0xFF, FLASH_PAGE_SIZE);
     return FLASH_COMPLETE;
 }
 
@@ -68,7 +92,11 @@ FLASH_Status FLASH_ProgramHalfWord(uint32_t address, uint16_t data)
     uint16_t before;
     memcpy(&before, at(address), sizeof before);
     CHECK(unlocked && address % 2 == 0 && (before == 0xFFFF || data == 0));
+    if (++operations == cut_at)
+        data = (uint16_t)(before & (data | random_bits()));
     memcpy(at(address), &data, sizeof data);
+    if (operations == cut_at)
+        longjmp(lost, 1);
     return FLASH_COMPLETE;
 }
 
@@ -95,12 +123,56 @@ static void read_configuration(void)
     MissionLoad();
 }
 
+static uint8_t check_of(const void *configuration)
+{
+    const uint8_t *bytes = configuration;
+    uint8_t check = 0;
+    for (unsigned i = 0; i < sizeof cfg; i++)
+        check ^= bytes[i];
+    return check;
+}
+
+static bool valid_configuration(void)
+{
+    const config_t *there = (const config_t *)(void *)at(FLASH_WRITE_ADDR);
+    return there->version == VERSION && there->size == sizeof cfg && there->magic_be == 0xBE && there->magic_ef == 0xEF &&
+           check_of(there) == 0;
+}
+
+static void complete(void)
+{
+    cfg.version = VERSION;
+    cfg.size = sizeof cfg;
+    cfg.magic_be = 0xBE;
+    cfg.magic_ef = 0xEF;
+    cfg.chk = 0;
+    cfg.chk = check_of(&cfg);
+}
+
+static void program_place(void)
+{
+    uint16_t word;
+    FLASH_Unlock();
+    for (uint32_t page = 0; page < FLASH_PAGES_FORCONFIG; page++)
+        FLASH_ErasePage(FLASH_WRITE_ADDR + page * FLASH_PAGE_SIZE);
+    for (uint32_t i = 0; i < sizeof cfg; i += 2) {
+        memcpy(&word, (const uint8_t *)&cfg + i, sizeof word);
+        FLASH_ProgramHalfWord(FLASH_WRITE_ADDR + i, word);
+    }
+    FLASH_Lock();
+}
+
 void writeParams(uint8_t b)
 {
     (void)b;
-    MissionStore();
-    memcpy(at(FLASH_WRITE_ADDR), &cfg, sizeof cfg);
     config_writes++;
+    MissionStore();
+    complete();
+    if (!ConfigIsWritten()) {
+        ConfigStage();
+        program_place();
+        ConfigWritten();
+    }
     read_configuration();
 }
 
@@ -108,22 +180,39 @@ static void power_up(void)
 {
     memset(&mission, 0, sizeof mission);
     memset(&f, 0, sizeof f);
+    memset(&cfg, 0, sizeof cfg);
     ScheduleEEPROMwriteMS = 0;
-    upload_open = pass = false;
+    upload_open = pass = unlocked = false;
     rcData[THROTTLE] = 1000;
+    ConfigStart(valid_configuration(), VERSION);
+    if (!valid_configuration()) {
+        memset(&cfg, 0, sizeof cfg); /* resetConf() */
+        writeParams(0);
+    }
     read_configuration();
+}
+
+/* Start a build without the extension, let it change its configuration, and switch it off. */
+static void unpatched(uint8_t settings, uint16_t count, uint8_t fill)
+{
+    memcpy(&cfg, at(FLASH_WRITE_ADDR), sizeof cfg);
+    memset(cfg.others, settings, sizeof cfg.others);
+    cfg.FDUsedDatasets = count;
+    if (count)
+        memset(cfg.FloppyDisk, fill, sizeof cfg.FloppyDisk);
+    complete();
+    program_place();
 }
 
 /* A chip with only a configuration, with a list of `count` records from an unpatched firmware. */
 static void new_chip(uint16_t count, uint8_t fill)
 {
-    memset(at(MISSION_FLASH_ADDR), 0xFF, FLASH_END - MISSION_FLASH_ADDR);
+    memset(at(CONFIG_STAGED_ADDR), 0xFF, FLASH_END - CONFIG_STAGED_ADDR);
     memset(&cfg, 0, sizeof cfg);
     cfg.gps_wp_radius = 200;
     cfg.rc_minchk = 1100;
-    cfg.FDUsedDatasets = count;
-    memset(cfg.FloppyDisk, fill, sizeof cfg.FloppyDisk);
     memcpy(at(FLASH_WRITE_ADDR), &cfg, sizeof cfg);
+    unpatched(OLD, count, fill);
     now = 1000;
     power_up();
 }
@@ -321,6 +410,182 @@ static void test_with_feature_pass_writes_wait_for_the_throttle(void)
     CHECK(config_writes == 2);
 }
 
+static bool settings_are(uint8_t byte)
+{
+    for (unsigned i = 0; i < sizeof cfg.others; i++)
+        if (cfg.others[i] != byte)
+            return false;
+    return cfg.gps_wp_radius == 200 && cfg.rc_minchk == 1100 && valid_configuration();
+}
+
+static void save(uint8_t settings)
+{
+    memset(cfg.others, settings, sizeof cfg.others);
+    writeParams(0);
+}
+
+/* Run `action` until the power is cut at a flash operation, then power up. False if the action needs fewer operations. */
+static bool cut(void (*action)(void), unsigned operation)
+{
+    operations = 0;
+    cut_at = operation;
+    if (!setjmp(lost)) {
+        action();
+        cut_at = 0;
+        return false;
+    }
+    cut_at = 0;
+    return true;
+}
+
+static void save_new(void)
+{
+    save(NEW);
+}
+
+static void test_a_power_cut_at_every_operation_leaves_a_whole_configuration(void)
+{
+    static uint8_t before[FLASH_END - CONFIG_STAGED_ADDR], after_cut[sizeof before];
+    volatile unsigned cuts = 0, restarts = 0, new = 0;
+    new_chip(3, 9);
+    memcpy(before, at(CONFIG_STAGED_ADDR), sizeof before);
+    for (volatile unsigned operation = 1;; operation++) {
+        memcpy(at(CONFIG_STAGED_ADDR), before, sizeof before);
+        power_up();
+        seed = operation * 2654435761u | 1u;
+        if (!cut(save_new, operation))
+            break;
+        memcpy(after_cut, at(CONFIG_STAGED_ADDR), sizeof before);
+        power_up();
+        CHECK((settings_are(OLD) || settings_are(NEW)) && has(3, 9));
+        const bool is_new = settings_are(NEW);
+        cuts++;
+        new += is_new;
+        /* The power is cut again at some operations of the start that finishes the write. */
+        for (volatile unsigned again = 1; again < 3000; again += 1 + random_bits() % 97) {
+            memcpy(at(CONFIG_STAGED_ADDR), after_cut, sizeof before);
+            if (!cut(power_up, again))
+                break;
+            power_up();
+            CHECK(settings_are(is_new ? NEW : OLD) && has(3, 9));
+            restarts++;
+        }
+        save(OLD + 1);
+        power_up();
+        CHECK(settings_are(OLD + 1) && has(3, 9));
+    }
+    CHECK(cuts > 1000 && new > 0 && new < cuts && restarts > cuts);
+    printf("  power cut at every flash operation of a configuration write: %u of %u left the old or the new one,\n"
+           "  and %u of %u at operations of the start after it\n", cuts, cuts, restarts, restarts);
+}
+
+static void test_the_old_place_is_imported_once(void)
+{
+    new_chip(3, 9);
+    CHECK(settings_are(OLD) && has(3, 9));
+    operations = 0;
+    power_up();
+    CHECK(settings_are(OLD) && has(3, 9) && operations == 0);
+}
+
+static void test_an_unpatched_build_finds_the_last_configuration(void)
+{
+    const config_t *there = (const config_t *)(void *)at(FLASH_WRITE_ADDR);
+    new_chip(3, 9);
+    for (uint8_t settings = 1; settings < 5; settings++) {
+        save(settings);
+        CHECK(valid_configuration() && there->others[0] == settings && there->others[499] == settings);
+    }
+}
+
+static void test_patching_again_takes_what_the_unpatched_build_has_changed(void)
+{
+    new_chip(3, 9);
+    CHECK(push_one(2) == NM_OK);
+    unpatched(NEW, 3, 9); /* it has the list of the last configuration write, and keeps it */
+    power_up();
+    CHECK(settings_are(NEW) && has(1, 1));
+    save(OLD);
+    unpatched(NEW, 5, 7);
+    power_up();
+    CHECK(settings_are(NEW) && has(5, 7));
+    CHECK(push_one(3) == NM_OK);
+    unpatched(OLD, 5, 7);
+    power_up();
+    CHECK(settings_are(OLD) && has(1, 1));
+}
+
+static void test_the_first_slot_saves_what_an_unpatched_build_loses(void)
+{
+    new_chip(3, 9);
+    save(NEW);
+    memset(at(FLASH_WRITE_ADDR), 0xFF, FLASH_PAGE_SIZE);
+    power_up();
+    CHECK(settings_are(NEW) && has(3, 9));
+}
+
+static void test_what_is_stored_is_not_written_again(void)
+{
+    new_chip(3, 9);
+    save(NEW);
+    operations = 0;
+    save(NEW);
+    CHECK(operations == 0);
+}
+
+static void test_the_budget_covers_requests_that_write_the_configuration(void)
+{
+    unsigned accepted = 0;
+    new_chip(0, 0);
+    CHECK(GuardAccepts(EEPROM_WRITE, 0) && mission.writes_left == NM_WRITE_BURST);
+    for (unsigned i = 0; i < 2 * NM_WRITE_BURST; i++) {
+        cfg.rc_minchk = (uint16_t)(2000 + i);
+        accepted += GuardAccepts(EEPROM_WRITE, 0);
+    }
+    CHECK(accepted == NM_WRITE_BURST && !GuardAccepts(ACC_CALIBRATION, 0) && !GuardAccepts(RESET_CONF, 0));
+    now += NM_WRITE_INTERVAL_MS;
+    MissionPoll();
+    CHECK(GuardAccepts(EEPROM_WRITE, 0) && !GuardAccepts(EEPROM_WRITE, 0));
+}
+
+/* Saves, pushes, power cuts and unpatched builds in any order: a configuration is the last one or the one being written. */
+static void test_a_random_history_loses_nothing(void)
+{
+    volatile uint8_t settings = OLD;
+    new_chip(0, 0);
+    for (volatile unsigned step = 0; step < 3000; step++) {
+        const uint8_t next = (uint8_t)step;
+        seed = step * 2654435761u | 1u;
+        switch (random_bits() % 4) {
+        case 0:
+            save(next);
+            settings = next;
+            break;
+        case 1:
+            CHECK(push_one((uint8_t)(step % 8)) <= NM_SAME);
+            power_up();
+            CHECK(has(1, 1));
+            break;
+        case 2:
+            unpatched(next, cfg.FDUsedDatasets, cfg.FloppyDisk[0]);
+            settings = next;
+            power_up();
+            break;
+        default:
+            memset(cfg.others, next, sizeof cfg.others);
+            cut_at = operations = 0;
+            cut_at = 1 + random_bits() % 1500;
+            if (!setjmp(lost))
+                writeParams(0);
+            cut_at = 0;
+            power_up();
+            CHECK(settings_are(settings) || settings_are(next));
+            settings = cfg.others[0];
+        }
+        CHECK(settings_are(settings));
+    }
+}
+
 int main(void)
 {
     static void (*const tests[])(void) = {
@@ -336,6 +601,14 @@ int main(void)
         test_the_configurations_copy_follows_with_the_next_write,
         test_writing_waits_for_a_scheduled_write,
         test_with_feature_pass_writes_wait_for_the_throttle,
+        test_a_power_cut_at_every_operation_leaves_a_whole_configuration,
+        test_the_old_place_is_imported_once,
+        test_an_unpatched_build_finds_the_last_configuration,
+        test_patching_again_takes_what_the_unpatched_build_has_changed,
+        test_the_first_slot_saves_what_an_unpatched_build_loses,
+        test_what_is_stored_is_not_written_again,
+        test_the_budget_covers_requests_that_write_the_configuration,
+        test_a_random_history_loses_nothing,
     };
     void *const flash_at = (void *)(uintptr_t)FLASH_START;
     CHECK(mmap(flash_at, FLASH_END - FLASH_START, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED_NOREPLACE,

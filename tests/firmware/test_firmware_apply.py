@@ -22,12 +22,18 @@ from hypothesis import strategies as st
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 PATCHES = sorted((FIRMWARE / "patches").glob("*.patch"))
 CORE = (
+    "naze_slots.h",
+    "naze_slots.c",
     "naze_mission.h",
     "naze_mission.c",
     "harakiri_mission.h",
     "harakiri_mission.c",
     "harakiri_guard.h",
     "harakiri_guard.c",
+    "harakiri_config.h",
+    "harakiri_config.c",
+    "harakiri_flash.h",
+    "harakiri_flash.c",
 )
 
 PATCH = """\
@@ -363,7 +369,7 @@ def test_a_missing_tree_is_reported(workshop: Workshop) -> None:
 def test_shipped_patches_have_only_our_own_lines(path: Path) -> None:
     """No context, no removed line, no function name of Harakiri after a hunk header."""
     header, _, body = path.read_text().partition("diff --git")
-    assert len(re.findall(r"^base [0-9a-f]{64} \S+$", header, re.MULTILINE)) == 11
+    assert len(re.findall(r"^base [0-9a-f]{64} \S+$", header, re.MULTILINE)) == 12
     for line in body.splitlines()[1:]:
         assert re.match(r"\+|--- a/|diff --git a/|index [0-9a-f]+\.\.[0-9a-f]+ 100644$|@@ -\d+,0 \+[\d,]+ @@$", line), (
             line

@@ -33,11 +33,17 @@ typedef struct {
 } wp_t;
 
 typedef struct {
+    uint8_t version;
+    uint16_t size;
+    uint8_t magic_be;
     uint16_t gps_wp_radius;
     uint16_t rc_minchk;
     uint8_t rc_auxch;
+    uint8_t others[500];
     uint16_t FDUsedDatasets;
     uint8_t FloppyDisk[FDByteSize];
+    uint8_t magic_ef;
+    uint8_t chk;
 } config_t;
 
 typedef struct {
