@@ -59,6 +59,8 @@ class Bridge:
         self._config, owner = config, config.settings
         self._emit = emit
         self._was_armed = False
+        #: True while an autopilot speaks MAVLink itself: the bridge then sends nothing in its name.
+        self.is_passing_through = False
         #: The armed craft, for the BridgeConfig of a restarted bridge; it changes rarely. None: it is not armed.
         self.flight = config.flight
         self._announcer = LinkAnnouncer(now, was_found=self.flight is not None)
@@ -204,11 +206,6 @@ class Bridge:
 
     # Between the parts.
 
-    @property
-    def is_passing_through(self) -> bool:
-        """True while an autopilot speaks MAVLink itself: the bridge then sends nothing in its name."""
-        return self._incoming.routes is not None
-
     def _say(self, news: tuple[Severity, str] | None) -> None:
         if news is not None and not self.is_passing_through:
             self.ground.say(*news)
@@ -223,8 +220,8 @@ class Bridge:
 
     def _controller_changed(self, controller: FlightController | None, now: float) -> None:
         vehicle = self.session.vehicle
-        passes = controller is not None and controller.profile.spoken is Spoken.OTHER_MAVLINK
-        self._incoming.routes = Routes(self.ground) if passes else None
+        self.is_passing_through = controller is not None and controller.profile.spoken is Spoken.OTHER_MAVLINK
+        self._incoming.routes = Routes(self.ground) if self.is_passing_through else None
         self.settings.found(controller, now)
         if controller is None:
             trouble = self.session.state.trouble

@@ -164,7 +164,8 @@ class Runner:
         try:
             self._run(answer, now)
         finally:
-            self._begin_next(now)
+            if self._current is None:
+                self._begin_next(now)
 
     def _run(self, answer: object, now: float) -> None:
         assert self._current is not None
@@ -190,20 +191,20 @@ class Runner:
                     case Receive(commands, request) if self._link:
                         if request is not None:
                             self._link.send(request, now)
-                        deadline = self._link.reply_deadline(commands, now)
+                        deadline = min(self._link.reply_deadline(commands, now), task.ends_at)
                         self.awaited_replies = commands
                     case Await(_, seconds) if self._transmit:
-                        deadline = now + seconds
+                        deadline = min(now + seconds, task.ends_at)
                     case Send() | Transmit() | Receive() | Await():
                         answer = LinkLost("the flight controller does not speak this protocol now")
                         continue
                     case Pause(seconds):
-                        deadline = now + seconds
+                        deadline = min(now + seconds, task.ends_at)
                     case Save() | Conclude() | Recall() | NoteReader() | FindPending():
                         self.store_effects.append(effect)
                         deadline = now + _STORE_TIMEOUT_S
                 self._awaited = effect
-                self.due = deadline if self._interruptible is None else min(deadline, task.ends_at)
+                self.due = deadline
                 return
         except StopIteration as stop:
             self._end(task, stop.value, now)

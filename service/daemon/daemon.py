@@ -167,7 +167,8 @@ class Daemon:
         self.fc.carry_out()
         while bridge.runner.store_effects:
             self._carry_out(bridge.runner.store_effects.popleft())
-        self._flight.follow(bridge.flight)
+        if bridge.flight is not self._flight.saved:
+            self._flight.save(bridge.flight)
         self._deadline = bridge.next_deadline()
         if self._timer is not None:
             if 0 <= self._deadline - self._timer.when() < _TOO_EARLY_S:

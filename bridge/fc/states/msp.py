@@ -72,11 +72,6 @@ class MspLine(State):
             self._take(frame, now)
         return self._end or self._silence(now)
 
-    def deadline(self) -> float:
-        if self._end is not None:
-            return 0.0
-        return min(self.link.next_deadline(), self._silent_since() + self._silence_s())
-
     def unanswered(self) -> PendingReplies:
         return self.link.unanswered()
 
@@ -142,7 +137,9 @@ class Identifying(MspLine):
         return event
 
     def deadline(self) -> float:
-        return min(super().deadline(), self._give_up_at)
+        if self._end is not None:
+            return 0.0
+        return min(self.link.next_deadline(), self._silent_since() + self._silence_s(), self._give_up_at)
 
     def _silent_since(self) -> float:
         # The identification may have to wait its turn, behind a conversation that waits for the store.
@@ -180,7 +177,10 @@ class Polling(MspLine):
         return event
 
     def deadline(self) -> float:
-        deadline = min(super().deadline(), self.port.polls.next_deadline(self.link))
+        if self._end is not None:
+            return 0.0
+        silent_at = self.link.last_heard_at + self._silence_s()
+        deadline = min(self.link.next_deadline(), self.port.polls.next_deadline(self.link), silent_at)
         return deadline if deadline <= self._check_at or self.port.runner.is_busy else self._check_at
 
     def _checked(self, board: FlightController | LinkLost | None, now: float) -> None:

@@ -27,7 +27,7 @@ def computer(root: Path, boot_id: str) -> Host:
 
 def leave(folder: Path, flight: FlightMemory | None, *, stopped_at: float = 200.0) -> None:
     file = FlightFile(folder, "/dev/ttyAMA0", computer(folder, "boot 1"))
-    file.follow(flight)
+    file.save(flight)
     file.close(stopped_at)
 
 
@@ -60,7 +60,7 @@ def test_without_a_flight_there_is_none(tmp_path: Path) -> None:
     assert found(tmp_path) == FLIGHT  # a daemon that has not heard the craft leaves it
     file = FlightFile(tmp_path, "/dev/ttyAMA0", computer(tmp_path, "boot 1"))
     file.load(210.0)
-    file.follow(None)
+    file.save(None)
     file.close(211.0)
     assert found(tmp_path) is None
 
@@ -82,6 +82,6 @@ def test_a_damaged_file_is_ignored(tmp_path: Path, damaged: bytes) -> None:
 
 def test_a_state_folder_is_not_needed(tmp_path: Path) -> None:
     file = FlightFile(None, "/dev/ttyAMA0", computer(tmp_path, "boot 1"))
-    file.follow(FLIGHT)
+    file.save(FLIGHT)
     assert file.load(1.0) == FLIGHT
     file.close(2.0)
