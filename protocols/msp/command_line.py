@@ -52,4 +52,4 @@ class EchoWatch:
     def is_echo(self, size: int = _EVIDENCE) -> bool:
         """True if the last `size` bytes are our own requests, with a header: a reply may quote a request's text."""
         tail = self._heard[-size:]
-        return _HEADER in tail and tail in _printable(b"".join(self.sent))
+        return len(tail) == size and _HEADER in tail and tail in _printable(b"".join(self.sent))

@@ -7,7 +7,7 @@ from typing import Any
 import zenoh
 from rich.console import Console
 
-from fleet.vehicle import FleetVehicle, in_order
+from fleet.vehicle import FleetVehicle
 from fleet.watch import Watch, watching
 from fleet.watch_screen import ScreenRow, screen
 from payloads import compact
@@ -118,8 +118,3 @@ def test_only_vehicles_on_the_screen_send_their_states() -> None:
         session.put("fleet/owl/v1/overview", cbor, encoding=encoding)
         shows((12.34, -3, "0000abcd", "Harakiri"), True, False)
         del tokens
-
-
-def test_numbers_in_names_are_ordered_by_value() -> None:
-    names = ["kite-10", "kite-2", "2kites", "kite", "kite-02b", "Kite-1"]
-    assert sorted(names, key=in_order) == ["2kites", "Kite-1", "kite", "kite-2", "kite-02b", "kite-10"]

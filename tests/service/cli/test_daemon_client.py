@@ -1,13 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A daemon that is missing, another user's, or taken over."""
 
+import os
+import pty
 import socket
 import subprocess
 import sys
 from pathlib import Path
 from threading import Thread
 
-from tests.service.cli.test_mission_commands import assert_one_sentence
+import pytest
+
+from protocols.mission_item import Command
+from tests.service.cli.test_mission_commands import ask, assert_one_sentence, write_plan
+from tests.support.plan import HOME, PlanRow, plain_plan
 from tests.support.programs import Daemon, run_naze_bridge
 
 
@@ -53,3 +59,33 @@ def test_another_users_daemon_is_reported_as_such(daemon: Daemon) -> None:
     finally:
         daemon.state_dir.chmod(0o755)
     assert_one_sentence(ended, 1, "no permission", "sudo", "group", str(daemon.state_dir))
+
+
+def test_a_list_that_would_erase_the_mission_needs_confirmation(daemon: Daemon, tmp_path: Path) -> None:
+    ask(daemon, "push", write_plan(tmp_path / "plan", plain_plan(7, start=20)))
+    held = daemon.pull()["records"]
+    nothing = write_plan(tmp_path / "nothing", [HOME, PlanRow(Command.DO_CHANGE_SPEED)])
+    refused = ask(daemon, "push", nothing)
+    assert refused.returncode == 3
+    assert "would erase the current mission" in refused.stdout
+    assert daemon.pull()["records"] == held
+    assert ask(daemon, "push", "--erase", nothing).returncode == 0
+    assert daemon.pull()["records"] == []
+
+
+@pytest.mark.parametrize(("typed", "code", "left"), [(b"n\n", 3, 7), (b"\n", 3, 7), (b"y\n", 0, 0)])
+def test_a_person_at_a_terminal_is_asked_before_the_mission_is_erased(
+    daemon: Daemon, tmp_path: Path, typed: bytes, code: int, left: int
+) -> None:
+    ask(daemon, "push", write_plan(tmp_path / "plan", plain_plan(7, start=20)))
+    nothing = write_plan(tmp_path / "nothing", [HOME, PlanRow(Command.DO_CHANGE_SPEED)])
+    terminal, far_end = pty.openpty()
+    try:
+        os.write(terminal, typed)
+        ended = ask(daemon, "push", nothing, stdin=far_end)
+    finally:
+        os.close(terminal)
+        os.close(far_end)
+    assert "Erase it? [y/N]" in ended.stderr
+    assert ended.returncode == code, ended
+    assert len(daemon.pull()["records"]) == left

@@ -5,7 +5,6 @@ import errno
 import json
 import math
 import os
-import pty
 import stat
 import subprocess
 from dataclasses import replace
@@ -68,36 +67,6 @@ def test_a_refusal_is_reported_with_exit_status_1(daemon: Daemon, tmp_path: Path
     refused = ask(daemon, "push", write_plan(tmp_path / "plan", [HOME, PlanRow(Command.NAV_LAND), waypoint(1)]))
     assert refused.returncode == 1
     assert refused.stdout.splitlines()[-1] == "INVALID: Rejected, WP 1: LAND must be last"
-
-
-def test_a_list_that_would_erase_the_mission_needs_confirmation(daemon: Daemon, tmp_path: Path) -> None:
-    ask(daemon, "push", write_plan(tmp_path / "plan", plain_plan(7, start=20)))
-    held = daemon.pull()["records"]
-    nothing = write_plan(tmp_path / "nothing", [HOME, PlanRow(Command.DO_CHANGE_SPEED)])
-    refused = ask(daemon, "push", nothing)
-    assert refused.returncode == 3
-    assert "would erase the current mission" in refused.stdout
-    assert daemon.pull()["records"] == held
-    assert ask(daemon, "push", "--erase", nothing).returncode == 0
-    assert daemon.pull()["records"] == []
-
-
-@pytest.mark.parametrize(("typed", "code", "left"), [(b"n\n", 3, 7), (b"\n", 3, 7), (b"y\n", 0, 0)])
-def test_a_person_at_a_terminal_is_asked_before_the_mission_is_erased(
-    daemon: Daemon, tmp_path: Path, typed: bytes, code: int, left: int
-) -> None:
-    ask(daemon, "push", write_plan(tmp_path / "plan", plain_plan(7, start=20)))
-    nothing = write_plan(tmp_path / "nothing", [HOME, PlanRow(Command.DO_CHANGE_SPEED)])
-    terminal, far_end = pty.openpty()
-    try:
-        os.write(terminal, typed)
-        ended = ask(daemon, "push", nothing, stdin=far_end)
-    finally:
-        os.close(terminal)
-        os.close(far_end)
-    assert "Erase it? [y/N]" in ended.stderr
-    assert ended.returncode == code, ended
-    assert len(daemon.pull()["records"]) == left
 
 
 def test_a_list_that_is_too_long_is_refused_without_a_table(daemon: Daemon, tmp_path: Path) -> None:

@@ -3,10 +3,7 @@
 
 from pathlib import Path
 
-import pytest
-from structlog.testing import capture_logs
-
-from service.links.port_memory import PORTS_FILE, PortMemory
+from service.links.port_memory import PortMemory
 
 
 def test_finds_in_quick_succession_are_all_kept(tmp_path: Path) -> None:
@@ -20,12 +17,3 @@ def test_finds_in_quick_succession_are_all_kept(tmp_path: Path) -> None:
     again = PortMemory(tmp_path)
     assert again.flight_controller == "usb 1-7"
     assert again.others == {key: what for key, what in found.items() if key != "usb 1-7"}
-
-
-@pytest.mark.parametrize("content", ["", "[]", '{"others": {}}', '{"flight_controller": "", "others": []}', "\xff"])
-def test_a_damaged_file_is_reported_and_ignored(tmp_path: Path, content: str) -> None:
-    (tmp_path / PORTS_FILE).write_bytes(content.encode("latin-1"))
-    with capture_logs() as logged:
-        memory = PortMemory(tmp_path)
-    assert (memory.flight_controller, memory.others) == ("", {})
-    assert [entry["event"] for entry in logged] == ["state.lost"]

@@ -18,7 +18,7 @@ from bridge.model.verdict import Result, Verdict
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.mission_messages import item_from_float_message
 from protocols.mission_item import Command, MissionItem, MissionResult
-from protocols.msp.nav import FLY_HOME, LAST, LEGS, NavAction, NavRecord, UnsafeRecord, decode_wp, encode_set_wp
+from protocols.msp.nav import FLY_HOME, LAST, LEGS, NavAction, NavRecord, decode_wp, encode_set_wp
 from tests.bridge.controllers.harakiri.test_rules import degrees, numbers
 
 INAV, MULTIWII = NavRules(inav_profile()), NavRules(multiwii_profile())
@@ -131,18 +131,6 @@ def test_a_landing_without_a_position_after_rtl_is_merged_into_it() -> None:
     rtl, land = item(C.NAV_RETURN_TO_LAUNCH, at=False), item(C.NAV_LAND, at=False)
     assert kept(WP, rtl, land)[1:] == (NavRecord(A.RTH, p1=1, flag=LAST),)
     assert findings_for(WP, rtl, land) == [(3, "command", 21, DROPPED)]
-
-
-@pytest.mark.parametrize("number", [0, 255, -1])
-def test_home_and_the_hold_position_cannot_be_written(number: int) -> None:
-    with pytest.raises(UnsafeRecord):
-        encode_set_wp(number, NavRecord(A.WAYPOINT, 1, 2, 3))
-
-
-def test_set_wp_has_the_bytes_of_the_specification() -> None:
-    spec = bytes.fromhex("244d3c15d101018768111ff99254ff88130000000000000000007e")
-    number, record = decode_wp(spec[5:-1]) or (0, NavRecord(0))
-    assert encode_set_wp(number, record) == spec
 
 
 @pytest.mark.parametrize(

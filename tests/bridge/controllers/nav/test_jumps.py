@@ -8,7 +8,7 @@ import pytest
 from bridge.model.finding import REJECTED
 from bridge.model.verdict import Result
 from protocols.mission_item import MissionItem, MissionResult
-from protocols.msp.nav import LAST, NavRecord, UnsafeRecord, encode_set_wp
+from protocols.msp.nav import LAST, NavRecord
 from tests.bridge.controllers.nav.test_check import (
     MULTIWII,
     RTL,
@@ -69,12 +69,6 @@ def test_a_jump_that_blocks_arming_or_crashes_inav_rejects_the_list(items: tuple
     verdict = verdict_on(*items)
     assert (verdict.result, verdict.ack) == (Result.REJECTED, MissionResult.INVALID_PARAM1)
     assert verdict.findings[-1].becomes == REJECTED
-
-
-@pytest.mark.parametrize("target", [0, -1, -32768])
-def test_a_jump_that_crashes_cannot_even_be_encoded(target: int) -> None:
-    with pytest.raises(UnsafeRecord):
-        encode_set_wp(2, NavRecord(A.JUMP, p1=target))
 
 
 def test_a_jump_to_the_first_record_as_the_last_one_means_hover() -> None:

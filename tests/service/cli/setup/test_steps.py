@@ -64,11 +64,6 @@ class FreshPi(FaultyMachine):
                     self.write(CMDLINE, f"{self.read(CMDLINE).strip()} cfg80211.ieee80211_regdom={country}\n")
 
 
-@pytest.fixture(params=MODELS)
-def model(request: pytest.FixtureRequest) -> str:
-    return str(request.param)
-
-
 def test_a_fresh_card_is_set_up_in_one_run(tmp_path: Path, model: str) -> None:
     pi = FreshPi(tmp_path, model)
     answers = SetupChoices(hotspot=("naze field", "long-enough"), country="DE", name="naze", key="secret words")
@@ -119,34 +114,10 @@ def test_a_failed_hotspot_is_retried(tmp_path: Path) -> None:
     assert step.purpose == "open the Wi-Fi hotspot 'naze field'"
 
 
-def test_a_second_run_keeps_the_key_and_the_hotspot(tmp_path: Path, model: str) -> None:
-    pi = FreshPi(tmp_path, model)
-    pi.carry_out(missing_steps(pi, SetupChoices(key="secret words")))
-    (step,) = missing_steps(pi, SetupChoices(page=False))[:1]
-    pi.carry_out(missing_steps(pi, SetupChoices(page=False)))
-    assert step.purpose == "save the settings: fc = auto, status page off"
-    settings = tomllib.loads(pi.read(SETTINGS_FILE))
-    assert "web" not in settings
-    assert "key_file" in settings["gcs"][0]
-    assert "systemctl restart naze-bridge.service" in pi.ran
-
-
 @pytest.mark.parametrize("fc", ["/dev/ttyUSB0,57600", '/dev/the "naze"', "/dev/a\\b", "/dev/näze"])
 def test_any_port_gives_a_valid_settings_file(fc: str, tmp_path: Path) -> None:
     text = settings_text(FreshPi(tmp_path, "4"), SetupChoices(fc=fc))
     assert tomllib.loads(text)["fc"] == fc
-
-
-def test_an_enabled_getty_is_disabled(tmp_path: Path) -> None:
-    pi = FreshPi(tmp_path, "4")
-    pi.write(CMDLINE, "console=tty1 rootwait\n")
-    wants = pi.path("/etc/systemd/system/getty.target.wants")
-    wants.mkdir(parents=True)
-    (wants / "serial-getty@ttyS0.service").symlink_to("x")
-    (console, *_) = missing_steps(pi, SetupChoices())
-    assert not console.needs_reboot
-    pi.carry_out([console])
-    assert pi.ran == ["systemctl disable --now serial-getty@ttyS0.service"]
 
 
 @pytest.mark.parametrize(
@@ -187,16 +158,6 @@ def test_a_radio_found_on_usb_is_not_named_naze(tmp_path: Path) -> None:
     rules = pi.read("/etc/udev/rules.d/59-naze-bridge-others.rules")
     assert 'KERNELS=="1-1.3", ATTRS{idVendor}=="10c4", ATTRS{idProduct}=="ea60"' in rules
     assert missing_steps(pi, SetupChoices()) == []
-
-
-def test_the_command_shows_the_planned_changes(tmp_path: Path, model: str) -> None:
-    pi = FreshPi(tmp_path, model)
-    ended = run_naze_bridge("setup", "--dry-run", "--root", tmp_path)
-    assert ended.returncode == 0, ended
-    assert ended.stdout.startswith(f"This is a {MODELS[model][0]}.")
-    assert f"write {CONFIG}" in ended.stdout
-    assert MODELS[model][2] not in pi.read(CONFIG)
-    assert [line for line in ended.stdout.splitlines() if len(line) > 80] == []
 
 
 @pytest.mark.parametrize(

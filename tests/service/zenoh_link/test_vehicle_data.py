@@ -18,7 +18,7 @@ from tests.support.plan import plain_plan
 from tests.support.programs import until
 from tests.support.zenoh_bench import I_KNOW, Reader, ask, ask_surely, body, endpoint, key, session, zenoh_bench
 
-MISSION = (Path(__file__).parents[2] / "examples" / "naze-field.waypoints").read_bytes()
+MISSION = (Path(__file__).parents[3] / "examples" / "naze-field.waypoints").read_bytes()
 SCHEMAS = {key.suffix: key.schema for key in KEYS}
 COMPACT = {key.suffix for key in KEYS if key.encoding is PayloadEncoding.CBOR}
 

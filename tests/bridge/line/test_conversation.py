@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Questions to a board: how often they are repeated, and which reply is believed."""
+
+from typing import Any
+
+import pytest
+
+from bridge.line.conversation import Conversation, Receive, Send, ask, ask_status, ask_surely
+from protocols.msp.frame import Direction, MspFrame, request
+
+IDENT = 100
+
+
+def reply(payload: bytes = b"x") -> MspFrame:
+    return MspFrame(Direction.REPLY, IDENT, payload)
+
+
+def carry_out(conversation: Conversation[Any], *answers: MspFrame | None) -> tuple[Any, int]:
+    """The conversation's result, and how many requests it sent; None: a request is not answered."""
+    sent, left, answer = 0, list(answers), None
+    try:
+        while True:
+            effect = conversation.send(answer)
+            sent += isinstance(effect, Send)
+            answer = left.pop(0) if isinstance(effect, Receive) else None
+    except StopIteration as ended:
+        return ended.value, sent
+
+
+@pytest.mark.parametrize("lost", range(4))
+def test_a_lost_reply_is_asked_for_again_but_not_forever(lost: int) -> None:
+    result, sent = carry_out(ask(request(IDENT), IDENT, 7), *[None] * lost, reply())
+    assert (result, sent) == ((reply(), lost + 1) if lost < 3 else (None, 3))
+
+
+def test_a_reply_is_believed_once_it_came_twice_in_a_row() -> None:
+    first, second = reply(b"a"), reply(b"b")
+    assert carry_out(ask_surely(request(IDENT), IDENT, 1), first, second, second) == (second, 3)
+    assert carry_out(ask_surely(request(IDENT), IDENT, 1), *[first, second] * 3) == (None, 5)
+
+
+def test_bytes_that_may_change_are_not_compared() -> None:
+    first, second = reply(b"AB1"), reply(b"AB2")
+    assert carry_out(ask_surely(request(IDENT), IDENT, 3, lasting=2), first, second) == (second, 2)
+
+
+def test_a_status_that_is_too_short_is_unknown() -> None:
+    assert carry_out(ask_status(tries=1), MspFrame(Direction.REPLY, 101, b"\1")) == (None, 1)

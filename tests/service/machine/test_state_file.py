@@ -1,0 +1,18 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A small JSON file: damage is reported and ignored."""
+
+from pathlib import Path
+
+import pytest
+from structlog.testing import capture_logs
+
+from service.links.port_memory import PORTS_FILE, PortMemory
+
+
+@pytest.mark.parametrize("content", ["", "[]", '{"others": {}}', '{"flight_controller": "", "others": []}', "\xff"])
+def test_a_damaged_file_is_reported_and_ignored(tmp_path: Path, content: str) -> None:
+    (tmp_path / PORTS_FILE).write_bytes(content.encode("latin-1"))
+    with capture_logs() as logged:
+        memory = PortMemory(tmp_path)
+    assert (memory.flight_controller, memory.others) == ("", {})
+    assert [entry["event"] for entry in logged] == ["state.lost"]
