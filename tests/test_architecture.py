@@ -55,6 +55,8 @@ SERVICE["service.daemon"] = {*SERVICE}
 SERVICE["service.web"] = SERVICE["service.zenoh_link"] = {*SERVICE, "service.daemon"} - {"service.links"}
 SERVICE["service.cli"] = {*SERVICE} - {"service.recording"}
 INSIDE = BRIDGE | SERVICE
+#: The share of modules with a test file of like name.
+LEAST_MIRRORED = 0.8
 #: Only service/ and simulator/ may use a clock, a port or an event loop.
 IMPURE = {"asyncio", "selectors", "serial", "socket", "subprocess", "threading", "time"}
 
@@ -98,6 +100,18 @@ def test_imports_between_the_simulators_packages_have_no_cycle() -> None:
         if name.startswith("simulator.") and (imported := name.split(".")[1]) != package:
             graph.setdefault(package, set()).add(imported)
     TopologicalSorter(graph).prepare()
+
+
+def test_most_modules_have_a_test_file_of_like_name() -> None:
+    """tests/bridge/gcs/test_guard.py tests bridge/gcs/guard.py.
+
+    Modules of up to 40 lines may do without, and the simulator, whose parts are tested as whole boards."""
+    files = (file for package in PACKAGES.keys() - {"simulator"} for file in (REPOSITORY / package).rglob("[!_]*.py"))
+    modules = [file.relative_to(REPOSITORY) for file in files if len(file.read_text().splitlines()) > 40]
+    tests = REPOSITORY / "tests"
+    lacking = [str(file) for file in modules if not (tests / file.with_name(f"test_{file.name}")).exists()]
+    share = 1 - len(lacking) / len(modules)
+    assert share >= LEAST_MIRRORED, f"{share:.2f}; without: {', '.join(sorted(lacking))}"
 
 
 def test_every_package_of_the_service_is_listed() -> None:
