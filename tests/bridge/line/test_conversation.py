@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from bridge.line.conversation import Conversation, Receive, Send, ask, ask_status, ask_surely
+from bridge.line.conversation import Conversation, Receive, ask, ask_status, ask_surely
 from protocols.msp.frame import Direction, MspFrame, request
 
 IDENT = 100
@@ -17,12 +17,14 @@ def reply(payload: bytes = b"x") -> MspFrame:
 
 def carry_out(conversation: Conversation[Any], *answers: MspFrame | None) -> tuple[Any, int]:
     """The conversation's result, and how many requests it sent; None: a request is not answered."""
-    sent, left, answer = 0, list(answers), None
+    left = list(answers)
+    sent, answer = 0, None
     try:
         while True:
             effect = conversation.send(answer)
-            sent += isinstance(effect, Send)
-            answer = left.pop(0) if isinstance(effect, Receive) else None
+            assert isinstance(effect, Receive)
+            sent += effect.request is not None
+            answer = left.pop(0)
     except StopIteration as ended:
         return ended.value, sent
 
