@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from payloads.mission_data import mission_items, plain, to_json
+from payloads.mission_data import mission_items, to_json
 from protocols.mission_item import MissionItem
 
 _NUMBER = st.floats(width=32, allow_infinity=False)
@@ -39,7 +39,3 @@ def test_infinity_is_json_too() -> None:
 def test_a_bad_item_is_refused_by_the_name_of_its_field(entry: Any, named: str) -> None:
     with pytest.raises(ValueError, match=named):
         mission_items([entry])
-
-
-def test_texts_cannot_act_on_a_terminal() -> None:
-    assert "\x1b" not in str(plain({"a": ["\x1b[2J", {"b": "\x1b]0;x"}]}))
