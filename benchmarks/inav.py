@@ -125,7 +125,7 @@ async def _push_all(fc: FcAddress, turn: int) -> list[float]:
     daemon = Daemon(Settings(fc, [GcsAddress("udpout", "127.0.0.1", free_port())]))
     running = asyncio.create_task(daemon.run())
     try:
-        while isinstance(daemon.bridge.missions.fc_store, Refusal) or daemon.bridge.runner.is_busy:  # noqa: ASYNC110 - as in push
+        while isinstance(daemon.bridge.missions.fc_store, Refusal) or daemon.bridge.is_busy:  # noqa: ASYNC110 - as in push
             await asyncio.sleep(0.01)
         return [await _push(daemon, _records(turn * _RUNS + run)) for run in range(_RUNS)]
     finally:

@@ -170,7 +170,7 @@ def _noise() -> list[Figure]:
     events: list[BridgeEvent] = []
     now = 0.0
     bridge = Bridge(BridgeConfig((_BAUD,)), events.append, now)
-    bridge.session.opened(now)
+    bridge.fc_opened(now)
     ground, controller = Peer("udp", "noise"), Controller()
     while not any(isinstance(event, FcFound) for event in events):
         now += 0.01
@@ -188,7 +188,7 @@ def _noise() -> list[Figure]:
         bridge.fc_received(chance.randbytes(_CHUNK_BYTES), now)
         bridge.tick(now)
         bridge.take_fc_output()
-        kinds = [MavlinkSplitter().feed(frame)[0].msgid for _, frame in bridge.ground.take_datagrams()]
+        kinds = [MavlinkSplitter().feed(frame)[0].msgid for _, frame in bridge.take_datagrams()]
         false_frames += sum(msgid == messages.MAVLINK_MSG_ID_ATTITUDE for msgid in kinds)
         if number % (chunks // _SAMPLES) == 0:
             memory.append(tracemalloc.get_traced_memory()[0])

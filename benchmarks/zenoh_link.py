@@ -173,8 +173,8 @@ class _Fed:
         self._controller = Controller()
         # An hour ahead: no timer of the loop runs before its simulated time.
         self._now = asyncio.get_running_loop().time() + 3600
-        daemon.bridge.session.opened(self._now)
-        while daemon.bridge.session.vehicle.last(Orientation) is None:
+        daemon.bridge.fc_opened(self._now)
+        while daemon.bridge.vehicle.last(Orientation) is None:
             self.step()
 
     def step(self) -> int:

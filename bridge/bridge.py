@@ -11,9 +11,11 @@ An autopilot that speaks MAVLink itself is not represented but passed through, b
     FcSession <-> Routes <-> Ground
 """
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from itertools import count
 from math import inf
+from typing import Protocol
 
 from bridge.config import BridgeConfig, PassThroughRule
 from bridge.fc.actions import FcActions
@@ -23,10 +25,12 @@ from bridge.gcs.ground import FrameListener, Ground
 from bridge.gcs.guard import Guard
 from bridge.gcs.routes import Routes
 from bridge.gcs.station import Peer, Severity
+from bridge.line.msp_link import RoundTrips
 from bridge.line.runner import Runner
-from bridge.missions.mission_service import NO_LINK, EndingListener, MissionService, MissionTransfer
+from bridge.missions.mission_service import NO_LINK, EndingListener, HeldMission, MissionService, MissionTransfer
 from bridge.model.events import Armed, Disarmed, Emit
 from bridge.model.refusal import ARMED, Refusal
+from bridge.model.settings import SettingsState
 from bridge.model.vehicle import FlightState, Health, MissionLeg, Readiness
 from bridge.sharing.msp_sharing import MspSharing
 from bridge.transfers.downloads import MissionDownloads
@@ -43,6 +47,35 @@ from bridge.vehicle.settings_seal import SettingsSeal
 from bridge.vehicle.vehicle_report import VehicleReporter
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.mission_item import MissionResult
+
+
+@dataclass(frozen=True, slots=True)
+class Counters:
+    """Since the start; those of the flight controller since it was found, None without MSP."""
+
+    ground_stations: int
+    #: Frames of ground stations, by link and message id; damaged ones; refused ones, by link and reason.
+    frames_received: Mapping[tuple[str, int], int]
+    bad_frames: int
+    refused: Mapping[tuple[str, str], int]
+    #: Requests of programs on a share, by reason.
+    refused_by_share: Mapping[str, int]
+    fc_bad_checksums: int
+    fc_requests_lost: int | None
+    fc_round_trips: RoundTrips | None
+    firmware_version: tuple[int, int, int] | None
+    settings: SettingsState | None
+
+
+class TimedPart(Protocol):
+    """A part with a timer: `tick` is called at `due` or later, and sets the next `due`; infinity: nothing is due."""
+
+    @property
+    def due(self) -> float:
+        """Monotonic s."""
+
+    def tick(self, now: float) -> None:
+        """Do what is due."""
 
 
 class Bridge:
@@ -63,7 +96,11 @@ class Bridge:
         self.is_passing_through = False
         #: The armed craft, for the BridgeConfig of a restarted bridge; it changes rarely. None: it is not armed.
         self.flight = config.flight
-        self._announcer = LinkAnnouncer(now, was_found=self.flight is not None)
+        #: True while an autopilot speaks MAVLink itself: the bridge then sends nothing in its name.
+        self.is_passing_through = False
+        self._announcer = LinkAnnouncer(
+            self._say, lambda: self.session.state.trouble, now, was_found=self.flight is not None
+        )
         incidents = count(1)
 
         self.guard = Guard(config.links, emit, passes_everything=owner.pass_through is PassThroughRule.EVERYTHING)
@@ -88,7 +125,9 @@ class Bridge:
             owner.autopilot,
             config.flight,
         )
-        self.missions = MissionService(self.session.vehicle, self.runner, on_ending)
+        #: Its readings, which are kept when it is lost.
+        self.vehicle = self.session.vehicle
+        self.missions = MissionService(self.vehicle, self.runner, on_ending)
         self.local = LocalMissions(self.missions, self.ground, emit, incidents)
         self.sharing = MspSharing(self.session, self.runner, self.missions, emit, self._say_refused)
         self._vehicle = OwnVehicle(self.session, self.missions, self.ground, self._announcer, config.unix_time_s, now)
@@ -97,7 +136,9 @@ class Bridge:
             self.session, self.missions, self.ground, emit, config.seals, lambda: self.transfer is not None
         )
         self.sharing.on_change = self.settings.changed_here
-        self.report = VehicleReporter(self.session, self.missions, self.ground, self.settings, self._vehicle.also_want)
+        self._reporter = VehicleReporter(
+            self.session, self.missions, self.ground, self.settings, self._vehicle.also_want
+        )
         self._uploads = MissionUploads(self.missions, self.ground, emit, incidents, self._vehicle.let_read)
         self._watch = MissionWatch(self.missions, self.ground, emit)
         downloads = MissionDownloads(self.missions, self.ground)
@@ -115,18 +156,60 @@ class Bridge:
             owner.sysid,
             config.compid,
         )
+        self.ground.on_silent = self._incoming.forget
+        #: Served in this order.
+        self._parts: tuple[TimedPart, ...] = (
+            self.session,
+            self.runner,
+            self.sharing,
+            self._uploads,
+            self._watch,
+            self.settings,
+            self.ground,
+            self._announcer,
+            self._calibration,
+            self._vehicle,
+        )
+
+        # The front door: calls that one part answers.
+        #: When the port is opened; when it is gone, with the reason, None if the bridge closed it itself.
+        self.fc_opened, self.fc_closed = self.session.opened, self.session.closed
+        #: The bytes to be written to the port at `fc_speed`.
+        self.take_fc_output = self.session.take_output
+        self.take_datagrams = self.ground.take_datagrams
+        self.displaced = self.ground.displaced
+        self.add_default_peer, self.remove_default_peer = self.ground.add_default_peer, self.ground.remove_default_peer
+        #: Requests of the command line, the page and zenoh.
+        self.push, self.pull, self.check = self.local.push, self.local.pull, self.local.check
+        #: The store's work, in order, and its answers.
+        self.store_effects, self.store_answered = self.runner.store_effects, self.runner.store_answered
+        #: End the running conversation cleanly.
+        self.abort = self.runner.stop
+        self.report, self.group = self._reporter.whole, self._reporter.group
+        self.watch, self.take_fresh = self._reporter.watch, self._reporter.take_fresh
 
     # The flight controller's side.
 
-    def fc_received(self, data: bytes, now: float) -> None:
+    def fc_received(self, data: bytes, now: float) -> bool:
+        """Handle bytes from the port; False if they ended inside a frame and nothing else has changed."""
         self.session.received(data, now)
-        self._pass_on_news(now)
-        if self.sharing.due < inf:
-            self.sharing.serve(now)
+        self._follow_line(now)
+        return not self.session.state.is_mid_frame
 
-    def take_fc_output(self) -> list[bytes]:
-        """The bytes to be written to the port at the current `session.state.speed`."""
-        return self.session.take_output()
+    @property
+    def fc_speed(self) -> int | None:
+        """The speed that the port must have, baud; None where it has none."""
+        return self.session.state.speed
+
+    @property
+    def fc_trouble(self) -> str:
+        """Why the board cannot be used and what the pilot must do; empty if nothing."""
+        return self.session.state.trouble
+
+    @property
+    def is_searching(self) -> bool:
+        """True while a port is open and the flight controller is not identified yet."""
+        return self.session.state.is_searching
 
     # The ground stations' side.
 
@@ -147,7 +230,20 @@ class Bridge:
         self._uploads.peer_gone(peer, now)
         self._incoming.forget(peer)
 
+    def notify(self, text: str) -> None:
+        """Show a text to each ground station that connects from now on."""
+        self.ground.notices.append(text)
+
     # Missions.
+
+    @property
+    def held(self) -> HeldMission | None:
+        """The flight controller's mission, as last read."""
+        return self.missions.held
+
+    @property
+    def others(self) -> tuple[HeldMission, ...]:
+        return self.missions.others
 
     @property
     def transfer(self) -> MissionTransfer | None:
@@ -160,81 +256,83 @@ class Bridge:
         self.sharing.stop()
         self._uploads.end(STOPPED, now)
 
+    # For metrics and the status.
+
+    def counters(self) -> Counters:
+        state = self.session.state
+        return Counters(
+            ground_stations=len(self.ground.stations.peers()),
+            frames_received=self.ground.frames_received,
+            bad_frames=self.ground.bad_frames,
+            refused=self.guard.refused,
+            refused_by_share=self.sharing.refused,
+            fc_bad_checksums=state.bad_checksums or 0,
+            fc_requests_lost=None if state.link is None else state.link.requests_lost,
+            fc_round_trips=None if state.link is None else state.link.round_trips,
+            firmware_version=self.vehicle.version,
+            settings=self.settings.state,
+        )
+
     # Time.
+
+    @property
+    def is_busy(self) -> bool:
+        """True while a conversation with the flight controller runs or waits."""
+        return self.runner.is_busy
 
     def restart(self, why: str, now: float) -> None:
         """Recover from a bug: end the running conversation and search for the flight controller again."""
         self.runner.reset(now)
         self.session.restart(why, now)
 
+    @property
+    def due(self) -> float:
+        """The time of the next `tick`."""
+        due = inf
+        for part in self._parts:  # a loop: this is asked after every reply
+            if (part_due := part.due) < due:
+                due = part_due
+        return due
+
     def tick(self, now: float) -> None:
         self.ground.now = now
-        self.session.tick(now)
-        self._pass_on_news(now)
-        self.runner.tick(now)
-        if self.sharing.due < inf:
-            self.sharing.serve(now)
-        if now >= self._uploads.due:
-            self._uploads.tick(now)
-        if now >= self._watch.due:
-            self._watch.tick(now)
-        if now >= self.settings.due:
-            self.settings.tick(now)
-        if now >= self.ground.stations.due:
-            for peer in self.ground.expire(now):
-                self._incoming.forget(peer)
-        if now >= self._announcer.due:
-            self._say(self._announcer.tick(now, self.session.state.trouble))
-        if now >= self._calibration.due:
-            self._calibration.tick(now)
-        if now >= self._vehicle.due and not self.is_passing_through:
-            self._vehicle.tick(now)
-
-    def next_deadline(self) -> float:
-        return min(
-            self.session.state.deadline(),
-            self.runner.due,
-            self.sharing.due,
-            self._uploads.due,
-            self.ground.stations.due,
-            self._announcer.due,
-            self._calibration.due,
-            self._watch.due,
-            self.settings.due,
-            inf if self.is_passing_through else self._vehicle.due,
-        )
+        for part in self._parts:
+            if now >= part.due:
+                part.tick(now)
+        self._follow_line(now)
 
     # Between the parts.
 
-    def _say(self, news: tuple[Severity, str] | None) -> None:
-        if news is not None and not self.is_passing_through:
-            self.ground.say(*news)
+    def _say(self, severity: Severity, text: str) -> None:
+        if not self.is_passing_through:
+            self.ground.say(severity, text)
 
     def _say_refused(self, text: str) -> None:
         """A program's request was refused. In flight a warning would cover what concerns the craft."""
-        self.ground.say(Severity.NOTICE if self.session.vehicle.armed else Severity.WARNING, text)
+        self.ground.say(Severity.NOTICE if self.vehicle.armed else Severity.WARNING, text)
 
     def _newcomer(self, peer: Peer) -> None:
         if not self.is_passing_through:
             self._vehicle.newcomer(peer)
 
     def _controller_changed(self, controller: FlightController | None, now: float) -> None:
-        vehicle = self.session.vehicle
         self.is_passing_through = controller is not None and controller.profile.spoken is Spoken.OTHER_MAVLINK
         self._incoming.routes = Routes(self.ground) if self.is_passing_through else None
+        # A passed-through autopilot represents itself.
+        self._vehicle.due = inf if self.is_passing_through else min(self._vehicle.due, now)
         self.settings.found(controller, now)
         if controller is None:
             trouble = self.session.state.trouble
             self.missions.use(Refusal(MissionResult.DENIED, trouble) if trouble else NO_LINK, now, is_same_board=True)
             self._uploads.end(FC_LOST, now)
-            self._announcer.lost(now if vehicle.heard_at is None else vehicle.heard_at)
+            self._announcer.lost(now if self.vehicle.heard_at is None else self.vehicle.heard_at)
             return
         missions = controller.profile.missions
         rules = RuleSettings(self._config.settings.takeoff_max_m)
-        store = missions if isinstance(missions, Refusal) else missions(controller, vehicle, rules)
+        store = missions if isinstance(missions, Refusal) else missions(controller, self.vehicle, rules)
         # On a port that was opened since, an armed board may be another one.
         self.missions.use(store, now, is_same_board=self.session.met_family == controller.profile.family)
-        self._say(self._announcer.found(controller, now))
+        self._announcer.found(controller, now)
         self._calibration.controller_found(now)
         if not isinstance(store, Refusal):
             # Read its list at once: MISSION_CURRENT reports the count, and the first Read needs no wait.
@@ -244,33 +342,36 @@ class Bridge:
         if self._incoming.routes is not None:
             self._incoming.routes.from_autopilot(frames)
 
-    def _pass_on_news(self, now: float) -> None:
-        if self.report.watched:
+    def _follow_line(self, now: float) -> None:
+        """Pass on new readings, and serve programs, which may use the line when no poll is due."""
+        is_watched = self._reporter.watched
+        if is_watched:
             self.session.settle_telemetry()
-        if not self.session.vehicle.news:
-            return
-        news = self.session.vehicle.take_news()
-        if self.report.watched:
-            self.report.heard(news)
-        if not self.is_passing_through:
-            self._vehicle.heard(news, now)
-            if Health in news or Readiness in news:
-                self._parameters.follow()
-        if MissionLeg in news and (leg := self.session.vehicle.last(MissionLeg)) is not None:
-            self.missions.follow(leg.status)
-        if FlightState in news:
-            self._follow_arming(now)
-            self._remember_flight(now)
+        if self.vehicle.news:
+            news = self.vehicle.take_news()
+            if is_watched:
+                self._reporter.heard(news)
+            if not self.is_passing_through:
+                self._vehicle.heard(news, now)
+                if Health in news or Readiness in news:
+                    self._parameters.follow()
+            if MissionLeg in news and (leg := self.vehicle.last(MissionLeg)) is not None:
+                self.missions.follow(leg.status)
+            if FlightState in news:
+                self._follow_arming(now)
+                self._remember_flight(now)
+        if self.sharing.due < inf:
+            self.sharing.tick(now)
 
     def _remember_flight(self, now: float) -> None:
-        if self.session.vehicle.armed is None or self.is_passing_through:
+        if self.vehicle.armed is None or self.is_passing_through:
             return
         before, memory = self.flight, self.session.flight_memory(now)
         if before is None or memory is None or replace(memory, made_at=before.made_at, mode=before.mode) != before:
             self.flight = memory
 
     def _follow_arming(self, now: float) -> None:
-        armed = self.session.vehicle.armed
+        armed = self.vehicle.armed
         if armed is None or armed == self._was_armed:
             # Unknown is not a change: a Harakiri that arms may fall silent first.
             return

@@ -114,6 +114,26 @@ def test_most_modules_have_a_test_file_of_like_name() -> None:
     assert share >= LEAST_MIRRORED, f"{share:.2f}; without: {', '.join(sorted(lacking))}"
 
 
+def test_the_bridge_is_used_through_its_front_door() -> None:
+    """Never a part of it: outside, no `bridge.x.y` and no `bridge._x`."""
+    found = []
+    for file in (
+        file for package in ("service", "fleet", "simulator") for file in (REPOSITORY / package).rglob("*.py")
+    ):
+        for node in ast.walk(ast.parse(file.read_text())):
+            match node:
+                case ast.Attribute(value=ast.Attribute(value=owner)) if _is_bridge(owner):
+                    found.append((file.name, ast.unparse(node)))
+                case ast.Attribute(value=owner, attr=name) if _is_bridge(owner) and name.startswith("_"):
+                    found.append((file.name, ast.unparse(node)))
+    assert found == []
+
+
+def _is_bridge(node: ast.expr) -> bool:
+    name = node.attr if isinstance(node, ast.Attribute) else getattr(node, "id", "")
+    return name in ("bridge", "_bridge")
+
+
 def test_every_package_of_the_service_is_listed() -> None:
     # A folder without modules is the byte code of a removed package.
     found = [path for path in (REPOSITORY / "service").glob("[!_.]*") if path.is_file() or any(path.glob("*.py"))]

@@ -48,6 +48,8 @@ class Ground:
         self._compid = compid
         self._emit = emit
         self._on_newcomer = on_newcomer
+        #: Called for a peer that was forgotten after a silence.
+        self.on_silent: Callable[[Peer], None] = lambda _peer: None
         self._logs_flights = on_frames is not None
         self.on_frames = on_frames or _drop
         self._standing = standing
@@ -112,13 +114,17 @@ class Ground:
         self.stations.gone(peer)
         self._forget(peer)
 
-    def expire(self, now: float) -> list[Peer]:
-        """Forget silent peers, and return them."""
-        silent = self.stations.expire(now)
-        for peer in silent:
+    @property
+    def due(self) -> float:
+        """The time of the next `tick`."""
+        return self.stations.due
+
+    def tick(self, now: float) -> None:
+        """Forget silent peers."""
+        for peer in self.stations.expire(now):
             self._forget(peer)
             self._emit(GcsSilent(peer=str(peer)))
-        return silent
+            self.on_silent(peer)
 
     def _forget(self, peer: Peer) -> None:
         self._everyone = None

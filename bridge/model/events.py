@@ -2,7 +2,7 @@
 """What happened: the log prints these events, and other parts act on some of them. docs/events.md is for users."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 Level = Literal["debug", "info", "warning", "error"]
@@ -22,7 +22,9 @@ class BridgeEvent:
     level: Level = "info"
 
     def facts(self) -> dict[str, object]:
-        return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "level"}
+        facts = vars(self).copy()
+        del facts["level"]
+        return facts
 
 
 #: Passes an event to everything that logs it or acts on it.

@@ -72,7 +72,7 @@ class MspSharing:
         self.refused: Counter[str] = Counter()
         #: Called after a request that may have changed settings.
         self.on_change: Callable[[float], None] = lambda _now: None
-        #: The time of the next `serve`; infinity while no request waits.
+        #: The time of the next `tick`; infinity while no request waits.
         self.due = inf
 
     def join(self, program: Program) -> None:
@@ -92,13 +92,13 @@ class MspSharing:
             return
         self._total.spend(program.account, taken)
         if program.waiting:
-            self.serve(now)
+            self.tick(now)
 
     def stop(self) -> None:
         """Forward nothing more: the bridge is stopping."""
         self._stopped = True
 
-    def serve(self, now: float) -> None:
+    def tick(self, now: float) -> None:
         """Answer what can be answered, disconnect who waited too long, and forward the next request."""
         waiting = [program for program in self._programs if program.waiting]
         for program in waiting:
@@ -203,7 +203,7 @@ class MspSharing:
                 else:
                     # It may have been carried out, so it is not repeated.
                     self._give_up(program, request, at)
-            self.serve(at)
+            self.tick(at)
 
         conversation = _carry(request, frame_size(request.frame.command, right.reply), controller.arm_bit)
         self._runner.start(conversation, done, now, in_background=True)

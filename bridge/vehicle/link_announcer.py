@@ -5,6 +5,7 @@ A craft that arms may change protocol and speed; finding it again takes a second
 loss: Mission Planner reads warnings out loud.
 """
 
+from collections.abc import Callable
 from math import inf
 
 from bridge.fc.profile import FlightController, Spoken
@@ -21,9 +22,22 @@ _NOT_FOUND_REPEAT_S = 30.0
 
 
 class LinkAnnouncer:
-    """`found` and `tick` return a text to show, or None. was_found: before the bridge was restarted in flight."""
+    """Reports a loss, its end and a new flight controller with `say`.
 
-    def __init__(self, now: float, *, was_found: bool = False) -> None:
+    `trouble` gives the cause of a loss, if known, and what the pilot must do. `was_found`: before the bridge was
+    restarted in flight.
+    """
+
+    def __init__(
+        self,
+        say: Callable[[Severity, str], None],
+        trouble: Callable[[], str],
+        now: float,
+        *,
+        was_found: bool = False,
+    ) -> None:
+        self._say = say
+        self._trouble = trouble
         self._known: str | None = None
         self._was_found = was_found
         self._silent_since: float | None = now
@@ -52,7 +66,7 @@ class LinkAnnouncer:
         if self._silent_since is not None and not self.is_lost:
             self.due = max(self._silent_since + _LOST_S, until)
 
-    def found(self, controller: FlightController, now: float) -> tuple[Severity, str] | None:
+    def found(self, controller: FlightController, now: float) -> None:
         silent_since, self._silent_since, self.due = self._silent_since, None, inf
         was_lost, self.is_lost = self.is_lost, False
         was_found, self._was_found = self._was_found, True
@@ -61,24 +75,24 @@ class LinkAnnouncer:
         if not is_switch:
             self._known = controller.name
         if profile.notice is not None and controller.name != before:
-            return Severity.WARNING, profile.notice
-        if was_lost and silent_since is not None and was_found:
+            self._say(Severity.WARNING, profile.notice)
+        elif was_lost and silent_since is not None and was_found:
             # It replaces the warning on Mission Planner's HUD.
-            return Severity.WARNING, f"Flight controller back after {now - silent_since:.0f} s"
-        if controller.name == before or is_switch:
-            return None
-        return Severity.INFO, f"Found {controller.name}"
+            self._say(Severity.WARNING, f"Flight controller back after {now - silent_since:.0f} s")
+        elif controller.name != before and not is_switch:
+            self._say(Severity.INFO, f"Found {controller.name}")
 
-    def tick(self, now: float, trouble: str) -> tuple[Severity, str] | None:
-        """Report a loss, and again as long as it lasts; `trouble`: its cause, if known, and what the pilot must do."""
+    def tick(self, now: float) -> None:
+        """Report a loss, and again as long as it lasts."""
         if self._silent_since is None:
-            return None
+            return
         self.is_lost = True
         self.due = now + _REPEAT_S
-        if trouble:
-            return Severity.WARNING, trouble
-        if not self._was_found:
+        if trouble := self._trouble():
+            self._say(Severity.WARNING, trouble)
+        elif not self._was_found:
             self.due = now + _NOT_FOUND_REPEAT_S
-            return Severity.WARNING, "No flight controller found: check power, wiring"
-        # Another text each time: Mission Planner does not renew a text that stands.
-        return Severity.WARNING, f"Flight controller lost: silent for {now - self._silent_since:.0f} s"
+            self._say(Severity.WARNING, "No flight controller found: check power, wiring")
+        else:
+            # Another text each time: Mission Planner does not renew a text that stands.
+            self._say(Severity.WARNING, f"Flight controller lost: silent for {now - self._silent_since:.0f} s")

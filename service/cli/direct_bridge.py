@@ -36,10 +36,10 @@ async def ask_directly(fc: FcAddress, request: Json, progress: Callable[[int], N
     job: asyncio.Future[Json] | None = None
     try:
         timeout_s = _SEARCH_TIMEOUT_S * (_PORTS_SEARCHED if isinstance(fc, AutoFc) else 1)
-        await _wait(lambda: bool(daemon.fc.trouble or daemon.bridge.session.state.controller), timeout_s)
+        await _wait(lambda: bool(daemon.fc.trouble) or daemon.fc.found_at is not None, timeout_s)
         if daemon.fc.trouble:
             raise ControlError(daemon.fc.trouble)
-        if daemon.bridge.session.state.controller is None:
+        if daemon.fc.found_at is None:
             where = daemon.fc.where
             raise ControlError(f"no flight controller answers on {where}: check its power, the wiring and the speed")
         # The controller is identified before its telemetry arrives, and some never send all of it.

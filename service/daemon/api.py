@@ -64,18 +64,18 @@ class DaemonApi:
         def written(records: int) -> None:
             progress({"progress": records})
 
-        self._daemon.bridge.local.push(items, source, written, done, self._loop.time(), may_erase=may_erase)
+        self._daemon.bridge.push(items, source, written, done, self._loop.time(), may_erase=may_erase)
         self._daemon.flush()
         return await future
 
     async def check(self, items: list[MissionItem]) -> Json:
         """The verdict on a list for the current flight controller."""
-        local = self._daemon.bridge.local
-        return verdict_data(await self._answer(lambda answered, now: local.check(items, answered, now)))
+        check = self._daemon.bridge.check
+        return verdict_data(await self._answer(lambda answered, now: check(items, answered, now)))
 
     async def pull(self) -> Json:
-        held = await self._answer(self._daemon.bridge.local.pull)
-        return _held(held) | {"others": [_held(other) for other in self._daemon.bridge.missions.others]}
+        held = await self._answer(self._daemon.bridge.pull)
+        return _held(held) | {"others": [_held(other) for other in self._daemon.bridge.others]}
 
     async def _answer(self, start: Callable[[Callable[[T | Refusal], None], float], None]) -> T:
         """Start an operation and wait for its result; ControlError if it is refused."""
@@ -89,11 +89,10 @@ class DaemonApi:
 
     def status(self) -> Json:
         daemon = self._daemon
-        bridge, web = daemon.bridge, daemon.settings.web
-        report = bridge.report.whole(self._loop.time())
-        settings = bridge.settings.state
+        web, report, counters = daemon.settings.web, daemon.report(), daemon.bridge.counters()
+        settings = counters.settings
         change = None if settings is None else settings.change
-        link, mission, firmware = report.link, report.mission, bridge.session.vehicle.version
+        link, mission, firmware = report.link, report.mission, counters.firmware_version
         return {
             "version": version(),
             "uptime_s": round(self._loop.time() - daemon.started_at, 1),
@@ -113,8 +112,8 @@ class DaemonApi:
             "satellites": report.gps.satellites,
             "ground_stations": list(link.ground_stations),
             "refused": [
-                *(f"{count} x {why} ({link})" for (link, why), count in bridge.guard.refused.items()),
-                *(f"{count} x {why} (share)" for why, count in bridge.sharing.refused.items()),
+                *(f"{count} x {why} ({link})" for (link, why), count in counters.refused.items()),
+                *(f"{count} x {why} (share)" for why, count in counters.refused_by_share.items()),
             ],
             "recording": daemon.recording,
             "store_trouble": daemon.store_trouble,

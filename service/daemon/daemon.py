@@ -19,7 +19,7 @@ from bridge.line.conversation import StoreEffect
 from bridge.missions.mission_service import DeliveryResult
 from bridge.model.events import Armed, BridgeEvent, Disarmed
 from bridge.model.mission_log import ArrivedMission
-from bridge.model.vehicle_groups import Group
+from bridge.model.vehicle_groups import Group, VehicleReport
 from payloads.mission_data import Json
 from service.daemon.fc_connection import FcConnection
 from service.daemon.flight_file import FlightFile
@@ -30,7 +30,7 @@ from service.links.msp_share import open_share
 from service.links.signing_state import SigningState
 from service.links.traffic import Traffic
 from service.machine.host import Host
-from service.machine.log_setup import log_event, warn_once
+from service.machine.log_setup import warn_once
 from service.machine.package import version
 from service.recording.tlog_recorder import TLOG_FOLDER, TlogRecorder
 from service.settings import Settings
@@ -54,7 +54,7 @@ class Follower:
     """A part of this process that follows the daemon's events. Its methods must not block."""
 
     def telemetry(self, groups: frozenset[Group]) -> None:
-        """New values in these groups, which were requested with `bridge.report.watch`."""
+        """New values in these groups, which were requested with `Bridge.watch`."""
 
     def happened(self, event: BridgeEvent) -> None:
         """Something happened that the log has, too."""
@@ -152,6 +152,10 @@ class Daemon:
     def add_follower(self, follower: Follower) -> None:
         self._followers.append(follower)
 
+    def report(self) -> VehicleReport:
+        """The vehicle as it is known now."""
+        return self.bridge.report(self._loop.time())
+
     def followers_status(self) -> Json:
         return {key: value for follower in self._followers for key, value in follower.status().items()}
 
@@ -165,11 +169,11 @@ class Daemon:
         bridge = self.bridge
         self._forward()  # first: telemetry is shown without delay
         self.fc.carry_out()
-        while bridge.runner.store_effects:
-            self._carry_out(bridge.runner.store_effects.popleft())
+        while effects := bridge.store_effects:
+            self._carry_out(effects.popleft())
         if bridge.flight is not self._flight.saved:
             self._flight.save(bridge.flight)
-        self._deadline = bridge.next_deadline()
+        self._deadline = bridge.due
         if self._timer is not None:
             if 0 <= self._deadline - self._timer.when() < _TOO_EARLY_S:
                 # Every reply postpones the deadline a little, mostly to that of a request sent later. A timer that
@@ -183,7 +187,7 @@ class Daemon:
         self.gcs.send()
         if self._tlog is not None:
             self._tlog.record()
-        if self._followers and self.bridge.report.fresh and (fresh := self.bridge.report.take_fresh()):
+        if self._followers and (fresh := self.bridge.take_fresh()):
             for follower in self._followers:
                 follower.telemetry(fresh)
 
@@ -195,24 +199,24 @@ class Daemon:
             await self.abort()
 
     async def abort(self) -> None:
-        self.bridge.runner.stop(self._loop.time())
+        self.bridge.abort(self._loop.time())
         self.flush()
         await self.is_at_rest(_ABORT_S)
 
     async def is_at_rest(self, seconds: float) -> bool:
         """Wait for the end of all conversations, with a timeout; True if there are none."""
         for _ in range(int(seconds / _REST_INTERVAL_S)):
-            if not self.bridge.runner.is_busy:
+            if not self.bridge.is_busy:
                 break
             await asyncio.sleep(_REST_INTERVAL_S)
-        return not self.bridge.runner.is_busy
+        return not self.bridge.is_busy
 
     def _mission_ended(self, mission: ArrivedMission, delivery: DeliveryResult) -> None:
         for follower in self._followers:
             follower.mission_ended(mission, delivery)
 
     def _happened(self, event: BridgeEvent) -> None:
-        log_event(event)
+        getattr(_log, event.level)(event.name_in_log, **event.facts())
         if self._tlog is not None and isinstance(event, Armed | Disarmed):
             self._tlog.flies(is_flying=isinstance(event, Armed))
         self.fc.happened(event)
@@ -221,7 +225,7 @@ class Daemon:
 
     def _cannot_store(self, why: str) -> None:
         self.store_trouble = why
-        self.bridge.ground.notices.append("Missions are kept in memory: state folder unusable")
+        self.bridge.notify("Missions are kept in memory: state folder unusable")
         self.flush()
 
     def _fault(self, _loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
@@ -254,7 +258,7 @@ class Daemon:
 
     def _carry_out(self, effect: StoreEffect) -> None:
         def answered(answer: object) -> None:
-            self.bridge.runner.store_answered(effect, answer, self._loop.time())
+            self.bridge.store_answered(effect, answer, self._loop.time())
             self.flush()
 
         self.store.carry_out(effect, answered)

@@ -64,7 +64,7 @@ class FcConnection:
     @property
     def trouble(self) -> str:
         """Why the flight controller cannot be used: its port, or its state; empty if it can be."""
-        return self._port.trouble or self._bridge.session.state.trouble
+        return self._port.trouble or self._bridge.fc_trouble
 
     @property
     def where(self) -> str:
@@ -102,7 +102,7 @@ class FcConnection:
 
     def carry_out(self) -> None:
         bridge = self._bridge
-        speed = bridge.session.state.speed
+        speed = bridge.fc_speed
         if speed != self._speed:
             self._speed = speed
             self._port.set_speed(speed)
@@ -126,7 +126,7 @@ class FcConnection:
     def _opened(self) -> None:
         if self.capture is not None:
             self.capture.note(UartAction.OPEN, self._speed)
-        self._bridge.session.opened(self._loop.time())
+        self._bridge.fc_opened(self._loop.time())
         self._flush()
         self._report_search()
 
@@ -136,21 +136,21 @@ class FcConnection:
         bridge = self._bridge
         if self._finder is not None:
             self._finder.received(data)
-        bridge.fc_received(data, self._loop.time())
+        has_changed = bridge.fc_received(data, self._loop.time())
         if bridge.is_passing_through:
             self._forward()
-        elif not bridge.session.state.is_mid_frame:
+        elif has_changed:
             self._flush()
 
     def _closed(self, why: str) -> None:
         if self.capture is not None:
             self.capture.note(UartAction.CLOSE, self._speed, text=why)
-        self._bridge.session.closed(self._loop.time(), None if why in (STOPPED, MOVED_ON) else why)
+        self._bridge.fc_closed(self._loop.time(), None if why in (STOPPED, MOVED_ON) else why)
         self._flush()
 
     def _report_search(self) -> None:
         if self._search_report is not None:
             self._search_report.cancel()
-        if self._bridge.session.state.is_searching:
+        if self._bridge.is_searching:
             _log.info("fc.searching", fc=self.where)
         self._search_report = self._loop.call_later(_SEARCH_REPORT_S, self._report_search)

@@ -30,9 +30,9 @@ class GcsConnections:
         self._flush = flush
         self._loop = asyncio.get_running_loop()
         self._links: dict[str, GcsLink] = {}
-        self.displaced = bridge.ground.displaced
-        self.add_default_peer = bridge.ground.add_default_peer
-        self.remove_default_peer = bridge.ground.remove_default_peer
+        self.displaced = bridge.displaced
+        self.add_default_peer = bridge.add_default_peer
+        self.remove_default_peer = bridge.remove_default_peer
 
     def open(self, address: GcsAddress) -> None:
         """Open a link; LinkError if that fails."""
@@ -65,7 +65,7 @@ class GcsConnections:
         return tuple(address for address in new if str(address) in self._links)
 
     def send(self) -> None:
-        for peer, data in self._bridge.ground.take_datagrams():
+        for peer, data in self._bridge.take_datagrams():
             self._links[peer.link].send(peer, data)
             traffic = self._traffic[peer.link]
             traffic.pieces_sent += 1

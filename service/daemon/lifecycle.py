@@ -85,17 +85,17 @@ class _Reporting:
 
 def link_line(daemon: Daemon) -> str:
     """The flight controller and the ground stations in one line."""
-    bridge = daemon.bridge
-    state = bridge.session.state
+    report = daemon.report()
+    link = report.link
     if daemon.fc.trouble:
         where = daemon.fc.trouble
-    elif state.controller is None:
+    elif link.flight_controller is None:
         where = f"looking for a flight controller on {daemon.fc.where}"
     else:
-        speed = "" if state.speed is None else f", {state.speed} baud"
-        armed = {None: "", True: ", armed", False: ", disarmed"}[bridge.session.vehicle.armed]
-        where = f"{state.controller.name} ({state.name}{speed}{armed})"
-    count = len(list(bridge.ground.stations.peers()))
+        speed = "" if link.speed_baud is None else f", {link.speed_baud} baud"
+        armed = {None: "", True: ", armed", False: ", disarmed"}[report.status.armed]
+        where = f"{link.flight_controller} ({link.state}{speed}{armed})"
+    count = len(link.ground_stations)
     return f"{where}; {count} ground station{'' if count == 1 else 's'}"
 
 

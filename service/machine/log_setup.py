@@ -14,8 +14,6 @@ from contextlib import suppress
 import structlog
 from structlog.typing import EventDict, Processor
 
-from bridge.model.events import BridgeEvent
-
 #: The levels in ascending order, with their syslog priorities.
 _PRIORITIES = {"debug": 7, "info": 6, "warning": 4, "error": 3}
 _WEIGHTS = {level: weight for weight, level in enumerate(_PRIORITIES)}
@@ -97,10 +95,6 @@ class _FromLibraries(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         level = _log.error if record.levelno >= logging.ERROR else _log.warning
         level("library.log", logger=record.name, what=record.getMessage(), exc_info=record.exc_info)
-
-
-def log_event(event: BridgeEvent) -> None:
-    getattr(_log, event.level)(event.name_in_log, **event.facts())
 
 
 def warn_once(known: set[str], event: str, /, **facts: object) -> None:

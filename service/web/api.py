@@ -107,7 +107,7 @@ class Api:
     async def _state(self, _request: Request) -> Response:
         daemon = self._daemon
         now = asyncio.get_running_loop().time()
-        transfer = daemon.bridge.transfer
+        transfer, refused = daemon.bridge.transfer, daemon.bridge.counters().refused
         try:
             listed = (await self._api.list_missions(1))["missions"]
             newest = {key: listed[0][key] for key in ("number", "outcome")} if listed else None
@@ -117,10 +117,10 @@ class Api:
         return _json(
             {
                 "version": version(),
-                **asdict(daemon.bridge.report.whole(now)),
+                **asdict(daemon.report()),
                 "traffic": {name: asdict(traffic) for name, traffic in daemon.traffic.items()},
                 "port": {"address": daemon.fc.where, "trouble": daemon.fc.trouble},
-                "refused": [f"{count} x {why} ({link})" for (link, why), count in daemon.bridge.guard.refused.items()],
+                "refused": [f"{count} x {why} ({link})" for (link, why), count in refused.items()],
                 "recording": daemon.recording,
                 "newest_mission": newest,
                 "store_trouble": store,
@@ -132,7 +132,7 @@ class Api:
 
     async def _held(self, _request: Request) -> Response:
         """The mission as last read: an unauthenticated request must not use the flight controller's line."""
-        held = self._daemon.bridge.missions.held
+        held = self._daemon.bridge.held
         if held is None:
             return _json({"count": None, "checksum": None, "items": []})
         if self._held_text is None or self._held_text[0] is not held:

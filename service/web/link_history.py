@@ -33,15 +33,14 @@ class LinkHistory:
 
     def start(self) -> None:
         """Take the first sample; more follow until `close`."""
-        state = self._daemon.bridge.session.state
-        link, damaged = state.link, state.bad_checksums or 0
-        lost = 0 if link is None else link.requests_lost
+        link = self._daemon.report().link
+        lost, damaged = link.requests_lost or 0, link.bad_checksums or 0
         lost_before, damaged_before = self._before
         self._before = lost, damaged
         # Both counters restart with another flight controller.
         self._samples.append(
             Sample(
-                None if link is None else round(link.round_trip_s * 1000, 1),
+                link.round_trip_ms,
                 max(lost - lost_before, 0),
                 max(damaged - damaged_before, 0),
             )

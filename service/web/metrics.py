@@ -4,7 +4,6 @@
 Imported only if it is used: the client library takes several megabytes.
 """
 
-import asyncio
 import time
 from collections.abc import Iterator, Mapping
 from itertools import accumulate
@@ -128,41 +127,41 @@ class _State(Collector):
                 pieces.add_metric([name], getattr(traffic, f"pieces_{way}"))
             yield sizes
             yield pieces
-        bridge = self._daemon.bridge
-        yield _gauge("ground_stations", "Ground stations currently heard.", {}, len(bridge.ground.stations.peers()))
+        counters = self._daemon.bridge.counters()
+        yield _gauge("ground_stations", "Ground stations currently heard.", {}, counters.ground_stations)
         frames = _counters(
             "ground_received_frames", "Frames of ground stations, by MAVLink message id.", "link", "msgid"
         )
-        for (link, msgid), count in bridge.ground.frames_received.items():
+        for (link, msgid), count in counters.frames_received.items():
             frames.add_metric([link, str(msgid)], count)
         yield frames
-        damaged = bridge.ground.bad_frames
+        damaged = counters.bad_frames
         yield _counted("ground_damaged_frames", "Frames of ground stations with a wrong checksum.", damaged)
         refused = _counters("refused_frames", "Frames of ground stations without write access.", "link", "why")
-        for (link, why), count in bridge.guard.refused.items():
+        for (link, why), count in counters.refused.items():
             refused.add_metric([link, why], count)
         yield refused
 
     def _flight_controller(self) -> Iterator[Metric]:
-        state = self._daemon.bridge.session.state
+        counters, state = self._daemon.bridge.counters(), self._daemon.report().link.state
         states = GaugeMetricFamily(_PREFIX + "fc_state", "1 for the link's current state.", labels=["state"])
         for each in TRANSITIONS:
-            states.add_metric([each.name], float(type(state) is each))
+            states.add_metric([each.name], float(each.name == state))
         yield states
         dropped = self._daemon.fc.dropped_bytes
         yield _counted(
             "fc_dropped_bytes", "Bytes to the flight controller dropped because its line was too slow.", dropped
         )
         # These restart at 0 with each flight controller found, which Prometheus permits for counters.
-        damaged = state.bad_checksums or 0
+        damaged = counters.fc_bad_checksums
         yield _counted("fc_damaged_frames", "Frames of the flight controller with a wrong checksum.", damaged)
-        if state.link is not None:
-            lost = state.link.requests_lost
+        if counters.fc_requests_lost is not None and counters.fc_round_trips is not None:
+            lost = counters.fc_requests_lost
             yield _counted("fc_lost_requests", "MSP requests that were not answered in time.", lost)
-            yield _round_trips(state.link.round_trips)
+            yield _round_trips(counters.fc_round_trips)
 
     def _vehicle(self) -> Iterator[Metric]:
-        report = self._daemon.bridge.report.whole(asyncio.get_running_loop().time())
+        report = self._daemon.report()
         records = None if report.mission is None else report.mission.count
         known: dict[str, tuple[str, float | None]] = {
             "armed": ("1 while it is armed.", report.status.armed),

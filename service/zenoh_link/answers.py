@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Queries about the vehicle: state, overview, history, mission/current and mission/list."""
 
-import asyncio
-
 from bridge.bridge import Bridge
 from payloads import keys
 from payloads.mission_data import Json, strict
@@ -35,10 +33,10 @@ class Answers:
         }
 
     async def _state(self, _: Question) -> Json:
-        return self._data.state(asyncio.get_running_loop().time())
+        return self._data.state()
 
     async def _overview(self, _: Question) -> Json:
-        return plain(overview_of(self._data.state(asyncio.get_running_loop().time())))
+        return plain(overview_of(self._data.state()))
 
     async def _past(self, question: Question) -> Json:
         most = question.whole_number("positions", 0, _MAX_POSITIONS)
@@ -46,7 +44,7 @@ class Answers:
         return found | {"missions": [_with_units(each) for each in found["missions"]]}
 
     async def _mission_current(self, _: Question) -> Json:
-        return mission_current(self._bridge.missions.held)
+        return mission_current(self._bridge.held)
 
     async def _mission_list(self, question: Question) -> Json:
         limit = question.whole_number("limit", _USUAL_LIMIT, _MAX_LIMIT)

@@ -27,7 +27,6 @@ from payloads.overview import overview_of
 from payloads.payload import Payloads, plain
 from service.daemon.api import DaemonApi
 from service.daemon.daemon import Daemon, Follower
-from service.machine.log_setup import log_event
 from service.recording.tlog_recorder import TLOG_FOLDER
 from service.settings.zenoh import ZenohProfile, ZenohSettings
 from service.settings.zenoh_config import make_config
@@ -66,7 +65,7 @@ class Node(Follower):
         self._publisher = Publisher(self._payloads, self._readers_changed)
         self._presence = Liveliness(settings.vehicle, self._emit)
         self._mavlink = MavlinkLink(self._publisher, daemon.gcs, self._presence.others)
-        self._data = VehicleData(settings.vehicle, daemon.bridge, self._presence.others, clock)
+        self._data = VehicleData(settings.vehicle, daemon, self._presence.others, clock)
         self._queries = Queries(self._payloads, self._thread)
         api = DaemonApi(daemon)
         state_dir = daemon.settings.state_dir
@@ -138,7 +137,7 @@ class Node(Follower):
         return keys.full(self._settings.prefix, self._settings.vehicle, suffix)
 
     def _emit(self, event: BridgeEvent) -> None:
-        log_event(event)
+        getattr(_log, event.level)(event.name_in_log, **event.facts())
         self.happened(event)
 
     def _readers_changed(self, key: ZenohKey, is_read: bool) -> None:
@@ -147,14 +146,14 @@ class Node(Follower):
             self._mavlink.read(is_read=is_read)
         elif key.suffix in _GROUPS:
             read = [group for group, its_key in keys.TELEMETRY.items() if self._publisher.has_readers(its_key)]
-            self._daemon.bridge.report.watch(read)
+            self._daemon.bridge.watch(read)
             self._daemon.flush()
 
     def _publish(self, group: Group, *, gathered: bool = False) -> None:
         key = keys.TELEMETRY[group]
         if self._publisher.has_readers(key):
             now = self._loop.time()
-            sample = self._daemon.bridge.report.group(group, now)
+            sample = self._daemon.bridge.group(group, now)
             if self._rates.admits(group, sample, now, gathered=gathered):
                 self._publisher.put(key, plain(sample))
 
@@ -176,7 +175,7 @@ class Node(Follower):
         self._pending_publish = None
         for group in {Group.LINK, *self._rates.held_back}:
             self._publish(group, gathered=True)
-        state = self._data.state(self._loop.time())
+        state = self._data.state()
         marks = (state["status"]["armed"], state["mission"], state["link"]["state"], state["others_of_this_name"])
         if self._publisher.is_declared and self._rates.admits_state(marks, self._loop.time()):
             self._publisher.put(keys.STATE, state)
@@ -184,7 +183,7 @@ class Node(Follower):
             overview = overview_of(state)
             if self._rates.admits_overview(overview.marks, self._loop.time()):
                 self._publisher.put(keys.OVERVIEW, plain(overview))
-        held = self._daemon.bridge.missions.held
+        held = self._daemon.bridge.held
         if held is not self._held:
             self._held = held
             self._send_reliably(keys.MISSION_CURRENT, partial(vehicle_data.mission_current, held))

@@ -3,31 +3,31 @@
 
 from dataclasses import asdict
 
-from bridge.bridge import Bridge
 from bridge.missions.mission_service import DeliveryResult, HeldMission
 from bridge.model.events import BridgeEvent
 from bridge.model.mission_log import ArrivedMission
 from payloads.mission_data import Json, strict
 from payloads.payload import plain
 from service.daemon.api import delivery_data
+from service.daemon.daemon import Daemon
 from service.zenoh_link.time_source import SampleClock
 
 
 class VehicleData:
-    """Reads the bridge. `others`: bridges with the same name."""
+    """Reads the daemon's bridge. `others`: bridges with the same name."""
 
-    def __init__(self, vehicle: str, bridge: Bridge, others: set[str], clock: SampleClock) -> None:
+    def __init__(self, vehicle: str, daemon: Daemon, others: set[str], clock: SampleClock) -> None:
         self._vehicle = vehicle
-        self._bridge = bridge
+        self._daemon = daemon
         self._others = others
         self._clock = clock
 
-    def state(self, now: float) -> Json:
+    def state(self) -> Json:
         return {
             "vehicle": self._vehicle,
             "others_of_this_name": len(self._others),
-            "time_source": self._clock.source(self._bridge.session.vehicle),
-            **plain(self._bridge.report.whole(now)),
+            "time_source": self._clock.source(self._daemon.bridge.vehicle),
+            **plain(self._daemon.report()),
         }
 
 

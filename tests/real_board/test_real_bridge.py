@@ -91,7 +91,7 @@ def test_arming_into_mavlink_on_a_slow_line(image: Image, flash: bytes, figure: 
     world.wait_until(lambda w: w.naze.armed, _STICKS_S)
     at_arming = world.now
     world.wait_until(
-        lambda w: isinstance(w.bridge.session.state, HarakiriMavlink) and w.bridge.session.vehicle.armed is True,
+        lambda w: isinstance(w.bridge.session.state, HarakiriMavlink) and w.bridge.vehicle.armed is True,
         _FOUND_WITHIN_S,
     )
     found_s = world.now - at_arming
@@ -100,7 +100,7 @@ def test_arming_into_mavlink_on_a_slow_line(image: Image, flash: bytes, figure: 
     world.naze.faults.armed = False
     world.wait_until(lambda w: not w.naze.armed, _STICKS_S)
     back_s = world.wait_until(
-        lambda w: isinstance(w.bridge.session.state, Polling) and w.bridge.session.vehicle.armed is False,
+        lambda w: isinstance(w.bridge.session.state, Polling) and w.bridge.vehicle.armed is False,
         _FOUND_WITHIN_S,
     )
     figure(f"armed at {_SLOW_BAUD} baud with tele_prot {tele_prot}", f"found in {found_s:.1f} s, MSP in {back_s:.1f} s")
@@ -116,7 +116,7 @@ def test_the_mission_is_readable_while_armed(image: Image, flash: bytes, figure:
     assert Upload(GroundStation(world, "writer"), _NEW).run() is MissionResult.ACCEPTED
     world.naze.faults.armed = True
     world.wait_until(lambda w: w.naze.armed, _STICKS_S)
-    world.wait_until(lambda w: w.is_found and w.bridge.session.vehicle.armed is True, _FOUND_WITHIN_S)
+    world.wait_until(lambda w: w.is_found and w.bridge.vehicle.armed is True, _FOUND_WITHIN_S)
     world.run(_SETTLED_S)
     if tele_prot == 0:
         world.bridge.missions.held = None

@@ -72,10 +72,10 @@ def set_switches(naze: EmulatedNaze) -> None:
 def test_a_read_only_share_changes_nothing(image: Image, flash: bytes, figure: Figure) -> None:
     world = World(speeds=(115200,), peer=EmulatedNaze(image, flash=memoryview(bytearray(flash))))
     set_switches(world.naze)
-    world.wait_until(lambda w: w.bridge.session.vehicle.armed is False and not w.bridge.runner.is_busy, _BOOT_S)
+    world.wait_until(lambda w: w.bridge.vehicle.armed is False and not w.bridge.is_busy, _BOOT_S)
     through_share(world, image, figure, "disarmed")
     world.naze.faults.armed = True
-    world.wait_until(lambda w: w.naze.armed and w.bridge.session.vehicle.armed is True, _STICKS_S)
+    world.wait_until(lambda w: w.naze.armed and w.bridge.vehicle.armed is True, _STICKS_S)
     through_share(world, image, figure, "armed")
 
 

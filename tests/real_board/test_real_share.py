@@ -71,7 +71,7 @@ def test_a_display_in_flight(world: World, station: GroundStation, figure: Figur
     program.ask_in_turn(0.005, _MWP)
     world.run(2)
     world.naze.faults.armed = True
-    world.wait_until(lambda world: bool(world.bridge.session.vehicle.armed), _STICKS_S)
+    world.wait_until(lambda world: bool(world.bridge.vehicle.armed), _STICKS_S)
     program.replies.clear()
     hz = attitude_hz(world, station, 10)
     figure("mwp's loop in flight", f"{len(program.replies) / 10:.0f} replies/s, attitude to the station {hz:.1f} Hz")

@@ -156,7 +156,7 @@ class Conversation(RuleBasedStateMachine):
         self.the_board_holds_a_list_that_was_sent()
         assert isinstance(world.bridge.session.state, Polling)
         assert not world.bridge._uploads._queue.uploads
-        assert not world.bridge.runner.is_busy
+        assert not world.bridge.is_busy
         items = waypoints(LONGEST + 5, 900)
         for station in self.stations:
             assert Upload(station, items).run(5) is MissionResult.ACCEPTED

@@ -87,15 +87,15 @@ def test_no_reply_raises(seed: int) -> None:
     inputs = FuzzInputs(seed)
     faults = Faults()
     world = World(peer=_corrupting_board(inputs, faults), faults=faults, speeds=(115200, 9600, 57600))
-    world.bridge.report.watch(Group)
+    world.bridge.watch(Group)
     station = GroundStation(world)
     for _ in range(AT_ONCE // 20):
         station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
         station.send(messages.MAVLink_mission_request_list_message(1, 1))
         world.run(0.5)
         faults.armed = inputs.random.random() < 0.5
-        for group in world.bridge.report.take_fresh():
-            to_json(asdict(world.bridge.report.group(group, world.now)))
+        for group in world.bridge.take_fresh():
+            to_json(asdict(world.bridge.group(group, world.now)))
     world.run(1)
 
 

@@ -103,7 +103,7 @@ def test_every_conversation_ends_with_any_replies(seed: int) -> None:
     assert Upload(station, waypoints(30, seed)).run(120) not in (None, MissionResult.ACCEPTED)
     Download(station).run(60)
     station.send(messages.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", 300.0, 9))
-    world.wait_until(lambda w: not w.bridge.runner.is_busy, 60)
+    world.wait_until(lambda w: not w.bridge.is_busy, 60)
     assert not world.bridge._uploads._queue.uploads
 
 
@@ -219,7 +219,7 @@ def test_a_refused_read_is_tried_only_once_more() -> None:
     """Two READs are in flight at a time."""
     board = Reader(Records(ReplyStatus.ARMED, 0, []), is_stubborn=True)
     world, _ = found(board)
-    world.wait_until(lambda w: board.reads > 0 and not w.bridge.runner.is_busy, 30)
+    world.wait_until(lambda w: board.reads > 0 and not w.bridge.is_busy, 30)
     assert board.reads <= 4
 
 

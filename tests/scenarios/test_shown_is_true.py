@@ -194,7 +194,7 @@ def is_found(world: World) -> bool:
 
 def arm(screen: Screen) -> None:
     screen.world.faults.armed = True
-    while not (screen.world.bridge.session.vehicle.armed and is_found(screen.world)):
+    while not (screen.world.bridge.vehicle.armed and is_found(screen.world)):
         screen.fly(STEP_S, linked=False)
 
 
@@ -231,7 +231,7 @@ def test_every_shown_value_is_true_for_two_minutes_of_flight(board: str | Teleme
         assert screen.heartbeat.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED
         home = screen.station.messages("HOME_POSITION")[-1]
         assert (home.latitude, home.longitude) == FIELD
-        place = screen.world.bridge.report.whole(screen.world.now).position
+        place = screen.world.bridge.report(screen.world.now).position
         assert (place.home_lat_deg, place.home_lon_deg) == (home.latitude / 1e7, home.longitude / 1e7)
         shown = [screen.shown[name][1] / 1e7 for name in ("lat", "lon")]
         assert (place.lat_deg, place.lon_deg) == pytest.approx(shown)

@@ -31,12 +31,12 @@ def stop(world: World) -> None:
 
 
 def abort(world: World) -> None:
-    world.bridge.runner.stop(world.now)
+    world.bridge.abort(world.now)
     world._flush()
 
 
 def at_rest(world: World) -> bool:
-    return not world.bridge.runner.is_busy
+    return not world.bridge.is_busy
 
 
 def test_a_push_under_way_is_finished(world: World) -> None:

@@ -183,13 +183,13 @@ class World:
 
     def plug(self) -> None:
         self._plugged = True
-        self.bridge.session.opened(self.now)
+        self.bridge.fc_opened(self.now)
         self._flush()
 
     def unplug(self) -> None:
         """Remove the port; the board keeps its power."""
         self._plugged = False
-        self.bridge.session.closed(self.now, "unplugged")
+        self.bridge.fc_closed(self.now, "unplugged")
         self._flush()
 
     def restart_bridge(self, away_s: float = 2.0, *, flight: bool = True) -> None:
@@ -238,7 +238,7 @@ class World:
 
     def wait_ready(self, seconds: float = 20.0) -> float:
         """Wait until the flight controller is found and its list is read."""
-        return self.wait_until(lambda world: world.is_found and not world.bridge.runner.is_busy, seconds)
+        return self.wait_until(lambda world: world.is_found and not world.bridge.is_busy, seconds)
 
     def receive_from_fc(self, data: bytes) -> None:
         """Let the bridge read bytes that are not from the simulated board."""
@@ -259,7 +259,7 @@ class World:
     def push(self, items: Sequence[Any]) -> list[Any]:
         """Push like the command line; the returned list receives the outcome."""
         outcome: list[Any] = []
-        self.bridge.local.push(items, "test", lambda _: None, lambda *args: outcome.append(args), self.now)
+        self.bridge.push(items, "test", lambda _: None, lambda *args: outcome.append(args), self.now)
         self._flush()
         return outcome
 
@@ -296,7 +296,7 @@ class World:
     def _step(self, end: float) -> None:
         """Advance to the next event and execute it."""
         wakeup = max(self.naze.next_wakeup(self.now), self.now + 1e-6)
-        wanted = min(self.bridge.next_deadline() + self._lateness_s, wakeup, end)
+        wanted = min(self.bridge.due + self._lateness_s, wakeup, end)
         if self._events:
             wanted = min(wanted, self._events[0][0])
         self.now = max(self.now, wanted)
@@ -310,11 +310,11 @@ class World:
         while self._events and self._events[0][0] <= self.now:
             heapq.heappop(self._events)[2]()
         assert len(self.bridge.runner._queue) <= MAX_QUEUED
-        if self.bridge.next_deadline() + self._lateness_s > self.now:
+        if self.bridge.due + self._lateness_s > self.now:
             return
         self._lateness_s = self.random.random() * self._late_s
         for _ in range(_MAX_TICKS_AT_ONCE):
-            if self.bridge.next_deadline() > self.now:
+            if self.bridge.due > self.now:
                 break
             self.bridge.tick(self.now)
             self._flush()
@@ -324,12 +324,12 @@ class World:
     def _flush(self) -> None:
         for data in self.bridge.take_fc_output():
             self._write(data)
-        for peer, frame in self.bridge.ground.take_datagrams():
+        for peer, frame in self.bridge.take_datagrams():
             station = self.stations.get(peer)
             if station is not None:
                 station.carry(frame)
-        while self.bridge.runner.store_effects:
-            self._carry_out(self.bridge.runner.store_effects.popleft())
+        while effects := self.bridge.store_effects:
+            self._carry_out(effects.popleft())
 
     def _write(self, data: bytes) -> None:
         assert self._plugged
@@ -363,7 +363,7 @@ class World:
 
     def _carry_out(self, effect: StoreEffect) -> None:
         def answer() -> None:
-            self.bridge.runner.store_answered(effect, self.store.carry_out(effect), self.now)
+            self.bridge.store_answered(effect, self.store.carry_out(effect), self.now)
             self._flush()
 
         self.after(self.store.delay_s, answer)

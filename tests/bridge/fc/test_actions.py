@@ -134,7 +134,7 @@ def test_on_unknown_firmware_an_action_is_unsupported() -> None:
     """Its handlers are not known, so the numbers may mean something else."""
     board = MspFake({100: ident(230, HARAKIRI_CAPABILITY), 101: bytes(11), 116: b"ANGLE;ARM;"})
     world = World(speeds=(115200,), peer=board)
-    world.wait_until(lambda w: w.bridge.session.vehicle.armed is False, 5)
+    world.wait_until(lambda w: w.bridge.vehicle.armed is False, 5)
     station = GroundStation(world)
     for command, params, _ in ALL:
         station.send(long(command, params))

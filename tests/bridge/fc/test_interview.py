@@ -67,7 +67,7 @@ def test_a_board_that_arms_and_disarms_is_found_again(baud: int, protocol: Telem
         world = identifying(baud, seed, protocol)
         world.faults.armed = True
         if (baud, protocol) != (1200, TelemetryProtocol.MAVLINK):
-            world.wait_until(lambda w: is_known(w) and w.bridge.session.vehicle.armed is True, FOUND_WITHIN_S)
+            world.wait_until(lambda w: is_known(w) and w.bridge.vehicle.armed is True, FOUND_WITHIN_S)
         world.run(random.Random(seed).random() * 6)
         world.faults.armed = False
         # Until 4 s after the last request it hears only MAVLink; then its ring must empty.

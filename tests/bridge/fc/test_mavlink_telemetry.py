@@ -16,7 +16,7 @@ from tests.bridge.vehicle.test_vehicle_report import EMPTY, without_age
 
 def test_groups_are_made_from_a_mavlink_autopilot() -> None:
     world, autopilot, _ = passing()
-    world.bridge.report.watch(Group)
+    world.bridge.watch(Group)
     autopilot.send(m.MAVLink_heartbeat_message(2, 3, 81 | 128, 4, 4, 3))
     autopilot.send(m.MAVLink_attitude_message(1, 0.1, -0.2, -0.3, 0, 0, 0))
     autopilot.send(m.MAVLink_global_position_int_message(1, 453838000, 84733000, 131000, 20000, 100, -200, -50, 9000))
@@ -28,7 +28,7 @@ def test_groups_are_made_from_a_mavlink_autopilot() -> None:
     autopilot.outgoing += m.MAVLink_heartbeat_message(26, 8, 0, 0, 4, 3).pack(gimbal)
     autopilot.outgoing += m.MAVLink_attitude_message(1, 1.0, 1.0, 1.0, 0, 0, 0).pack(gimbal)
     world.run(0.05)
-    report = world.bridge.report
+    bridge = world.bridge
     assert report.take_fresh() == {
         Group.ATTITUDE, Group.POSITION, Group.GPS, Group.BATTERY, Group.RC, Group.STATUS
     }  # fmt: skip
@@ -50,35 +50,35 @@ def test_an_autopilot_with_a_new_system_id_is_followed() -> None:
     autopilot.heartbeat = m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3)
     world.run(2)
     autopilot.send(m.MAVLink_home_position_message(453838000, 84733000, 0, 0, 0, 0, [1, 0, 0, 0], 0, 0, 0))
-    world.bridge.report.watch(Group)
+    world.bridge.watch(Group)
     autopilot.mavlink.srcSystem = 7
     autopilot.heartbeat = m.MAVLink_heartbeat_message(2, 3, 81 | 128, 4, 4, 3)
-    world.wait_until(lambda w: bool(w.bridge.session.vehicle.armed), 8)
+    world.wait_until(lambda w: bool(w.bridge.vehicle.armed), 8)
     autopilot.send(m.MAVLink_attitude_message(1, 0.5, 0, 0, 0, 0, 0))
     world.run(0.05)
-    assert world.bridge.report.group(Group.ATTITUDE, world.now).roll_deg == 28.65
-    assert world.bridge.session.vehicle.home is None
+    assert world.bridge.group(Group.ATTITUDE, world.now).roll_deg == 28.65
+    assert world.bridge.vehicle.home is None
     assert world.events("vehicle.armed") != []
 
 
 def test_two_autopilots_on_one_line_are_not_mixed() -> None:
     world, autopilot, _ = passing()
     autopilot.heartbeat = m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3)
-    world.bridge.report.watch(Group)
+    world.bridge.watch(Group)
     other = m.MAVLink(None, srcSystem=7, srcComponent=1)
     for _ in range(40):
         autopilot.outgoing += m.MAVLink_heartbeat_message(2, 3, 81 | 128, 4, 4, 3).pack(other)
         autopilot.outgoing += m.MAVLink_attitude_message(1, 0.5, 0, 0, 0, 0, 0).pack(other)
         world.run(0.5)
-        assert world.bridge.session.vehicle.armed is False
-        assert world.bridge.report.group(Group.ATTITUDE, world.now).roll_deg is None
+        assert world.bridge.vehicle.armed is False
+        assert world.bridge.group(Group.ATTITUDE, world.now).roll_deg is None
 
 
 def test_after_a_stall_the_same_one_of_two_autopilots_is_shown() -> None:
     """The other's heartbeats arrive first."""
     world, autopilot, _ = passing()
     autopilot.heartbeat = m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3)
-    world.bridge.report.watch(Group)
+    world.bridge.watch(Group)
     other = m.MAVLink(None, srcSystem=7, srcComponent=1)
     world.run(2)
     autopilot._due += 14
@@ -91,8 +91,8 @@ def test_after_a_stall_the_same_one_of_two_autopilots_is_shown() -> None:
     for sender, roll in ((other, 0.5), (autopilot.mavlink, 0.25)):
         autopilot.outgoing += m.MAVLink_attitude_message(1, roll, 0, 0, 0, 0, 0).pack(sender)
     world.run(0.1)
-    assert world.bridge.session.vehicle.armed is False
-    assert world.bridge.report.group(Group.ATTITUDE, world.now).roll_deg == 14.32
+    assert world.bridge.vehicle.armed is False
+    assert world.bridge.group(Group.ATTITUDE, world.now).roll_deg == 14.32
 
 
 def test_a_companion_on_board_does_not_replace_an_autopilot_that_restarts() -> None:
@@ -104,40 +104,40 @@ def test_a_companion_on_board_does_not_replace_an_autopilot_that_restarts() -> N
     for _ in range(3):
         autopilot.outgoing += m.MAVLink_heartbeat_message(2, 3, 81 | 128, 4, 4, 3).pack(own)
         world.run(1)
-    assert world.bridge.session.vehicle.armed
+    assert world.bridge.vehicle.armed
 
 
 def test_an_unused_channel_does_not_move_the_others() -> None:
     world, autopilot, _ = passing()
-    world.bridge.report.watch(Group)
+    world.bridge.watch(Group)
     autopilot.send(m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3))
     autopilot.send(m.MAVLink_rc_channels_message(1, 5, 1500, 1501, 65535, 1502, 1800, *[65535] * 13, 127))
     world.run(0.05)
-    assert world.bridge.report.group(Group.RC, world.now).channels_us == (1500, 1501, 0, 1502, 1800)
+    assert world.bridge.group(Group.RC, world.now).channels_us == (1500, 1501, 0, 1502, 1800)
 
 
 def test_the_autopilots_own_remaining_charge_is_shown() -> None:
     world, autopilot, _ = passing()
-    world.bridge.report.watch(Group)
+    world.bridge.watch(Group)
     autopilot.send(m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3))
     autopilot.send(m.MAVLink_sys_status_message(7, 7, 6, 0, 12600, 100, 43, 0, 0, 0, 0, 0, 0))
     world.run(0.05)
-    assert world.bridge.report.group(Group.BATTERY, world.now).remaining_percent == 43
+    assert world.bridge.group(Group.BATTERY, world.now).remaining_percent == 43
 
 
 def test_the_second_block_of_channels_does_not_replace_the_first() -> None:
     world, autopilot, _ = passing()
-    world.bridge.report.watch(Group)
+    world.bridge.watch(Group)
     autopilot.send(m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3))
     for port in (0, 1):
         autopilot.send(m.MAVLink_rc_channels_raw_message(1, port, *[1500 + port] * 8, 127))
         world.run(0.05)
-    assert world.bridge.report.group(Group.RC, world.now).channels_us == (1500,) * 8
+    assert world.bridge.group(Group.RC, world.now).channels_us == (1500,) * 8
 
 
 def test_a_voltage_is_not_renewed_by_the_consumption() -> None:
     world, autopilot, _ = passing()
-    world.bridge.report.watch(Group)
+    world.bridge.watch(Group)
     autopilot.send(m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3))
     autopilot.send(m.MAVLink_sys_status_message(7, 7, 6, 0, 12600, 100, -1, 0, 0, 0, 0, 0, 0))
     for battery in (0, 1):
@@ -145,7 +145,7 @@ def test_a_voltage_is_not_renewed_by_the_consumption() -> None:
         consumed = 500 + battery
         autopilot.send(m.MAVLink_battery_status_message(battery, 0, 0, 0, [65535] * 10, 100, consumed, -1, 50))
     world.run(0.05)
-    power = world.bridge.report.group(Group.BATTERY, world.now)
+    power = world.bridge.group(Group.BATTERY, world.now)
     assert power.age_s is not None
     assert power.age_s > 9
     assert power.drawn_mah == 500
@@ -165,7 +165,7 @@ def test_arbitrary_contents_of_an_intact_frame_raise_nothing(data: st.DataObject
         autopilot.outgoing += b"\xfd" + checked + crc.to_bytes(2, "little")
     world.run(0.05)
     for group in EMPTY:
-        found = world.bridge.report.group(group, world.now)
+        found = world.bridge.group(group, world.now)
         assert isinstance(found, type(EMPTY[group]))
         assert json.dumps(asdict(found), allow_nan=False)
 
@@ -175,4 +175,4 @@ def test_autopilots_on_mavlink_1_and_2_are_reported_separately() -> None:
     autopilot.send(m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3))
     autopilot.send(m.MAVLink_attitude_message(1, 0.5, 0, 0, 0, 0, 0))
     world.run(0.05)
-    assert world.bridge.report.group(Group.ATTITUDE, world.now).roll_deg == 28.65
+    assert world.bridge.group(Group.ATTITUDE, world.now).roll_deg == 28.65

@@ -139,7 +139,7 @@ def test_the_sticks_are_in_arducopters_order() -> None:
 def test_an_unanswered_address_gets_ten_a_second_until_the_craft_arms() -> None:
     world = World(SimOptions(), speeds=(115200,))
     station = GroundStation(world)
-    world.bridge.ground.add_default_peer(station.peer, until_answered=False)
+    world.bridge.add_default_peer(station.peer, until_answered=False)
     world.run(3)
     station.take()
     world.run(10)

@@ -57,7 +57,7 @@ def test_a_flood_of_counts_is_not_logged() -> None:
     world = ready_world()
     station = GroundStation(world)
     world.faults.armed = True
-    world.wait_until(lambda world: bool(world.bridge.session.vehicle.armed), 5)
+    world.wait_until(lambda world: bool(world.bridge.vehicle.armed), 5)
     for number in range(2000):
         world.after(number / 500, lambda: station.send(m.MAVLink_mission_count_message(1, 1, 999)))
     world.run(5)
@@ -73,7 +73,7 @@ def test_requests_from_strangers_are_not_passed_to_an_armed_board() -> None:
     stranger = GroundStation(world)
     stranger.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
     world.faults.armed = True
-    world.wait_until(lambda world: bool(world.bridge.session.vehicle.armed), 5)
+    world.wait_until(lambda world: bool(world.bridge.vehicle.armed), 5)
     asked = (
         m.MAVLink_mission_clear_all_message(1, 1),
         m.MAVLink_mission_count_message(1, 1, 9),

@@ -199,7 +199,7 @@ def test_a_signed_upload_is_accepted_and_every_reply_is_signed() -> None:
 def test_mavlink_1_and_unheard_peers_get_only_signed_frames() -> None:
     world = keyed()
     unheard = GroundStation(world, "unheard")
-    world.bridge.ground.add_default_peer(unheard.peer, until_answered=False)
+    world.bridge.add_default_peer(unheard.peer, until_answered=False)
     old = GroundStation(world, "old", version=1)
     old.send(READS[0])
     world.run(3)

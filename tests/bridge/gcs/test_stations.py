@@ -153,7 +153,7 @@ def test_an_active_station_is_kept() -> None:
 def test_a_default_peer_always_gets_messages_in_both_versions() -> None:
     world = ready_world()
     station = GroundStation(world, "fixed")
-    world.bridge.ground.add_default_peer(station.peer, until_answered=False)
+    world.bridge.add_default_peer(station.peer, until_answered=False)
     world.run(5)
     assert versions(station) == {1, 2}
     assert len(station.messages("ATTITUDE")) >= 4
@@ -162,7 +162,7 @@ def test_a_default_peer_always_gets_messages_in_both_versions() -> None:
     station.take()
     world.run(5)
     assert len(station.messages("ATTITUDE")) >= 4
-    world.bridge.ground.remove_default_peer(station.peer)
+    world.bridge.remove_default_peer(station.peer)
     station.take()
     world.run(3)
     assert station.received == []
@@ -171,7 +171,7 @@ def test_a_default_peer_always_gets_messages_in_both_versions() -> None:
 def test_a_broadcast_address_is_used_until_a_station_answers() -> None:
     world = ready_world()
     everyone = GroundStation(world, "broadcast")
-    world.bridge.ground.add_default_peer(everyone.peer, until_answered=True)
+    world.bridge.add_default_peer(everyone.peer, until_answered=True)
     world.run(3)
     assert everyone.messages("HEARTBEAT")
     station = GroundStation(world, "answers")

@@ -67,7 +67,7 @@ def test_a_push_with_downloads_and_telemetry_fits_the_ring(baud: int) -> None:
     world.wait_until(lambda _: bool(outcome), 60)
     world.run(30)
     assert station.messages("MISSION_COUNT")
-    assert world.bridge.session.vehicle.last(Orientation) is not None
+    assert world.bridge.vehicle.last(Orientation) is not None
     world.assert_line_was_clean()
     assert world.naze.counters.max_outstanding_reply_bytes <= MAX_OUTSTANDING_BYTES
 

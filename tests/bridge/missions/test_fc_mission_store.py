@@ -55,7 +55,7 @@ class Craft:
 
     def pull(self) -> HeldMission:
         held: list[Any] = []
-        self.world.bridge.local.pull(held.append, self.world.now)
+        self.world.bridge.pull(held.append, self.world.now)
         self.world.wait_until(lambda _: bool(held), TIMEOUT_S)
         assert isinstance(held[0], HeldMission), held[0]
         return held[0]
@@ -67,7 +67,7 @@ class Craft:
 
     def arm(self) -> None:
         self.faults.armed = True
-        self.world.wait_until(lambda w: bool(w.bridge.session.vehicle.armed), 30)
+        self.world.wait_until(lambda w: bool(w.bridge.vehicle.armed), 30)
 
 
 def is_alike(one: MissionItem, other: MissionItem) -> bool:
@@ -122,7 +122,7 @@ def assert_is_true(
 def craft(request: pytest.FixtureRequest) -> Craft:
     made = MAKERS[request.param]()
     made.world.wait_until(lambda w: w.kind is not None and w.kind.name == request.param, 20)
-    made.world.wait_until(lambda w: w.bridge.session.vehicle.armed is False and not w.bridge.runner.is_busy, 20)
+    made.world.wait_until(lambda w: w.bridge.vehicle.armed is False and not w.bridge.is_busy, 20)
     made.world.run(1)
     return made
 
@@ -214,7 +214,7 @@ def test_nothing_is_sent_to_an_armed_craft(craft: Craft) -> None:
     craft.world.run(3)
     assert any("isarm" in text for text in craft.station.texts())
     craft.faults.armed = False
-    craft.world.wait_until(lambda w: w.bridge.session.vehicle.armed is False, 30)
+    craft.world.wait_until(lambda w: w.bridge.vehicle.armed is False, 30)
     craft.world.run(3)
     assert craft.holds(craft.plan(6))
 
@@ -224,7 +224,7 @@ def test_an_armed_craft_is_not_asked_for_its_list(craft: Craft) -> None:
     craft.arm()
     craft.world.bridge.missions.held = None
     answers: list[HeldMission | Refusal] = []
-    craft.world.bridge.local.pull(answers.append, craft.world.now)
+    craft.world.bridge.pull(answers.append, craft.world.now)
     craft.world.wait_until(lambda _: bool(answers), TIMEOUT_S)
     (answer,) = answers
     assert isinstance(answer, Refusal)
@@ -240,7 +240,7 @@ def test_a_push_that_loses_its_line_ends_with_a_true_result(craft: Craft, moment
     craft.world.wait_until(lambda _: bool(outcome), 10)
     delivery, _ = outcome[0]
     craft.world.plug()
-    craft.world.wait_until(lambda w: w.is_found and w.bridge.session.vehicle.armed is False, 20)
+    craft.world.wait_until(lambda w: w.is_found and w.bridge.vehicle.armed is False, 20)
     craft.world.run(8)
     assert_is_true(craft, delivery, craft.plan(6), craft.plan(60, 1))
 
@@ -250,7 +250,7 @@ def test_a_push_that_is_stopped_ends_with_a_true_result(craft: Craft, moment: fl
     assert craft.upload(craft.plan(6)) is ACCEPTED
     outcome = craft.world.push(craft.plan(100, 1))
     craft.world.run(moment)
-    craft.world.bridge.runner.stop(craft.world.now)
+    craft.world.bridge.abort(craft.world.now)
     craft.world.wait_until(lambda _: bool(outcome), 10)
     delivery, _ = outcome[0]
     craft.world.run(4)

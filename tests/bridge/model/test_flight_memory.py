@@ -56,7 +56,7 @@ def test_mode_arming_and_home_stay_as_they_are(protocol: TelemetryProtocol, boxe
     assert set(screens.mission_planner.armed.values(restarted_at)) <= {True}
     assert set(screens.mission_planner.mode.values(restarted_at)) <= {before.mode}
     assert home(station) == placed
-    assert world.bridge.session.vehicle.home == world.bridge.flight.home  # type: ignore[union-attr]
+    assert world.bridge.vehicle.home == world.bridge.flight.home  # type: ignore[union-attr]
 
 
 def test_without_memory_the_mode_is_a_guess() -> None:
@@ -64,7 +64,7 @@ def test_without_memory_the_mode_is_a_guess() -> None:
     world, _, screens = flying(TelemetryProtocol.MAVLINK_57600, GPS_HOLD)
     world.restart_bridge(flight=False)
     assert screens.look(10.0)[0].mode == "Acro"
-    assert world.bridge.session.vehicle.home is None
+    assert world.bridge.vehicle.home is None
 
 
 def test_a_landing_that_nobody_saw_ends_the_flight() -> None:

@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as m
 
+from bridge.bridge import Bridge
 from bridge.model.flight_mode import FlightMode
 from bridge.model.vehicle import (
     STALE_S,
@@ -33,7 +34,6 @@ from bridge.model.vehicle import (
 from bridge.model.vehicle_groups import Group
 from bridge.vehicle import vehicle_messages as make
 from bridge.vehicle.vehicle_messages import Maker
-from bridge.vehicle.vehicle_report import VehicleReporter
 from payloads.keys import TELEMETRY, PayloadEncoding
 from payloads.payload import Payloads, decoded, plain
 from protocols.mavlink.codec import FrameWriter, pack
@@ -110,12 +110,12 @@ class Receivers:
     """A vehicle as seen by subscribers and by ground stations."""
 
     vehicle: Vehicle
-    report: VehicleReporter
+    bridge: Bridge
     encoding: PayloadEncoding
 
     def group(self, group: Group) -> Any:
         key, payloads = TELEMETRY[group], Payloads(self.encoding, lambda: 0.0)
-        body = payloads.head(key) | plain(self.report.group(group, NOW))
+        body = payloads.head(key) | plain(self.bridge.group(group, NOW))
         return decoded(payloads.encode(key, body), str(payloads.encoding(key)))
 
     def message(self, maker: Maker) -> Any:
@@ -142,13 +142,13 @@ def test_groups_have_the_values_of_mavlink_messages(
     readings: tuple[Reading | None, ...], home: tuple[int, int] | None, encoding: PayloadEncoding
 ) -> None:
     bridge = World(powered=False, plugged=False).bridge
-    vehicle = bridge.session.vehicle
+    vehicle = bridge.vehicle
     for reading in readings:
         if reading is not None:
             vehicle.hear(reading)
     if home is not None:
         vehicle.hear_home(*home)
-    receivers = Receivers(vehicle, bridge.report, encoding)
+    receivers = Receivers(vehicle, bridge, encoding)
     attitude_is_true(receivers)
     position_is_true(receivers)
     home_is_true(receivers)

@@ -31,7 +31,7 @@ def ready(kind: str) -> World:
 
 def arm(world: World) -> None:
     world.naze.faults.armed = True
-    world.wait_until(lambda world: bool(world.bridge.session.vehicle.armed), 5)
+    world.wait_until(lambda world: bool(world.bridge.vehicle.armed), 5)
     world.run(0.3)
 
 

@@ -36,7 +36,7 @@ AT_ONCE = 60
 def test_no_request_changes_a_board(name: str, seed: int) -> None:
     board = BOARDS[name]()
     world = World(speeds=(115200,), peer=board)
-    world.wait_until(lambda w: w.bridge.session.vehicle.armed is False and not w.bridge.runner.is_busy, 30)
+    world.wait_until(lambda w: w.bridge.vehicle.armed is False and not w.bridge.is_busy, 30)
     before, stored = [answer(world, *setting) for setting in SETTINGS], world.naze.stored_records
     assert any(before)
     draw = random.Random(seed)

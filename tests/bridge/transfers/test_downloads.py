@@ -141,11 +141,11 @@ def test_an_empty_list_is_count_0_until_home_is_known() -> None:
     world.wait_until(lambda w: w.is_found, 5)
     station = GroundStation(world)
     (count,) = ask(station, list_message())
-    assert count.count == int(world.bridge.session.vehicle.place() is not None)
+    assert count.count == int(world.bridge.vehicle.place() is not None)
     world.run(6)
     (home,) = Download(station).run(2)
     assert (home.seq, home.command, home.frame) == (0, 16, 0)
-    assert (home.lat_e7, home.lon_e7) == world.bridge.session.vehicle.place()
+    assert (home.lat_e7, home.lon_e7) == world.bridge.vehicle.place()
     world.run(1.1)
     assert station.messages("MISSION_CURRENT")[-1].mission_state == 1
 
@@ -185,7 +185,7 @@ def test_item_0_alone_has_the_altitude_of_home_while_armed() -> None:
     world, station = holding()
     world.faults.armed = True
     world.run(1)
-    home = world.bridge.session.vehicle.home
+    home = world.bridge.vehicle.home
     assert home is not None
     for as_int in (True, False):
         (item,) = ask(station, request_message(0, as_int=as_int))
@@ -273,8 +273,8 @@ def test_waiting_downloads_are_refused_when_the_link_is_lost() -> None:
     bridge = world.bridge
     answers: list[HeldMission | Refusal] = []
     for _ in range(600):
-        bridge.local.pull(answers.append, world.now)
-    bridge.session.closed(world.now, "unplugged")
+        bridge.pull(answers.append, world.now)
+    bridge.fc_closed(world.now, "unplugged")
     assert len(answers) == 600
     assert {answer.text for answer in answers if isinstance(answer, Refusal)} == {"No link to the flight controller"}
 
@@ -314,7 +314,7 @@ def disarmed(board: str | TelemetryProtocol) -> tuple[World, list[MissionItem]]:
 
 def arm(world: World) -> None:
     world.faults.armed = True
-    world.wait_until(lambda w: bool(w.bridge.session.vehicle.armed) and w.is_found, 20)
+    world.wait_until(lambda w: bool(w.bridge.vehicle.armed) and w.is_found, 20)
     world.run(3)
 
 
@@ -336,7 +336,7 @@ def test_the_mission_is_readable_while_armed(board: str | TelemetryProtocol) -> 
 def test_a_mission_that_was_not_read_before_arming_is_read_or_refused(board: str | TelemetryProtocol) -> None:
     """The bridge was started in flight: only boards whose list can be read armed have one."""
     world = armed_before(board)
-    world.wait_until(lambda w: bool(w.bridge.session.vehicle.armed), 15)
+    world.wait_until(lambda w: bool(w.bridge.vehicle.armed), 15)
     world.run(5)
     station = GroundStation(world)
     download = Download(station)
@@ -377,7 +377,7 @@ def test_a_mission_that_another_client_changed_in_flight_is_not_served() -> None
     arm(world)
     for number, action, count in ((3, NavAction.WAYPOINT, 9), (12, NavAction.WAYPOINT, 0)):
         status = NavStatus(NavMode.MISSION, 0, action, number, 0, 0)
-        world.bridge.session.vehicle.hear(MissionLeg(world.now, Source.MSP, status))
+        world.bridge.vehicle.hear(MissionLeg(world.now, Source.MSP, status))
         world.run(0.1)
         download = Download(GroundStation(world, f"after {number}"))
         assert len(download.run(5)) == count
@@ -398,7 +398,7 @@ def armed_before(board: str | TelemetryProtocol) -> World:
 @pytest.mark.parametrize("board", BOARDS)
 def test_a_craft_that_is_armed_from_the_start_has_an_item_0(board: str | TelemetryProtocol) -> None:
     world = armed_before(board)
-    world.wait_until(lambda w: bool(w.bridge.session.vehicle.armed), 15)
+    world.wait_until(lambda w: bool(w.bridge.vehicle.armed), 15)
     station = GroundStation(world)
     for item in ask(station, request_message(0)):  # unanswered if there is no position yet
         assert (item.get_type(), item.x != 0) == ("MISSION_ITEM_INT", True)
@@ -415,7 +415,7 @@ def test_item_0_is_not_denied_while_the_craft_may_be_armed(board: TelemetryProto
     """Mission Planner repeats its request; it is refused only once the craft is known to be disarmed."""
     world = armed_before(board)
     station = GroundStation(world)
-    while not world.bridge.session.vehicle.armed:
+    while not world.bridge.vehicle.armed:
         for reply in ask(station, request_message(0), 0.2):
             assert reply.get_type() != "MISSION_ACK"
         assert not any("link" in text or "disarm" in text for text in station.texts())

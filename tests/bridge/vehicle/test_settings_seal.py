@@ -94,7 +94,7 @@ def requests(world: World, since: float) -> list[int]:
 def test_a_change_without_the_bridge_is_reported_once_by_name(name: str) -> None:
     case = CASES[name]
     world, station = sealed(case.make)
-    before = world.bridge.report.whole(world.now).settings
+    before = world.bridge.report(world.now).settings
     assert before is not None
     assert before.changed is None
     on_the_board(world, case.command, case.payload)
@@ -103,7 +103,7 @@ def test_a_change_without_the_bridge_is_reported_once_by_name(name: str) -> None
     (event,) = world.events("settings.changed_on_board")
     assert (event.level, event.facts["detail"]) == ("warning", told)
     assert warnings(station) == [told]
-    after = world.bridge.report.whole(world.now).settings
+    after = world.bridge.report(world.now).settings
     assert after is not None
     assert (after.changed, after.seal == before.seal) == (told, False)
 
@@ -152,7 +152,7 @@ def test_a_station_that_connects_later_is_told_until_the_craft_is_armed() -> Non
     world.run(1)
     assert warnings(late) == [told]
     world.naze.faults.armed = True
-    world.wait_until(lambda world: world.bridge.session.vehicle.armed is True, 5)
+    world.wait_until(lambda world: world.bridge.vehicle.armed is True, 5)
     world.run(1)
     later = GroundStation(world, "later")
     later.send(heartbeat)
@@ -181,7 +181,7 @@ def test_another_board_is_no_change() -> None:
 def test_an_armed_board_is_not_asked_and_its_changes_are_told_after_the_flight() -> None:
     world, _ = sealed(naze)
     world.naze.faults.armed = True
-    world.wait_until(lambda world: world.bridge.session.vehicle.armed is True, 5)
+    world.wait_until(lambda world: world.bridge.vehicle.armed is True, 5)
     armed_at = world.now
     on_the_board(world, SET_PID, bytes((41, *NAZE_PIDS[1:])))
     world.run(2 * ROUND_S)
@@ -221,7 +221,7 @@ def test_a_board_without_the_commands_is_left_alone() -> None:
     world.run(300)
     asked = requests(world, 0.0)
     assert all(asked.count(command) <= 2 for command in (RC_TUNING, PID, MISC, 34))
-    assert world.bridge.report.whole(world.now).settings is None
+    assert world.bridge.report(world.now).settings is None
     assert not [event for event in world.log_event if event.level == "warning"]
 
 

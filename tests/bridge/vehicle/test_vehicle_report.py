@@ -38,7 +38,7 @@ def test_groups_have_the_values_sent_to_ground_stations() -> None:
     station.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
     world.wait_ready()
     world.run(5.0)
-    report = world.bridge.report.whole(world.now)
+    report = world.bridge.report(world.now)
     attitude, position = last(station, "ATTITUDE"), last(station, "GLOBAL_POSITION_INT")
     assert report.attitude.pitch_deg == pytest.approx(math.degrees(attitude.pitch), abs=1e-4)
     assert report.attitude.roll_deg == pytest.approx(math.degrees(attitude.roll), abs=1e-4)
@@ -63,64 +63,64 @@ def test_groups_have_the_values_sent_to_ground_stations() -> None:
 
 def test_everything_is_unknown_before_a_flight_controller_is_found() -> None:
     world = World(plugged=False)
-    report = world.bridge.report
-    assert {group: report.group(group, world.now) for group in EMPTY} == EMPTY
-    assert report.group(Group.LINK, world.now).state == "no port"
-    assert report.whole(world.now).mission is None
+    bridge = world.bridge
+    assert {group: bridge.group(group, world.now) for group in EMPTY} == EMPTY
+    assert bridge.group(Group.LINK, world.now).state == "no port"
+    assert bridge.report(world.now).mission is None
 
 
 def test_a_lost_link_keeps_the_last_values() -> None:
     world = World()
     world.wait_ready()
     world.run(3.0)
-    report = world.bridge.report
-    known = {group: without_age(report.group(group, world.now)) for group in EMPTY}
+    bridge = world.bridge
+    known = {group: without_age(bridge.group(group, world.now)) for group in EMPTY}
     assert None not in (known[Group.POSITION].lat_deg, known[Group.ATTITUDE].roll_deg)
     world.unplug()
     world.run(10)
-    assert {group: without_age(report.group(group, world.now)) for group in EMPTY} == known
-    assert all(report.group(group, world.now).age_s > 9 for group in EMPTY)
+    assert {group: without_age(bridge.group(group, world.now)) for group in EMPTY} == known
+    assert all(bridge.group(group, world.now).age_s > 9 for group in EMPTY)
 
 
 def test_watched_groups_are_polled_and_published_with_each_reply() -> None:
     world = World()
     world.wait_ready()
-    report = world.bridge.report
-    assert report.take_fresh() == frozenset()
-    report.watch({Group.ATTITUDE})
+    bridge = world.bridge
+    assert bridge.take_fresh() == frozenset()
+    bridge.watch({Group.ATTITUDE})
     found = 0
     for _ in range(100):
         world.run(0.02)
-        fresh = report.take_fresh()
+        fresh = bridge.take_fresh()
         assert fresh <= {Group.ATTITUDE}
         found += len(fresh)
     assert 15 <= found <= 25
-    report.watch(())
+    bridge.watch(())
     world.run(2.0)
-    assert report.take_fresh() == frozenset()
+    assert bridge.take_fresh() == frozenset()
 
 
 def test_the_age_of_a_value_grows_while_the_bridge_hears_nothing_and_has_nothing_to_do() -> None:
     world, autopilot, _ = passing()
-    world.bridge.report.watch(Group)
+    world.bridge.watch(Group)
     autopilot.send(m.MAVLink_attitude_message(1, 0.25, 0, 0, 0, 0, 0))
     world.run(0.1)
     heard_at = world.now
     world.unplug()
     # No tick and no input in between: the age is that of the moment of the question.
-    assert world.bridge.report.group(Group.ATTITUDE, heard_at + 10).age_s == pytest.approx(10, abs=0.2)
-    assert world.bridge.report.whole(heard_at + 10).attitude.age_s == pytest.approx(10, abs=0.2)
+    assert world.bridge.group(Group.ATTITUDE, heard_at + 10).age_s == pytest.approx(10, abs=0.2)
+    assert world.bridge.report(heard_at + 10).attitude.age_s == pytest.approx(10, abs=0.2)
 
 
 def test_groups_continue_when_an_armed_harakiri_switches_to_mavlink() -> None:
     world = World(SimOptions(tele_prot=TelemetryProtocol.MAVLINK))
     world.wait_ready()
     world.run(2.0)
-    before = world.bridge.report.whole(world.now)
+    before = world.bridge.report(world.now)
     world.faults.armed = True
     world.wait_until(lambda w: w.kind is harakiri.MAVLINK, 10)
     world.run(3.0)
-    now = world.bridge.report.whole(world.now)
+    now = world.bridge.report(world.now)
     assert now.status.armed
     assert now.position.lat_deg == pytest.approx(before.position.lat_deg, abs=0.01)
     assert now.battery.voltage_v == pytest.approx(before.battery.voltage_v, abs=1.0)

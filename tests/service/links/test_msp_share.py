@@ -69,7 +69,7 @@ async def sharing(address: str, *, write: bool = False) -> AsyncIterator[Daemon]
     try:
         async with asyncio.timeout(TIMEOUT_S):
             bridge = daemon.bridge
-            while bridge.session.vehicle.armed is None or bridge.runner.is_busy:  # noqa: ASYNC110
+            while bridge.vehicle.armed is None or bridge.is_busy:  # noqa: ASYNC110
                 await asyncio.sleep(0.01)
         yield daemon
     finally:
@@ -131,7 +131,7 @@ async def test_a_change_is_passed_on_if_allowed() -> None:
 
 async def test_no_change_is_passed_on_while_armed(monkeypatch: pytest.MonkeyPatch) -> None:
     async with shared(write=True) as (daemon, program):
-        monkeypatch.setattr(type(daemon.bridge.session.vehicle), "armed", True)
+        monkeypatch.setattr(type(daemon.bridge.vehicle), "armed", True)
         (reply,) = await program.ask(IDENT)  # the bridge knows it
         assert reply.direction is Direction.REPLY
         assert await program.is_closed_after(EEPROM_WRITE)
@@ -143,7 +143,7 @@ async def test_a_mission_transfer_is_not_disturbed() -> None:
         items = load_mission(Path(__file__).parents[3] / "examples" / "long-146.waypoints")
         pushing = asyncio.create_task(DaemonApi(daemon).push(items, "test", lambda _: None))
         async with asyncio.timeout(TIMEOUT_S):
-            while not daemon.bridge.runner.is_busy:  # noqa: ASYNC110
+            while not daemon.bridge.is_busy:  # noqa: ASYNC110
                 await asyncio.sleep(0)
             (known,) = await program.ask(IDENT)
             assert not pushing.done()
@@ -262,4 +262,4 @@ async def test_an_empty_setter_is_no_read(monkeypatch: pytest.MonkeyPatch) -> No
             assert after == before
         (status,) = await program.ask(STATUS)
         assert not int.from_bytes(status.payload[6:10], "little") & ARMED
-        assert daemon.bridge.session.vehicle.armed is False
+        assert daemon.bridge.vehicle.armed is False

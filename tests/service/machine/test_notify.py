@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from bridge.bridge import Bridge
 from service.daemon.daemon import Daemon
 from service.daemon.lifecycle import run_until_signal
 from service.machine.notify import Notifier
@@ -96,10 +97,10 @@ async def test_a_bridge_that_no_longer_ticks_does_not_feed_the_watchdog(
     running = asyncio.create_task(run_until_signal(daemon, Notifier(), lambda: daemon.settings))
     await next_feed(systemd, 0)
 
-    def bug() -> float:
+    def bug(_bridge: Bridge) -> float:
         raise BugError
 
-    monkeypatch.setattr(daemon.bridge, "next_deadline", bug)
+    monkeypatch.setattr(Bridge, "due", property(bug))
     await until_async(lambda: not daemon.is_ticking, "the end of the ticks")
     fed = systemd.listen().count("WATCHDOG=1")
     await asyncio.sleep(1.0)

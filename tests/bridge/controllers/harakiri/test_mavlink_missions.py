@@ -38,7 +38,7 @@ def mavlink_only(
     world = World(peer=board, faults=faults, speeds=(115200,), seed=seed)
     world.store.missions += [] if pending is None else [(pending, None)]
     world.wait_until(lambda w: w.kind is harakiri.MAVLINK, 8)
-    world.wait_until(lambda w: w.bridge.session.vehicle.armed is False and not w.bridge.runner.is_busy, 8)
+    world.wait_until(lambda w: w.bridge.vehicle.armed is False and not w.bridge.is_busy, 8)
     return world, GroundStation(world)
 
 
@@ -90,7 +90,7 @@ def test_an_earlier_list_is_read() -> None:
     world.unplug()
     world.plug()
     world.wait_until(lambda w: w.kind is harakiri.MAVLINK, 8)
-    world.wait_until(lambda w: w.bridge.session.vehicle.armed is False, 8)
+    world.wait_until(lambda w: w.bridge.vehicle.armed is False, 8)
     read = Download(station).run()
     assert read is not None
     # The region of interest, too, is returned as sent: the list is recognised.
@@ -104,7 +104,7 @@ def test_an_empty_list_clears_the_board() -> None:
     assert world.stored == ()
     (home,) = Download(station).run()
     assert (home.seq, home.command) == (0, 16)
-    assert (home.lat_e7, home.lon_e7) == world.bridge.session.vehicle.place()
+    assert (home.lat_e7, home.lon_e7) == world.bridge.vehicle.place()
 
 
 def test_an_upload_while_armed_is_denied() -> None:
@@ -178,7 +178,7 @@ def test_an_item_with_impossible_values_ends_the_reading(x: float, z: float) -> 
     wrong = messages.MAVLink_mission_item_message(255, 190, 1, 3, 16, 0, 1, 0, 2, 0, 0, x, 8.4, z)
     frame = bytes(wrong.pack(messages.MAVLink(None, srcSystem=1, srcComponent=200), force_mavlink1=True))
     answers: list[HeldMission | Refusal] = []
-    world.bridge.local.pull(answers.append, world.now)
+    world.bridge.pull(answers.append, world.now)
     end = world.now + 30
     while not answers and world.now < end:
         world.run(0.01)

@@ -165,7 +165,7 @@ def test_a_pull_over_a_bad_line_is_exact_or_fails() -> None:
         world.faults.bit_error_rate = 1e-3
         world.bridge.missions.held = None
         answers: list[HeldMission | Refusal] = []
-        world.bridge.local.pull(answers.append, world.now)
+        world.bridge.pull(answers.append, world.now)
         world.wait_until(lambda _, answers=answers: bool(answers), 60)  # type: ignore[misc]
         if isinstance(answers[0], HeldMission):
             held += 1
@@ -219,7 +219,7 @@ def test_a_port_lost_at_any_moment_leaves_the_old_list_or_the_new_one() -> None:
     def inject(world: World, draw: random.Random) -> None:
         def unplug() -> None:
             world.unplug()
-            world.after(0, lambda: busy.append(world.bridge.runner.is_busy))
+            world.after(0, lambda: busy.append(world.bridge.is_busy))
 
         begin = draw.random() * 0.4
         world.after(begin, unplug)

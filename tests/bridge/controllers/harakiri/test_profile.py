@@ -45,4 +45,4 @@ def test_the_arm_box_is_found_by_its_name() -> None:
         world = World(peer=MspFake({100: ident(241, 0), 2: b"MWII", 116: boxes, 101: status}))
         world.wait_until(lambda w: w.is_found, 3)
         world.run(1)
-        assert world.bridge.session.vehicle.armed is True
+        assert world.bridge.vehicle.armed is True

@@ -185,7 +185,7 @@ def test_polls_to_a_slow_board_are_not_lost() -> None:
 
 def test_mission_progress_is_reported_item_by_item() -> None:
     board, world, station = board_with()
-    home = world.bridge.session.vehicle.home
+    home = world.bridge.vehicle.home
     assert home is not None
     legs = [MissionItem(n, 16, 3, 0, 0, 0, 0, home.lat_e7 + 900 * n, home.lon_e7, 10.0) for n in (1, 2, 3)]
     speed = MissionItem(0, 178, 3, 1, 5, 0, 0, 0, 0, 0)
@@ -234,7 +234,7 @@ def test_a_stop_during_a_transfer_loads_the_old_list_again() -> None:
     assert Upload(station, plan(10)).run() is ACCEPTED
     upload = Upload(station, plan(100, 1))
     world.run(0.4)
-    world.bridge.runner.stop(world.now)
+    world.bridge.abort(world.now)
     assert upload.run(2) is DENIED
     assert any("stopped during the write" in text for text in station.texts())
     assert without_home(Download(station).run()) == without_home(plan(10))

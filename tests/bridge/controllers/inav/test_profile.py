@@ -20,4 +20,4 @@ def test_the_board_is_recognised_by_its_answers(make: Callable[[], FakeInav], ki
     assert world.kind is kind
     assert world.bridge.session.state.controller is not None
     assert world.bridge.session.state.controller.capacity == capacity
-    assert world.bridge.session.vehicle.armed is False
+    assert world.bridge.vehicle.armed is False

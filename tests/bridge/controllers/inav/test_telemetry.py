@@ -91,7 +91,7 @@ def test_a_failsafe_is_critical_at_once_and_only_in_flight(platform: int, failsa
 
 def test_load_battery_percentage_and_cells_come_from_the_board() -> None:
     _, world, station = introduced()
-    power, health = world.bridge.session.vehicle.last(Power), world.bridge.session.vehicle.last(Health)
+    power, health = world.bridge.vehicle.last(Power), world.bridge.vehicle.last(Health)
     assert power is not None
     assert health is not None
     assert (power.cells, power.remaining_percent, power.drawn_mah) == (3, 88, 120)
@@ -104,7 +104,7 @@ def test_load_battery_percentage_and_cells_come_from_the_board() -> None:
 @pytest.mark.parametrize("unix_s", [0.0, 1_777_636_800.0])
 def test_the_boards_time_is_known_once_its_gps_has_it(unix_s: float) -> None:
     _, world, _ = introduced(unix_s=unix_s)
-    time = world.bridge.session.vehicle.last(GpsTime)
+    time = world.bridge.vehicle.last(GpsTime)
     assert (time is not None) == bool(unix_s)
     if time is not None:
         assert time.unix_s - unix_s == pytest.approx(time.heard_at, abs=0.1)
@@ -136,7 +136,7 @@ def test_the_current_item_is_reported_together_with_nav_status() -> None:
     while not seen or station.messages("MISSION_CURRENT")[-1].mission_state != messages.MISSION_STATE_COMPLETE:
         assert world.now < 100
         world.run(0.1)
-        leg = world.bridge.session.vehicle.last(MissionLeg)
+        leg = world.bridge.vehicle.last(MissionLeg)
         if leg is not None and leg.status.mode == NavMode.MISSION:
             seen.add(leg.status.number)
             assert station.messages("MISSION_CURRENT")[-1].seq == leg.status.number

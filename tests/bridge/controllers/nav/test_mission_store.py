@@ -125,7 +125,7 @@ def test_the_arming_state_is_read_before_a_transfer() -> None:
     upload = Upload(GroundStation(world, "far", radio=Radio(delay_s=0.02)), plan(10))
     world.run_until(lambda _: len(upload.requested) == 10, 5)
     inav.armed = True
-    assert world.bridge.session.vehicle.armed is False
+    assert world.bridge.vehicle.armed is False
     assert upload.run() is DENIED
     assert inav.writes == 0
 
@@ -146,7 +146,7 @@ def test_after_arming_during_a_transfer_the_last_record_is_not_sent() -> None:
     assert not inav.is_valid
     assert len(inav.records) < 59
     assert any("armed during the write" in text for text in station.texts())
-    assert world.bridge.missions.held is None
+    assert world.bridge.held is None
 
 
 def test_a_save_that_fails_is_reported() -> None:
@@ -169,7 +169,7 @@ def test_a_cleared_list_is_one_return_home_and_reads_as_empty() -> None:
         assert download.run()[1:] == []
         assert download.count == 1  # home
         other, other_station = found(board)
-        assert other.bridge.missions.held is not None
+        assert other.bridge.held is not None
         assert Download(other_station).run()[1:] == []
 
 
@@ -309,6 +309,6 @@ def test_multiwii_reports_the_current_in_tenths_of_an_ampere() -> None:
     board.answers = {**board.answers, 110: struct.pack("<BHHH", 120, 500, 0, 125)}
     world, _ = found(board)
     world.run(2)
-    power = world.bridge.session.vehicle.last(Power)
+    power = world.bridge.vehicle.last(Power)
     assert power is not None
     assert (power.current_a, power.drawn_mah) == (12.5, 500)

@@ -66,7 +66,7 @@ class Bench:
         self.faults.armed = True
         self.world.run(3)
         assert self.board.armed
-        held = self.world.bridge.missions.held
+        held = self.world.bridge.held
         self.faults.armed = False
         self.world.run(3)
         return [] if held is None else [record.pack() for record in held.records]
@@ -85,7 +85,7 @@ def others_of(bench: Bench) -> list[list[bytes]]:
     def packed_records(held: HeldMission) -> list[bytes]:
         return [record.pack() for record in held.records]
 
-    return [packed_records(held) for held in bench.world.bridge.missions.others]
+    return [packed_records(held) for held in bench.world.bridge.others]
 
 
 # -- several missions ----------------------------------------------------------------------------------------
@@ -162,7 +162,7 @@ def test_after_a_failed_push_all_missions_are_restored() -> None:
     bench = Bench(4, 6)
     upload = Upload(bench.station, plan(100, 7))
     bench.world.run(0.4)
-    bench.world.bridge.runner.stop(bench.world.now)
+    bench.world.bridge.abort(bench.world.now)
     upload.run(2)
     bench.world.run(3)
     assert bench.stored() == sets(4, 6)
@@ -216,7 +216,7 @@ def test_while_armed_the_missing_mission_is_reported_but_not_loaded() -> None:
 
 def pulled(bench: Bench) -> HeldMission | Refusal:
     answers: list[HeldMission | Refusal] = []
-    bench.world.bridge.local.pull(answers.append, bench.world.now)
+    bench.world.bridge.pull(answers.append, bench.world.now)
     bench.world.wait_until(lambda _: bool(answers), 30)
     return answers[0]
 
@@ -256,7 +256,7 @@ def test_a_mission_selected_by_sticks_is_noticed_within_two_seconds(armed: bool)
     bench.world.run(3)
     bench.faults.selected_mission = 2
     bench.world.run(2.0)
-    held = bench.world.bridge.missions.held
+    held = bench.world.bridge.held
     assert held is not None
     assert [record.pack() for record in held.records] == sets(4, 6)[1]
     assert "changed: 6 records" in bench.text()
@@ -271,7 +271,7 @@ def test_another_clients_list_is_noticed_and_its_progress_is_correct() -> None:
     bench.faults.stick_loads += 1
     bench.world.run(2.0)
     assert "changed: 4 records" in bench.text()
-    held = bench.world.bridge.missions.held
+    held = bench.world.bridge.held
     assert held is not None
     assert [record.pack() for record in held.records] == sets(4)[0]
     bench.faults.armed, bench.faults.boxes = True, NAV_WP
@@ -302,7 +302,7 @@ def test_a_list_of_the_same_size_is_noticed_within_two_seconds(kind: str, size: 
         MultiWiiMission(memoryview(eeprom), options.capacity).store(size // 2, unpack_waypoint(b"\0" + changed)[1])
     world.run(2.0)
     assert f"Mission on the flight controller changed: {size} records" in " ".join(station.texts())
-    assert [record.pack() for record in world.bridge.missions.held.records] == packed(moved)  # type: ignore[union-attr]
+    assert [record.pack() for record in world.bridge.held.records] == packed(moved)  # type: ignore[union-attr]
 
 
 def with_the_longest_list(streams_hz: int = 0) -> tuple[MspBoard, World, GroundStation]:
@@ -324,7 +324,7 @@ def test_another_list_of_the_longest_size_is_noticed_within_two_seconds(streams_
         mission.write(number, unpack_waypoint(bytes((number,)) + record)[1])
     world.run(2.0)
     assert f"Mission on the flight controller changed: {CAPACITY} records" in " ".join(station.texts())
-    assert [record.pack() for record in world.bridge.missions.held.records] == other  # type: ignore[union-attr]
+    assert [record.pack() for record in world.bridge.held.records] == other  # type: ignore[union-attr]
 
 
 def test_one_changed_record_in_the_longest_list_is_noticed_from_the_upload() -> None:
@@ -350,10 +350,10 @@ def test_a_reloaded_former_list_is_noticed_within_two_seconds(streams_hz: int) -
     for number, record in enumerate(records, 1):
         mission.write(number, unpack_waypoint(bytes((number,)) + record)[1])
     world.run(10)
-    assert [record.pack() for record in world.bridge.missions.held.records] == records  # type: ignore[union-attr]
+    assert [record.pack() for record in world.bridge.held.records] == records  # type: ignore[union-attr]
     mission.load()
     world.run(2.0)
-    assert [record.pack() for record in world.bridge.missions.held.records] == ours  # type: ignore[union-attr]
+    assert [record.pack() for record in world.bridge.held.records] == ours  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize("streams_hz", [0, 50])
@@ -366,7 +366,7 @@ def test_a_list_that_the_sticks_load_is_read_at_once(streams_hz: int) -> None:
         board._eeprom[(number - 1) * WAYPOINT_SIZE + 1 : number * WAYPOINT_SIZE] = changed
         board.faults.stick_loads += 1
         world.run(3)
-        assert world.bridge.missions.held.records[number - 1].pack() == changed  # type: ignore[union-attr]
+        assert world.bridge.held.records[number - 1].pack() == changed  # type: ignore[union-attr]
 
 
 def test_a_list_that_another_client_is_writing_is_reported_once_it_is_complete() -> None:

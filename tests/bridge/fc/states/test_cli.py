@@ -44,9 +44,9 @@ def type_exit(world: World) -> bytes:
     received: list[bytes] = []
     receive = world.bridge.fc_received
 
-    def listen(data: bytes, now: float) -> None:
+    def listen(data: bytes, now: float) -> bool:
         received.append(data)
-        receive(data, now)
+        return receive(data, now)
 
     world.bridge.fc_received = listen  # type: ignore[method-assign]
     world.naze.receive(b"exit\r", world.now)
@@ -76,7 +76,7 @@ def assert_nothing_was_typed(world: World, since: float) -> None:
 def test_it_is_recognised_when_the_port_is_opened(kind: str) -> None:
     world = left_in_cli(BOARDS[kind]())
     station = GroundStation(world)
-    world.bridge.ground.add_default_peer(station.peer, until_answered=False)
+    world.bridge.add_default_peer(station.peer, until_answered=False)
     world.wait_until(is_in_cli, 2)
     (event,) = world.events("fc.in_command_line")
     assert event.facts["speed_baud"] == 115200
@@ -94,7 +94,7 @@ def test_it_is_recognised_when_the_port_is_opened(kind: str) -> None:
 def test_it_is_recognised_in_mid_conversation_and_found_again_after_exit(kind: str) -> None:
     world = World(peer=BOARDS[kind]())
     station = GroundStation(world)
-    world.bridge.ground.add_default_peer(station.peer, until_answered=False)
+    world.bridge.add_default_peer(station.peer, until_answered=False)
     world.wait_ready()
     world.run(5)
     open_command_line(world)

@@ -48,4 +48,4 @@ def test_a_deaf_board_is_recognised_by_its_frsky_telemetry(after_s: float) -> No
     assert world.kind is harakiri.FRSKY
     world.run(20)
     assert world.kind is harakiri.FRSKY
-    assert world.bridge.session.vehicle.fresh(GlobalPosition, world.now) is not None
+    assert world.bridge.vehicle.fresh(GlobalPosition, world.now) is not None

@@ -48,7 +48,7 @@ def wait_for_telemetry(world: World, station: GroundStation, *, armed: bool) -> 
 def test_ground_stations_see_one_vehicle(protocol: TelemetryProtocol, baud: int) -> None:
     world = World(SimOptions(baud=baud, tele_prot=protocol))
     station = GroundStation(world)
-    world.bridge.ground.add_default_peer(station.peer, until_answered=False)
+    world.bridge.add_default_peer(station.peer, until_answered=False)
     world.wait_ready()
     assert Upload(station, waypoints(12)).run() is MissionResult.ACCEPTED
     modes: set[int] = set()
@@ -76,7 +76,7 @@ def test_ground_stations_see_one_vehicle_while_frsky_is_sent(board: type[Simulat
     faults = Faults()
     world = World(faults=faults, peer=board(SimOptions(tele_prot=TelemetryProtocol.FRSKY_9600), faults))
     station = GroundStation(world)
-    world.bridge.ground.add_default_peer(station.peer, until_answered=False)
+    world.bridge.add_default_peer(station.peer, until_answered=False)
     world.wait_ready()
     for _ in range(2):
         station.received.clear()
@@ -114,10 +114,10 @@ def test_a_harakiri_that_disarms_is_asked_for_msp_at_once() -> None:
     world = World(SimOptions(tele_prot=TelemetryProtocol.MAVLINK), speeds=(115200,))
     world.wait_ready()
     world.faults.armed = True
-    world.wait_until(lambda w: w.kind is harakiri.MAVLINK and w.bridge.session.vehicle.armed is True, 8)
+    world.wait_until(lambda w: w.kind is harakiri.MAVLINK and w.bridge.vehicle.armed is True, 8)
     world.run(3.3)
     world.faults.armed = False
-    world.wait_until(lambda w: w.bridge.session.vehicle.armed is False, 5)
+    world.wait_until(lambda w: w.bridge.vehicle.armed is False, 5)
     world.run(0.01)
     assert PROBE in [data for at, _, data in world.written if at >= world.now - 0.02]
 

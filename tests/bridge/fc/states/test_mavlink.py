@@ -38,7 +38,7 @@ def found_as_another(peer: SimulatedNaze) -> World:
 def test_a_harakiri_taken_for_another_autopilot() -> None:
     world = found_as_another(silent_harakiri())
     station = GroundStation(world)
-    world.bridge.ground.add_default_peer(station.peer)
+    world.bridge.add_default_peer(station.peer)
     world.wait_until(lambda w: w.kind is harakiri.MAVLINK, 10)
     world.run(60)
     assert world.kind is harakiri.MAVLINK

@@ -28,7 +28,7 @@ def verdict(world: World) -> bool:
 
 
 def reports_armed(world: World) -> bool | None:
-    return world.bridge.session.vehicle.armed
+    return world.bridge.vehicle.armed
 
 
 @pytest.mark.parametrize("extension", [True, False])
@@ -131,7 +131,7 @@ def test_frsky_telemetry_while_armed_is_ignored() -> None:
     world.faults.armed = True
     world.wait_until(lambda w: w.bridge.session.state.speed == 9600 and w.kind is harakiri.PATCHED, 15)
     world.run(30)
-    assert world.bridge.session.vehicle.armed
+    assert world.bridge.vehicle.armed
     world.faults.armed = False
     world.wait_until(lambda w: w.bridge.session.state.speed == 115200 and w.kind is harakiri.PATCHED, 8)
     assert {event.facts["protocol"] for event in world.events("fc.found")} == {"MSP"}
