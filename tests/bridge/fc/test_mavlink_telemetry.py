@@ -29,20 +29,20 @@ def test_groups_are_made_from_a_mavlink_autopilot() -> None:
     autopilot.outgoing += m.MAVLink_attitude_message(1, 1.0, 1.0, 1.0, 0, 0, 0).pack(gimbal)
     world.run(0.05)
     bridge = world.bridge
-    assert report.take_fresh() == {
+    assert bridge.take_fresh() == {
         Group.ATTITUDE, Group.POSITION, Group.GPS, Group.BATTERY, Group.RC, Group.STATUS
     }  # fmt: skip
-    assert without_age(report.group(Group.ATTITUDE, world.now)) == Attitude(
+    assert without_age(bridge.group(Group.ATTITUDE, world.now)) == Attitude(
         5.73, -11.46, round(math.degrees(-0.3), 2) % 360
     )
-    assert without_age(report.group(Group.POSITION, world.now)) == Position(
+    assert without_age(bridge.group(Group.POSITION, world.now)) == Position(
         45.3838, 8.4733, 131.0, 20.0, 0.5, 1.0, -2.0
     )
-    assert without_age(report.group(Group.GPS, world.now)) == Gps("2D", None, 1.2, None, None)
-    assert without_age(report.group(Group.BATTERY, world.now)) == Battery(12.6, None, None, 3, 100)
-    assert without_age(report.group(Group.RC, world.now)) == Rc((1500, 1501, 1000, 1502), 50.0)
-    assert without_age(report.group(Group.STATUS, world.now)) == Status(True, "4", ("accelerometer", "compass"))
-    assert report.group(Group.LINK, world.now).state == "MAVLink"
+    assert without_age(bridge.group(Group.GPS, world.now)) == Gps("2D", None, 1.2, None, None)
+    assert without_age(bridge.group(Group.BATTERY, world.now)) == Battery(12.6, None, None, 3, 100)
+    assert without_age(bridge.group(Group.RC, world.now)) == Rc((1500, 1501, 1000, 1502), 50.0)
+    assert without_age(bridge.group(Group.STATUS, world.now)) == Status(True, "4", ("accelerometer", "compass"))
+    assert bridge.group(Group.LINK, world.now).state == "MAVLink"
 
 
 def test_an_autopilot_with_a_new_system_id_is_followed() -> None:
