@@ -92,8 +92,6 @@ class Bridge:
         self._config, owner = config, config.settings
         self._emit = emit
         self._was_armed = False
-        #: True while an autopilot speaks MAVLink itself: the bridge then sends nothing in its name.
-        self.is_passing_through = False
         #: The armed craft, for the BridgeConfig of a restarted bridge; it changes rarely. None: it is not armed.
         self.flight = config.flight
         #: True while an autopilot speaks MAVLink itself: the bridge then sends nothing in its name.
