@@ -8,7 +8,7 @@ from simulator.board.options import Faults, SimOptions
 from simulator.emulated_naze.dma import Memory
 from simulator.emulated_naze.flash_controller import PAGE_SIZE
 from simulator.emulated_naze.image import Image
-from simulator.naze.mission_slots import MissionSlots, flash_size
+from simulator.naze.mission_slots import MissionSlots, slot_pages
 
 #: In the struct of flags `f` (mw.h of both trees), ARMED is the second.
 _FLAGS, _ARMED = "f", 1
@@ -49,6 +49,6 @@ class HarakiriMemory:
     def stored_records(self) -> list[bytes]:
         """The list that the patched firmware would load at its next start."""
         options = SimOptions()
-        pages = self._flash[_SLOTS : _SLOTS + flash_size(options) - PAGE_SIZE]
+        pages = self._flash[_SLOTS : _SLOTS + 2 * slot_pages(options.capacity) * PAGE_SIZE]
         slots = MissionSlots(NorFlash(pages, Faults()), options)
         return [slots.read(index, 1) for index in range(slots.stored.count)]

@@ -106,12 +106,18 @@ class SimulatedNaze(SimulatedBoard):
                 heard_ms = min(self.options.reception_ms, self.options.boot_ms)
                 self._uart.discard_arrived(at + (heard_ms - self.options.boot_ms) / 1000)
                 self._uart.keep_arrived(at)
-                self._firmware = Firmware(
-                    self.options, self.faults, self.counters, self._uart, self._flash, self._boot_missions, at
-                )
-                self.power = Power.RUNNING
+                self._start_firmware(at)
         if self._firmware and self.faults.hang:
             self._firmware.hold(now)
+
+    def _start_firmware(self, at: float) -> None:
+        try:
+            self._firmware = Firmware(
+                self.options, self.faults, self.counters, self._uart, self._flash, self._boot_missions, at
+            )
+            self.power = Power.RUNNING
+        except PowerCutError:
+            self._cut_power()
 
     def _run_loop(self, firmware: Firmware, at: float) -> None:
         try:

@@ -84,6 +84,9 @@ class Firmware:
         self._resets_at: float | None = None
 
         self._config = StoredConfig(flash, options)
+        if faults.extension:
+            with contextlib.suppress(FlashError):
+                self._config.finish()
         self._board = Board(options, faults, self._config.load())
         self._missions = boot_missions(flash, self._board) if faults.extension else None
         # The extension enlarges the buffer for its longest CHUNK: mask, number, records.
@@ -189,10 +192,11 @@ class Firmware:
             # With the extension the list has flash of its own; without it, it is part of the configuration.
             if self._missions:
                 self._floppy.save()
+                self._config.stage(self._board.wp_radius_cm)
             self._config.erase()
             if not self._missions:
                 self._floppy.save()
-            self._config.program(self._board.wp_radius_cm)
+            self._config.program(self._board.wp_radius_cm, sealed=self._missions is not None)
         self._stall()
 
     def _stall(self) -> None:

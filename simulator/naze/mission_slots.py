@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Two flash slots for the mission, the newest valid one in use, and the configuration's page.
+"""Two flash slots for the mission, the newest valid one in use, and the configuration's pages.
 
 The layout is that of firmware/naze_mission.h: a header, then the records. The header is programmed after them, its
 seal last: until then the other slot is the list. Staging needs no RAM.
@@ -19,7 +19,10 @@ _SEAL = b"\0\0"
 _SEAL_AT = _HEADER.size + _HEADER_CHECKSUM.size
 _RECORDS_AT = 32
 _MAGIC = 0x4D4E
-_CONFIG = struct.Struct("<HH")
+_CONFIG = struct.Struct("<HHH")  # the seal of the extension's configurations, gps_wp_radius, its inverse
+#: The configuration's place, and the page in which the extension stages it.
+_CONFIG_PAGES = 2
+_CONFIG_SEAL, _NO_SEAL = 0x5EA1, 0xFFFF
 _SLOTS = 2
 _BLANK = bytes((ERASED,)) * PAGE_SIZE
 
@@ -31,7 +34,7 @@ def slot_pages(capacity: int) -> int:
 
 def flash_size(options: SimOptions) -> int:
     """The size of the flash for these options, bytes."""
-    return (_SLOTS * slot_pages(options.capacity) + 1) * PAGE_SIZE
+    return (_SLOTS * slot_pages(options.capacity) + _CONFIG_PAGES) * PAGE_SIZE
 
 
 class MissionSlots:
@@ -135,32 +138,51 @@ def _sealed(header: bytes) -> bytes:
 
 
 class StoredConfig:
-    """The only simulated setting. A power cut between `erase` and `program` loses it, as in Harakiri."""
+    """The only simulated setting.
+
+    Without the extension, a power cut between `erase` and `program` loses it. With it, `stage` keeps it in another page
+    meanwhile, and `finish` completes the write at the next boot (harakiri_config.h).
+    """
 
     def __init__(self, flash: NorFlash, options: SimOptions) -> None:
         self._flash = flash
-        self._page = _SLOTS * slot_pages(options.capacity)
+        self._place = _SLOTS * slot_pages(options.capacity)
         self._default_cm = options.wp_radius_cm
         self._seconds = options.config_write_ms / 1000 / 2
 
     @property
     def is_valid(self) -> bool:
-        value, inverse = self._read()
-        return value ^ inverse == 0xFFFF
+        return self._read(self._place) is not None
 
     def load(self) -> int:
-        """gps_wp_radius, cm; the default if the page is not valid."""
-        return self._read()[0] if self.is_valid else self._default_cm
+        """gps_wp_radius, cm; the default if the place is not valid."""
+        place = self._read(self._place)
+        return place[0] if place else self._default_cm
+
+    def finish(self) -> None:
+        """Complete a write that a power cut has interrupted. FlashError, PowerCutError."""
+        place, staged = self._read(self._place), self._read(self._place + 1)
+        if staged and (place is None or (place[1] == _CONFIG_SEAL and place[0] != staged[0])):
+            self.erase()
+            self.program(staged[0], sealed=True)
+
+    def stage(self, wp_radius_cm: int) -> None:
+        """Keep what is about to be written. FlashError, PowerCutError."""
+        self._flash.erase(self._place + 1, self._seconds / 4)
+        self._program(self._place + 1, wp_radius_cm, _CONFIG_SEAL, self._seconds / 4)
 
     def erase(self) -> None:
         """FlashError, PowerCutError."""
-        self._flash.erase(self._page, self._seconds)
+        self._flash.erase(self._place, self._seconds)
 
-    def program(self, wp_radius_cm: int) -> None:
+    def program(self, wp_radius_cm: int, *, sealed: bool = False) -> None:
         """Write gps_wp_radius to the erased page. FlashError, PowerCutError."""
-        data = _CONFIG.pack(wp_radius_cm, wp_radius_cm ^ 0xFFFF)
-        self._flash.program(self._page * PAGE_SIZE, data, self._seconds)
+        self._program(self._place, wp_radius_cm, _CONFIG_SEAL if sealed else _NO_SEAL, self._seconds)
 
-    def _read(self) -> tuple[int, int]:
-        value, inverse = _CONFIG.unpack(self._flash.read(self._page * PAGE_SIZE, _CONFIG.size))
-        return value, inverse
+    def _program(self, page: int, wp_radius_cm: int, seal: int, seconds: float) -> None:
+        data = _CONFIG.pack(seal, wp_radius_cm, wp_radius_cm ^ 0xFFFF)
+        self._flash.program(page * PAGE_SIZE, data, seconds)
+
+    def _read(self, page: int) -> tuple[int, int] | None:
+        seal, value, inverse = _CONFIG.unpack(self._flash.read(page * PAGE_SIZE, _CONFIG.size))
+        return (value, seal) if value ^ inverse == 0xFFFF else None

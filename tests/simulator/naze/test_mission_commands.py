@@ -450,19 +450,20 @@ def test_a_power_cut_at_any_flash_operation_leaves_the_old_list_or_the_new_one(o
     assert bench.pull() == new
 
 
-def test_a_power_cut_in_the_configuration_loses_it_but_not_the_list() -> None:
-    """Harakiri has one copy of its configuration, apart from the slots."""
+@pytest.mark.parametrize("operation", range(1, 5))
+def test_a_power_cut_in_the_configuration_leaves_the_old_or_the_new_one(operation: int) -> None:
+    """Its staged page is erased and programmed, then its place."""
     bench = Bench()
     bench.push(mission(7))
     bench.payload(encode_radius(350))
     bench.run(1.5)
     bench.payload(encode_radius(500))
-    bench.naze.faults.power_cut_at_flash_operation = 2
+    bench.naze.faults.power_cut_at_flash_operation = operation
     bench.run(1.5)
     assert bench.naze.power is Power.OFF
     bench.naze.power_on(bench.now)
     bench.run(BOOT_SECONDS + 0.1)
-    assert info(bench).wp_radius_cm == 200
+    assert info(bench).wp_radius_cm == (350 if operation <= 2 else 500)
     assert bench.pull() == mission(7)
 
 
