@@ -17,7 +17,7 @@ from protocols.mission_item import Command
 from tests.support.doc_pages import blocks
 from tests.support.fleet_bench import Fleet
 from tests.support.plan import HOME, PlanRow, judge, plain_plan, plan_file, records_of, waypoint
-from tests.support.programs import run_naze_bridge, until
+from tests.support.programs import until
 from tests.support.zenoh_router import EXAMPLES
 
 NAMES = ("kite", "owl", "swift")
@@ -216,8 +216,3 @@ def test_a_vehicle_without_commands_is_reported(fleet: Fleet, tmp_path: Path) ->
         assert "accepts no commands" in pushed["deaf"]["error"]
     finally:
         deaf.end()
-
-
-def test_help_lists_every_command() -> None:
-    result = run_naze_bridge("fleet", "--help").stdout
-    assert [name for name in ("list", "watch", "push", "pull") if f"  {name} " not in result] == []

@@ -130,13 +130,6 @@ def test_a_name_that_is_not_a_members_is_refused_and_changes_nothing(enrolled: E
     assert files() == before
 
 
-def test_a_vehicle_with_any_name_has_a_rule_of_its_own(tmp_path: Path) -> None:
-    for name in ("asked", "answered", "everything"):
-        assert run_naze_bridge("fleet", "enroll", name, "--folder", tmp_path).returncode == 0
-    rules = [rule["id"] for rule in json.loads((tmp_path / "router.json5").read_text())["access_control"]["rules"]]
-    assert len(set(rules)) == len(rules)
-
-
 def test_a_wrong_and_a_missing_login_are_told_apart(enrolled: Enrolled, tmp_path: Path) -> None:
     config = json.loads((enrolled.folder / "pilot.json5").read_text())
     config["transport"]["auth"]["usrpwd"]["password"] += "?"
@@ -146,15 +139,3 @@ def test_a_wrong_and_a_missing_login_are_told_apart(enrolled: Enrolled, tmp_path
     assert (refused.returncode, "does not accept this user and password" in refused.stderr) == (1, True), refused
     nobody = run_naze_bridge("fleet", "list", "--connect", enrolled.endpoint)
     assert "requires a user and a password" in nobody.stderr, nobody
-
-
-def test_a_full_router_is_reported(tmp_path: Path) -> None:
-    endpoint = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
-    config = tmp_path / "router.json5"
-    config.write_text(json.dumps({"listen": {"endpoints": [endpoint]}, "transport": {"unicast": {"max_sessions": 1}}}))
-    first = zenoh.Config()
-    first.insert_json5("mode", '"client"')
-    first.insert_json5("connect/endpoints", json.dumps([endpoint]))
-    with running_router(tmp_path, endpoint, config), zenoh.open(first):
-        refused = run_naze_bridge("fleet", "list", "--connect", endpoint)
-        assert "accepts no more sessions: raise transport/unicast/max_sessions" in refused.stderr, refused

@@ -129,3 +129,10 @@ def test_a_stalled_subscriber_delays_nothing(start: Starter) -> None:
         bench.board.assert_unharmed()
         assert bench.daemon.end() == 0
     assert "Traceback" not in bench.daemon.printed
+
+
+def test_a_failed_connection_is_reported_with_its_reason(start: Starter) -> None:
+    where = endpoint()
+    bench = zenoh_bench(start, f'connect = ["{where}"]')
+    alone = until(lambda: bench.daemon.has_logged("zenoh.alone"), "a log entry about it")
+    assert alone["why"] == f"{where}: no router is running there (connection refused)"

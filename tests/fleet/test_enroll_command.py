@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The enroll command: rules of its own for each name, a full router."""
+
+import json
+import socket
+from pathlib import Path
+
+import zenoh
+
+from tests.support.programs import free_port, run_naze_bridge
+from tests.support.zenoh_router import running_router
+
+
+def test_a_vehicle_with_any_name_has_a_rule_of_its_own(tmp_path: Path) -> None:
+    for name in ("asked", "answered", "everything"):
+        assert run_naze_bridge("fleet", "enroll", name, "--folder", tmp_path).returncode == 0
+    rules = [rule["id"] for rule in json.loads((tmp_path / "router.json5").read_text())["access_control"]["rules"]]
+    assert len(set(rules)) == len(rules)
+
+
+def test_a_full_router_is_reported(tmp_path: Path) -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+    config = tmp_path / "router.json5"
+    config.write_text(json.dumps({"listen": {"endpoints": [endpoint]}, "transport": {"unicast": {"max_sessions": 1}}}))
+    first = zenoh.Config()
+    first.insert_json5("mode", '"client"')
+    first.insert_json5("connect/endpoints", json.dumps([endpoint]))
+    with running_router(tmp_path, endpoint, config), zenoh.open(first):
+        refused = run_naze_bridge("fleet", "list", "--connect", endpoint)
+        assert "accepts no more sessions: raise transport/unicast/max_sessions" in refused.stderr, refused

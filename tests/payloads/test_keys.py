@@ -1,0 +1,20 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The keys of a vehicle."""
+
+from payloads.keys import COMMAND_KEYS, COMMANDS, KEYS, MAVLINK_IN, QueryKind, full, vehicle_in
+
+
+def test_no_two_keys_are_alike() -> None:
+    assert len({key.suffix for key in KEYS}) == len(KEYS)
+
+
+def test_a_wildcard_over_telemetry_reaches_no_command_and_no_mavlink() -> None:
+    """zenoh's `**` matches no chunk that begins with @."""
+    assert all(key.suffix.startswith("@") for key in (*COMMAND_KEYS, MAVLINK_IN))
+    assert {key for key in KEYS if key.query_kind is QueryKind.COMMAND} == set(COMMAND_KEYS)
+    assert {key for key in KEYS if key.suffix.startswith(COMMANDS)} == set(COMMAND_KEYS)
+    assert not any(key.is_published for key in (*COMMAND_KEYS, MAVLINK_IN))
+
+
+def test_a_key_names_its_vehicle() -> None:
+    assert all(vehicle_in(full("fleet", "kite", key.suffix)) == "kite" for key in KEYS)

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The effect of MAVLink messages: unknown ones are never harmless."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+from protocols.rights.effect import Effect
+from protocols.rights.mavlink import COMMANDS, effect_of
+
+SENDER = mavlink.MAVLink(None, srcSystem=255)
+
+
+def frame(message: mavlink.MAVLink_message) -> MavlinkFrame:
+    (found,) = MavlinkSplitter().feed(message.pack(SENDER))
+    return found
+
+
+@given(command=st.integers(0, 65535).filter(lambda number: number not in COMMANDS))
+def test_a_command_without_a_row_moves_the_craft(command: int) -> None:
+    long = mavlink.MAVLink_command_long_message(1, 1, command, 0, 0, 0, 0, 0, 0, 0, 0)
+    whole = mavlink.MAVLink_command_int_message(1, 1, 0, command, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+    assert effect_of(frame(long)) is effect_of(frame(whole)) is Effect.MOVE
+
+
+@pytest.mark.parametrize(
+    ("interval_us", "effect"),
+    [(0, Effect.RATE), (1e6, Effect.RATE), (-1, Effect.SILENCE), (1e7, Effect.SILENCE), (math.nan, Effect.SILENCE)],
+)
+def test_a_message_that_would_come_less_than_once_a_second_is_silenced(interval_us: float, effect: Effect) -> None:
+    number = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
+    assert (
+        effect_of(frame(mavlink.MAVLink_command_long_message(1, 1, number, 0, 30, interval_us, 0, 0, 0, 0, 0)))
+        is effect
+    )
+
+
+@pytest.mark.parametrize(("current", "effect"), [(0, Effect.CHANGE), (1, Effect.CHANGE), (2, Effect.MOVE)])
+def test_an_item_that_is_flown_to_at_once_is_no_upload(current: int, effect: Effect) -> None:
+    item = mavlink.MAVLink_mission_item_int_message(1, 1, 0, 3, 16, current, 1, 0, 0, 0, 0, 0, 0, 0.0)
+    assert effect_of(frame(item)) is effect
+
+
+def test_arming_moves_and_a_request_for_the_list_changes_nothing() -> None:
+    arm = mavlink.MAVLink_command_long_message(1, 1, mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, 1, 0, 0, 0, 0, 0, 0)
+    assert effect_of(frame(arm)) is Effect.MOVE
+    assert effect_of(frame(mavlink.MAVLink_mission_request_list_message(1, 1))) is Effect.DIALOGUE
