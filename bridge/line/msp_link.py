@@ -222,7 +222,8 @@ class MspLink:
     def receive(self, data: bytes, now: float) -> list[MspFrame]:
         """Take bytes from the port; return the replies, matched with their requests."""
         self._last_byte_at = now
-        return self._take(self.parser.feed(data), now)
+        frames = self.parser.feed(data)
+        return self._take(frames, now) if frames else frames
 
     def tick(self, now: float) -> list[MspFrame]:
         """Time out requests; return replies that were hidden behind a false header."""

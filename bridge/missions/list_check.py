@@ -30,20 +30,17 @@ class Range:
 
     def fit(self, value: float) -> int:
         """Truncate toward zero, then clamp; NaN and infinities count as 0."""
-        return min(max(_whole(value), self.low), self.high) or self.instead_of_zero
+        whole = math.trunc(value) if math.isfinite(value) else 0
+        return min(max(whole, self.low), self.high) or self.instead_of_zero
 
     def reason(self, value: float) -> str:
         """The reason that `value` is not stored unchanged."""
         if not math.isfinite(value):
             return "not a number"
-        whole = _whole(value)
+        whole = math.trunc(value)
         if whole == 0 and self.instead_of_zero:
             return "less than 1" if value else "0 not allowed"
         return "whole numbers only" if self.low != self.high and self.fit(value) == whole else self.why
-
-
-def _whole(value: float) -> int:
-    return math.trunc(value) if math.isfinite(value) else 0
 
 
 UNUSED = Range(0, 0, "not used")
@@ -101,6 +98,12 @@ class ListCheck(ABC):
     def _fit(self, item: MissionItem, name: str, allowed: Range, news: News = News.NOTICE) -> int:
         """Convert one field to a whole number that can be stored."""
         value: float = getattr(item, name)
+        if (
+            allowed.low <= value <= allowed.high
+            and value == (stored := int(value))
+            and (value or not allowed.instead_of_zero)
+        ):
+            return stored
         stored = allowed.fit(value)
         if stored != (0 if math.isnan(value) else value):
             self._note(item, name, given(value), stored, allowed.reason(value), news)

@@ -1,23 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Converts MissionItem to and from MISSION_ITEM and MISSION_ITEM_INT (https://mavlink.io/en/services/mission.html)."""
 
+from dataclasses import replace
+
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import MissionItem, degrees_to_e7
 
 
 def item_from_float_message(message: Message) -> MissionItem:
     """Read MISSION_ITEM: its coordinates are float degrees."""
-    return _item(message, degrees_to_e7(message.x), degrees_to_e7(message.y))
+    return replace(item_from_int_message(message), lat_e7=degrees_to_e7(message.x), lon_e7=degrees_to_e7(message.y))
 
 
 def item_from_int_message(message: Message) -> MissionItem:
     """Read MISSION_ITEM_INT: its coordinates are exact."""
-    return _item(message, message.x, message.y)
-
-
-def _item(message: Message, lat_e7: int | None, lon_e7: int | None) -> MissionItem:
     params = (message.param1, message.param2, message.param3, message.param4)
-    return MissionItem(message.seq, message.command, message.frame, *params, lat_e7, lon_e7, message.z)
+    return MissionItem(message.seq, message.command, message.frame, *params, message.x, message.y, message.z)
 
 
 def item_message(item: MissionItem, sysid: int, compid: int, *, as_int: bool) -> Message:

@@ -119,7 +119,7 @@ class HarakiriCheck(ListCheck):
         if rule is None:
             self._leave_out(item)
             return None
-        if fault := self._misplaced(item.seq, rule):
+        if rule.place is not InList.ANY and (fault := self._misplaced(item.seq, rule)):
             return reject(MissionResult.INVALID, item, "command", fault)
         if rule.position and (rejection := refuse_position(item)):
             return rejection
