@@ -346,7 +346,7 @@ class Bridge:
         if is_watched:
             self.session.settle_telemetry()
         if self.vehicle.news:
-            news = self.vehicle.take_news()
+            news, self.vehicle.news = self.vehicle.news, set()
             if is_watched:
                 self._reporter.heard(news)
             if not self.is_passing_through:

@@ -6,7 +6,6 @@ metrics. Units are SI, angles are in degrees. None means unknown. A reading keep
 which separates old values from current ones; a lost link clears nothing.
 """
 
-from collections.abc import Set
 from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
 from typing import Protocol, TypeVar
@@ -240,7 +239,7 @@ class Vehicle:
         self.heard_at: float | None = None
         self.track = GroundTrack()
         self._readings.clear()
-        #: The kinds of readings heard since the last `take_news`.
+        #: The kinds of readings heard; their reader replaces the set.
         self.news: set[type[Reading]] = set()
         self._cells = 1
         #: False before the first arming, while home is only the place of the craft.
@@ -348,11 +347,6 @@ class Vehicle:
         """The latest reading of a kind, unless it is stale."""
         reading = self.last(kind)
         return reading if reading is not None and now <= reading.heard_at + stale_s else None
-
-    def take_news(self) -> Set[type[Reading]]:
-        """Return and clear `news`."""
-        news, self.news = self.news, set()
-        return news
 
     def home_or_position(self) -> Home | None:
         """Home; before it is known, the current position, at the altitude of the launch."""

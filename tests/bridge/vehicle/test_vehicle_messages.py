@@ -77,7 +77,7 @@ def test_errors_and_short_replies_change_nothing() -> None:
     for poll in Msp:
         hear_msp(state, MspFrame(Direction.ERROR, poll, bytes(40)), HARAKIRI, 0.0)
         hear_msp(state, MspFrame(Direction.REPLY, poll, b"\x01"), HARAKIRI, 0.0)
-    assert (state.take_news(), state.home) == (frozenset(), None)
+    assert (state.news, state.home) == (set(), None)
 
 
 @pytest.mark.parametrize("fill", [0x00, 0x01, 0x7F, 0x80, 0xFF])
@@ -127,9 +127,9 @@ def test_a_first_fix_in_motion_has_no_direction_yet() -> None:
 def test_the_height_is_shown_without_a_fix() -> None:
     """Mission Planner shows only relative_alt of GLOBAL_POSITION_INT. ArduPilot sends the last known place, too."""
     state = with_replies(Vehicle(), HARAKIRI, STATUS=status(), ALTITUDE=struct.pack("<ih", 3000, -70))
-    state.take_news()
+    state.news.clear()
     with_replies(state, HARAKIRI, RAW_GPS=gps(fix=0))
-    assert GlobalPosition in state.take_news()  # so it is sent
+    assert GlobalPosition in state.news  # so it is sent
     position = fields(make.global_position_int(at(state)))
     assert (position["lat"], position["lon"], position["relative_alt"], position["vz"]) == (0, 0, 30000, 70)
     with_replies(state, HARAKIRI, RAW_GPS=gps())
