@@ -366,7 +366,8 @@ class MspLink:
             answered.deadline = min(answered.deadline, now + self.outstanding_bytes * self.byte_s + self.round_trip_s)
         elif not answered.exclusive:
             measured = max(now - answered.sent_at, 0.0)
-            self.round_trips.add(measured)
+            self.round_trips.counts[bisect_left(BOUNDS_S, measured)] += 1
+            self.round_trips.sum_s += measured
             self.round_trip_s += (measured - self.round_trip_s) / 8
 
     def _is_certain(self, answered: _Request) -> bool:
@@ -383,7 +384,3 @@ class RoundTrips:
     def __init__(self) -> None:
         self.counts = [0] * (len(BOUNDS_S) + 1)
         self.sum_s = 0.0
-
-    def add(self, elapsed_s: float) -> None:
-        self.counts[bisect_left(BOUNDS_S, elapsed_s)] += 1
-        self.sum_s += elapsed_s

@@ -87,7 +87,7 @@ class MspLine(State):
         return self.link.last_heard_at
 
     def _silence_s(self) -> float:
-        if self.link.parser.skipped_bytes == self._foreign.skipped_before or not self._is_foreign():
+        if not self._is_foreign():
             return self._longest_silence_s
         return min(_FOREIGN_SILENCE_S + _BYTES_BEFORE_CHANGE * self.link.byte_s, self._longest_silence_s)
 
@@ -179,7 +179,8 @@ class Polling(MspLine):
     def deadline(self) -> float:
         if self._end is not None:
             return 0.0
-        silent_at = self.link.last_heard_at + self._silence_s()
+        is_torn = self.link.parser.skipped_bytes > self._foreign.skipped_before
+        silent_at = self.link.last_heard_at + (self._silence_s() if is_torn else self._longest_silence_s)
         deadline = min(self.link.next_deadline(), self.port.polls.next_deadline(self.link), silent_at)
         return deadline if deadline <= self._check_at or self.port.runner.is_busy else self._check_at
 
