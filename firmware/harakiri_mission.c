@@ -6,6 +6,7 @@
 #include "baseflight_mavlink.h"
 #include "harakiri_flash.h"
 #include "harakiri_guard.h"
+#include "harakiri_settings.h"
 #include "mw.h"
 
 static nm_t mission;
@@ -110,5 +111,6 @@ bool MissionSpendWrite(void)
 
 int MissionRequest(uint8_t command, uint8_t *buffer, uint8_t size)
 {
-    return nm_handle(&mission, command, buffer, size);
+    const int length = nm_handle(&mission, command, buffer, size);
+    return length < 0 ? SettingsRequest(command, buffer, size) : length;
 }

@@ -41,7 +41,7 @@ void MissionPoll(void);
 /* Take a write of the configuration that a companion asks for from the core's budget. False if it is spent. */
 bool MissionSpendWrite(void);
 
-/* nm_handle() on the receive buffer. */
+/* Answer a request of the extension, see nm_handle() and SettingsRequest(). */
 int MissionRequest(uint8_t command, uint8_t *buffer, uint8_t size);
 
 #endif

@@ -289,8 +289,7 @@ static int reply_radius(const nm_t *m, uint8_t *reply, nm_status_t status)
 
 /* ---- requests --------------------------------------------------------------------------------------------------------- */
 
-/* Unmask in place. Returns the body's length, or 0 if the payload is not masked. */
-static uint8_t unmask(uint8_t *payload, uint8_t size)
+uint8_t nm_unmask(uint8_t *payload, uint8_t size)
 {
     if (size % 2 == 0)
         return 0;
@@ -314,18 +313,18 @@ int nm_handle(nm_t *m, uint8_t command, uint8_t *buffer, uint8_t size)
     case NM_INFO:
         return reply_info(m, buffer);
     case NM_BEGIN:
-        return reply_progress(m, buffer, unmask(buffer, size) == 6 ? begin(m, body) : NM_BAD_REQUEST);
+        return reply_progress(m, buffer, nm_unmask(buffer, size) == 6 ? begin(m, body) : NM_BAD_REQUEST);
     case NM_CHUNK:
-        length = unmask(buffer, size);
+        length = nm_unmask(buffer, size);
         return reply_progress(m, buffer, chunk_length(length) ? chunk(m, body, length) : NM_BAD_REQUEST);
     case NM_COMMIT:
-        return reply_stored(m, buffer, unmask(buffer, size) == 6 ? commit(m, body) : NM_BAD_REQUEST);
+        return reply_stored(m, buffer, nm_unmask(buffer, size) == 6 ? commit(m, body) : NM_BAD_REQUEST);
     case NM_ABORT:
         return reply_abort(m, buffer, size);
     case NM_READ:
-        return reply_read(m, buffer, body, unmask(buffer, size));
+        return reply_read(m, buffer, body, nm_unmask(buffer, size));
     case NM_RADIUS:
-        return reply_radius(m, buffer, unmask(buffer, size) == 4 ? set_radius(m, body) : NM_BAD_REQUEST);
+        return reply_radius(m, buffer, nm_unmask(buffer, size) == 4 ? set_radius(m, body) : NM_BAD_REQUEST);
     default:
         return -1;
     }

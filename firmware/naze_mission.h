@@ -156,6 +156,9 @@ nm_status_t nm_store(nm_t *m, const uint8_t *records, uint16_t count);
 /* Take a flash write from the budget. False if it is spent. */
 bool nm_spend_write(nm_t *m);
 
+/* Unmask a request's payload in place. Returns the body's length (the body begins at payload + 1), or 0 if it is not masked. */
+uint8_t nm_unmask(uint8_t *payload, uint8_t size);
+
 /* The stored list's nm_t.stored.count records, in flash. NULL if there has never been a list. */
 const uint8_t *nm_records(const nm_t *m);
 

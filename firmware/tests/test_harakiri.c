@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * Tests of harakiri_guard.c, of harakiri_mission.c (the list in cfg, the list in the flash slots and the copy in the
+ * Tests of harakiri_guard.c, of harakiri_settings.c, of harakiri_mission.c (the list in cfg, the list in the flash slots and the copy in the
  * configuration) and of harakiri_config.c (power cuts while the configuration is written, and other builds in between). This file stands in for Harakiri: it makes the calls that the patches make.
  */
 #include "harakiri_guard.c"
 #include "harakiri_mission.c"
+#include "harakiri_settings.c"
+#include "harakiri/settings_table.h"
 #include "harakiri_config.h"
 #include "reference.h"
 
@@ -586,6 +588,180 @@ static void test_a_random_history_loses_nothing(void)
     }
 }
 
+/* ---- settings --------------------------------------------------------------------------------------------------------- */
+
+static uint8_t reply[NM_BUFFER_SIZE];
+
+static int ask(uint8_t command, const void *body, uint8_t size)
+{
+    reply[0] = 0x5A; /* the mask */
+    for (uint8_t i = 0; i < size; i++)
+        reply[1 + i] = ((const uint8_t *)body)[i] ^ 0x5A;
+    return MissionRequest(command, reply, (uint8_t)(size + 1));
+}
+
+static int read_from(uint16_t first, uint16_t count)
+{
+    const uint16_t body[2] = {first, count};
+    return ask(SETTING, body, sizeof body);
+}
+
+static int set_to(uint16_t index, uint32_t identity, uint32_t value)
+{
+    uint8_t body[SET_SETTING_BODY];
+    memcpy(body, &index, 2);
+    memcpy(body + 2, &identity, 4);
+    memcpy(body + 6, &value, 4);
+    return ask(SET_SETTING, body, sizeof body);
+}
+
+static uint32_t identity_of(uint16_t index)
+{
+    const int size = read_from(index, 1);
+    CHECK(size > HEADER_SIZE + NAME_AT && reply[0] == NM_OK);
+    return bitwise_crc32(reply + HEADER_SIZE + TYPE_AT, (uint32_t)(size - HEADER_SIZE - TYPE_AT));
+}
+
+static int set(uint16_t index, uint32_t value)
+{
+    const uint32_t identity = identity_of(index);
+    (void)set_to(index, identity, value);
+    return reply[0];
+}
+
+static uint32_t table_checksum(void)
+{
+    uint32_t checksum;
+    CHECK(read_from(WHOLE_TABLE, 1) == TABLE_SIZE && reply[0] == NM_OK && reply[3] == SETTINGS);
+    memcpy(&checksum, reply + 5, 4);
+    return checksum;
+}
+
+static void new_board(void)
+{
+    new_chip(0, 0);
+    cfg.serial_baudrate = 115200;
+    cfg.esc_moff = 1000;
+    cfg.rc_auxch = 4;
+    cfg.bar_lag = 0.3f;
+    writeParams(0);
+    config_writes = 0;
+}
+
+static void test_settings_take_their_range_and_nothing_else(void)
+{
+    for (uint16_t index = 0; index < SETTINGS; index++) {
+        const setting_t *s = &settings_table[index];
+        if (s->type == SETTING_FLOAT || s->variable == &cfg.esc_moff || is_fixed(s))
+            continue;
+        new_board();
+        CHECK(set(index, (uint32_t)s->max) == NM_OK && held(s) == (uint32_t)s->max);
+        CHECK(set(index, (uint32_t)s->min) == NM_OK && held(s) == (uint32_t)s->min);
+        CHECK(set(index, (uint32_t)s->max + 1) == NM_RANGE && set(index, (uint32_t)s->min - 1) == NM_RANGE);
+        CHECK(held(s) == (uint32_t)s->min && reply[0] == NM_RANGE && reply[HEADER_SIZE + TYPE_AT] == s->type);
+    }
+}
+
+static void test_a_float_takes_numbers_in_range(void)
+{
+    static const uint32_t refused[] = {0x7FC00000u, 0x7F800000u, 0xFF800000u, 0xBF800000u, 0x41200001u};
+    new_board();
+    for (unsigned i = 0; i < sizeof refused / sizeof *refused; i++)
+        CHECK(set(5, refused[i]) == NM_RANGE);
+    CHECK(set(5, 0x41200000u) == NM_OK && held(&settings_table[5]) == 0x41200000u);
+}
+
+static void test_the_motors_off_pulse_is_not_raised(void)
+{
+    new_board();
+    CHECK(set(6, 1001) == NM_RANGE && set(6, 900) == NM_OK && set(6, 901) == NM_RANGE && cfg.esc_moff == 900);
+}
+
+static void test_settings_that_crash_a_running_board_are_not_changed(void)
+{
+    new_board();
+    CHECK(set(10, 0) == NM_OK && set(10, 255) == NM_RANGE && cfg.gbl_flg == 0);
+    CHECK(set(9, 0) == NM_OK && set(9, 1) == NM_RANGE && set(9, (uint32_t)-3) == NM_RANGE && cfg.align[1][2] == 0);
+}
+
+static void test_another_sensor_clears_the_calibration(void)
+{
+    new_board();
+    cfg.acc_calibrated = cfg.mag_calibrated = 1;
+    cfg.angleTrim[1] = cfg.accZero[2] = 5;
+    CHECK(set(7, 0) == NM_OK && cfg.acc_calibrated && set(7, 1) == NM_OK && !cfg.acc_calibrated && cfg.mag_calibrated);
+    CHECK(!(cfg.angleTrim[1] > 0) && !(cfg.accZero[2] > 0) && cfg.sens_1G == 1);
+    CHECK(set(8, 1) == NM_OK && !cfg.mag_calibrated);
+}
+
+static void test_only_the_described_setting_is_set(void)
+{
+    new_board();
+    for (uint16_t index = 0; index < SETTINGS; index++) {
+        const uint32_t identity = identity_of((uint16_t)((index + 1) % SETTINGS));
+        CHECK(set_to(index, identity, 1) == HEADER_SIZE && reply[0] == NM_CHECKSUM);
+    }
+    CHECK(set_to(SETTINGS, 0, 1) == HEADER_SIZE && reply[0] == NM_RANGE);
+    CHECK(read_from(SETTINGS, 1) == HEADER_SIZE && reply[0] == NM_RANGE);
+}
+
+static void test_requests_of_another_size_are_refused(void)
+{
+    static uint8_t body[NM_BUFFER_SIZE];
+    new_board();
+    for (uint8_t size = 0; size < NM_BUFFER_SIZE - 1; size++) {
+        if (size != SETTING_BODY)
+            CHECK(ask(SETTING, body, size) == HEADER_SIZE && reply[0] == NM_BAD_REQUEST);
+        if (size != SET_SETTING_BODY)
+            CHECK(ask(SET_SETTING, body, size) == HEADER_SIZE && reply[0] == NM_BAD_REQUEST);
+    }
+    CHECK(read_from(0, 0) == HEADER_SIZE && reply[0] == NM_BAD_REQUEST);
+    CHECK(set_to(WHOLE_TABLE, 1, table_checksum()) == HEADER_SIZE && reply[0] == NM_BAD_REQUEST);
+}
+
+static void test_a_reply_holds_as_many_settings_as_fit(void)
+{
+    new_board();
+    const int size = read_from(0, 0xFFFF);
+    CHECK(size > HEADER_SIZE && size <= (int)REPLY_MAX_SIZE);
+    CHECK(read_from(SETTINGS - 1, 9) == HEADER_SIZE + NAME_AT + NAME_MAX_SIZE);
+}
+
+static void test_a_save_writes_what_was_announced(void)
+{
+    new_board();
+    CHECK(set(0, 7) == NM_OK);
+    CHECK(set_to(WHOLE_TABLE, 0, 1) == TABLE_SIZE && reply[0] == NM_CHECKSUM && !ScheduleEEPROMwriteMS);
+    const uint32_t wanted = table_checksum();
+    CHECK(set_to(WHOLE_TABLE, 0, wanted) == TABLE_SIZE && reply[0] == NM_OK && ScheduleEEPROMwriteMS);
+    const uint32_t identity = identity_of(0);
+    CHECK(set_to(0, identity, 1) == HEADER_SIZE && reply[0] == NM_BUSY);
+    CHECK(set_to(WHOLE_TABLE, 0, wanted) == HEADER_SIZE && reply[0] == NM_BUSY);
+    serve_scheduled_write();
+    power_up();
+    CHECK(config_writes == 1 && cfg.rc_db == 7 && table_checksum() == wanted);
+    CHECK(set(0, 8) == NM_OK);
+    mission.writes_left = 0;
+    CHECK(set_to(WHOLE_TABLE, 0, table_checksum()) == TABLE_SIZE && reply[0] == NM_BUSY && !ScheduleEEPROMwriteMS);
+}
+
+static void test_armed_no_setting_is_read_set_or_saved(void)
+{
+    new_board();
+    const uint32_t wanted = table_checksum(), identity = identity_of(0);
+    const config_t before = cfg;
+    for (int with_pass = 0; with_pass < 2; with_pass++) {
+        f.ARMED = !with_pass;
+        pass = with_pass;
+        rcData[THROTTLE] = 1500;
+        CHECK(read_from(0, 1) == HEADER_SIZE && reply[0] == NM_ARMED);
+        CHECK(read_from(WHOLE_TABLE, 1) == HEADER_SIZE && reply[0] == NM_ARMED);
+        CHECK(set_to(0, identity, 1) == HEADER_SIZE && reply[0] == NM_ARMED);
+        CHECK(set_to(WHOLE_TABLE, 0, wanted) == HEADER_SIZE && reply[0] == NM_ARMED);
+    }
+    CHECK(memcmp(&before, &cfg, sizeof cfg) == 0 && !ScheduleEEPROMwriteMS);
+}
+
 int main(void)
 {
     static void (*const tests[])(void) = {
@@ -609,6 +785,16 @@ int main(void)
         test_what_is_stored_is_not_written_again,
         test_the_budget_covers_requests_that_write_the_configuration,
         test_a_random_history_loses_nothing,
+        test_settings_take_their_range_and_nothing_else,
+        test_a_float_takes_numbers_in_range,
+        test_the_motors_off_pulse_is_not_raised,
+        test_settings_that_crash_a_running_board_are_not_changed,
+        test_another_sensor_clears_the_calibration,
+        test_only_the_described_setting_is_set,
+        test_requests_of_another_size_are_refused,
+        test_a_reply_holds_as_many_settings_as_fit,
+        test_a_save_writes_what_was_announced,
+        test_armed_no_setting_is_read_set_or_saved,
     };
     void *const flash_at = (void *)(uintptr_t)FLASH_START;
     CHECK(mmap(flash_at, FLASH_END - FLASH_START, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED_NOREPLACE,

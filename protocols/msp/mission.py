@@ -235,7 +235,7 @@ def apply_mask(body: bytes, mask: int) -> bytes:
     return (int.from_bytes(body) ^ int.from_bytes(bytes((mask,)) * len(body))).to_bytes(len(body))
 
 
-def _masked_request(command: MissionCommand, body: bytes) -> bytes | None:
+def _masked_request(command: int, body: bytes) -> bytes | None:
     """Encode a request with a masked body; None if its frame would hold a hazard byte with every mask."""
     size = len(body) + 1
     mask = find_mask(body, size ^ command)
@@ -245,7 +245,8 @@ def _masked_request(command: MissionCommand, body: bytes) -> bytes | None:
     return frame if is_clean(frame) else None
 
 
-def _short_request(command: MissionCommand, body: bytes) -> bytes:
+def masked_request(command: int, body: bytes) -> bytes:
+    """Encode a request with a masked body of up to 83 bytes."""
     frame = _masked_request(command, body)
     if frame is None:
         raise AssertionError(f"a {len(body)} byte body always has a mask")
@@ -254,20 +255,20 @@ def _short_request(command: MissionCommand, body: bytes) -> bytes:
 
 def encode_begin(identity: ListIdentity) -> bytes:
     """Encode BEGIN for a list; an empty one clears the stored list."""
-    return _short_request(MissionCommand.BEGIN, _LIST.pack(identity.count, identity.checksum))
+    return masked_request(MissionCommand.BEGIN, _LIST.pack(identity.count, identity.checksum))
 
 
 def encode_commit(identity: ListIdentity) -> bytes:
-    return _short_request(MissionCommand.COMMIT, _LIST.pack(identity.count, identity.checksum))
+    return masked_request(MissionCommand.COMMIT, _LIST.pack(identity.count, identity.checksum))
 
 
 def encode_read(first: int, count: int) -> bytes:
-    return _short_request(MissionCommand.READ, struct.pack("<HBB", first, count, 0))
+    return masked_request(MissionCommand.READ, struct.pack("<HBB", first, count, 0))
 
 
 def encode_radius(wp_radius_cm: int) -> bytes:
     """Encode RADIUS, 0..2000 cm."""
-    return _short_request(MissionCommand.RADIUS, struct.pack("<HH", wp_radius_cm, wp_radius_cm ^ 0xFFFF))
+    return masked_request(MissionCommand.RADIUS, struct.pack("<HH", wp_radius_cm, wp_radius_cm ^ 0xFFFF))
 
 
 @dataclass(frozen=True, slots=True)

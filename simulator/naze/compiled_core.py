@@ -79,6 +79,9 @@ class CompiledCore:
         if status == ReplyStatus.FLASH:
             raise FlashError
 
+    def spend_write(self) -> bool:
+        return bool(self._library.nm_spend_write(self._core))
+
     @property
     def writes(self) -> int:
         """The number of lists ever made valid in this flash."""
@@ -191,5 +194,6 @@ _FUNCTIONS = {
     "nm_poll": (None, [POINTER(_Core)]),
     "nm_handle": (c_int, [POINTER(_Core), c_uint8, POINTER(c_uint8), c_uint8]),
     "nm_store": (c_int, [POINTER(_Core), ctypes.c_char_p, c_uint16]),
+    "nm_spend_write": (c_bool, [POINTER(_Core)]),
     "nm_records": (c_void_p, [POINTER(_Core)]),
 }

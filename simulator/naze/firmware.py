@@ -25,6 +25,7 @@ from simulator.naze.mavlink_port import MavlinkSchedule, MavlinkSender
 from simulator.naze.mission_slots import StoredConfig
 from simulator.naze.mission_store import Floppy
 from simulator.naze.missions import Board, BootMissions
+from simulator.naze.settings_commands import STORED_SIZE, SettingsCommands
 from simulator.naze.uart import Uart
 
 _AUTOSENSE_SECONDS = 4.0
@@ -89,6 +90,11 @@ class Firmware:
                 self._config.finish()
         self._board = Board(options, faults, self._config.load())
         self._missions = boot_missions(flash, self._board) if faults.extension else None
+        self._settings = (
+            SettingsCommands(self._board, self._config.load_settings(STORED_SIZE), self._missions.spend_write)
+            if self._missions
+            else None
+        )
         # The extension enlarges the buffer for its longest CHUNK: mask, number, records.
         self._msp = MspReceiver(3 + options.chunk_records * RECORD_SIZE) if faults.extension else MspReceiver()
         self._answers = MspAnswers(lambda: self.craft_at(self._clock), options.tree)
@@ -188,15 +194,16 @@ class Firmware:
     def _write_config(self) -> None:
         """Write the whole configuration; the firmware does not verify it (writeParams)."""
         self._board.config_write_due = None
+        settings = self._settings.encode() if self._settings else b""
         with contextlib.suppress(FlashError):
             # With the extension the list has flash of its own; without it, it is part of the configuration.
             if self._missions:
                 self._floppy.save()
-                self._config.stage(self._board.wp_radius_cm)
+                self._config.stage(self._board.wp_radius_cm, settings)
             self._config.erase()
             if not self._missions:
                 self._floppy.save()
-            self._config.program(self._board.wp_radius_cm, sealed=self._missions is not None)
+            self._config.program(self._board.wp_radius_cm, settings, sealed=self._missions is not None)
         self._stall()
 
     def _stall(self) -> None:
@@ -294,12 +301,11 @@ class Firmware:
         return False
 
     def _answer(self, command: int, payload: bytes) -> None:
-        if self._missions and (answer := self._missions.answer(command, payload, self._clock)) is not None:
+        if (answer := self._extension_answer(command, payload)) is not None:
             frame = reply(command, answer)
             self._msp.overwrite(answer)
             if command == MissionCommand.COMMIT:
                 self._floppy.load()
-            self._counters.flash_writes = self._missions.writes
         elif self._missions and not accepts(command, len(payload), box_size=self._answers.box_size, armed=self.armed):
             frame = error(command)
         else:
@@ -311,6 +317,13 @@ class Firmware:
             frame = self._answers.answer(command, self._msp.buffer)
         self._stall()
         self._uart.write(frame, self._clock)
+
+    def _extension_answer(self, command: int, payload: bytes) -> bytes | None:
+        if not (self._missions and self._settings):
+            return None
+        answer = self._missions.answer(command, payload, self._clock)
+        self._counters.flash_writes = self._missions.writes
+        return self._settings.answer(command, payload, self._clock) if answer is None else answer
 
     # -- the CLI, which only a reset leaves ------------------------------------------------------------------
 

@@ -127,8 +127,7 @@ class MissionCommands:
             return ReplyStatus.ARMED
         return ReplyStatus.BUSY if self._board.write_pending else None
 
-    def _spend_write(self) -> bool:
-        """Take a write from the budget; False if there is none."""
+    def spend_write(self) -> bool:
         if self._writes_left:
             self._writes_left -= 1
             return True
@@ -156,7 +155,7 @@ class MissionCommands:
         if identity == self._slots.stored:
             return ReplyStatus.SAME
         if not self._slots.is_prepared:
-            if not self._spend_write():
+            if not self.spend_write():
                 return ReplyStatus.BUSY
             try:
                 self._slots.prepare()
@@ -246,7 +245,7 @@ class MissionCommands:
             return refusal
         if value > MAX_RADIUS_CM:
             return ReplyStatus.RANGE
-        if not self._spend_write():
+        if not self.spend_write():
             return ReplyStatus.BUSY
         self._board.set_wp_radius(value, now)
         return ReplyStatus.OK

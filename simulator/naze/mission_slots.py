@@ -138,7 +138,7 @@ def _sealed(header: bytes) -> bytes:
 
 
 class StoredConfig:
-    """The only simulated setting.
+    """gps_wp_radius, and with the extension all settings.
 
     Without the extension, a power cut between `erase` and `program` loses it. With it, `stage` keeps it in another page
     meanwhile, and `finish` completes the write at the next boot (harakiri_config.h).
@@ -162,27 +162,40 @@ class StoredConfig:
     def finish(self) -> None:
         """Complete a write that a power cut has interrupted. FlashError, PowerCutError."""
         place, staged = self._read(self._place), self._read(self._place + 1)
-        if staged and (place is None or (place[1] == _CONFIG_SEAL and place[0] != staged[0])):
+        kept = self._settings(self._place + 1)
+        if staged and (
+            place is None or (place[1] == _CONFIG_SEAL and (place[0], self._settings(self._place)) != (staged[0], kept))
+        ):
             self.erase()
-            self.program(staged[0], sealed=True)
+            self.program(staged[0], kept, sealed=True)
 
-    def stage(self, wp_radius_cm: int) -> None:
+    def stage(self, wp_radius_cm: int, settings: bytes = b"") -> None:
         """Keep what is about to be written. FlashError, PowerCutError."""
         self._flash.erase(self._place + 1, self._seconds / 4)
-        self._program(self._place + 1, wp_radius_cm, _CONFIG_SEAL, self._seconds / 4)
+        self._program(self._place + 1, wp_radius_cm, settings, _CONFIG_SEAL, self._seconds / 4)
 
     def erase(self) -> None:
         """FlashError, PowerCutError."""
         self._flash.erase(self._place, self._seconds)
 
-    def program(self, wp_radius_cm: int, *, sealed: bool = False) -> None:
-        """Write gps_wp_radius to the erased page. FlashError, PowerCutError."""
-        self._program(self._place, wp_radius_cm, _CONFIG_SEAL if sealed else _NO_SEAL, self._seconds)
+    def program(self, wp_radius_cm: int, settings: bytes = b"", *, sealed: bool = False) -> None:
+        """Write the settings to the erased page. FlashError, PowerCutError."""
+        self._program(self._place, wp_radius_cm, settings, _CONFIG_SEAL if sealed else _NO_SEAL, self._seconds)
 
-    def _program(self, page: int, wp_radius_cm: int, seal: int, seconds: float) -> None:
-        data = _CONFIG.pack(seal, wp_radius_cm, wp_radius_cm ^ 0xFFFF)
-        self._flash.program(page * PAGE_SIZE, data, seconds)
+    def load_settings(self, size: int) -> bytes:
+        """The settings' bytes; none if the place has none."""
+        has_settings = self.is_valid and self._settings(self._place)
+        return self._flash.read((self._place + 1) * PAGE_SIZE - _CONFIG.size - size, size) if has_settings else b""
+
+    def _settings(self, page: int) -> bytes:
+        """The settings without leading FF bytes, which need no programming."""
+        return self._flash.read(page * PAGE_SIZE, PAGE_SIZE - _CONFIG.size).lstrip(bytes((ERASED,)))
+
+    def _program(self, page: int, wp_radius_cm: int, settings: bytes, seal: int, seconds: float) -> None:
+        # A power cut leaves the first half: the part that makes the page valid comes last.
+        data = settings + _CONFIG.pack(seal, wp_radius_cm, wp_radius_cm ^ 0xFFFF)
+        self._flash.program((page + 1) * PAGE_SIZE - len(data), data, seconds)
 
     def _read(self, page: int) -> tuple[int, int] | None:
-        seal, value, inverse = _CONFIG.unpack(self._flash.read(page * PAGE_SIZE, _CONFIG.size))
+        seal, value, inverse = _CONFIG.unpack(self._flash.read((page + 1) * PAGE_SIZE - _CONFIG.size, _CONFIG.size))
         return (value, seal) if value ^ inverse == 0xFFFF else None

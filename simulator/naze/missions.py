@@ -27,6 +27,10 @@ class Board:
     def set_wp_radius(self, radius_cm: int, now: float) -> None:
         """Set gps_wp_radius; it is stored a little later."""
         self.wp_radius_cm = radius_cm
+        self.schedule_write(now)
+
+    def schedule_write(self, now: float) -> None:
+        """Schedule a write of the configuration."""
         self.config_write_due = now + self.options.config_write_delay_ms / 1000
 
 
@@ -45,6 +49,9 @@ class Missions(Protocol):
 
     def store(self, records: bytes) -> None:
         """Store records that the firmware received by other means (nm_store). FlashError, PowerCutError."""
+
+    def spend_write(self) -> bool:
+        """Take a flash write from the budget; False if there is none."""
 
     @property
     def writes(self) -> int:

@@ -7,6 +7,15 @@ from pathlib import Path
 from protocols.mission_record import identify, pack_records
 from protocols.msp import mission as ext
 from protocols.msp.mission import WpCommand, WpRecord
+from protocols.msp.setting_table import (
+    TABLE_REQUEST,
+    SettingCommand,
+    decode_settings,
+    decode_table,
+    encode_read_settings,
+    encode_save,
+    encode_set_setting,
+)
 from tests.support.naze_bench import Bench
 
 PAGE = Path(__file__).parents[2] / "docs" / "msp-mission.md"
@@ -29,6 +38,29 @@ def exchange() -> list[str]:
         ext.encode_commit(identify(records)),
         ext.encode_read(0, 2),
     ]
+    return replies(bench, requests)
+
+
+def settings_exchange() -> list[str]:
+    """Read the first setting, set it, try a value out of range, and save."""
+    bench = Bench()
+    reply = decode_settings(bench.payload(encode_read_settings(0, 1)))
+    assert reply is not None
+    rc_db = reply.settings[0].setting
+    assert bench.ask(encode_set_setting(0, rc_db, 13)) is not None
+    table = decode_table(bench.payload(TABLE_REQUEST))
+    assert table is not None
+    requests = [
+        encode_read_settings(0, 1),
+        encode_set_setting(0, rc_db, 13),
+        encode_set_setting(0, rc_db, 33),
+        TABLE_REQUEST,
+        encode_save(table.checksum),
+    ]
+    return replies(Bench(), requests)
+
+
+def replies(bench: Bench, requests: list[bytes]) -> list[str]:
     bench.ask(ext.INFO_REQUEST)  # ends AUTOSENSE, whose heartbeats would be in the exchange
     lines = []
     for request in requests:
@@ -42,7 +74,7 @@ def test_worked_exchange_is_true() -> None:
     page = PAGE.read_text()
     assert f"`{pack_records([HOME, WAYPOINT]).hex()}`" in page
     printed = re.findall(r"^(?:->|<-) [0-9a-f ]+$", page, re.MULTILINE)
-    assert printed == exchange()
+    assert printed == settings_exchange() + exchange()
 
 
 def test_every_status_and_command_is_on_the_page() -> None:
@@ -51,3 +83,5 @@ def test_every_status_and_command_is_on_the_page() -> None:
         assert f"| {status.value} | {status.name} |" in page
     for command in ext.MissionCommand:
         assert f"### {command.value} {command.name}" in page
+    for setting_command in SettingCommand:
+        assert f"### {setting_command.value} {setting_command.name}" in page

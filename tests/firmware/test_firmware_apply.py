@@ -34,6 +34,8 @@ CORE = (
     "harakiri_config.c",
     "harakiri_flash.h",
     "harakiri_flash.c",
+    "harakiri_settings.h",
+    "harakiri_settings.c",
 )
 
 PATCH = """\
@@ -369,7 +371,7 @@ def test_a_missing_tree_is_reported(workshop: Workshop) -> None:
 def test_shipped_patches_have_only_our_own_lines(path: Path) -> None:
     """No context, no removed line, no function name of Harakiri after a hunk header."""
     header, _, body = path.read_text().partition("diff --git")
-    assert len(re.findall(r"^base [0-9a-f]{64} \S+$", header, re.MULTILINE)) == 12
+    assert len(re.findall(r"^base [0-9a-f]{64} \S+$", header, re.MULTILINE)) == 13
     for line in body.splitlines()[1:]:
         assert re.match(r"\+|--- a/|diff --git a/|index [0-9a-f]+\.\.[0-9a-f]+ 100644$|@@ -\d+,0 \+[\d,]+ @@$", line), (
             line
