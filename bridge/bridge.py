@@ -5,7 +5,7 @@ The service feeds in bytes, time and the store's answers, and then takes the out
 The path of a byte from the UART:
     fc_received -> FcSession -> MspLink -> Vehicle -> OwnVehicle -> Ground -> take_datagrams
 The path of a mission item to the flight controller, and back for verification:
-    gcs_received -> Ground -> Guard -> MessageRouter -> MissionUploads -> ListCheck
+    gcs_received -> Incoming -> GroundStation -> Guard -> MessageRouter -> MissionUploads -> ListCheck
         -> MissionService.deliver -> FcMissionStore.push -> MspLink
 An autopilot that speaks MAVLink itself is not represented but passed through, both ways:
     FcSession <-> Routes <-> Ground
@@ -22,7 +22,9 @@ from bridge.fc.actions import FcActions
 from bridge.fc.profile import FlightController, RuleSettings, Spoken
 from bridge.fc.session import FcSession
 from bridge.gcs.ground import FrameListener, Ground
+from bridge.gcs.ground_station import GroundStation
 from bridge.gcs.guard import Guard
+from bridge.gcs.rights import LinkAccess
 from bridge.gcs.routes import Routes
 from bridge.gcs.station import Peer, Severity
 from bridge.line.msp_link import RoundTrips
@@ -39,8 +41,9 @@ from bridge.transfers.mission_watch import MissionWatch
 from bridge.transfers.uploads import FC_LOST, STOPPED, MissionUploads
 from bridge.vehicle.calibration import Calibration
 from bridge.vehicle.commands import CommandService
+from bridge.vehicle.incoming import Incoming
 from bridge.vehicle.link_announcer import LinkAnnouncer
-from bridge.vehicle.message_router import Incoming, MessageRouter
+from bridge.vehicle.message_router import MessageRouter
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.parameters import Parameters
 from bridge.vehicle.settings_seal import SettingsSeal
@@ -101,16 +104,17 @@ class Bridge:
         )
         incidents = count(1)
 
-        self.guard = Guard(config.links, emit, passes_everything=owner.pass_through is PassThroughRule.EVERYTHING)
+        passes_everything = owner.pass_through is PassThroughRule.EVERYTHING
         self.ground = Ground(
             owner.sysid,
             config.compid,
             emit,
             self._newcomer,
             on_frames,
-            self.guard.standing,
-            self.guard.signers,
+            {name: replace(access, passes_everything=passes_everything) for name, access in config.links.items()},
+            LinkAccess(passes_everything=passes_everything),
         )
+        self.guard = Guard(self.ground, emit)
         self.runner = Runner()
         self.session = FcSession(
             config.speeds,
@@ -154,7 +158,6 @@ class Bridge:
             owner.sysid,
             config.compid,
         )
-        self.ground.on_silent = self._incoming.forget
         #: Served in this order.
         self._parts: tuple[TimedPart, ...] = (
             self.session,
@@ -216,17 +219,13 @@ class Bridge:
         return self._incoming.received(peer, data, now, datagram=datagram)
 
     def gcs_gone(self, peer: Peer, now: float) -> None:
-        self._forget(peer, now)
+        self._uploads.peer_gone(peer, now)
         self.ground.gone(peer)
 
     def link_closed(self, name: str, now: float) -> None:
         """A link is closed, and all ground stations on it are gone."""
         for peer in self.ground.remove_link(name):
-            self._forget(peer, now)
-
-    def _forget(self, peer: Peer, now: float) -> None:
-        self._uploads.peer_gone(peer, now)
-        self._incoming.forget(peer)
+            self._uploads.peer_gone(peer, now)
 
     def notify(self, text: str) -> None:
         """Show a text to each ground station that connects from now on."""
@@ -259,7 +258,7 @@ class Bridge:
     def counters(self) -> Counters:
         state = self.session.state
         return Counters(
-            ground_stations=len(self.ground.stations.peers()),
+            ground_stations=len(self.ground.peers()),
             frames_received=self.ground.frames_received,
             bad_frames=self.ground.bad_frames,
             refused=self.guard.refused,
@@ -293,7 +292,6 @@ class Bridge:
         return due
 
     def tick(self, now: float) -> None:
-        self.ground.now = now
         for part in self._parts:
             if now >= part.due:
                 part.tick(now)
@@ -309,9 +307,9 @@ class Bridge:
         """A program's request was refused. In flight a warning would cover what concerns the craft."""
         self.ground.say(Severity.NOTICE if self.vehicle.armed else Severity.WARNING, text)
 
-    def _newcomer(self, peer: Peer) -> None:
+    def _newcomer(self, station: GroundStation, now: float) -> None:
         if not self.is_passing_through:
-            self._vehicle.newcomer(peer)
+            self._vehicle.newcomer(station, now)
 
     def _controller_changed(self, controller: FlightController | None, now: float) -> None:
         self.is_passing_through = controller is not None and controller.profile.spoken is Spoken.OTHER_MAVLINK

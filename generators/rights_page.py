@@ -5,7 +5,7 @@ import sys
 from collections.abc import Collection, Mapping
 from pathlib import Path
 
-from bridge.gcs.guard import RIGHTS
+from bridge.gcs.rights import RIGHTS
 from protocols.mavlink.command import command_name
 from protocols.mavlink.dialect import messages
 from protocols.rights.effect import Effect

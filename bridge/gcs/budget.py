@@ -1,124 +1,170 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rate limits for each ground station and for all of them together. Sans-IO: the time is passed in."""
+"""Limits on the work that ground stations cause. Sans-IO: the time is passed in.
+
+A station that has proven its rights has a budget of its own, and so have the first 16 other hosts, each for all of its
+stations. All hosts that come later share one total in equal parts. A seat among the 16 may be lost in the first
+seconds, to a host that stays connected: made-up addresses do not.
+"""
 
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
-from math import exp
+from collections.abc import Hashable
+from math import inf
 
-from bridge.gcs.cost import LIMITS, Cost, Rate
-from bridge.gcs.station import Peer
+from bridge.gcs.cost import FLASH_PROVEN, FLASH_RESERVE, LIMITS, SEATS, Cost, Rate
 
-#: The number of accounts for hosts: forged ones cannot use more memory.
-_ACCOUNTS = 1024
-#: Counts grow by this factor before they are scaled back, which forgets those below 1 / 1000.
-_RESCALE_AT = 1e6
-#: After this many times the memory's length every count has decayed to 0; the clock may also start at any value.
-_ALL_FORGOTTEN = 50.0
+#: Hosts that are remembered after their stations have left: a new connection does not renew a budget.
+_MAX_HOSTS = 1024
 
 
 class TokenBucket:
-    """A token bucket, full at the start."""
+    """Counts uses: `rate.burst` at once, of which `rate.per_s` are regained in a second. The rate may change."""
 
     def __init__(self, rate: Rate) -> None:
         self.rate = rate
-        self._tokens = rate.burst
+        self._used = 0.0
         self._counted_at = 0.0
 
     def has(self, now: float) -> bool:
         """True if one more is allowed now."""
-        self._tokens = min(self.rate.burst, self._tokens + max(0.0, now - self._counted_at) * self.rate.per_s)
+        self._used = max(0.0, self._used - max(0.0, now - self._counted_at) * self.rate.per_s)
         self._counted_at = now
-        return self._tokens >= 1.0
+        return self._used + 1.0 <= self.rate.burst
 
     def spend(self, amount: float = 1.0) -> None:
         """Count one; a negative amount takes it back."""
-        self._tokens -= amount
+        self._used += amount
+
+    def take(self, now: float) -> bool:
+        """Count one if it is allowed."""
+        used = max(0.0, self._used - max(0.0, now - self._counted_at) * self.rate.per_s)
+        self._counted_at = now
+        is_allowed = used + 1.0 <= self.rate.burst
+        self._used = used + 1.0 if is_allowed else used
+        return is_allowed
+
+    @property
+    def used(self) -> float:
+        """The uses that were not regained when it was last asked."""
+        return self._used
 
 
-class Shares:
-    """A budget for many accounts; uses decay exponentially.
+class Budget:
+    """The limits of one ground station."""
 
-    `rate.burst` uses at once; of these, at most `rate.per_s` are regained in a second.
-    """
+    #: False while it is a part of the total.
+    is_own = True
 
-    def __init__(self, rate: Rate) -> None:
-        self._burst = rate.burst
-        self._memory_s = rate.burst / rate.per_s
-        # Instead of shrinking all counts over time, the unit of counting grows.
-        self._unit = 1.0
-        self._unit_at = 0.0
-        self._used: dict[Hashable, float] = {}
-        self._total = 0.0
+    def __init__(self) -> None:
+        self._buckets: dict[Cost, TokenBucket] = {}
 
-    def left(self, now: float) -> float:
-        """The uses left; below 0 if more were spent."""
-        self._unit *= exp(min(max(0.0, now - self._unit_at) / self._memory_s, _ALL_FORGOTTEN))
-        self._unit_at = now
-        if self._unit >= _RESCALE_AT:
-            kept = {account: used / self._unit for account, used in self._used.items()}
-            self._used = {account: used for account, used in kept.items() if used >= 1e-3}
-            self._total = sum(self._used.values())
-            self._unit = 1.0
-        return self._burst - self._total / self._unit
-
-    def used(self, account: Hashable) -> float:
-        """The account's recent uses, as of the last call of `left`."""
-        return self._used.get(account, 0.0) / self._unit
-
-    def spend(self, account: Hashable, amount: float = 1.0) -> None:
-        """Count a use; a negative amount takes it back."""
-        self._used[account] = self._used.get(account, 0.0) + amount * self._unit
-        self._total += amount * self._unit
-
-    def hand_over(self, account: Hashable, heir: Hashable) -> None:
-        """Continue an account under another name."""
-        self._used[heir] = self._used.pop(account, 0.0)
-
-
-class Budgets:
-    """Counts the work that each peer causes.
-
-    `has_standing`: True for a peer that has authenticated, or has precedence on its link (bridge.gcs.stations). It has
-    its own budgets. The others share theirs by host: a stranger gains nothing from many ports. All of them share a
-    total, of which a host may use as much as it leaves: each of n busy hosts uses 1 / (n + 1), and a newcomer finds as
-    much.
-    """
-
-    def __init__(self, has_standing: Callable[[Peer], bool]) -> None:
-        self._has_standing = has_standing
-        #: By cost and peer, or the account of its host.
-        self._buckets: dict[tuple[Cost, Peer | int], TokenBucket] = {}
-        #: The account of each host, the host heard least recently first.
-        self._accounts: OrderedDict[Hashable, int] = OrderedDict()
-        self._totals = {cost: Shares(limit.total) for cost, limit in LIMITS.items()}
-        #: How often each limit was exceeded.
-        self.exceeded = dict.fromkeys(Cost, 0)
-
-    def allows(self, cost: Cost, peer: Peer, now: float) -> bool:
-        """Count one for a peer; False if that exceeds a limit."""
-        account = None if self._has_standing(peer) else self._account(peer.host)
-        key = cost, peer if account is None else account
-        bucket = self._buckets.get(key)
+    def allows(self, cost: Cost, now: float) -> bool:
+        """Count work; False if it exceeds the limit."""
+        bucket = self._buckets.get(cost)
         if bucket is None:
-            bucket = self._buckets[key] = TokenBucket(LIMITS[cost].each)
-        total = self._totals[cost]
-        if not (bucket.has(now) and (account is None or total.left(now) > total.used(account))):
-            self.exceeded[cost] += 1
+            bucket = self._buckets[cost] = TokenBucket(LIMITS[cost].each)
+        return bucket.take(now)
+
+
+class HostBudget(Budget):
+    """A host, and the budget of its stations that have proven nothing."""
+
+    def __init__(self, hosts: "HostBudgets") -> None:
+        super().__init__()
+        self._hosts = hosts
+        self.is_own = False
+        #: The number of its connected stations that have proven nothing.
+        self.stations = 0
+        self.is_steady = False
+        #: The reserve of writes to the flash that belongs to its seat.
+        self.seat: TokenBucket | None = None
+        #: The writes of its stations that have proven their rights.
+        self.proven_writes = TokenBucket(FLASH_PROVEN)
+        self.wrote_at = -inf
+
+    def allows(self, cost: Cost, now: float) -> bool:
+        limit = LIMITS[cost]
+        bucket = self._buckets.get(cost)
+        if bucket is None:
+            bucket = self._buckets[cost] = TokenBucket(limit.each)
+        if self.is_own:
+            return bucket.take(now)
+        parts, total = max(self._hosts.without_seat, 1), self._hosts.totals[cost]
+        bucket.rate = Rate(
+            min(limit.total.per_s / parts, limit.each.per_s), min(max(limit.total.burst / parts, 1.0), limit.each.burst)
+        )
+        if not (bucket.has(now) and total.take(now)):
             return False
         bucket.spend()
-        if account is not None:
-            total.spend(account)
         return True
 
-    def _account(self, host: Hashable) -> int:
-        """The host's account. If all are taken, a new host continues that of the host heard least recently."""
-        account = self._accounts.pop(host, None)
-        if account is None:
-            is_room = len(self._accounts) < _ACCOUNTS
-            account = len(self._accounts) if is_room else self._accounts.popitem(last=False)[1]
-        self._accounts[host] = account
-        return account
+    def has_seat(self, *, is_own: bool) -> None:
+        """It was given a seat, or has lost it."""
+        self.is_own = is_own
+        for cost, bucket in self._buckets.items():
+            bucket.rate = LIMITS[cost].each
 
-    def forget(self, peer: Peer) -> None:
-        for cost in Cost:
-            self._buckets.pop((cost, peer), None)
+    def join(self, *, may_sit: bool) -> None:
+        """A station that has proven nothing has connected; it takes a seat if one is free."""
+        self.stations += 1
+        self._hosts.without_seat += self.stations == 1
+        if may_sit and self.seat is None and self._hosts.free_seats:
+            self._hosts.give_seat(self)
+
+    def stays(self) -> None:
+        """One of its stations has been connected for a while: it may take the seat of a host that has just come."""
+        self.is_steady = True
+        if self.seat is None:
+            self._hosts.give_seat(self)
+
+    def leave(self) -> None:
+        """Such a station has left, or has proven its rights."""
+        self.stations -= 1
+        if not self.stations:
+            self._hosts.take_seat(self)
+            self._hosts.without_seat -= 1
+            self.is_steady = False
+
+
+class HostBudgets:
+    """All hosts."""
+
+    def __init__(self) -> None:
+        #: A seat's writes outlive its host: a new address gains nothing.
+        self.free_seats = [TokenBucket(FLASH_RESERVE) for _ in range(SEATS)]
+        #: The number of connected hosts that share the totals.
+        self.without_seat = 0
+        self.totals = {cost: TokenBucket(limit.total) for cost, limit in LIMITS.items()}
+        self._seated: list[HostBudget] = []
+        self._hosts: OrderedDict[Hashable, HostBudget] = OrderedDict()  # the one asked for least recently first
+
+    def host(self, name: Hashable) -> HostBudget:
+        """The host of this name. Too many are forgotten, except those with connected stations."""
+        host = self._hosts.pop(name, None)
+        if host is None:
+            host = HostBudget(self)
+            if len(self._hosts) >= _MAX_HOSTS:
+                oldest = next((name for name, host in self._hosts.items() if not host.stations), None)
+                self._hosts.pop(oldest, None)
+        self._hosts[name] = host
+        return host
+
+    def give_seat(self, host: HostBudget) -> None:
+        """Give a seat to a host that has none: a free one, or that of the latest host that is not steady."""
+        latest = next((other for other in reversed(self._seated) if not other.is_steady), None)
+        if not self.free_seats and latest is not None:
+            self.take_seat(latest)
+        if self.free_seats:
+            host.seat = min(self.free_seats, key=lambda seat: seat.used)
+            self.free_seats.remove(host.seat)
+            self._seated.append(host)
+            self.without_seat -= 1
+            host.has_seat(is_own=True)
+
+    def take_seat(self, host: HostBudget) -> None:
+        """Free the seat of a host, if it has one."""
+        if host.seat is not None:
+            self.free_seats.append(host.seat)
+            self._seated.remove(host)
+            self.without_seat += 1
+            host.seat = None
+            host.has_seat(is_own=False)

@@ -28,7 +28,6 @@ class Cost(IntEnum):  # hashed for each datagram: as an int, in C
     BOARD: a request to the flight controller, which has a few hundred bytes a second to spare.
     PASSED: a frame for an autopilot that speaks MAVLink itself, over a slow line.
     COPIED: a copy of a station's frame for another station, alongside such an autopilot.
-    FOLLOWED: such an autopilot's telemetry for one station; its heartbeats are not counted.
     STORED: a list in the store that did not reach the flight controller.
     RECORDED: a ground station's frame in the telemetry log, whose space is mostly for the flight itself.
     """
@@ -42,17 +41,13 @@ class Cost(IntEnum):  # hashed for each datagram: as an int, in C
     BOARD = auto()
     PASSED = auto()
     COPIED = auto()
-    FOLLOWED = auto()
     STORED = auto()
     RECORDED = auto()
 
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """`each`: for every peer with standing, and every host of the others. `total`: shared by all the others.
-
-    bridge.gcs.budget describes standing and sharing.
-    """
+    """`each`: for a station or host with its own budget (bridge.gcs.budget). `total`: for all the others together."""
 
     each: Rate
     total: Rate
@@ -62,13 +57,21 @@ LIMITS = {
     Cost.RECEIVED: Limit(Rate(1500, 3000), Rate(15000, 15000)),
     Cost.ARRIVAL: Limit(Rate(5, 32), Rate(50, 200)),
     Cost.ANSWER: Limit(Rate(50, 600), Rate(500, 3000)),
-    Cost.TRANSFER: Limit(Rate(1000, 2000), Rate(1000, 2000)),
+    Cost.TRANSFER: Limit(Rate(1000, 2000), Rate(1000, 8000)),
     Cost.TEXT: Limit(Rate(5, 200), Rate(10, 300)),
     Cost.UPLOAD: Limit(Rate(10, 50), Rate(10, 400)),
     Cost.BOARD: Limit(Rate(4, 20), Rate(10, 40)),
     Cost.PASSED: Limit(Rate(200, 600), Rate(200, 600)),
     Cost.COPIED: Limit(Rate(150, 300), Rate(150, 300)),
-    Cost.FOLLOWED: Limit(Rate(1000, 1000), Rate(1200, 1200)),
     Cost.STORED: Limit(Rate(1 / 10, 20), Rate(1 / 5, 40)),
     Cost.RECORDED: Limit(Rate(50, 400), Rate(100, 800)),
 }
+
+#: Hosts with a budget of their own.
+SEATS = 16
+#: Writes to the flash (bridge.gcs.flash_budget) for each seat, and for all hosts without one: 17 times 2 at once, and
+#: 17 times 1 in two hours.
+FLASH_RESERVE = Rate(1 / 7200, 2)
+#: For all: with the reserves it makes 400 at once, and 12 an hour.
+FLASH_SHARED = Rate(3.5 / 3600, 366)
+FLASH_PROVEN = Rate(1 / 300, 400)

@@ -1,24 +1,33 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The ground side: connected stations, received frames, and the queue of datagrams to send. Sans-IO."""
+"""All ground stations, and the queue of datagrams to them. Sans-IO."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from math import inf
 
-from bridge.gcs.budget import Budgets
+from bridge.gcs.budget import HostBudgets
 from bridge.gcs.cost import Cost
 from bridge.gcs.flash_budget import FlashBudget
-from bridge.gcs.guard import Signer, Standing
-from bridge.gcs.recent_texts import RecentTexts
+from bridge.gcs.ground_station import GroundStation
+from bridge.gcs.places import MAX_LISTENERS, MAX_PEERS, Places
+from bridge.gcs.rights import LinkAccess, Standing
 from bridge.gcs.station import RECORDER, Peer, Severity, Station
-from bridge.gcs.stations import Stations, displaced
+from bridge.gcs.texts import cut_text, split_text
 from bridge.model.events import Emit, GcsFound, GcsSilent, GcsText
 from bridge.model.refusal import Refusal
 from protocols.mavlink.codec import FrameWriter, Packed, pack
 from protocols.mavlink.dialect import Message, messages
-from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+from protocols.mavlink.frame import MavlinkFrame
 from protocols.mission_item import MissionResult
 
-_TEXT_SIZE = 50
+#: A UDP station that is silent for this long has left; a TCP station leaves with its connection.
+EXPIRY_S = 60.0
+#: The same for a station whose ids have all moved to another address, as after Wi-Fi roaming.
+MOVED_S = 5.0
+#: A connected station, whether or not it transfers a mission, is never silent for this long.
+_STILL_S = 1.0
+#: The interval between searches for silent stations.
+_EXPIRY_INTERVAL_S = 1.0
 _MAX_TEXT_ID = 0xFFFF
 
 #: A frame listener: called with all frames to and from ground stations, each once.
@@ -26,12 +35,10 @@ FrameListener = Callable[[Sequence[bytes]], None]
 
 
 class Ground:
-    """All ground stations together. `on_newcomer` is called for a peer that is new or returns after a silence.
+    """The ground stations. `on_newcomer` is called for one that is new or returns after a silence.
 
-    `standing`: a peer's rights (bridge.gcs.guard). One that may only read gets telemetry and answers, but no texts
-    for everyone, and is not recorded.
-
-    `signers` by link name: on such a link everything the bridge sends is signed, and so MAVLink 2.
+    `access`: the rules of each link; a link without rules is `open_access`. A station that may only read gets telemetry
+    and answers, but no texts for everyone, and is not recorded.
     """
 
     def __init__(
@@ -39,39 +46,36 @@ class Ground:
         sysid: int,
         compid: int,
         emit: Emit,
-        on_newcomer: Callable[[Peer], None],
+        on_newcomer: Callable[[GroundStation, float], None],
         on_frames: FrameListener | None,
-        standing: Callable[[Peer], Standing],
-        signers: Mapping[str, Signer],
+        access: Mapping[str, LinkAccess],
+        open_access: LinkAccess,
     ) -> None:
-        self._sysid = sysid
-        self._compid = compid
+        self._ids = sysid, compid
         self._emit = emit
         self._on_newcomer = on_newcomer
-        #: Called for a peer that was forgotten after a silence.
-        self.on_silent: Callable[[Peer], None] = lambda _peer: None
         self._logs_flights = on_frames is not None
         self.on_frames = on_frames or _drop
-        self._standing = standing
-        self._signers = signers
-        self.stations = Stations()
-        self.budgets = Budgets(self.has_standing)
-        self.flash = FlashBudget(standing, self.stations)
+        self._access = access
+        self._open_access = open_access
+        self._heard: dict[Peer, GroundStation] = {}  # in order of arrival
+        #: Configured stations, and connections, that have not sent a frame.
+        self._unheard: dict[Peer, GroundStation] = {}
         self._default_peers: dict[Peer, bool] = {}
-        self._splitters: dict[Peer, MavlinkSplitter] = {}
-        self._writers: dict[Peer, FrameWriter] = {}
+        self._places: dict[tuple[str, bool], Places] = {}
+        self.hosts = HostBudgets()
+        self.flash = FlashBudget()
         self._datagrams: list[tuple[Peer, bytes]] = []
-        self._texts = RecentTexts()
         self._text_id = 0
-        #: The time of the last input.
-        self.now = 0.0
+        #: The time of the next `tick`.
+        self.due = inf
         #: Texts for each newcomer, about problems that began before it connected.
         self.notices: list[str] = []
         #: Frames from ground stations whose checksum was wrong.
         self.bad_frames = 0
         #: Whole frames from ground stations, by link and message id.
         self.frames_received: Counter[tuple[str, int]] = Counter()
-        self._everyone: list[Peer] | None = None  # recomputed after each change
+        self._everyone: list[GroundStation] | None = None  # recomputed after each change
 
     # The connected stations.
 
@@ -79,116 +83,190 @@ class Ground:
         """Send to `peer` before it is heard; `until_answered`: only while no peer is heard on its link (broadcast)."""
         self._default_peers[peer] = until_answered
         self._everyone = None
+        if self.station(peer) is None:
+            self._unheard[peer] = self._made(peer)
 
     def remove_default_peer(self, peer: Peer) -> None:
         self._default_peers.pop(peer, None)
+        self._unheard.pop(peer, None)
         self._everyone = None
-        self._writers.pop(peer, None)
 
     def remove_link(self, name: str) -> list[Peer]:
-        """Forget all peers on a link; returns those that were heard."""
+        """Forget all stations on a link; returns those that were heard."""
         for peer in [peer for peer in self._default_peers if peer.link == name]:
             self.remove_default_peer(peer)
-        heard = [peer for peer in self.stations.peers() if peer.link == name]
-        for peer in heard:
+        heard = [peer for peer in self._heard if peer.link == name]
+        for peer in [*heard, *(peer for peer in self._unheard if peer.link == name)]:
             self.gone(peer)
         return heard
 
-    def everyone(self) -> Sequence[Peer]:
-        """All peers that receive broadcasts."""
+    def station(self, peer: Peer) -> GroundStation | None:
+        return self._heard.get(peer) or self._unheard.get(peer)
+
+    def peers(self) -> list[Peer]:
+        """The peers that were heard, in order of arrival."""
+        return list(self._heard)
+
+    def everyone(self) -> Sequence[GroundStation]:
+        """All stations that receive broadcasts."""
         if self._everyone is None:
-            heard = self.stations.peers()
+            answered = {peer.link for peer in self._heard}
             unheard = (
-                peer
-                for peer in self.unheard()
-                if not (self._default_peers[peer] and any(peer.link == other.link for other in heard))
+                station
+                for peer, station in self._unheard.items()
+                if (is_until := self._default_peers.get(peer)) is not None and not (is_until and peer.link in answered)
             )
-            self._everyone = [*heard, *unheard]
+            self._everyone = [*self._heard.values(), *unheard]
         return self._everyone
 
-    def unheard(self) -> list[Peer]:
-        """The default peers that are not connected: nothing may be listening there."""
-        return [peer for peer in self._default_peers if self.stations.is_unknown(peer)]
-
     def gone(self, peer: Peer) -> None:
-        self.stations.gone(peer)
-        self._forget(peer)
-
-    @property
-    def due(self) -> float:
-        """The time of the next `tick`."""
-        return self.stations.due
+        """Forget a station; a configured one starts from scratch."""
+        self._unheard.pop(peer, None)
+        station = self._heard.pop(peer, None)
+        if station is not None:
+            self._places_of(station).remove(station)
+            station.leaves()
+        self._everyone = None
+        if peer in self._default_peers:
+            self._unheard[peer] = self._made(peer)
 
     def tick(self, now: float) -> None:
-        """Forget silent peers."""
-        for peer in self.stations.expire(now):
-            self._forget(peer)
-            self._emit(GcsSilent(peer=str(peer)))
-            self.on_silent(peer)
+        """Forget silent stations."""
+        latest: dict[tuple[str, tuple[int, int]], float] = {}
+        for peer, station in self._heard.items():
+            for ids, heard_at in station.speakers.items():
+                latest[peer.link, ids] = max(heard_at, latest.get((peer.link, ids), -inf))
+        for peer, station in [*self._heard.items()]:
+            # Heard later at another address: the station has moved there.
+            moved = all(latest[peer.link, ids] > at for ids, at in station.speakers.items())
+            if now >= station.heard_at + (MOVED_S if moved else EXPIRY_S):
+                self._leaves(station)
+        self.due = now + _EXPIRY_INTERVAL_S if self._heard else inf
 
-    def _forget(self, peer: Peer) -> None:
-        self._everyone = None
-        self.budgets.forget(peer)
-        self._splitters.pop(peer, None)
-        self._writers.pop(peer, None)
+    def _leaves(self, station: GroundStation) -> None:
+        self.gone(station.peer)
+        self._emit(GcsSilent(peer=str(station.peer)))
+
+    def _made(self, peer: Peer, *, is_connection: bool = False) -> GroundStation:
+        access = self._access.get(peer.link, self._open_access)
+        return GroundStation(peer, access, *self._ids, self.hosts.host(peer.host) if is_connection else None)
+
+    def _places_of(self, station: GroundStation) -> Places:
+        key = station.peer.link, station.is_listener
+        places = self._places.get(key)
+        if places is None:
+            places = self._places[key] = Places(MAX_LISTENERS if station.is_listener else MAX_PEERS)
+        return places
 
     # Received from them.
 
-    def received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> list[MavlinkFrame]:
-        """Parse bytes from a peer into frames. A datagram holds whole frames only."""
-        self.now = now
-        splitter = self._splitters.get(peer)
-        if splitter is None:
-            splitter = MavlinkSplitter()
+    def sender(self, peer: Peer, now: float, *, datagram: bool) -> GroundStation | None:
+        """The sender of a read or a datagram; None if it sends too many. A new one is remembered when it is admitted.
+
+        New addresses share one limit, because they may be made up; a connection cannot be.
+        """
+        station = self._heard.get(peer) or self._unheard.get(peer)
+        if station is None:
+            station = self._made(peer, is_connection=not datagram)
             if not datagram:
-                self._splitters[peer] = splitter
+                self._unheard[peer] = station
+        is_allowed = station.allows(Cost.RECEIVED, now) and (
+            station.host is not None or self.hosts.totals[Cost.RECEIVED].take(now)
+        )
+        return station if is_allowed else None
+
+    def split(self, station: GroundStation, data: bytes, *, datagram: bool) -> list[MavlinkFrame]:
+        """Parse bytes from a station into frames. A datagram holds whole frames only."""
+        splitter = station.splitter
         bad_before = splitter.bad_frames
         frames = splitter.feed(data)
-        if datagram:
+        if datagram and splitter.is_waiting:
             frames += splitter.reset()
         self.bad_frames += splitter.bad_frames - bad_before
         # Our own frames come back from a broadcast, or from a router that floods.
-        return [frame for frame in frames if frame.sender != (self._sysid, self._compid)]
+        return [frame for frame in frames if frame.sender != self._ids]
 
-    def admits(self, peer: Peer, now: float) -> bool:
-        """False if a frame must be ignored, because it comes from one of too many new addresses."""
-        standing = self._standing(peer)
-        if standing is Standing.PROVEN or not self.stations.is_unknown(peer):
-            return True
-        has_room = self.stations.has_room_for(peer, is_listener=standing is Standing.LISTENER)
-        return has_room and self.budgets.allows(Cost.ARRIVAL, peer, now)
+    def admits(self, station: GroundStation, now: float) -> bool:
+        """False if a station's first frame must be ignored, because it comes from one of too many new addresses."""
+        if station.standing is not Standing.PROVEN and not self._places_of(station).has_room_for(station.peer):
+            return False
+        station.host = self.hosts.host(station.peer.host)
+        return station.standing is Standing.PROVEN or station.host.allows(Cost.ARRIVAL, now)
 
-    def heard(self, peer: Peer, frame: MavlinkFrame, now: float) -> None:
-        """Note a frame from a peer, which counts as connected from now on."""
+    def heard(self, station: GroundStation, frame: MavlinkFrame, sender: tuple[int, int], now: float) -> None:
+        """Note a frame from a station, which counts as connected from now on."""
+        peer = station.peer
         self.frames_received[peer.link, frame.msgid] += 1
-        station = Station(peer, frame.sysid, frame.compid)
-        is_listener, is_unknown = self._standing(peer) is Standing.LISTENER, self.stations.is_unknown(peer)
-        if self.stations.heard(station, frame.version, now, is_listener=is_listener):
-            self._everyone = None
-            self._on_newcomer(peer)
-            if is_unknown:
-                self._emit(GcsFound(station=str(station)))
-                for notice in self.notices:
-                    self.say(Severity.WARNING, notice, station)
+        if is_unknown := not station.is_heard:
+            self._takes_place(station, now)
+        else:
+            self._places_of(station).stations.move_to_end(peer)
+        if station.heard(frame, sender, now):
+            self._on_newcomer(station, now)
+        if is_unknown:
+            name = Station(peer, *sender)
+            self._emit(GcsFound(station=str(name)))
+            for notice in self.notices:
+                self.say(Severity.WARNING, notice, name)
 
-    def record(self, peer: Peer, frame: MavlinkFrame, now: float) -> None:
-        if not self.stations.is_listener(peer) and self.budgets.allows(Cost.RECORDED, peer, now):
+    def _takes_place(self, station: GroundStation, now: float) -> None:
+        places = self._places_of(station)
+        if (displaced := places.displaced_by(station.peer)) is not None:
+            self._leaves(displaced)
+        places.add(station)
+        station.joins()
+        self._unheard.pop(station.peer, None)
+        self._heard[station.peer] = station
+        self._everyone = None
+        self.due = min(self.due, now + _EXPIRY_INTERVAL_S)
+
+    def has_shown_key(self, station: GroundStation) -> None:
+        """A station has sent its first valid signature."""
+        places = self._places_of(station)
+        station.has_key = True
+        if station.is_heard:
+            places.remove(station)
+            station.leaves()
+        station.settle_rights()
+        if station.is_heard:
+            self._takes_place(station, station.heard_at)
+
+    def record(self, station: GroundStation, frame: MavlinkFrame) -> None:
+        if self.on_frames is not _drop and not station.is_listener and station.allows(Cost.RECORDED):
             self.on_frames([frame.raw])
 
     def displaced(self, peers: Mapping[Peer, float]) -> Peer:
-        """The connection of a full link to drop; one with standing only if there is no other."""
-        others = {peer: at for peer, at in peers.items() if self._standing(peer) is not Standing.PROVEN}
-        return displaced(others or peers, self.stations.steady)
+        """The connection of a full link to drop: the longest-silent one, those with their own budget last.
 
-    def has_standing(self, peer: Peer) -> bool:
-        """True for a peer that has authenticated, or has precedence on its link: strangers cannot use its shares.
-
-        An address that was never heard may be made up, even if it is listed.
+        `peers`: when each was last heard.
         """
-        if self.stations.is_unknown(peer):
-            return False
-        standing = self._standing(peer)
-        return standing is Standing.PROVEN or (standing is Standing.OPEN and self.stations.has_standing(peer))
+
+        def worth(peer: Peer) -> tuple[bool, bool, float]:
+            station = self._heard.get(peer)
+            return station is not None and station.has_own_budget, station is not None, peers[peer]
+
+        return min(peers, key=worth)
+
+    def has_own_budget(self, peer: Peer) -> bool:
+        """True for a connected station whose limits strangers cannot use up."""
+        return (station := self._heard.get(peer)) is not None and station.has_own_budget
+
+    def allows(self, station: Station, cost: Cost) -> bool:
+        """Count work that a ground station causes; False if that exceeds its limit."""
+        return (sender := self._heard.get(station.peer)) is not None and sender.allows(cost)
+
+    def allows_write(self, station: Station, now: float) -> bool:
+        """Count a write to the flight controller's flash; False if it must wait."""
+        return self.flash.allows(self._heard.get(station.peer), now)
+
+    def not_written(self, station: Station) -> None:
+        """Take back a write: the flash held the same already, or the flight controller refused."""
+        self.flash.not_written(self._heard.get(station.peer))
+
+    def wrote_at(self, station: Station) -> float:
+        """When the station's host last wrote: the host that has waited longest writes first."""
+        sender = self._heard.get(station.peer)
+        return inf if sender is None or sender.host is None else sender.host.wrote_at
 
     @property
     def is_recording(self) -> bool:
@@ -202,6 +280,32 @@ class Ground:
         else:
             self.remove_default_peer(RECORDER)
 
+    # Wi-Fi roaming.
+
+    def moved_to(self, station: Station, now: float) -> list[Station]:
+        """The new addresses of a station that fell silent at its old one: usually none."""
+        old = self._heard.get(station.peer)
+        if old is None or now < old.heard_at + _STILL_S:
+            return []
+        elsewhere = (Station(peer, station.sysid, station.compid) for peer in self._heard)
+        return [where for where in elsewhere if self.has_moved(station, where, now)]
+
+    def has_moved(self, station: Station, to: Station, now: float) -> bool:
+        """True if `to` is the new address of a station that fell silent at its old one.
+
+        This excludes a second station with the same ids, heard earlier or alongside the first.
+        """
+        ids = station.sysid, station.compid
+        old, new = self._heard.get(station.peer), self._heard.get(to.peer)
+        if old is None or new is None or old is new or ids != (to.sysid, to.compid):
+            return False
+        return (
+            now >= old.heard_at + _STILL_S
+            and self._places_of(new) is self._places_of(old)
+            and ids in new.speakers
+            and new.came_at >= old.heard_at
+        )
+
     # Sent to them.
 
     def take_datagrams(self) -> list[tuple[Peer, bytes]]:
@@ -210,8 +314,10 @@ class Ground:
         return datagrams
 
     def to(self, station: Station, *together: Message) -> None:
-        """Send messages in one datagram to one ground station."""
-        self._send(station.peer, self._writer(station.peer), *together)
+        """Send messages in one datagram to one ground station, unless it has left."""
+        receiver = self._heard.get(station.peer) or self._unheard.get(station.peer)
+        if receiver is not None:
+            self._send(receiver, [receiver.frame(pack(message)) for message in together])
 
     def mission_ack(self, station: Station, result: MissionResult, mission_type: int = 0) -> None:
         """Send a MISSION_ACK."""
@@ -222,132 +328,89 @@ class Ground:
         self.say(Severity.ERROR, refusal.text, station)
         self.mission_ack(station, refusal.ack)
 
-    def allows(self, station: Station, cost: Cost) -> bool:
-        """Count work that a ground station causes; False if that exceeds its limit."""
-        return self.budgets.allows(cost, station.peer, self.now)
-
-    def to_as(self, ids: tuple[int, int], station: Station, message: Message) -> None:
+    def to_as(self, ids: tuple[int, int], receiver: GroundStation, message: Message) -> None:
         """Send a message to one ground station under the ids that it addressed."""
-        self._send(station.peer, FrameWriter(*ids, self._signers.get(station.peer.link)), message)
+        frame = FrameWriter(*ids, receiver.access.signer).frame(pack(message), receiver.frame_version)
+        self._send(receiver, [frame])
 
-    def _send(self, peer: Peer, writer: FrameWriter, *together: Message) -> None:
-        frames = [writer.frame(pack(message), self._version(peer)) for message in together]
-        self._datagrams.append((peer, b"".join(frames)))
-        if not self.stations.is_listener(peer):
+    def _send(self, receiver: GroundStation, frames: list[bytes]) -> None:
+        self._datagrams.append((receiver.peer, b"".join(frames)))
+        if self.on_frames is not _drop and not receiver.is_listener:
             self.on_frames(frames)
 
     def broadcast(self, message: Message) -> None:
         self.multicast(pack(message), self.everyone())
 
-    def multicast(self, packed: Packed, peers: Iterable[Peer]) -> None:
-        """Send a packed message to several peers that can read it."""
+    def multicast(self, packed: Packed, stations: Iterable[GroundStation]) -> None:
+        """Send a packed message to several stations that can read it."""
         frame = None
         is_logged = not self.is_recording
-        for peer in peers:
-            version = self._version(peer)
-            if version == 1 and packed.is_v2_only:
+        for station in stations:
+            if packed.is_v2_only and station.frame_version == 1:
                 continue
-            frame = self._writer(peer).frame(packed, version)
-            if peer is RECORDER:
+            frame = station.frame(packed)
+            if station.peer is RECORDER:
                 is_logged = True
             else:
-                self._datagrams.append((peer, frame))
+                self._datagrams.append((station.peer, frame))
         if frame is not None and is_logged:
             self.on_frames([frame])
 
-    def beat(self, heartbeat: Message, peers: Iterable[Peer]) -> None:
-        """Send the heartbeat in MAVLink 2, then in MAVLink 1 too, to peers that have not sent MAVLink 2.
+    def beat(self, heartbeat: Message, stations: Iterable[GroundStation]) -> None:
+        """Send the heartbeat in MAVLink 2, then in MAVLink 1 too, to stations that have not sent MAVLink 2.
 
         QGroundControl talks to the vehicle in the version of the first frame that it gets, and a ground station that
         knows only MAVLink 1 would not see the vehicle otherwise. Signed links need no MAVLink 1.
         """
         packed = pack(heartbeat)
         logged: bytes | None = None
-        for peer in peers:
-            writer = self._writer(peer)
-            frames = [writer.frame(packed, version) for version in ((2,) if self._has_sent_v2(peer) else (2, 1))]
+        for station in stations:
+            frames = [station.writer.frame(packed, version) for version in ((2,) if station.reads_v2_only else (2, 1))]
             logged = logged or frames[0]
-            if peer is not RECORDER:
-                self._datagrams += [(peer, frame) for frame in frames]
+            if station.peer is not RECORDER:
+                self._datagrams += [(station.peer, frame) for frame in frames]
         if logged is not None:
             self.on_frames([logged])
 
-    def _has_sent_v2(self, peer: Peer) -> bool:
-        is_certain = peer is RECORDER or peer.link in self._signers
-        return is_certain or not (self.stations.is_unknown(peer) or self.stations.version(peer) == 1)
-
-    def say(self, severity: Severity, text: str, to: Station | None = None) -> None:
-        """Show a text on one ground station or on all."""
+    def say(self, severity: Severity, text: str, to: Station | None = None, *, is_reminder: bool = False) -> None:
+        """Show a text on one ground station or on all; a refusal only once per attempt, unless `is_reminder`."""
         if to is None:
             self._say(severity, text, self._readers_of_texts())
-        elif self.allows(to, Cost.TEXT):
-            self._say(severity, text, [to.peer])
+        elif (station := self.station(to.peer)) is not None and station.allows(Cost.TEXT):
+            is_refusal = severity is Severity.ERROR and not is_reminder
+            if not is_refusal or station.texts.is_new(text, station.heard_at):
+                self._say(severity, text, [station])
 
     def say_to_others(self, severity: Severity, text: str, station: Station) -> None:
         """Show a text on all ground stations but one."""
-        self._say(severity, text, [peer for peer in self._readers_of_texts() if peer != station.peer])
+        self._say(severity, text, [reader for reader in self._readers_of_texts() if reader.peer != station.peer])
 
-    def _say(self, severity: Severity, text: str, peers: Sequence[Peer]) -> None:
-        """Send a text in pieces that fit STATUSTEXT; a refusal only once per attempt."""
+    def _say(self, severity: Severity, text: str, stations: Sequence[GroundStation]) -> None:
+        """Send a text in pieces that fit STATUSTEXT."""
         self._emit(GcsText(text=text))
-        if severity is Severity.ERROR:
-            peers = self._texts.new_to(peers, text, self.now)
-        if peers and self.is_recording and RECORDER not in peers:
-            peers = [*peers, RECORDER]  # a text for one station is part of the flight's log, too
+        recorder = self.station(RECORDER)
+        if stations and recorder is not None and recorder not in stations:
+            stations = [*stations, recorder]  # a text for one station is part of the flight's log, too
         self._text_id = self._text_id % _MAX_TEXT_ID + 1
         # MAVSDK joins the pieces with nothing in between, and shows padding as a gap.
-        joining = [peer for peer in peers if self.stations.is_like_mavsdk(peer)]
-        self._send_pieces(severity, cut_text(text), joining)
-        self._send_pieces(severity, split_text(text), [peer for peer in peers if peer not in joining])
+        self._send_pieces(severity, cut_text(text), [station for station in stations if station.is_like_mavsdk])
+        self._send_pieces(severity, split_text(text), [station for station in stations if not station.is_like_mavsdk])
 
-    def _send_pieces(self, severity: Severity, pieces: Sequence[str], peers: Sequence[Peer]) -> None:
+    def _send_pieces(self, severity: Severity, pieces: Sequence[str], stations: Sequence[GroundStation]) -> None:
         for chunk, piece in enumerate(pieces):
             # With an id, MAVSDK, MAVProxy and QGroundControl join the pieces; Mission Planner shows each by itself.
             text_id = self._text_id if len(pieces) > 1 else 0
             message = messages.MAVLink_statustext_message(severity, piece.encode("ascii", "replace"), text_id, chunk)
-            self.multicast(pack(message), peers)
+            self.multicast(pack(message), stations)
 
-    def _readers_of_texts(self) -> list[Peer]:
-        return [peer for peer in self.everyone() if self._standing(peer) is not Standing.LISTENER]
+    def _readers_of_texts(self) -> list[GroundStation]:
+        return [station for station in self.everyone() if not station.is_listener]
 
-    def forward(self, frames: Sequence[bytes], peers: Iterable[Peer]) -> None:
+    def forward(self, datagrams: Sequence[bytes], stations: Iterable[GroundStation]) -> None:
         """Send datagrams of one or more whole frames unchanged."""
-        for peer in peers:
-            for frame in frames:
-                self._datagrams.append((peer, frame))
-
-    def _writer(self, peer: Peer) -> FrameWriter:
-        writer = self._writers.get(peer)
-        if writer is None:
-            writer = FrameWriter(self._sysid, self._compid, self._signers.get(peer.link))
-            # A late reply to a peer that has left must not keep a writer forever.
-            if peer in self.everyone():
-                self._writers[peer] = writer
-        return writer
-
-    def _version(self, peer: Peer) -> int:
-        return 2 if peer.link in self._signers else self.stations.version(peer)
-
-
-def cut_text(text: str) -> list[str]:
-    """Cut into pieces of 50 characters; the last one is shorter, and may be empty, which ends the text."""
-    if len(text) <= _TEXT_SIZE:
-        return [text]
-    return [text[at : at + _TEXT_SIZE] for at in range(0, len(text) + 1, _TEXT_SIZE)]
-
-
-def split_text(text: str) -> list[str]:
-    """Split at spaces into pieces of 50 characters, padded with at least one space; the last one is shorter.
-
-    A piece shorter than 50 ends the text for clients that join them with nothing in between (STATUSTEXT.chunk_seq).
-    """
-    pieces: list[str] = []
-    while len(text) > _TEXT_SIZE - bool(pieces):
-        cut = text.rfind(" ", 1, _TEXT_SIZE)
-        cut = cut if cut > 0 else _TEXT_SIZE
-        pieces.append(text[:cut].ljust(_TEXT_SIZE))
-        text = text[cut:].lstrip()
-    return [*pieces, text]
+        for station in stations:
+            for datagram in datagrams:
+                self._datagrams.append((station.peer, datagram))
 
 
 def _drop(_frames: Sequence[bytes]) -> None:

@@ -1,24 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Access control: the one place that every frame from a ground station passes first. Sans-IO.
 
-`RIGHTS` is the whole policy; protocols/rights/mavlink.py has the effect of each message.
+bridge/gcs/rights.py has the policy; protocols/rights/mavlink.py has the effect of each message.
 """
 
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
-from enum import Enum
-from functools import partial
 from typing import NamedTuple
 
-from bridge.gcs.station import Peer, Station
+from bridge.gcs.ground import Ground
+from bridge.gcs.ground_station import GroundStation
+from bridge.gcs.station import Station
 from bridge.model.events import Emit, GcsRefused
 from protocols.mavlink.command import CommandResult
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.mavlink.ftp import refuse
-from protocols.mavlink.signing import Check, Signing
+from protocols.mavlink.signing import Check
 from protocols.mission_item import MissionResult
 from protocols.rights.effect import Effect
 from protocols.rights.mavlink import effect_of
@@ -27,61 +25,15 @@ _SETUP = "set the key in naze-bridge's settings"
 _ADDRESS = "this address may only read"
 #: At most 50 characters with "Refused: ".
 _NOT_OVER_OPEN_LINK = "open link; see pass_through in settings"
-
-
-#: Returns the signature of a MAVLink 2 frame.
-Signer = Callable[[bytes], bytes]
-
-
-class Standing(Enum):
-    """The rights that a peer has proven."""
-
-    LISTENER = "may only read"
-    OPEN = "its link requires nothing"
-    PROVEN = "has the key or the address that its link requires"
-
-
-class Rights(NamedTuple):
-    """The effects that a peer may have on the bridge's own vehicle, a passed-through autopilot, and other stations."""
-
-    own: Collection[Effect]
-    autopilot: Collection[Effect]
-    stations: Collection[Effect]
-
-
-_ALL = tuple(effect for effect in Effect if effect is not Effect.KEY)
-_NO_COMMANDS = Effect.READ, Effect.DIALOGUE, Effect.RATE, Effect.CHANGE
-#: The own vehicle itself refuses to arm, to move and to restart; other stations hear what concerns only themselves.
-RIGHTS: Mapping[Standing, Rights] = {
-    Standing.LISTENER: Rights((Effect.READ, Effect.DIALOGUE), (Effect.READ,), ()),
-    Standing.OPEN: Rights(_ALL, _NO_COMMANDS, (*_NO_COMMANDS, Effect.REPORT)),
-    Standing.PROVEN: Rights(_ALL, _ALL, _ALL),
-}
 #: Ground stations and radios repeat these.
 _ROUTINE = Effect.RATE, Effect.SILENCE
-
-
-@dataclass(frozen=True, slots=True)
-class LinkAccess:
-    """The conditions for writing over a link. `signing`: a signature with its key; `may_write`: the right address.
-
-    None: not required. Everything the bridge sends over a link with `signing` is signed, too; `link_id` is the link's
-    number in the signature.
-    """
-
-    signing: Signing | None = None
-    link_id: int = 0
-    may_write: Callable[[Peer], bool] | None = None
-
-
-_OPEN = LinkAccess()
 
 
 class GuardRefusal(NamedTuple):
     """The reason for refusing a frame.
 
-    `is_routine`: ground stations repeat it, so it is not reported. `is_forged`: the peer has the key, but this frame
-    is not signed with it, or is a copy. It gets no answer and has no effect, not even on the time the peer was last
+    `is_routine`: ground stations repeat it, so it is not reported. `is_forged`: the station has the key, but this frame
+    is not signed with it, or is a copy. It gets no answer and has no effect, not even on the time the station was last
     heard.
     """
 
@@ -91,88 +43,52 @@ class GuardRefusal(NamedTuple):
 
 
 class Guard:
-    """Accepts or refuses frames; refusals are counted, and logged once for each peer and reason.
+    """Accepts or refuses frames; refusals are counted, and logged once for each station and reason."""
 
-    `passes_everything`: an autopilot that speaks MAVLink itself gets all commands over open links, too.
-    """
-
-    def __init__(self, links: Mapping[str, LinkAccess], emit: Emit, *, passes_everything: bool = False) -> None:
-        self._links = links
+    def __init__(self, ground: Ground, emit: Emit) -> None:
+        self._ground = ground
         self._emit = emit
-        self._passes_everything = passes_everything
-        self._signed: set[Peer] = set()
-        self._logged: dict[Peer, set[str]] = {}
         #: Refusals by (link, reason).
         self.refused: Counter[tuple[str, str]] = Counter()
 
-    def standing(self, peer: Peer) -> Standing:
-        access = self._links.get(peer.link, _OPEN)
-        if access.signing is None and access.may_write is None:
-            return Standing.OPEN
-        has_key = access.signing is None or peer in self._signed
-        has_address = access.may_write is None or access.may_write(peer)
-        return Standing.PROVEN if has_key and has_address else Standing.LISTENER
-
-    @property
-    def signers(self) -> dict[str, Signer]:
-        """The signers of the links that need one."""
-        return {
-            name: partial(access.signing.signature, link_id=access.link_id)
-            for name, access in self._links.items()
-            if access.signing is not None
-        }
-
-    def refusal(self, peer: Peer, frame: MavlinkFrame) -> GuardRefusal | None:
-        """The reason for refusing a frame; None if it is accepted."""
-        access = self._links.get(peer.link, _OPEN)
+    def judge(self, station: GroundStation, frame: MavlinkFrame) -> Effect | GuardRefusal:
+        """The effect of a frame if it is accepted, else the reason for refusing it."""
         # Read requests are checked, too: each valid one invalidates older recordings.
-        check = Check.VALID if access.signing is None else access.signing.check(frame)
-        if access.signing is not None and check is Check.VALID:
-            self._signed.add(peer)
-        elif peer in self._signed:
-            # A duplicate made by the network, or another sender posing as this peer.
-            return self._refuse(peer, frame, str(check.value), is_forged=True)
+        signing = station.access.signing
+        check = Check.VALID if signing is None else signing.check(frame)
         effect = effect_of(frame)
-        if effect in RIGHTS[self.standing(peer)].own:
-            return None
+        if signing is not None and check is Check.VALID:
+            if not station.has_key:
+                self._ground.has_shown_key(station)
+        elif station.has_key:
+            # A duplicate made by the network, or another sender posing as this station.
+            return self._refuse(station, effect, str(check.value), is_forged=True)
+        if effect in station.rights.own:
+            return effect
         if effect is Effect.KEY:
-            return self._refuse(peer, frame, _SETUP)
-        return self._refuse(peer, frame, _ADDRESS if check is Check.VALID else str(check.value))
+            return self._refuse(station, effect, _SETUP)
+        return self._refuse(station, effect, _ADDRESS if check is Check.VALID else str(check.value))
 
-    def passing_refusal(self, peer: Peer, frame: MavlinkFrame) -> GuardRefusal | None:
-        """The reason for not passing a frame that `refusal` accepted to an autopilot that speaks MAVLink itself."""
-        if effect_of(frame) in self._rights_beyond(peer).autopilot:
+    def passing_refusal(self, station: GroundStation, effect: Effect) -> GuardRefusal | None:
+        """The reason for not passing an accepted frame to an autopilot that speaks MAVLink itself."""
+        if effect in station.rights.autopilot:
             return None
-        if self.standing(peer) is Standing.LISTENER:
+        if station.is_listener:
             return GuardRefusal(_ADDRESS, is_routine=True)
-        return self._refuse(peer, frame, _NOT_OVER_OPEN_LINK)
+        return self._refuse(station, effect, _NOT_OVER_OPEN_LINK)
 
-    def may_reach_stations(self, peer: Peer, frame: MavlinkFrame) -> bool:
-        """True if a frame that `refusal` accepted may be sent on to other ground stations: a vehicle may be there."""
-        return effect_of(frame) in self._rights_beyond(peer).stations
-
-    def _rights_beyond(self, peer: Peer) -> Rights:
-        standing = self.standing(peer)
-        is_trusted = self._passes_everything and standing is Standing.OPEN
-        return RIGHTS[Standing.PROVEN if is_trusted else standing]
-
-    def forget(self, peer: Peer) -> None:
-        self._signed.discard(peer)
-        self._logged.pop(peer, None)
-
-    def report(self, refused: GuardRefusal, peer: Peer, frame: MavlinkFrame) -> bool:
-        """Log a refusal of a connected peer, if it is the peer's first for this reason; True if so."""
-        logged = self._logged.setdefault(peer, set())
-        if refused.is_routine or refused.why in logged:
+    def report(self, refused: GuardRefusal, station: GroundStation, frame: MavlinkFrame) -> bool:
+        """Log a refusal of a connected station, if it is the first for this reason; True if so."""
+        if refused.is_routine or refused.why in station.reported:
             return False
-        logged.add(refused.why)
-        station = Station(peer, frame.sysid, frame.compid)
-        self._emit(GcsRefused(station=str(station), message=_name(frame), why=refused.why))
+        station.reported.add(refused.why)
+        name = Station(station.peer, *frame.sender)
+        self._emit(GcsRefused(station=str(name), message=_name(frame), why=refused.why))
         return True
 
-    def _refuse(self, peer: Peer, frame: MavlinkFrame, why: str, *, is_forged: bool = False) -> GuardRefusal:
-        self.refused[peer.link, why] += 1
-        return GuardRefusal(why, effect_of(frame) in _ROUTINE, is_forged)
+    def _refuse(self, station: GroundStation, effect: Effect, why: str, *, is_forged: bool = False) -> GuardRefusal:
+        self.refused[station.peer.link, why] += 1
+        return GuardRefusal(why, effect in _ROUTINE, is_forged)
 
 
 def denial(message: Message, station: Station) -> Message | None:

@@ -9,20 +9,19 @@ not heard yet go to the autopilot.
 from collections.abc import Sequence
 from itertools import takewhile
 
-from bridge.gcs.cost import Cost
+from bridge.gcs.cost import SEATS, Cost
 from bridge.gcs.ground import Ground
-from bridge.gcs.station import Peer, Station
-from bridge.gcs.stations import PRECEDENCE
+from bridge.gcs.ground_station import GroundStation
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame
 from protocols.mavlink.target import has_target_field, target_of
 
 #: Mission Planner, QGroundControl, MAVSDK and MAVProxy read several frames in a datagram; MAVROS cuts at 296 bytes.
 MAX_DATAGRAM_SIZE = 280
-#: Ids remembered behind one peer: a router may carry a fleet, but made-up ids must not fill the memory.
-_MAX_SPEAKERS = 64
 #: Messages remembered that have no target: all of one dialect from a few components.
 _MAX_KINDS = 1024
+#: Stations without their own budget that get a datagram of telemetry, if more than 16 are connected.
+_OTHERS = 3
 #: Carries a signing key in the clear. The guard refuses it from ground stations.
 _NEVER_FORWARDED = messages.MAVLINK_MSG_ID_SETUP_SIGNING
 _HEARTBEAT = messages.MAVLINK_MSG_ID_HEARTBEAT
@@ -34,7 +33,8 @@ class Routes:
     def __init__(self, ground: Ground) -> None:
         self._ground = ground
         self._aboard: set[tuple[int, int]] = set()
-        self._heard: dict[Peer, set[tuple[int, int]]] = {}
+        #: The station without its own budget that is the next to get telemetry.
+        self._turn = 0
         #: Messages without a target, by the bytes of the header that hold sender and message id.
         self._for_all: set[bytes] = set()
 
@@ -57,30 +57,25 @@ class Routes:
         """True for the autopilot's own frame, returned by a router that floods."""
         return frame.sender in self._aboard
 
-    def from_station(self, station: Station, frame: MavlinkFrame, *, to_stations: bool) -> bool:
+    def from_station(self, station: GroundStation, frame: MavlinkFrame, *, to_stations: bool) -> bool:
         """Send a frame that the guard accepted on to other stations; True if it is for the autopilot, too.
 
-        `to_stations` False: it reaches no other station, and its sender is not found by its ids.
+        `to_stations` False: it reaches no other station.
         """
         system, component = target_of(frame)
-        there = self._ground.everyone() if system == 0 else self._peers_of(system, component)
-        others = [peer for peer in there if peer != station.peer]
+        there = self._ground.everyone() if system == 0 else self._stations_of(system, component)
+        others = [other for other in there if other is not station]
         if to_stations:
-            behind = self._heard.setdefault(station.peer, set())
-            if len(behind) < _MAX_SPEAKERS:
-                behind.add(frame.sender)
-            self._ground.forward([frame.raw], takewhile(lambda _: self._ground.allows(station, Cost.COPIED), others))
+            self._ground.forward([frame.raw], takewhile(lambda _: station.allows(Cost.COPIED), others))
         return system == 0 or self.addressed(system) is not None or not others
 
-    def forget(self, peer: Peer) -> None:
-        self._heard.pop(peer, None)
+    def _stations_of(self, system: int, component: int) -> list[GroundStation]:
+        """The stations with these ids. One that may only read is not found by its ids, which may be the pilot's."""
 
-    def _peers_of(self, system: int, component: int) -> list[Peer]:
-        def is_there(peer: Peer) -> bool:
-            behind = self._heard.get(peer, ())
-            return any(sysid == system and component in (0, compid) for sysid, compid in behind)
+        def is_there(station: GroundStation) -> bool:
+            return any(sysid == system and component in (0, compid) for sysid, compid in station.speakers)
 
-        return [peer for peer in self._ground.stations.peers() if is_there(peer)]
+        return [station for station in self._ground.everyone() if station.rights.stations and is_there(station)]
 
     def _is_for_all(self, kind: bytes, frame: MavlinkFrame) -> bool:
         """Meet a new kind of message from a component aboard; True if it has no target field."""
@@ -100,14 +95,21 @@ class Routes:
             self._send([frame.raw])
             return
         self._ground.on_frames([frame.raw])
-        self._ground.forward([frame.raw], self._peers_of(system, component))
+        self._ground.forward([frame.raw], self._stations_of(system, component))
 
     def _send(self, frames: list[bytes]) -> None:
         self._ground.on_frames(frames)
-        peers = self._ground.everyone()
-        if len(peers) > PRECEDENCE and _HEARTBEAT not in (MavlinkFrame(raw).msgid for raw in frames):
-            peers = [peer for peer in peers if self._ground.budgets.allows(Cost.FOLLOWED, peer, self._ground.now)]
-        self._ground.forward(in_datagrams(frames), peers)
+        stations = self._ground.everyone()
+        if len(stations) > SEATS and _HEARTBEAT not in (MavlinkFrame(raw).msgid for raw in frames):
+            stations = self._with_some_others(stations)
+        self._ground.forward(in_datagrams(frames), stations)
+
+    def _with_some_others(self, stations: Sequence[GroundStation]) -> list[GroundStation]:
+        """The stations with their own budget, and a few of the others in turn: a crowd does not multiply the load."""
+        own = [station for station in stations if station.has_own_budget]
+        others = [station for station in stations if not station.has_own_budget]
+        self._turn = (self._turn + _OTHERS) % max(len(others), 1)
+        return own + (others[self._turn :] + others[: self._turn])[:_OTHERS]
 
 
 def in_datagrams(frames: Sequence[bytes]) -> list[bytes]:

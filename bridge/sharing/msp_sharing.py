@@ -13,7 +13,7 @@ from math import inf
 
 from bridge.fc.profile import FlightController
 from bridge.fc.session import FcSession
-from bridge.gcs.budget import Shares, TokenBucket
+from bridge.gcs.budget import TokenBucket
 from bridge.gcs.cost import Rate
 from bridge.line.conversation import Conversation, LinkLost, Receive, Send, ask_status
 from bridge.line.msp_link import MspLink
@@ -22,6 +22,7 @@ from bridge.missions.mission_service import MissionService
 from bridge.model.events import Emit, Level, ShareRefused, ShareUnanswered
 from bridge.sharing.permission import ARMED, is_unknown_read, refusal, right_of
 from bridge.sharing.program import Program, WaitingRequest
+from bridge.sharing.shares import Shares
 from protocols.msp.frame import Direction, MspFrame, frame_size
 from protocols.rights.effect import Effect
 

@@ -100,8 +100,10 @@ class UploadAnswers:
         """
         accepted = delivery.ack is MissionResult.ACCEPTED
         if verdict.result is Result.ACCEPTED and station.peer not in self._informed:
-            connected = self._ground.stations
-            self._informed = {station.peer, *(peer for peer in self._informed if not connected.is_unknown(peer))}
+            self._informed = {
+                station.peer,
+                *(peer for peer in self._informed if self._ground.station(peer) is not None),
+            }
             self._ground.say(Severity.INFO, _ONLY_MISSIONS, station)
         for news, line in finding_lines(verdict.findings) if accepted else ():
             if line != delivery.text:
@@ -138,7 +140,7 @@ class UploadAnswers:
                 if now < due:
                     continue
                 if text is not None:
-                    self._ground.say(Severity.ERROR, text, station)
+                    self._ground.say(Severity.ERROR, text, station, is_reminder=True)
                 else:
                     self._ground.mission_ack(station, answer.ack)
             answer.again = [again for again in answer.again if now < again[0]]
@@ -189,7 +191,7 @@ class UploadAnswers:
         self._forget_old(now)
         if station in self._answers:
             return self._answers[station]
-        has_moved = self._ground.stations.has_moved
+        has_moved = self._ground.has_moved
         return next((answer for known, answer in self._answers.items() if has_moved(known, station, now)), None)
 
     def _is_known(self, station: Station, now: float) -> bool:
@@ -203,7 +205,7 @@ class UploadAnswers:
 
         def worth(station: Station) -> tuple[bool, int, bool]:
             peer = station.peer
-            return self._ground.has_standing(peer), -hosts[peer.host], not self._answers[station].is_refusal
+            return self._ground.has_own_budget(peer), -hosts[peer.host], not self._answers[station].is_refusal
 
         for station in sorted(self._answers, key=worth)[:_MOST]:
             del self._answers[station]

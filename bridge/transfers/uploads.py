@@ -14,8 +14,8 @@ from typing import Any
 from bridge.gcs.cost import Cost
 from bridge.gcs.flash_budget import TOO_MANY_WRITES
 from bridge.gcs.ground import Ground
+from bridge.gcs.places import MAX_PEERS
 from bridge.gcs.station import Peer, Severity, Station
-from bridge.gcs.stations import MAX_PEERS
 from bridge.line.conversation import Conversation
 from bridge.missions.fc_mission_store import StoreReport
 from bridge.missions.list_check import begin_check, check_count
@@ -76,7 +76,6 @@ class MissionUploads:
         self._ground = ground
         self._emit = emit
         self._incidents = incidents
-        self._flash = ground.flash
         self._let_read = let_read
         self._queue = UploadQueue()
         self.answers = UploadAnswers(ground, let_read)
@@ -190,9 +189,9 @@ class MissionUploads:
             elif now >= state.due:
                 self._request(upload, now, *state.repeats(now))
         self.answers.tick(now)
-        # First that of the host that has written least.
+        # First that of the host that has waited longest.
         waiting = self._queue.within(Waiting, Complete)
-        for upload in sorted(waiting, key=lambda upload: self._flash.used(upload.station.peer)):
+        for upload in sorted(waiting, key=lambda upload: self._ground.wrote_at(upload.station)):
             event = self._turn(upload, now)
             if event is not None:
                 self._handle(upload, event, now)
@@ -221,7 +220,7 @@ class MissionUploads:
         if armed is not None:
             self._handle(upload, Ended(armed), now)
         elif len(self._queue.uploads) > _MOST_UPLOADS:
-            ended = self._queue.least_worth(self._ground.has_standing)
+            ended = self._queue.least_worth(self._ground.has_own_budget)
             self._handle(ended, Ended(_cancelled("ended: too many at once")), now)
 
     def _turn(self, upload: Upload, now: float) -> Event | None:
@@ -230,7 +229,7 @@ class MissionUploads:
         if isinstance(state, Complete):
             refusal = self._missions.acquire(upload)
             is_write = state.whole.verdict.result is not Result.REJECTED
-            if refusal is None and is_write and not self._flash.allows(upload.station.peer, now):
+            if refusal is None and is_write and not self._ground.allows_write(upload.station, now):
                 refusal = Refusal(MissionResult.DENIED, TOO_MANY_WRITES)
         else:
             refusal = OCCUPIED if self._queue.must_wait(now) else self._missions.occupied()
@@ -312,7 +311,7 @@ class MissionUploads:
             return
         accepted = delivery.ack is MissionResult.ACCEPTED
         if verdict.result is not Result.REJECTED and accepted and not delivery.change:
-            self._flash.not_written(upload.station.peer)
+            self._ground.not_written(upload.station)
         self.answers.report(upload.station, verdict, delivery)
         if upload in self._queue.uploads:
             self._answer(upload, delivery.ack, now)
@@ -355,7 +354,7 @@ class MissionUploads:
         found = None
         if not self.answers.was_said_to(station, now):
             for upload in self._queue.uploads:
-                if self._ground.stations.has_moved(upload.station, station, now):
+                if self._ground.has_moved(upload.station, station, now):
                     before, after = str(upload.station), str(station)
                     self._emit(StationMoved(before=before, after=after, incident=upload.incident))
                     upload.station, found = station, upload
@@ -365,7 +364,7 @@ class MissionUploads:
         """Other addresses of the upload's station, except those that have announced their own list."""
         return [
             where
-            for where in self._ground.stations.moved_to(upload.station, now)
+            for where in self._ground.moved_to(upload.station, now)
             if self._queue.of(where) is None and not self.answers.was_said_to(where, now)
         ]
 

@@ -104,7 +104,8 @@ class CommandService:
 
     def take(self, station: Station, command: int, params: Sequence[float], now: float) -> None:
         """Execute a command and acknowledge it. `params`: param1..param7."""
-        self._ground.stations.note_request(station.peer, streams=False)
+        if (sender := self._ground.station(station.peer)) is not None:
+            sender.uses_commands = True
         action = _action(command, params)
         if action is None:
             self._acknowledge(station, command, self._do(station, command, params))
@@ -113,7 +114,7 @@ class CommandService:
             self._acknowledge(station, command, CommandResult.IN_PROGRESS)
         elif self._calibration.action is not None:
             self._acted(station, command, action, ActionResult.RUNNING, now)
-        elif not self._ground.flash.allows(station.peer, now):
+        elif not self._ground.allows_write(station, now):
             self._ground.say(Severity.ERROR, TOO_MANY_WRITES, station)
             self._acknowledge(station, command, CommandResult.TEMPORARILY_REJECTED)
         else:
@@ -130,7 +131,7 @@ class CommandService:
     def _acted(self, station: Station, command: int, action: FcAction, outcome: ActionResult, now: float) -> None:
         result = _OUTCOMES[outcome]
         if outcome in NOT_DONE:
-            self._ground.flash.not_written(station.peer)
+            self._ground.not_written(station)
         if result is not CommandResult.ACCEPTED:
             self._ground.say(Severity.ERROR, outcome.value, station)
             self._acknowledge(station, command, result)

@@ -10,10 +10,11 @@ from math import inf
 
 from bridge.fc.msp_telemetry import POLL_FOR
 from bridge.fc.session import FcSession
+from bridge.gcs.cost import SEATS
 from bridge.gcs.ground import Ground
-from bridge.gcs.message_rates import MessageRates
+from bridge.gcs.ground_station import GroundStation
+from bridge.gcs.message_rates import fastest_s, share_out, take_due
 from bridge.gcs.station import Peer, Severity, Station
-from bridge.gcs.stations import PRECEDENCE
 from bridge.missions.mission_service import MissionService
 from bridge.model.flight_memory import Home
 from bridge.model.flight_mode import FlightMode
@@ -46,6 +47,7 @@ _SHOWN_S = 10.0
 _FASTEST_S = 0.01
 _ALL_STREAMS = messages.MAV_DATA_STREAM_ALL
 _ROWS = {row.msgid: row for row in TELEMETRY}
+_DEFAULTS_S = {row.msgid: row.interval_s for row in TELEMETRY}
 _SYS_STATUS = _ROWS[messages.MAVLINK_MSG_ID_SYS_STATUS]
 
 
@@ -72,28 +74,21 @@ class OwnVehicle:
         self.due = self._second_ends = now
         #: The messages that any ground station wants, by the reading that triggers them.
         self._rows: dict[type[Reading] | None, list[Row]] = {}
-        self._rates = MessageRates({row.msgid: row.interval_s for row in TELEMETRY})
         self._progress = MissionProgress()
         self._announced_home: Home | None = None
-        #: Newcomers that wait for home and the reasons not to arm.
-        self._uninformed: dict[Peer, None] = {}
         self._also_wanted: Mapping[type[Reading], float] = {}
         self._stale_s: Mapping[type[Reading], float] = {}
-        #: New ground stations, and the end of their faster heartbeats.
-        self._newcomers: dict[Peer, float] = {}
         self._newcomers_due = inf
         self._polls_set_at, self._polls_due = -inf, inf
         #: Armed, mode, failsafe and lost as last announced.
         self._announced: tuple[bool | None, FlightMode | str | None, bool, bool] | None = None
 
-    def newcomer(self, peer: Peer) -> None:
+    def newcomer(self, station: GroundStation, now: float) -> None:
         """Send a new ground station more heartbeats, so that it connects sooner, then home and why it cannot arm."""
-        self._uninformed[peer] = None
-        if len(self._newcomers) < PRECEDENCE:  # to a crowd, one a second
-            self._newcomers[peer] = self._ground.now + _NEWCOMER_S
-        self._newcomers_due = min(self._newcomers_due, self._ground.now + _NEWCOMER_INTERVAL_S)
+        station.greeted_until, station.is_informed = now + _NEWCOMER_S, False
+        self._newcomers_due = min(self._newcomers_due, now + _NEWCOMER_INTERVAL_S)
         self.due = min(self.due, self._newcomers_due)
-        self._ground.beat(self._heartbeat(), [peer])
+        self._ground.beat(self._heartbeat(), [station])
         self._follow_requests()
 
     def tick(self, now: float) -> None:
@@ -104,14 +99,15 @@ class OwnVehicle:
             self._end_second(now)
         if now >= self._polls_due:
             self._set_polls(self._ground.everyone())
+            self._polls_set_at = now
         self.due = min(self._second_ends, self._newcomers_due, self._polls_due)
 
     def _end_second(self, now: float) -> None:
         self._second_ends = max(self._second_ends + _TICK_S, now)
         everyone = self._ground.everyone()
-        unwatched = () if self._session.vehicle.armed else self._ground.unheard()
-        self._rates.keep(everyone, set(filter(self._ground.has_standing, everyone)), unwatched)
+        share_out(everyone, in_flight=bool(self._session.vehicle.armed))
         self._set_polls(everyone)
+        self._polls_set_at = now
         self.arming_reasons.follow(now)
         self._ground.beat(self._heartbeat(), everyone)
         self._send_due(self._rows.get(None, ()))
@@ -122,20 +118,20 @@ class OwnVehicle:
         self._inform_newcomers(everyone)
 
     def _greet(self, now: float) -> None:
-        self._newcomers = {peer: until for peer, until in self._newcomers.items() if now < until}
-        self._newcomers_due = now + _NEWCOMER_INTERVAL_S if self._newcomers else inf
-        newcomers = [peer for peer in self._ground.everyone() if peer in self._newcomers]
+        """Of a crowd, greet a few: the others get a heartbeat a second."""
+        newcomers = [station for station in self._ground.everyone() if now < station.greeted_until][:SEATS]
+        self._newcomers_due = now + _NEWCOMER_INTERVAL_S if newcomers else inf
         self._ground.beat(self._heartbeat(), newcomers)
 
-    def _inform_newcomers(self, everyone: Sequence[Peer]) -> None:
+    def _inform_newcomers(self, everyone: Sequence[GroundStation]) -> None:
         """Tell home and the reasons not to arm: to a crowd, each second to some."""
-        peers = [peer for peer in [*self._uninformed][:PRECEDENCE] if self._uninformed.pop(peer, True) is None]
-        peers = [peer for peer in peers if peer in everyone]
-        for message in self._moment().made((make.home_position,)) if peers else ():
-            self._ground.multicast(pack(message), peers)
-        for peer in peers:
-            if not self._ground.stations.is_listener(peer):
-                self.arming_reasons.tell(Station(peer, 0, 0))
+        newcomers = [station for station in everyone if not station.is_informed][:SEATS]
+        for message in self._moment().made((make.home_position,)) if newcomers else ():
+            self._ground.multicast(pack(message), newcomers)
+        for station in newcomers:
+            station.is_informed = True
+            if not station.is_listener:
+                self.arming_reasons.tell(Station(station.peer, 0, 0))
 
     def heard(self, news: Collection[type[Reading]], now: float) -> None:
         """Send the messages that new readings trigger, where due."""
@@ -153,13 +149,13 @@ class OwnVehicle:
         everyone = self._ground.everyone()
         at: Moment | None = None
         for row in rows:
-            peers = self._rates.take_due(row.msgid, everyone, self._now)
-            if peers and row.msgid == messages.MAVLINK_MSG_ID_MISSION_CURRENT:
-                self._send_current(peers)
-            elif peers:
+            stations = take_due(everyone, row.msgid, row.interval_s, self._now)
+            if stations and row.msgid == messages.MAVLINK_MSG_ID_MISSION_CURRENT:
+                self._send_current(stations)
+            elif stations:
                 at = at or self._moment()
                 for message in at.made(row.makers):
-                    self._ground.multicast(pack(message), peers)
+                    self._ground.multicast(pack(message), stations)
 
     def also_want(self, readings: Mapping[type[Reading], float]) -> None:
         """Set the poll intervals for consumers other than ground stations: seconds by reading."""
@@ -182,7 +178,7 @@ class OwnVehicle:
             # A restarted station would otherwise show home at 0, 0.
             made = [make.autopilot_version(self._session.vehicle), *self._moment().made((make.home_position,))]
         elif (row := _ROWS.get(msgid)) is not None:
-            made = self._moment(self._sent_seqs(station.peer)).made(row.makers)
+            made = self._moment(self._sent_seqs(self._ground.station(station.peer))).made(row.makers)
         else:
             return None
         for message in made:
@@ -193,7 +189,8 @@ class OwnVehicle:
         """Set the interval of a message for one ground station; None: the default. False: no such message."""
         if msgid not in _ROWS:
             return False
-        self._rates.request(peer, msgid, None if interval_s is None else max(interval_s, _FASTEST_S))
+        if (station := self._ground.station(peer)) is not None:
+            station.rates.request(msgid, None if interval_s is None else max(interval_s, _FASTEST_S))
         self._follow_requests()
         return True
 
@@ -203,22 +200,25 @@ class OwnVehicle:
         Mission Planner's window hangs until one arrives. MAVSDK, which requests no streams, repeats its request at each
         that has another number, without end.
         """
-        if self._ground.stations.uses_streams(station.peer):
+        sender = self._ground.station(station.peer)
+        if sender is not None and sender.uses_streams:
             self.send_once(station, messages.MAVLINK_MSG_ID_MISSION_CURRENT)
-        else:
-            self._rates.withhold(station.peer, messages.MAVLINK_MSG_ID_MISSION_CURRENT, now + _NO_CURRENT_S)
+        elif sender is not None:
+            sender.rates.due[messages.MAVLINK_MSG_ID_MISSION_CURRENT] = now + _NO_CURRENT_S
 
     def let_read(self, peer: Peer) -> None:
         """Withhold SYS_STATUS from a ground station for as long as Mission Planner shows a text, while disarmed.
 
         An unhealthy sensor, indoors always the GPS, would replace the text after half a second.
         """
-        if not self._session.vehicle.armed:
-            self._rates.withhold(peer, messages.MAVLINK_MSG_ID_SYS_STATUS, self._ground.now + _SHOWN_S)
+        station = self._ground.station(peer)
+        if station is not None and not self._session.vehicle.armed:
+            station.rates.due[messages.MAVLINK_MSG_ID_SYS_STATUS] = self._now + _SHOWN_S
 
     def set_stream(self, peer: Peer, stream: int, interval_s: float) -> None:
         """Set the interval of all messages of one of ArduPilot's streams."""
-        self._ground.stations.note_request(peer, streams=True)
+        if (station := self._ground.station(peer)) is not None:
+            station.uses_streams = True
         for row in TELEMETRY:
             if row.stream == stream or (stream == _ALL_STREAMS and row.stream != NO_STREAM):
                 self.set_interval(peer, row.msgid, interval_s)
@@ -230,26 +230,25 @@ class OwnVehicle:
         if (row := _ROWS.get(msgid)) is None:
             return None
         pace_s = _TICK_S if row.poll is None else self._session.polls.interval_s(row.poll)
-        return max(self._rates.interval_s(peer, msgid), pace_s or 0.0)
+        station = self._ground.station(peer)
+        wanted_s = row.interval_s if station is None else station.rates.interval_s(msgid, row.interval_s)
+        return max(wanted_s, pace_s or 0.0)
 
     def _follow_requests(self) -> None:
-        """Update the polls now, or shortly after the last update."""
-        if self._ground.now >= self._polls_set_at + _POLLS_INTERVAL_S:
-            self._set_polls(self._ground.everyone())
-        else:
-            self._polls_due = self._polls_set_at + _POLLS_INTERVAL_S
-            self.due = min(self.due, self._polls_due)
+        """Update the polls soon, but not too often."""
+        self._polls_due = self._polls_set_at + _POLLS_INTERVAL_S
+        self.due = min(self.due, self._polls_due)
 
-    def _set_polls(self, everyone: Sequence[Peer]) -> None:
+    def _set_polls(self, everyone: Sequence[GroundStation]) -> None:
         """Set each poll to the highest rate requested."""
-        self._polls_set_at, self._polls_due = self._ground.now, inf
+        self._polls_due = inf
         wanted: dict[Msp, float] = {}
         for reading, interval_s in self._also_wanted.items():
             _want(wanted, POLL_FOR.get(reading), interval_s)
         self._rows = {}
-        fastest_s = self._rates.fastest_s(everyone)
+        intervals_s = fastest_s(everyone, _DEFAULTS_S)
         for row in TELEMETRY:
-            interval_s = fastest_s[row.msgid]
+            interval_s = intervals_s[row.msgid]
             if interval_s < inf:
                 self._rows.setdefault(row.reading, []).append(row)
             _want(wanted, row.poll, interval_s)
@@ -306,30 +305,30 @@ class OwnVehicle:
             self._send_current(everyone)
         seq = self._missions.seq_of(reached or 0)
         if seq:
-            for sent_seqs, peers in self._by_item_numbers(everyone):
+            for sent_seqs, stations in self._by_item_numbers(everyone):
                 number = (sent_seqs[seq] or 0) if sent_seqs else seq
-                self._ground.multicast(pack(make.mission_item_reached(number)), peers)
+                self._ground.multicast(pack(make.mission_item_reached(number)), stations)
 
-    def _send_current(self, receivers: Sequence[Peer]) -> None:
-        for sent_seqs, peers in self._by_item_numbers(receivers):
-            self._ground.multicast(pack(make.mission_current(self._moment(sent_seqs))), peers)
+    def _send_current(self, receivers: Sequence[GroundStation]) -> None:
+        for sent_seqs, stations in self._by_item_numbers(receivers):
+            self._ground.multicast(pack(make.mission_current(self._moment(sent_seqs))), stations)
 
-    def _by_item_numbers(self, peers: Sequence[Peer]) -> Iterable[tuple[SentSeqs, Sequence[Peer]]]:
-        """The peers that count the items alike; () stands for the numbers of the list as read back."""
+    def _by_item_numbers(self, stations: Sequence[GroundStation]) -> Iterable[tuple[SentSeqs, Sequence[GroundStation]]]:
+        """The stations that count the items alike; () stands for the numbers of the list as read back."""
         held = self._missions.held
         if held is None or not held.sent_seqs:
-            return [((), peers)]
-        alike: dict[SentSeqs, list[Peer]] = {}
-        for peer in peers:
-            alike.setdefault(self._sent_seqs(peer), []).append(peer)
+            return [((), stations)]
+        alike: dict[SentSeqs, list[GroundStation]] = {}
+        for station in stations:
+            alike.setdefault(self._sent_seqs(station), []).append(station)
         return alike.items()
 
-    def _sent_seqs(self, peer: Peer) -> SentSeqs:
-        """The item numbers of a peer that sent the list and has not read it since; else ()."""
+    def _sent_seqs(self, station: GroundStation | None) -> SentSeqs:
+        """The item numbers of a station that sent the list and has not read it since; else ()."""
         held = self._missions.held
-        if held is None or not held.sent_seqs:
+        if station is None or held is None or not held.sent_seqs:
             return ()
-        known = (held.sent_seqs.get(station.identity) for station in self._ground.stations.at(peer))
+        known = (held.sent_seqs.get(sender.identity) for sender in station.senders())
         return next(filter(None, known), ())
 
     def _announce_home(self) -> None:

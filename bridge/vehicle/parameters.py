@@ -95,7 +95,7 @@ class Parameters:
             return
         elif self._missions.armed_refusal() is not None:
             refusal = f"{WP_RADIUS} stays {radius_cm:.0f}: {PushFailure.ARMED.value}"
-        elif not self._ground.flash.allows(station.peer, now):
+        elif not self._ground.allows_write(station, now):
             refusal = TOO_MANY_WRITES
         else:
             self._write(fc_store, wanted_cm, station, now)
@@ -109,7 +109,7 @@ class Parameters:
             if failure is PushFailure.NO_ANSWER or isinstance(failure, LinkLost):
                 self._ground.say(Severity.ERROR, f"No answer: {WP_RADIUS} may be set, read it again", station)
             elif failure is not None:
-                self._ground.flash.not_written(station.peer)
+                self._ground.not_written(station)
                 text = f"{WP_RADIUS} stays {fc_store.wp_radius_cm}: {failure.value}"
                 self._ground.say(Severity.ERROR, text, station)
             self._send(station if failure else None, WP_RADIUS)
@@ -167,7 +167,8 @@ class Parameters:
         if station is not None and name:
             unknown = messages.MAV_PARAM_ERROR_DOES_NOT_EXIST
             missing = messages.MAVLink_param_error_message(station.sysid, station.compid, name.encode(), -1, unknown)
-            self._ground.multicast(pack(missing), [station.peer])
+            if (receiver := self._ground.station(station.peer)) is not None:
+                self._ground.multicast(pack(missing), [receiver])
 
 
 def _message(values: Mapping[str, float], name: str) -> Message:

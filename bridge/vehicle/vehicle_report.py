@@ -180,7 +180,7 @@ class VehicleReporter:
             round_trip_ms=None if msp is None else round(msp.round_trip_s * 1000, 1),
             requests_lost=None if msp is None else msp.requests_lost,
             bad_checksums=state.bad_checksums,
-            ground_stations=tuple(str(peer) for peer in self._ground.stations.peers()),
+            ground_stations=tuple(str(peer) for peer in self._ground.peers()),
         )
 
 

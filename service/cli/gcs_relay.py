@@ -2,12 +2,11 @@
 """`fleet mavlink`: one vehicle's MAVLink between zenoh and local ground stations."""
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import zenoh
 
 from bridge.gcs.station import Peer
-from bridge.gcs.stations import displaced
 from payloads.keys import MAVLINK_IN, MAVLINK_OUT, full
 from service.links.gcs_links import GcsLink, open_link
 from service.machine.threads import post
@@ -65,7 +64,10 @@ class GcsRelay:
         self._peers.pop(peer, None)
 
     remove_default_peer = gcs_gone
-    displaced = staticmethod(displaced)
+
+    def displaced(self, peers: Mapping[Peer, float]) -> Peer:
+        """The longest-silent connection."""
+        return min(peers, key=peers.__getitem__)
 
     def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
         self._peers[peer] = None

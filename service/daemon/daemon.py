@@ -14,7 +14,7 @@ import structlog
 from bridge.bridge import Bridge
 from bridge.config import BridgeConfig
 from bridge.fc.states.searching import SPEEDS
-from bridge.gcs.guard import LinkAccess
+from bridge.gcs.rights import LinkAccess
 from bridge.line.conversation import StoreEffect
 from bridge.missions.mission_service import DeliveryResult
 from bridge.model.events import Armed, BridgeEvent, Disarmed

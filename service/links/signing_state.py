@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from bridge.gcs.guard import LinkAccess
+from bridge.gcs.rights import LinkAccess
 from protocols.mavlink.signing import TICKS_PER_S, TOLERANCE, Signing, Timestamps
 from service.machine.state_file import StateFile
 from service.settings.addresses import GcsAddress

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.gcs.stations import MAX_PEERS
+from bridge.gcs.places import MAX_PEERS
 from protocols.mavlink.dialect import Message
 from protocols.mission_item import MissionResult
 from tests.support.attack_pilot import HELLO, Attack, Stranger, Watch, assert_uploads, has_read_all, m, sign

@@ -27,7 +27,7 @@ from bridge.fc.states.mavlink import MavlinkLine
 from bridge.fc.states.msp import Polling
 from bridge.fc.states.searching import SPEEDS
 from bridge.gcs.ground import FrameListener
-from bridge.gcs.guard import LinkAccess
+from bridge.gcs.rights import LinkAccess
 from bridge.gcs.routes import MAX_DATAGRAM_SIZE
 from bridge.gcs.station import Peer
 from bridge.line.conversation import Conclude, FindPending, NoteReader, Recall, Save, StoreEffect

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Long-term limits on a ground station's requests, in simulated time."""
 
+import gc
 from collections import Counter
 
-from bridge.gcs.budget import Budgets
-from bridge.gcs.cost import LIMITS, Cost
-from bridge.gcs.station import Peer
+from bridge.gcs.budget import Budget, HostBudget, HostBudgets
+from bridge.gcs.cost import LIMITS, SEATS, Cost
 from protocols.mavlink.dialect import messages as m
 from protocols.msp.frame import MspParser
 from tests.support.world import GroundStation, ready_world
@@ -21,36 +21,85 @@ def test_texts_are_limited() -> None:
     assert 200 < len(station.texts()) <= 200 + 5 * 10 + 5
 
 
-def test_new_peers_share_a_limit_per_host_and_a_total() -> None:
-    pilot = Peer("udp", ("10.0.0.1", 14550))
-    budgets = Budgets(lambda peer: peer == pilot)
-    for cost in (Cost.ARRIVAL, Cost.BOARD, Cost.STORED, Cost.TEXT):
+def host(hosts: HostBudgets, number: int, *, may_sit: bool = False) -> HostBudget:
+    """A host with one connected station."""
+    host = hosts.host(f"10.0.0.{number}")
+    host.join(may_sit=may_sit)
+    return host
+
+
+def spent(budget: Budget, cost: Cost, now: float = 0.0) -> int:
+    return sum(budget.allows(cost, now) for _ in range(10_000))
+
+
+def test_hosts_without_a_seat_share_the_total_in_equal_parts() -> None:
+    hosts = HostBudgets()
+    crowd = [host(hosts, number) for number in range(20)]
+    for cost in Cost:
         limit = LIMITS[cost]
-        spent = 0
-        for host in range(2, 22):
-            ports = (Peer("udp", (f"10.0.0.{host}", port)) for port in range(int(limit.each.burst) + 5))
-            of_host = sum(budgets.allows(cost, peer, 0.0) for peer in ports)
-            assert of_host <= limit.each.burst
-            spent += of_host
-        assert spent == int(limit.total.burst)
-        assert sum(budgets.allows(cost, pilot, 0.0) for _ in range(1000)) == limit.each.burst
+        parts = [spent(one, cost) for one in crowd]
+        assert sum(parts) <= max(limit.total.burst, len(crowd))
+        assert min(parts) >= min(max(1, int(limit.total.burst / 20)), int(limit.each.burst)), cost
+
+
+def test_a_crowd_uses_up_neither_a_seat_nor_the_budget_of_a_proven_station() -> None:
+    hosts = HostBudgets()
+    pilot = host(hosts, 1)
+    pilot.stays()
+    crowd = [host(hosts, number) for number in range(2, 60)]
+    for cost in Cost:
+        for stranger in crowd:
+            spent(stranger, cost)
+        assert spent(pilot, cost) == LIMITS[cost].each.burst
+        assert spent(Budget(), cost) == LIMITS[cost].each.burst
+
+
+def test_a_host_that_comes_back_has_the_budget_that_it_left() -> None:
+    hosts = HostBudgets()
+    stranger = host(hosts, 1)
+    assert spent(stranger, Cost.BOARD) == LIMITS[Cost.BOARD].each.burst
+    stranger.leave()
+    assert spent(host(hosts, 1), Cost.BOARD) == 0
+
+
+def test_a_seat_is_free_again_when_its_host_has_left() -> None:
+    hosts = HostBudgets()
+    seated = [host(hosts, number, may_sit=True) for number in range(SEATS)]
+    late = host(hosts, 99, may_sit=True)
+    for one in (*seated, late):
+        one.stays()
+    assert [late.is_own] == [False]
+    seated[3].leave()
+    late.stays()
+    assert late.is_own
+    assert [one.is_own for one in seated].count(True) == SEATS - 1
+    assert hosts.without_seat == 0
+
+
+def test_made_up_hosts_lose_their_seats_to_one_that_stays() -> None:
+    hosts = HostBudgets()
+    made_up = [host(hosts, number, may_sit=True) for number in range(30)]
+    pilot = host(hosts, 99, may_sit=True)
+    pilot.stays()
+    assert [one.is_own for one in made_up] == [True] * (SEATS - 1) + [False] * 15
+    assert pilot.is_own
+    assert hosts.without_seat == 15
+
+
+def test_thousands_of_hosts_are_not_remembered() -> None:
+    hosts = HostBudgets()
+    pilot = host(hosts, 1)
+    for number in range(5000):
+        hosts.host(("made up", number)).allows(Cost.ARRIVAL, 0.0)
+    assert hosts.host("10.0.0.1") is pilot
+    gc.collect()
+    assert sum(isinstance(each, HostBudget) for each in gc.get_objects()) < 3000
 
 
 def test_limits_do_not_depend_on_when_the_clock_starts() -> None:
-    peer = Peer("udp", ("10.0.0.1", 14550))
-    budgets = Budgets(lambda _peer: False)
+    stranger = host(HostBudgets(), 1)
     for now in (1e5, 1e5 + 1, 1e9, 1e9):
-        assert budgets.allows(Cost.RECEIVED, peer, now)
-
-
-def test_a_newcomer_gets_the_same_share_as_each_busy_host() -> None:
-    budgets = Budgets(lambda _peer: False)
-    hosts = [Peer("udp", (f"10.0.0.{host}", 14550)) for host in range(2, 12)]
-    for peer in hosts * 1000:
-        budgets.allows(Cost.TRANSFER, peer, 0.0)
-    newcomer = Peer("udp", ("10.0.0.1", 14550))
-    used = sum(budgets.allows(Cost.TRANSFER, newcomer, 0.0) for _ in range(1000))
-    assert used >= LIMITS[Cost.TRANSFER].total.burst / 11 / 2
+        assert stranger.allows(Cost.RECEIVED, now)
 
 
 def test_a_flood_of_counts_is_not_logged() -> None:

@@ -3,20 +3,23 @@
 
 import itertools
 from collections.abc import Callable, Iterator
+from math import inf
 
 import pytest
 
-from bridge.gcs.flash_budget import FlashBudget
-from bridge.gcs.guard import Standing
+from bridge.gcs.ground import Ground
+from bridge.gcs.rights import LinkAccess
 from bridge.gcs.station import Peer, Station
-from bridge.gcs.stations import Stations
+from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import messages as m
+from protocols.mavlink.frame import MavlinkFrame
 from protocols.mission_item import MissionResult
 from simulator.board.options import SimOptions
 from tests.support.conversations import Upload, records_of, waypoints
 from tests.support.world import GroundStation, Radio, World, ready_world
 
 HOUR_S = 3600.0
+HELLO = m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
 PILOT = Peer("udp", ("10.0.0.1", 14550))
 #: At this rate a page's 10,000 erases last for a month of uninterrupted attack.
 MOST_IN_A_DAY = 400 + 24 * 12 + 1
@@ -31,18 +34,20 @@ class Link:
 
     def __init__(self) -> None:
         self.now = 0.0
-        self.stations = Stations()
-        self.budget = FlashBudget(lambda _peer: Standing.OPEN, self.stations)
+        self.ground = Ground(1, 1, lambda *_args, **_facts: None, lambda *_args: None, None, {}, LinkAccess())
         self.writes = 0
 
     def connect(self, *peers: Peer) -> None:
+        frame = MavlinkFrame(FrameWriter(255, 190).frame(pack(HELLO), 2))
         for beat in range(3):
             for peer in peers:
-                self.stations.heard(Station(peer, 255, 190), 2, self.now + beat)
+                station = self.ground.station(peer) or self.ground.sender(peer, self.now + beat, datagram=False)
+                assert station is not None
+                self.ground.heard(station, frame, frame.sender, self.now + beat)
         self.now += 3
 
     def writes_now(self, peer: Peer) -> bool:
-        allowed = self.budget.allows(peer, self.now)
+        allowed = self.ground.allows_write(Station(peer, 255, 190), self.now)
         self.writes += allowed
         return allowed
 
@@ -68,7 +73,7 @@ def rotating(link: Link, hosts: int) -> Iterator[Callable[[], None]]:
     def attack() -> None:
         for stranger in present[:]:
             if link.writes_now(stranger):
-                link.stations.gone(stranger)
+                link.ground.gone(stranger)
                 present.remove(stranger)
         new = [host(next(names)) for _ in range(hosts - len(present))]
         link.connect(*new)
@@ -106,17 +111,30 @@ def test_a_pilot_who_arrives_after_a_day_of_attacks_writes_at_once() -> None:
         strike()
         link.now += 600
     link.connect(PILOT)
-    assert not link.stations.has_standing(PILOT)
+    assert not link.ground.has_own_budget(PILOT)
     assert link.writes_now(PILOT)
 
 
 def test_a_single_pilot_leaves_a_reserve_to_newcomers() -> None:
     link = Link()
     link.connect(PILOT)
-    assert [link.writes_now(PILOT) for _ in range(258)] == [True] * 257 + [False]
+    assert [link.writes_now(PILOT) for _ in range(369)] == [True] * 368 + [False]
     for _ in range(60):
-        link.now += 660
+        link.now += 1030
         assert link.writes_now(PILOT)
+    link.connect(host(1))
+    assert link.writes_now(host(1))
+
+
+def at(station: GroundStation) -> Station:
+    return Station(station.peer, station.sysid, station.compid)
+
+
+def writes_left(world: World, station: GroundStation) -> int:
+    for _ in range(4):  # to get a seat
+        station.send(HELLO)
+        world.run(1)
+    return sum(world.bridge.ground.allows_write(at(station), world.now) for _ in range(500))
 
 
 def test_an_unchanged_list_is_not_counted() -> None:
@@ -124,7 +142,7 @@ def test_an_unchanged_list_is_not_counted() -> None:
     pilot = GroundStation(world)
     for _ in range(40):
         assert Upload(pilot, waypoints(3)).run(2) is MissionResult.ACCEPTED
-    assert world.bridge.ground.flash.used(pilot.peer) == pytest.approx(1.0, abs=0.1)
+    assert writes_left(world, pilot) == 367
 
 
 def test_a_command_that_the_board_did_not_execute_is_not_counted() -> None:
@@ -138,7 +156,7 @@ def test_a_command_that_the_board_did_not_execute_is_not_counted() -> None:
         # Before the bridge has noticed that it is armed.
         pilot.send(message)
         world.run(1)
-    assert world.bridge.ground.flash.used(pilot.peer) == 0
+    assert writes_left(world, pilot) == 368
 
 
 @pytest.mark.parametrize(("hosts", "lists"), [(3, 4), (16, 1)])
@@ -159,7 +177,7 @@ def test_the_pilots_list_precedes_those_of_frequent_writers(hosts: int, lists: i
     for station in strangers:
         write(station)
     # All want to write their second list, in a queue of several seconds.
-    world.wait_until(lambda world: all(world.bridge.ground.flash.used(each.peer) > 0 for each in strangers), 30)
+    world.wait_until(lambda world: all(0 < world.bridge.ground.wrote_at(at(each)) < inf for each in strangers), 30)
     for seed in range(-lists, 0):
         began = world.now
         assert Upload(pilot, waypoints(20, seed), repeat_s=0.7).run(5) is MissionResult.ACCEPTED

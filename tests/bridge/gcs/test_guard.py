@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import all as every_message
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from bridge.controllers import other
-from bridge.gcs.guard import LinkAccess
+from bridge.gcs.rights import LinkAccess
 from bridge.gcs.station import Severity
 from protocols.mavlink.codec import FrameWriter, Packed
 from protocols.mavlink.dialect import CRC_EXTRA, Message
@@ -271,7 +271,7 @@ def test_listeners_do_not_displace_a_station_with_the_key() -> None:
         for _ in range(2):
             listener.send(READS[0])
         world.run(0.1)
-    peers = world.bridge.ground.stations.peers()
+    peers = world.bridge.ground.peers()
     assert pilot.peer in peers
     assert len(peers) < 20
 
@@ -517,7 +517,12 @@ def test_setup_signing_is_never_forwarded(access: LinkAccess) -> None:
     assert sum(refusals(world).values()) == 2
     assert "Refused: set the key in naze-bridge's settings" in station.texts()
     received = b"".join(b"".join(each.frames) for each in world.stations.values())
-    for place in (received, b"".join(logged), repr(world.log_event).encode(), repr(world.bridge.guard._links).encode()):
+    for place in (
+        received,
+        b"".join(logged),
+        repr(world.log_event).encode(),
+        repr(world.bridge.ground._access).encode(),
+    ):
         assert KEY not in place
         assert KEY.hex().encode() not in place
         assert repr(KEY).encode() not in place

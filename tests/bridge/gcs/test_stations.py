@@ -8,10 +8,13 @@ from fastcrc.crc16 import mcrf4xx
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.gcs.ground import split_text
-from bridge.gcs.message_rates import MessageRates
+from bridge.gcs.ground import EXPIRY_S
+from bridge.gcs.ground_station import GroundStation as GcsStation
+from bridge.gcs.message_rates import share_out, take_due
+from bridge.gcs.places import MAX_PEERS
+from bridge.gcs.rights import LinkAccess
 from bridge.gcs.station import Peer, Severity
-from bridge.gcs.stations import EXPIRY_S, MAX_PEERS
+from bridge.gcs.texts import split_text
 from protocols.mavlink.dialect import CRC_EXTRA, Message, messages
 from protocols.mission_item import MissionResult
 from tests.support.conversations import Upload, waypoints
@@ -134,7 +137,7 @@ def test_a_station_silent_for_a_minute_gets_no_more_messages() -> None:
     station.take()
     world.run(5)
     assert station.received == []
-    assert world.bridge.ground.stations.peers() == []
+    assert world.bridge.ground.peers() == []
     station.send(gcs_heartbeat())
     world.run(2)
     assert station.messages("HEARTBEAT")
@@ -193,9 +196,8 @@ def test_hundreds_of_strangers_leave_room_for_a_new_station() -> None:
         world.bridge.gcs_received(Peer("udp", ("10.0.0.1", number)), frame, world.now, datagram=True)
         if number % 50 == 49:
             world.run(6)
-    assert len(world.bridge.ground.stations.peers()) <= MAX_PEERS
+    assert len(world.bridge.ground.peers()) <= MAX_PEERS
     world.run(6)
-    assert len(world.bridge.ground._writers) <= MAX_PEERS
     # Once they are silent, there is room for a new one.
     station.send(gcs_heartbeat())
     world.run(1.5)
@@ -218,14 +220,13 @@ def test_thirty_stations_that_request_everything_share_1600_messages_a_second() 
 
 def test_a_thousand_peers_all_get_telemetry() -> None:
     """On several full links each one's share is below one message a second."""
-    rates = MessageRates({m.MAVLINK_MSG_ID_ATTITUDE: 0.1})
-    peers = [Peer("udp", number) for number in range(1000)]
+    stations = [GcsStation(Peer("udp", number), LinkAccess(), 1, 1) for number in range(1000)]
     taken: set[Peer] = set()
     for tenth in range(50):
-        rates.keep(peers, ())
+        share_out(stations, in_flight=True)
         taken = taken if tenth > 10 else set()  # the first share is larger
-        taken |= set(rates.take_due(m.MAVLINK_MSG_ID_ATTITUDE, peers, tenth / 10))
-    assert taken == set(peers)
+        taken |= {each.peer for each in take_due(stations, m.MAVLINK_MSG_ID_ATTITUDE, 0.1, tenth / 10)}
+    assert taken == {station.peer for station in stations}
 
 
 def test_a_stream_may_be_split_over_reads_and_is_forgotten_at_its_end() -> None:
@@ -245,9 +246,8 @@ def test_a_stream_may_be_split_over_reads_and_is_forgotten_at_its_end() -> None:
     world.run(0.01)
     assert len(station.messages("COMMAND_ACK")) == 2
     world.bridge.gcs_gone(station.peer, world.now)
-    assert world.bridge.ground.stations.peers() == []
-    assert world.bridge.ground._splitters == {}
-    assert not any(isinstance(account, Peer) for _, account in world.bridge.ground.budgets._buckets)
+    assert world.bridge.ground.peers() == []
+    assert world.bridge.ground.station(station.peer) is None
 
 
 def test_a_truncated_datagram_does_not_affect_the_next() -> None:
@@ -266,10 +266,10 @@ def test_our_own_frames_are_not_taken_for_a_station() -> None:
     station.send(gcs_heartbeat())
     world.run(2)
     echo = list(station.frames)
-    before = len(world.bridge.ground.stations.peers())
+    before = len(world.bridge.ground.peers())
     for frame in echo:
         world.bridge.gcs_received(Peer("udp", "echo"), frame, world.now, datagram=True)
-    assert len(world.bridge.ground.stations.peers()) == before
+    assert len(world.bridge.ground.peers()) == before
 
 
 def test_each_kind_of_station_gets_pieces_of_a_long_text_as_it_shows_them() -> None:
@@ -355,7 +355,7 @@ def test_any_payload_in_any_message_raises_nothing(seed: int) -> None:
     world = ready_world()
     station = GroundStation(world)
     draw = random.Random(seed)
-    understood = [msgid for msgid in CRC_EXTRA if world.bridge._incoming._router.understands(msgid)]
+    understood = [msgid for msgid in CRC_EXTRA if world.bridge._incoming._router.cost(msgid) is not None]
     assert len(understood) > 15
     for number in range(1500):
         msgid = draw.choice(understood)

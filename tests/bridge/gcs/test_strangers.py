@@ -13,7 +13,7 @@ import pytest
 from pymavlink.dialects.v20 import all as every_message
 
 from bridge.controllers import other
-from bridge.gcs.guard import LinkAccess, Standing
+from bridge.gcs.rights import LinkAccess, Standing
 from bridge.gcs.station import Peer
 from protocols.mavlink.codec import FrameWriter, Packed
 from protocols.mavlink.dialect import Message
@@ -204,7 +204,7 @@ def test_our_own_signed_answers_prove_nothing(sysid: int) -> None:
         thief = on_link(GroundStation(world, f"thief on {link}"), link)
         for frame in signed:
             world.receive_from(thief, frame)
-        assert world.bridge.guard.standing(thief.peer) is Standing.LISTENER
+        assert (station := world.bridge.ground.station(thief.peer)) is None or station.standing is Standing.LISTENER
     assert bytes(autopilot.received) == b""
 
 
@@ -230,7 +230,7 @@ def test_recorded_frames_of_the_pilot_act_once() -> None:
             world.receive_from(thief, frame)
             # Without the flag, and without the signature.
             world.receive_from(thief, frame[:2] + b"\0" + frame[3:-13])
-        assert world.bridge.guard.standing(thief.peer) is Standing.LISTENER
+        assert (station := world.bridge.ground.station(thief.peer)) is None or station.standing is Standing.LISTENER
     # The world reads by pieces: only whole frames of the pilot count.
     assert bytes(autopilot.received) == once
     assert {why for _, why in world.bridge.guard.refused} == {Check.REPLAYED.value}

@@ -10,7 +10,6 @@ from collections.abc import Mapping
 import pytest
 
 from bridge.gcs.station import Peer
-from bridge.gcs.stations import displaced
 from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
@@ -34,7 +33,7 @@ class Listener:
         """The connection is closed."""
 
     def displaced(self, peers: Mapping[Peer, float]) -> Peer:
-        return displaced(peers)
+        return min(peers, key=peers.__getitem__)
 
     def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
         self.peers.append(peer)

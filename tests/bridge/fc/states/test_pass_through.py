@@ -9,7 +9,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from bridge.controllers import other
-from bridge.gcs.guard import LinkAccess
+from bridge.gcs.rights import LinkAccess
 from bridge.gcs.station import Peer
 from protocols.mavlink.codec import FrameWriter, Packed
 from protocols.mavlink.frame import MavlinkSplitter
@@ -297,7 +297,7 @@ def test_a_crowd_does_not_multiply_frames() -> None:
     hello = stranger.pack(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
     for number in range(200):
         world.bridge.gcs_received(Peer("udp", (f"10.0.0.{number}", 14550)), hello, world.now, datagram=True)
-    assert len(ground.stations.peers()) > 100
+    assert len(ground.peers()) > 100
     world.run(1)
     ground.take_datagrams()
     for number in range(400):
@@ -310,7 +310,7 @@ def test_a_crowd_does_not_multiply_frames() -> None:
     assert [peer for peer, _ in copies].count(pilot.peer) == 400
     assert len(copies) < 400 * 20
     world.bridge.fc_received(autopilot.pack(mavlink.MAVLink_heartbeat_message(2, 12, 81, 0, 3, 3)), world.now)
-    assert {peer for peer, _ in ground.take_datagrams()} == set(ground.stations.peers())
+    assert {peer for peer, _ in ground.take_datagrams()} == set(ground.peers())
 
 
 def test_an_address_that_is_used_again_gets_nothing_for_its_former_ids() -> None:

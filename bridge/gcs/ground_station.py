@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One ground station, from its arrival to its departure. Sans-IO."""
+
+from collections.abc import Iterable
+from math import inf
+
+from bridge.gcs.budget import Budget, HostBudget
+from bridge.gcs.cost import Cost
+from bridge.gcs.message_rates import MessageRates
+from bridge.gcs.recent_texts import RecentTexts
+from bridge.gcs.rights import LinkAccess, Standing
+from bridge.gcs.station import RECORDER, Peer, Station
+from protocols.mavlink.codec import FrameWriter, Packed
+from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+
+#: After such a silence a station may have been restarted: all send a heartbeat each second.
+_RETURNS_S = 3.0
+#: A station is steady once it has been heard this often, with pauses of at least `_BEAT_S`, like heartbeats at 1 Hz.
+_STEADY_BEATS = 3
+_BEAT_S = 0.7
+#: Ids remembered behind one address: a router may carry a fleet, but made-up ids must not fill the memory.
+_MAX_SPEAKERS = 64
+
+
+class GroundStation:
+    """A ground station that the bridge sends to: it was heard, or it is configured.
+
+    It is one address, a UDP peer or a TCP connection, because rights, limits, MAVLink version and message rates belong
+    to an address. Several MAVLink ids may speak from there, behind a radio or a router: `speakers` has them all, and
+    the short-lived `Station` names one of them where a message must be addressed. All that is known about a station is
+    here, so dropping this object forgets it; only its `host` is remembered longer.
+    """
+
+    def __init__(self, peer: Peer, access: LinkAccess, sysid: int, compid: int, host: HostBudget | None = None) -> None:
+        self.peer = peer
+        self.access = access
+        #: None until a datagram was accepted: made-up addresses must cost no memory.
+        self.host = host
+        self._own_budget: Budget | None = None
+        self.has_key = False
+        self.settle_rights()
+        self.splitter = MavlinkSplitter()
+        self.writer = FrameWriter(sysid, compid, access.signer)
+        self.is_heard = False
+        #: The highest MAVLink version that it has sent, and the one of answers: everything signed is MAVLink 2.
+        self.version = 0
+        self.frame_version = 2
+        self.came_at = self.heard_at = -inf
+        self._beats = 0
+        self._beat_at = -inf
+        #: When each (sysid, compid) was last heard from there.
+        self.speakers: dict[tuple[int, int], float] = {}
+        #: It has sent REQUEST_DATA_STREAM; a command.
+        self.uses_streams = False
+        self.uses_commands = False
+        self.rates = MessageRates()
+        self.texts = RecentTexts()
+        #: The reasons for refusals that were logged.
+        self.reported: set[str] = set()
+        #: A newcomer gets more heartbeats until this time, then home and the reasons not to arm.
+        self.greeted_until = -inf
+        self.is_informed = True
+
+    # Rights and limits.
+
+    def settle_rights(self) -> None:
+        """Determine the rights again after `has_key` has changed."""
+        self.standing = self.access.standing(self.peer, has_key=self.has_key)
+        self.rights = self.access.rights(self.standing)
+        self.is_listener = self.standing is Standing.LISTENER
+
+    @property
+    def has_own_budget(self) -> bool:
+        """True if strangers cannot use up its limits."""
+        return self._own_budget is not None or (self.is_heard and self.host is not None and self.host.is_own)
+
+    def allows(self, cost: Cost, now: float | None = None) -> bool:
+        """Count work caused by the last message of the station, or at `now`; False if it exceeds the limit."""
+        budget = self._own_budget or self.host
+        return budget is None or budget.allows(cost, self.heard_at if now is None else now)
+
+    # Arrival and departure.
+
+    @property
+    def is_steady(self) -> bool:
+        """True if it has been heard for a while."""
+        return self._beats >= _STEADY_BEATS
+
+    def joins(self) -> None:
+        """It has a place on its link, or has gained other rights there."""
+        if self.standing is Standing.PROVEN:
+            self._own_budget = Budget()
+        elif self.host is not None:
+            self.host.join(may_sit=self.standing is Standing.OPEN)
+
+    def leaves(self) -> None:
+        """It loses its place on its link, or has gained other rights."""
+        if self._own_budget is None and self.host is not None:
+            self.host.leave()
+
+    def heard(self, frame: MavlinkFrame, sender: tuple[int, int], now: float) -> bool:
+        """Note a frame; True if the station is new, or returns after a silence, perhaps restarted."""
+        is_new = now >= self.heard_at + _RETURNS_S
+        if not self.is_heard:
+            self.is_heard, self.came_at = True, now
+        self.heard_at = now
+        if self.version != 2:
+            self.version = frame.version
+            self.frame_version = 2 if self.access.signing is not None else self.version
+        if sender in self.speakers or len(self.speakers) < _MAX_SPEAKERS:
+            self.speakers[sender] = now
+        if self._beats < _STEADY_BEATS and now >= self._beat_at + _BEAT_S:
+            self._beats, self._beat_at = self._beats + 1, now
+        host = self.host if self.standing is Standing.OPEN and self._beats >= _STEADY_BEATS else None
+        if host is not None and not (host.is_steady and host.is_own):
+            host.stays()
+        return is_new
+
+    def senders(self) -> Iterable[Station]:
+        """The stations heard from there; several behind a radio or a router."""
+        return (Station(self.peer, *ids) for ids in self.speakers)
+
+    # Sending.
+
+    @property
+    def reads_v2_only(self) -> bool:
+        """True if heartbeats in MAVLink 2 are enough: it has sent that version, or must."""
+        return self.version == 2 or self.access.signing is not None or self.peer is RECORDER
+
+    @property
+    def is_like_mavsdk(self) -> bool:
+        """True for a station that asks by commands only, and in MAVLink 2, as MAVSDK does from its connection on."""
+        return self.version == 2 and self.uses_commands and not self.uses_streams
+
+    def frame(self, packed: Packed) -> bytes:
+        return self.writer.frame(packed, self.frame_version)

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The rights of ground stations, and how a link's stations prove them. `RIGHTS` is the whole policy."""
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from functools import partial
+from typing import NamedTuple
+
+from bridge.gcs.station import Peer
+from protocols.mavlink.signing import Signing
+from protocols.rights.effect import Effect
+
+#: Returns the signature of a MAVLink 2 frame.
+Signer = Callable[[bytes], bytes]
+
+
+class Standing(Enum):
+    """The rights that a ground station has proven."""
+
+    LISTENER = "may only read"
+    OPEN = "its link requires nothing"
+    PROVEN = "has the key or the address that its link requires"
+
+
+class Rights(NamedTuple):
+    """The effects that a station may have on the bridge's vehicle, a passed-through autopilot, and other stations."""
+
+    own: Collection[Effect]
+    autopilot: Collection[Effect]
+    stations: Collection[Effect]
+
+
+_ALL = tuple(effect for effect in Effect if effect is not Effect.KEY)
+_NO_COMMANDS = Effect.READ, Effect.DIALOGUE, Effect.RATE, Effect.CHANGE
+#: The own vehicle itself refuses to arm, to move and to restart; other stations hear what concerns only themselves.
+RIGHTS: Mapping[Standing, Rights] = {
+    Standing.LISTENER: Rights((Effect.READ, Effect.DIALOGUE), (Effect.READ,), ()),
+    Standing.OPEN: Rights(_ALL, _NO_COMMANDS, (*_NO_COMMANDS, Effect.REPORT)),
+    Standing.PROVEN: Rights(_ALL, _ALL, _ALL),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class LinkAccess:
+    """The conditions for writing over a link. `signing`: a signature with its key; `may_write`: the right address.
+
+    None: not required. Everything the bridge sends over a link with `signing` is signed, too; `link_id` is the link's
+    number in the signature. `passes_everything`: without conditions, an autopilot that speaks MAVLink itself gets
+    commands, too.
+    """
+
+    signing: Signing | None = None
+    link_id: int = 0
+    may_write: Callable[[Peer], bool] | None = None
+    passes_everything: bool = False
+
+    @property
+    def signer(self) -> Signer | None:
+        return None if self.signing is None else partial(self.signing.signature, link_id=self.link_id)
+
+    def standing(self, peer: Peer, *, has_key: bool) -> Standing:
+        """The standing of a station; `has_key`: it has sent a valid signature."""
+        if self.signing is None and self.may_write is None:
+            return Standing.OPEN
+        is_proven = (self.signing is None or has_key) and (self.may_write is None or self.may_write(peer))
+        return Standing.PROVEN if is_proven else Standing.LISTENER
+
+    def rights(self, standing: Standing) -> Rights:
+        return RIGHTS[Standing.PROVEN if self.passes_everything and standing is Standing.OPEN else standing]

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Frames from ground stations: guarded, then answered by the message router, or passed on to an autopilot. Sans-IO."""
+
+from collections.abc import Callable
+from functools import partial
+
+from bridge.gcs.cost import Cost
+from bridge.gcs.ground import Ground
+from bridge.gcs.ground_station import GroundStation
+from bridge.gcs.guard import Guard, GuardRefusal, denial
+from bridge.gcs.routes import Routes
+from bridge.gcs.station import Peer, Severity, Station
+from bridge.vehicle.message_router import MessageRouter
+from bridge.vehicle.parameters import Parameters
+from protocols.mavlink.codec import MavlinkDecoder
+from protocols.mavlink.dialect import messages as m
+from protocols.mavlink.frame import MavlinkFrame
+from protocols.mavlink.target import target_of
+from protocols.rights.effect import Effect
+
+
+class Incoming:
+    """Guards, counts, and answers or passes on every frame from a ground station.
+
+    `routes` is set while an autopilot that represents itself is on the line; frames then go to it unchanged.
+    """
+
+    def __init__(
+        self,
+        guard: Guard,
+        ground: Ground,
+        router: MessageRouter,
+        parameters: Parameters,
+        send_to_autopilot: Callable[[bytes], None],
+        sysid: int,
+        compid: int,
+    ) -> None:
+        self._guard = guard
+        self._ground = ground
+        self._router = router
+        self._parameters = parameters
+        self._send_to_autopilot = send_to_autopilot
+        self._ids = sysid, compid
+        self._decoder = MavlinkDecoder()
+        self.routes: Routes | None = None
+
+    def received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> bool:
+        """Handle bytes from a ground station; False if they are dropped. A datagram holds whole frames only."""
+        sender = self._ground.sender(peer, now, datagram=datagram)
+        if sender is None:
+            return False
+        for frame in self._ground.split(sender, data, datagram=datagram):
+            judged = self._guard.judge(sender, frame)
+            if isinstance(judged, GuardRefusal) and judged.is_forged:
+                self._guard.report(judged, sender, frame)
+                continue
+            if not (sender.is_heard or self._ground.admits(sender, now)):
+                return False
+            ids = frame.sender
+            self._ground.heard(sender, frame, ids, now)
+            if isinstance(judged, GuardRefusal):
+                self._answer_refused(judged, sender, frame)
+            elif self.routes is not None:
+                self._pass_on(self.routes, sender, frame, judged)
+            else:
+                self._ground.record(sender, frame)
+                self._answer(sender, frame, Station(peer, *ids), now)
+        return True
+
+    def _answer(self, sender: GroundStation, frame: MavlinkFrame, station: Station, now: float) -> None:
+        cost = self._router.cost(frame.msgid)
+        if (
+            cost is not None
+            and self._is_ours(*target_of(frame))
+            and (message := self._decoder.decode(frame)) is not None
+            and sender.allows(cost)
+        ):
+            self._router.take(station, message, now)
+
+    def _pass_on(self, routes: Routes, sender: GroundStation, frame: MavlinkFrame, effect: Effect) -> None:
+        """Send a frame on to its targets, within its sender's rights."""
+        if not sender.allows(Cost.PASSED) or routes.is_echo(frame):
+            return
+        to_stations = effect in sender.rights.stations
+        is_for_autopilot = routes.from_station(sender, frame, to_stations=to_stations)
+        if is_for_autopilot or not to_stations:
+            refused = self._guard.passing_refusal(sender, effect)
+            if refused is not None:
+                self._answer_refused(refused, sender, frame)
+                return
+        self._ground.record(sender, frame)
+        if is_for_autopilot:
+            self._send_to_autopilot(frame.raw)
+
+    def _answer_refused(self, refused: GuardRefusal, sender: GroundStation, frame: MavlinkFrame) -> None:
+        """Answer a refused frame under the ids that it addressed, if these are the vehicle's."""
+        is_first = self._guard.report(refused, sender, frame)
+        station = Station(sender.peer, *frame.sender)
+        system, component = target_of(frame)
+        answers = partial(self._ground.to, station)
+        is_vehicle = self._is_ours(system, component)
+        if self.routes is not None:
+            asked = self.routes.addressed(system, component)
+            is_vehicle = asked is not None
+            if asked is not None:
+                answers = partial(self._ground.to_as, asked, sender)
+        if not (is_vehicle and sender.allows(Cost.ANSWER)):
+            return
+        message = self._decoder.decode(frame)
+        answer = None if message is None else denial(message, station)
+        if answer is not None:
+            answers(answer)
+        elif message is not None and frame.msgid == m.MAVLINK_MSG_ID_PARAM_SET and self.routes is None:
+            # The protocol's answer is the current value.
+            self._parameters.send_one(station, message.param_id, -1)
+        if is_first:
+            answers(m.MAVLink_statustext_message(Severity.WARNING, f"Refused: {refused.why}".encode()))
+
+    def _is_ours(self, system: int, component: int) -> bool:
+        sysid, compid = self._ids
+        return system in (0, sysid) and component in (0, compid)

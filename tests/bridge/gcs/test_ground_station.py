@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One object holds all that is known about a ground station: nothing else remembers one that has left."""
+
+import gc
+from collections.abc import Callable
+
+import pytest
+
+from bridge.gcs.ground import EXPIRY_S
+from bridge.gcs.ground_station import GroundStation as GcsStation
+from bridge.gcs.station import Peer
+from protocols.mavlink.dialect import messages as m
+from tests.support.conversations import count_message
+from tests.support.world import GroundStation, World, ready_world
+
+REQUESTS = (
+    m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3),
+    m.MAVLink_request_data_stream_message(1, 1, 0, 4, 1),
+    m.MAVLink_command_long_message(1, 1, 511, 0, 30, 20_000, 0, 0, 0, 0, 0),
+    m.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0),
+    m.MAVLink_mission_request_list_message(1, 1),
+    m.MAVLink_mission_set_current_message(1, 1, 2),
+    m.MAVLink_param_request_read_message(1, 1, b"SYSID_THISMAV", -1),
+    count_message(3),
+)
+
+#: The addresses that bridge/transfers remembers longer, in case their ids are heard again elsewhere.
+LAST_ANSWERS, LAST_READERS = 128, 16
+
+
+def fall_silent(_world: World, _peer: Peer) -> None:
+    """It leaves when it has been silent for a minute."""
+
+
+def disconnect(world: World, peer: Peer) -> None:
+    world.bridge.gcs_gone(peer, world.now)
+
+
+def close_link(world: World, peer: Peer) -> None:
+    world.bridge.link_closed(peer.link, world.now)
+
+
+@pytest.mark.parametrize("leave", [fall_silent, disconnect, close_link])
+def test_nothing_remembers_two_thousand_stations_that_have_left(leave: Callable[[World, Peer], None]) -> None:
+    world = ready_world()
+    gc.collect()
+    before = [each for each in gc.get_objects() if type(each) in (GcsStation, Peer)]
+    speaker = GroundStation(world)
+    del world.stations[speaker.peer]
+    data = b"".join(map(speaker.pack, REQUESTS))
+    for number in range(2000):
+        peer = Peer("udp", (f"10.0.{number // 250}.{number % 250}", 14550))
+        world.bridge.gcs_received(peer, data, world.now, datagram=True)
+        world.bridge.gcs_received(peer, data, world.now, datagram=True)
+        world.run(0.02)
+        leave(world, peer)
+    assert len(world.events("gcs.found")) > 500
+    # An upload ends after 5 s without an item, and a download after 20 s.
+    world.run(EXPIRY_S + 25)
+    world.log_event.clear()
+    gc.collect()
+    left = [each for each in gc.get_objects() if type(each) in (GcsStation, Peer)]
+    left = [each for each in left if not any(each is other for other in before)]
+    assert [each for each in left if isinstance(each, GcsStation)] == []
+    assert len(left) <= LAST_ANSWERS + LAST_READERS
