@@ -200,8 +200,7 @@ class MissionService:
 
     def acquire(self, owner: object) -> Refusal | None:
         """Take the transfer lock; a refusal if another client has it."""
-        refusal = self.occupied()
-        if refusal is None:
+        if (refusal := self.occupied()) is None:
             self._owner = owner
         return refusal
 
@@ -254,39 +253,41 @@ class MissionService:
 
         `is_kept` False: do not store it, because too many lists arrived.
         """
-        delivery = yield from self._deliver(arrived, progress, is_kept=is_kept)
+        number = (yield from save(arrived)) if is_kept else None
+        fc_store, verdict = self.fc_store, arrived.verdict
+        outcome: Outcome | None = Outcome.FAILED
+        is_lossy, change = False, ""
+        if verdict.result is Result.REJECTED:
+            ack, text = verdict.ack, verdict.findings[-1].text()
+            outcome = Outcome.CANCELLED if ack is MissionResult.OPERATION_CANCELLED else Outcome.REJECTED
+        elif isinstance(fc_store, Refusal):
+            ack, text = fc_store.ack, fc_store.text
+        elif not (yield from self._copy_erased(fc_store, verdict.records)):
+            ack, text = MissionResult.DENIED, _NO_COPY
+        else:
+            identity, before = identify(verdict.records), None if self.held is None else self.held.identity
+            result = yield from self._push(fc_store, arrived, progress)
+            if result.failure in LIST_IS_GONE:
+                self.is_settled, self.held, self._former = False, None, None
+            if result.failure is None:
+                self.held = self._held_now(arrived, identity)
+                lossy, is_erased = summary(len(arrived.items), verdict), verdict.result is Result.CLEARED
+                outcome, ack = Outcome.VERIFIED, MissionResult.ACCEPTED
+                text = lossy or _verified_text(verdict, unchanged=result.unchanged)
+                is_lossy = lossy is not None or (is_erased and not result.unchanged)
+                if not result.unchanged:
+                    change = "Mission erased" if is_erased else f"New mission, {len(verdict.items)} items"
+            else:
+                ack, text = _ACKS.get(result.failure, MissionResult.DENIED), result.failure.value
+                if result.failure is PushFailure.UNCERTAIN:
+                    # Only reading the list will show the outcome.
+                    outcome = None
+                    self.pending.append(PendingMission(number, identity, before))
+        if number is not None and outcome is not None and not (yield from conclude(number, outcome, text)):
+            number = None
+        delivery = DeliveryResult(ack, text, number, is_lossy, change)
         self._on_ending(arrived, delivery)
         return delivery
-
-    def _deliver(
-        self, arrived: ArrivedMission, progress: PushProgress, *, is_kept: bool
-    ) -> Conversation[DeliveryResult]:
-        number = (yield from save(arrived)) if is_kept else None
-        verdict = arrived.verdict
-        if verdict.result is Result.REJECTED:
-            reason = verdict.findings[-1].text()
-            cancelled = verdict.ack is MissionResult.OPERATION_CANCELLED
-            outcome = Outcome.CANCELLED if cancelled else Outcome.REJECTED
-            return (yield from self._conclude(number, outcome, verdict.ack, reason))
-        fc_store = self.fc_store
-        if isinstance(fc_store, Refusal):
-            return (yield from self._conclude(number, Outcome.FAILED, fc_store.ack, fc_store.text))
-        if not (yield from self._copy_erased(fc_store, verdict.records)):
-            return (yield from self._conclude(number, Outcome.FAILED, MissionResult.DENIED, _NO_COPY))
-        identity, before = identify(verdict.records), None if self.held is None else self.held.identity
-        pending = PendingMission(number, identity, before)
-        result = yield from self._push(fc_store, arrived, progress)
-        if result.failure is not None:
-            return (yield from self._not_written(result.failure, pending))
-        self.held = self._held_now(arrived, identity)
-        lossy = summary(len(arrived.items), verdict)
-        text = lossy or _verified_text(verdict, unchanged=result.unchanged)
-        delivery = yield from self._conclude(number, Outcome.VERIFIED, MissionResult.ACCEPTED, text)
-        if result.unchanged:
-            return replace(delivery, is_lossy=lossy is not None)
-        is_erased = verdict.result is Result.CLEARED
-        change = "Mission erased" if is_erased else f"New mission, {len(verdict.items)} items"
-        return replace(delivery, is_lossy=lossy is not None or is_erased, change=change)
 
     def _held_now(self, arrived: ArrivedMission, identity: ListIdentity) -> HeldMission:
         """The list that was just written."""
@@ -305,16 +306,6 @@ class MissionService:
             self.held = replace(self.held, sent_seqs=others)
             noted = note_reader(self.held.identity, reader)
             self.runner.start(noted, lambda _result, _at: None, now, in_background=True)
-
-    def _not_written(self, failure: PushFailure, mission: PendingMission) -> Conversation[DeliveryResult]:
-        """Store the failure, unless only reading the list will show the outcome."""
-        if failure in LIST_IS_GONE:
-            self.is_settled, self.held, self._former = False, None, None
-        if failure is PushFailure.UNCERTAIN:
-            self.pending.append(mission)
-            return DeliveryResult(MissionResult.DENIED, failure.value, mission.number)
-        ack = _ACKS.get(failure, MissionResult.DENIED)
-        return (yield from self._conclude(mission.number, Outcome.FAILED, ack, failure.value))
 
     def _push(
         self, fc_store: AnyFcMissionStore, arrived: ArrivedMission, progress: PushProgress
@@ -385,13 +376,6 @@ class MissionService:
 
     def _refreshed(self, fc_store: AnyFcMissionStore, held: HeldMission) -> HeldMission:
         return replace(held, items=fc_store.refreshed(held.items))
-
-    def _conclude(
-        self, number: int | None, outcome: Outcome, ack: MissionResult, text: str
-    ) -> Conversation[DeliveryResult]:
-        if number is not None and not (yield from conclude(number, outcome, text)):
-            number = None
-        return DeliveryResult(ack, text, number)
 
 
 _ACKS = {

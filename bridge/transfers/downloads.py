@@ -51,7 +51,6 @@ class MissionDownloads:
         self._vehicle = missions.vehicle
         self._snapshots: dict[Station, _Snapshot] = {}
         self._questions: dict[_Question, None] = {}
-        self._is_reading = False
         #: While home is unknown: the mission store of the flight controller, and when item 0 was first requested.
         self._homeless: tuple[object, float] = None, 0.0
 
@@ -77,20 +76,19 @@ class MissionDownloads:
 
     def _ask(self, question: _Question, now: float) -> None:
         """Read the list once for all waiting requests, so that a flood of them cannot fill the queue."""
+        is_reading = bool(self._questions)
         if len(self._questions) < _MAX_QUESTIONS:
             self._questions[question] = None
-        if self._is_reading:
+        if is_reading:
             return
         held = self._missions.held
         if held is not None and not self._ground.allows(question.station, Cost.BOARD):
             # A station that asks too often gets the copy.
             self._read(held, now)
         else:
-            self._is_reading = True
             self._missions.run(self._missions.shown(), self._read, now)
 
     def _read(self, held: HeldMission | Refusal, now: float) -> None:
-        self._is_reading = False
         questions, self._questions = self._questions, {}
         for question in questions:
             if isinstance(held, Refusal):

@@ -189,9 +189,11 @@ class MissionUploads:
             elif now >= state.due:
                 self._request(upload, now, *state.repeats(now))
         self.answers.tick(now)
-        # First that of the host that has waited longest.
         waiting = self._queue.within(Waiting, Complete)
-        for upload in sorted(waiting, key=lambda upload: self._ground.wrote_at(upload.station)):
+        if len(waiting) > 1:
+            # First that of the host that has waited longest.
+            waiting.sort(key=lambda upload: self._ground.wrote_at(upload.station))
+        for upload in waiting:
             event = self._turn(upload, now)
             if event is not None:
                 self._handle(upload, event, now)
