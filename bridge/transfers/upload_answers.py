@@ -2,7 +2,7 @@
 """The answers that end uploads: sent, reported as texts, and remembered for repeated items. Sans-IO."""
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import Any
@@ -40,7 +40,7 @@ class _Answer:
     until: float
     cancelled_until: float
     #: When to send the ack again, or the reason for a refusal.
-    again: list[tuple[float, str | None]]
+    again: Sequence[tuple[float, str | None]] = ()
 
     @property
     def is_refusal(self) -> bool:
@@ -84,11 +84,9 @@ class UploadAnswers:
         self._forget_old(now)
         self._answers.pop(station, None)
         cancel_s = _CANCEL_S if count and (is_cancelled or ack is not MissionResult.ACCEPTED) else 0.0
-        again: list[tuple[float, str | None]] = []
+        answer = self._answers[station] = _Answer(ack, count, now + _MEMORY_S, now + cancel_s)
         if is_repeated and count:
-            again = [(now + later_s, None) for later_s in _ACK_AGAIN_S]
-        self._answers[station] = _Answer(ack, count, now + _MEMORY_S, now + cancel_s, again)
-        self.due = min(self.due, *(at for at, _ in again), inf)
+            self._repeat(answer, _ACK_AGAIN_S, None, now)
         if len(self._answers) >= 2 * _MOST:
             self._forget_strangers()
         self._ground.mission_ack(station, ack, mission_type)
@@ -123,8 +121,11 @@ class UploadAnswers:
     def remind(self, station: Station, text: str, now: float) -> None:
         """Repeat the reason for a refusal that the station may not have noticed."""
         if (answer := self._answers.get(station)) is not None:
-            answer.again = [(now + later_s, text) for later_s in _REMINDERS_S]
-            self.due = min(self.due, answer.again[0][0])
+            self._repeat(answer, _REMINDERS_S, text, now)
+
+    def _repeat(self, answer: _Answer, later_s: Sequence[float], text: str | None, now: float) -> None:
+        answer.again = [(now + seconds, text) for seconds in later_s]
+        self.due = min(self.due, now + later_s[0])
 
     def went_on(self, station: Station) -> None:
         """The station has sent another mission message: it has the final ack, or does not wait for it."""
