@@ -60,6 +60,8 @@ class GroundStation:
         #: A newcomer gets more heartbeats until this time, then home and the reasons not to arm.
         self.greeted_until = -inf
         self.is_informed = True
+        #: A mission of it was accepted: it knows that fences are not stored.
+        self.has_written = False
 
     # Rights and limits.
 

@@ -58,8 +58,6 @@ class UploadAnswers:
         self._ground = ground
         self._let_read = let_read
         self._answers: dict[Station, _Answer] = {}  # oldest first
-        #: Those that know that only missions are stored.
-        self._informed: set[Peer] = set()
         #: The time of the next `tick`; infinity if nothing is to be sent later.
         self.due = inf
 
@@ -97,11 +95,9 @@ class UploadAnswers:
         The summary is last, and the only warning: Mission Planner shows the last one, and its voice says the first.
         """
         accepted = delivery.ack is MissionResult.ACCEPTED
-        if verdict.result is Result.ACCEPTED and station.peer not in self._informed:
-            self._informed = {
-                station.peer,
-                *(peer for peer in self._informed if self._ground.station(peer) is not None),
-            }
+        sender = self._ground.station(station.peer)
+        if verdict.result is Result.ACCEPTED and sender is not None and not sender.has_written:
+            sender.has_written = True
             self._ground.say(Severity.INFO, _ONLY_MISSIONS, station)
         for news, line in finding_lines(verdict.findings) if accepted else ():
             if line != delivery.text:
