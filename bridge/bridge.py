@@ -158,9 +158,8 @@ class Bridge:
             owner.sysid,
             config.compid,
         )
-        #: Served in this order.
+        #: Served in this order, after the line itself.
         self._parts: tuple[TimedPart, ...] = (
-            self.session,
             self.runner,
             self.sharing,
             self._uploads,
@@ -285,13 +284,14 @@ class Bridge:
     @property
     def due(self) -> float:
         """The time of the next `tick`."""
-        due = inf
+        due = self.session.state.due
         for part in self._parts:  # a loop: this is asked after every reply
             if (part_due := part.due) < due:
                 due = part_due
         return due
 
     def tick(self, now: float) -> None:
+        self.session.tick(now)
         for part in self._parts:
             if now >= part.due:
                 part.tick(now)

@@ -82,11 +82,6 @@ class FcSession:
         family = self._port.family
         return None if family is None else self.vehicle.memory(family, now)
 
-    @property
-    def due(self) -> float:
-        """The time of the next `tick`."""
-        return self.state.deadline()
-
     def opened(self, now: float) -> None:
         # Another board may have been connected.
         self._port.met_family = None

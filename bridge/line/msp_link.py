@@ -257,7 +257,8 @@ class MspLink:
         is_queued = any(message.command in commands for message in self._waiting)
         return now + self._timeout_s() if is_queued else now
 
-    def next_deadline(self) -> float:
+    @property
+    def due(self) -> float:
         """The time of the next `tick`; infinity while nothing is pending."""
         return min(self._follow_up_at, *map(_DEADLINE, self._sent)) if self._sent else self._follow_up_at
 

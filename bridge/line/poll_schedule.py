@@ -253,7 +253,7 @@ class PollSchedule:
             # The others follow with their own replies.
             slot.set_interval(self._present_interval(slot))
 
-    def next_deadline(self, link: MspLink) -> float:
+    def due(self, link: MspLink) -> float:
         """The time of the next request; infinity if a reply must arrive first."""
         earliest = min(map(_DUE, self._slots.values()), default=inf)
         if earliest > self._asked_at:

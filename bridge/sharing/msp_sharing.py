@@ -157,7 +157,7 @@ class MspSharing:
         link, controller = self._session.state.link, self._session.state.controller
         if self._obstacle() or self._runner.is_busy or link is None or controller is None:
             return
-        if self._session.polls.next_deadline(link) <= now:
+        if self._session.polls.due(link) <= now:
             return  # telemetry first
         for program in self._programs:
             request = None if now < program.blocked_until else _first_unknown(program.waiting)

@@ -114,7 +114,7 @@ class Line:
 
     def _step(self) -> None:
         assert not self._runner.store_effects
-        due = [self._link.next_deadline(), self._runner.due, *(at for at, *_ in self._wire[:1])]
+        due = [self._link.due, self._runner.due, *(at for at, *_ in self._wire[:1])]
         self.now = max(self.now, min(due))
         self._tell_the_board_the_time()
         while self._wire and self._wire[0][0] <= self.now:

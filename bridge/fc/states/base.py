@@ -152,8 +152,9 @@ class State(ABC):
     def tick(self, now: float) -> Event | None:
         """Run the timers."""
 
+    @property
     @abstractmethod
-    def deadline(self) -> float:
+    def due(self) -> float:
         """The time of the next `tick`; infinity only while the port is closed."""
 
     def unanswered(self) -> PendingReplies:
@@ -177,6 +178,7 @@ class Closed(State):
     def tick(self, now: float) -> Event | None:
         """Nothing is due."""
 
-    def deadline(self) -> float:
+    @property
+    def due(self) -> float:
         """Only opening the port ends this state."""
         return inf

@@ -43,7 +43,8 @@ class Cli(State):
             self.port.output.append(typed_and_rubbed_out(PROBE))
         return None
 
-    def deadline(self) -> float:
+    @property
+    def due(self) -> float:
         return min(self._ask_at, self._heard_at + _SILENCE_S)
 
     @property

@@ -49,5 +49,6 @@ class Frsky(State):
             self.port.output.append(PROBE)
         return Lost(f"no FrSky telemetry for {_SILENCE_S} s") if now >= self._heard_at + _SILENCE_S else None
 
-    def deadline(self) -> float:
+    @property
+    def due(self) -> float:
         return min(self._probe_due, self._heard_at + _SILENCE_S)

@@ -55,8 +55,9 @@ class HarakiriMavlink(MavlinkLine):
                 self.port.output.append(PROBE)
         return event
 
-    def deadline(self) -> float:
-        return min(super().deadline(), self._probe_due)
+    @property
+    def due(self) -> float:
+        return min(super().due, self._probe_due)
 
     def take(self, frames: list[MavlinkFrame], now: float) -> None:
         """Read its telemetry, and pass the answers of a transfer on."""

@@ -54,7 +54,8 @@ class MavlinkLine(State):
             return Lost(f"no MAVLink for {self.timeout_s:.1f} s")
         return event
 
-    def deadline(self) -> float:
+    @property
+    def due(self) -> float:
         silent_at = self._heard_at + self.timeout_s
         return min(silent_at, self._look_at) if self._splitter.is_waiting else silent_at
 

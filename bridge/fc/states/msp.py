@@ -136,10 +136,11 @@ class Identifying(MspLine):
             return Lost(f"not identified within {_IDENTIFY_TIMEOUT_S:.0f} s", pending=self.unanswered())
         return event
 
-    def deadline(self) -> float:
+    @property
+    def due(self) -> float:
         if self._end is not None:
             return 0.0
-        return min(self.link.next_deadline(), self._silent_since() + self._silence_s(), self._give_up_at)
+        return min(self.link.due, self._silent_since() + self._silence_s(), self._give_up_at)
 
     def _silent_since(self) -> float:
         # The identification may have to wait its turn, behind a conversation that waits for the store.
@@ -176,12 +177,13 @@ class Polling(MspLine):
                 self.port.runner.start(_identify(self.port.profiles), self._checked, now)
         return event
 
-    def deadline(self) -> float:
+    @property
+    def due(self) -> float:
         if self._end is not None:
             return 0.0
         is_torn = self.link.parser.skipped_bytes > self._foreign.skipped_before
         silent_at = self.link.last_heard_at + (self._silence_s() if is_torn else self._longest_silence_s)
-        deadline = min(self.link.next_deadline(), self.port.polls.next_deadline(self.link), silent_at)
+        deadline = min(self.link.due, self.port.polls.due(self.link), silent_at)
         return deadline if deadline <= self._check_at or self.port.runner.is_busy else self._check_at
 
     def _checked(self, board: FlightController | LinkLost | None, now: float) -> None:

@@ -83,7 +83,8 @@ class Searching(State):
         self.found: Found | None = None
         self._visit = self._new_visit(now)
 
-    def deadline(self) -> float:
+    @property
+    def due(self) -> float:
         return min(self._visit.phase_ends, self._visit.ends)
 
     def receive(self, data: bytes, now: float) -> Event | None:

@@ -140,7 +140,7 @@ def test_a_timed_out_request_counts_until_its_reply_can_no_longer_come() -> None
     link.send(question(195, 99), 0.0)
     sent(link)
     for _ in range(2):
-        now = link.next_deadline()
+        now = link.due
         link.tick(now)
     assert not link.awaits(195)
     assert link.outstanding_bytes == 210
@@ -160,7 +160,7 @@ def test_an_unanswered_request_is_forgotten_after_the_longest_stall() -> None:
     link.send(question(195, 99), 0.0)
     now = 0.0
     for _ in range(12):
-        now = link.next_deadline()
+        now = link.due
         link.tick(now)
     assert 3.0 < now < 8
     assert sent(link).count(195) == 3
@@ -171,7 +171,7 @@ def asked_again(message: Send) -> MspLink:
     link = MspLink(115200, [], 0.0)
     link.receiver_timeout_s = 0.05
     link.send(message, 0.0)
-    link.tick(link.next_deadline())
+    link.tick(link.due)
     link.send(message, 0.2)
     return link
 
@@ -190,7 +190,7 @@ def test_a_late_reply_is_neither_timed_nor_counted_twice() -> None:
 def test_lost_requests_do_not_block_a_repeat_to_a_board_that_answers() -> None:
     """A regression: each reply to a repeated request left another one open, so requests were sent endlessly."""
     link = asked_again(question(195, 99))
-    link.tick(link.next_deadline())  # the repeat is lost, too
+    link.tick(link.due)  # the repeat is lost, too
     now, asked = 2.0, sent(link)
     for _ in range(200):
         now += 0.005
@@ -223,11 +223,11 @@ def test_nothing_is_sent_alongside_an_exclusive_request() -> None:
 def test_a_resync_waits_for_the_reply_to_an_exclusive_request() -> None:
     link = MspLink(115200, [], 0.0)
     link.send(question(101, 11), 0.0)
-    now = link.next_deadline()
+    now = link.due
     link.tick(now)
     link.send(question(106, 18), now)
     link.send(question(191, 7, exclusive=True), now)
-    now = link.next_deadline()
+    now = link.due
     link.tick(now)
     assert link.requests_lost == 2
     assert RESYNC not in _taken(link)
@@ -247,7 +247,7 @@ def test_a_reply_behind_a_false_header_is_found_once_the_line_is_silent() -> Non
     link = MspLink(115200, [], 0.0)
     link.send(question(101, 11), 0.0)
     assert link.receive(b"$M>\xf0" + reply(101, 11), 0.005) == []
-    (found,) = link.tick(link.next_deadline())
+    (found,) = link.tick(link.due)
     assert found.command == 101
     assert link.requests_lost == 0
 
@@ -257,7 +257,7 @@ def test_half_a_reply_is_not_thrown_away_because_another_request_timed_out() -> 
     link.send(question(101, 11), 0.0)
     link.send(question(106, 18), 0.0)
     long_one = reply(106, 18)
-    deadline = link.next_deadline()
+    deadline = link.due
     assert link.receive(long_one[:10], deadline - 0.01) == []
     link.tick(deadline)
     (found,) = link.receive(long_one[10:], deadline + 0.1)
@@ -277,7 +277,7 @@ def test_a_harmless_request_follows_a_frame_with_a_hazard_byte_if_the_board_acce
     link.any_byte = True
     link.send(Send(request(100, b"#"), 100, 13), 0.0)
     assert sent(link) == [100]
-    now = link.next_deadline()
+    now = link.due
     assert now < 0.1
     link.tick(now)
     assert sent(link) == [Msp.API_VERSION]

@@ -44,7 +44,7 @@ class Line:
         """Let time pass; return the number of polls by command."""
         end, before = self.now + seconds, len(self.asked)
         while self.now < end:
-            due = [self.schedule.next_deadline(self.link), self.link.next_deadline(), *(at for at, _ in self._replies)]
+            due = [self.schedule.due(self.link), self.link.due, *(at for at, _ in self._replies)]
             self.now = min(max(min(due), self.now), end)
             while self._replies and self._replies[0][0] <= self.now:
                 self._settle(self.link.receive(self._replies.pop(0)[1], self.now))

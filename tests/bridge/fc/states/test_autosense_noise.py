@@ -87,7 +87,7 @@ def test_damaged_mavlink_and_foreign_msp_requests_give_no_verdict() -> None:
 def test_a_single_answer_is_not_enough() -> None:
     search = begin(115200)
     for number in range(500):
-        now = search.deadline()
+        now = search.due
         # Each answer differs.
         answer = MspFrame(Direction.REPLY, 100, bytes((211, 3, 0, number % 256, number // 256, 0, 128)))
         search.receive(answer.encode(), now)
@@ -104,5 +104,5 @@ def test_a_heartbeat_must_be_plausible_in_every_field() -> None:
         frame = bytes(messages.MAVLink_heartbeat_message(*fields).pack(mavlink))
         search.receive(frame, 0.0)
         for _ in range(6):
-            search.tick(search.deadline())
+            search.tick(search.due)
         assert (search.found is not None) is found
