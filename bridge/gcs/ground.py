@@ -344,11 +344,11 @@ class Ground:
     def multicast(self, packed: Packed, stations: Iterable[GroundStation]) -> None:
         """Send a packed message to several stations that can read it."""
         frame = None
-        is_logged = not self.is_recording
+        is_logged = self.on_frames is not _drop and not self.is_recording
         for station in stations:
-            if packed.is_v2_only and station.frame_version == 1:
+            if station.frame_version == 1 and packed.is_v2_only:
                 continue
-            frame = station.frame(packed)
+            frame = station.writer.frame(packed, station.frame_version)
             if station.peer is RECORDER:
                 is_logged = True
             else:
