@@ -63,7 +63,7 @@ def test_bad_requests_are_answered_and_change_nothing(start: Starter) -> None:
     for name, line in BAD_REQUESTS.items():
         answer = send(daemon, line)
         assert list(answer) == ["error"], name
-        assert len(str(answer["error"])) < 200, name
+        assert "\n" not in str(answer["error"]), name
     with pytest.raises(ControlError, match="limited to 256 kB: no flight controller stores"):
         daemon.ask({"do": " " * (64 << 20)})
     assert daemon.pull() == held
