@@ -3,7 +3,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from itertools import pairwise
 
 import pytest
@@ -20,7 +19,6 @@ from tests.support.conversations import (
     clear_message,
     count_message,
     item_message,
-    list_message,
     records_of,
     rounded,
     waypoints,
@@ -380,18 +378,6 @@ def test_an_upload_whose_turn_does_not_come_is_denied() -> None:
     assert state(world) is Receiving
 
 
-def test_an_upload_during_a_push_from_the_command_line_is_denied() -> None:
-    world, station = holding()
-    hanging_push(world)
-    for message in (count_message(5), count_message(5), item_message(0, OLD[1]), ack_message(A.ACCEPTED)):
-        station.send(message)
-    world.run(2.4)
-    assert station.messages("MISSION_ACK", "MISSION_REQUEST", "STATUSTEXT") == []
-    world.run(0.2)
-    assert acks(station) == [A.DENIED]
-    assert station.texts() == ["Another mission transfer is running"]
-
-
 def test_a_complete_list_whose_turn_does_not_come_is_denied() -> None:
     world, station = holding()
     receiving(world, station, waypoints(8), 7)
@@ -423,26 +409,6 @@ def test_a_waiting_upload_can_be_cancelled(message: Message) -> None:
     assert world.stored == records_of(waypoints(8))
 
 
-def test_the_command_line_and_a_ground_station_exclude_each_other() -> None:
-    world, station = holding()
-    outcome = world.push(waypoints(146))
-    station.send(count_message(5))
-    world.run(0.05)
-    assert requested(station) == []
-    world.wait_until(lambda _: bool(outcome), 2)
-    world.run(0.1)
-    assert requested(station) == [0]
-    for seq, item in enumerate(waypoints(5)):
-        station.send(item_message(seq, item))
-    world.run(0.02)
-    assert state(world) is Delivering
-    denied = world.push(waypoints(3))
-    assert denied[0][0].text == "Another mission transfer is running"
-    world.run(1)
-    assert acks(station) == [A.ACCEPTED]
-    assert world.stored == records_of(waypoints(5))
-
-
 @pytest.mark.parametrize("sent", [0, 1, 10, 29])
 @pytest.mark.parametrize("count", [7, 30, 60])
 def test_the_same_station_restarts_while_items_arrive(sent: int, count: int) -> None:
@@ -454,110 +420,6 @@ def test_the_same_station_restarts_while_items_arrive(sent: int, count: int) -> 
     begun = [event.facts["incident"] for event in world.events("mission.upload_started")]
     ends = world.events("mission.refused") + world.events("mission.upload_ended")
     assert [event.facts["incident"] for event in ends] == begun
-
-
-def test_two_lists_are_never_mixed_if_a_burst_loses_its_first_item() -> None:
-    """Mission Planner's "Write Fast" again, with another list of the same length."""
-    world, station = holding()
-    before, after = waypoints(12, 1), waypoints(12, 2)
-    receiving(world, station, before, 6)
-    station.send(count_message(12))
-    for seq in range(1, 10):
-        station.send(item_message(seq, after[seq]))
-    world.run(0.5)
-    assert requested(station)[-1] == 0
-    for seq in range(12):
-        station.send(item_message(seq, after[seq]))
-    world.run(2)
-    assert acks(station) == [A.ACCEPTED]
-    assert world.stored == records_of(after)
-
-
-@pytest.mark.parametrize("answered", [8, 18])
-@pytest.mark.parametrize("repeat", [0.0, 1.0])
-def test_two_lists_are_never_mixed_if_a_request_is_on_its_way(repeat: float, answered: int) -> None:
-    """MAVProxy answers the request for an item of the former list with one of the new list, which has the same home."""
-    world, station = holding()
-    station.radio = Radio(repeat=repeat, delay_s=0.05)
-    former = Upload(station, waypoints(20, 1))
-    world.wait_until(lambda _: answered in former.requested, 10)
-    former.stop()
-    items = [*waypoints(1, 1), *waypoints(20, 2)[1:]]
-    assert Upload(station, items).run() is A.ACCEPTED
-    assert world.stored == records_of(items)
-
-
-@pytest.mark.parametrize("count", [9, 16])
-def test_two_lists_are_never_mixed_if_items_of_the_former_are_late(count: int) -> None:
-    """MAVProxy had answered two requests for item 2, and both answers arrive after its next MISSION_COUNT."""
-    world, station = holding()
-    former, items = waypoints(16, 1), [*waypoints(1, 1), *waypoints(count, 2)[1:]]
-    receiving(world, station, former, 2)
-    station.radio = Radio(delay_s=0.02)
-    upload = Upload(station, items)
-    world.wait_until(lambda _: bool(upload.requested), 1)
-    for _ in range(2):
-        world.at(world.now, partial(world.receive_from, station, station.pack(item_message(2, former[2]))))
-    assert upload.run() is A.ACCEPTED
-    assert world.stored == records_of(items)
-
-
-def test_two_lists_are_never_mixed_if_a_request_and_its_repeat_are_on_their_way() -> None:
-    """MAVProxy answers both with its new list's last item."""
-    world, station = holding()
-    former, items = waypoints(5, 1), [*waypoints(1, 1), *waypoints(5, 2)[1:]]
-    receiving(world, station, former, 4)
-    world.wait_until(lambda _: 4 in requested(station), 2)
-    station.send(count_message(5))
-    for _ in range(2):
-        station.send(item_message(4, items[4]))
-        world.run(0.01)
-        assert state(world) is Receiving
-    answers_requests(world, station, items)
-    world.wait_until(lambda _: bool(acks(station)), 20)
-    assert acks(station) == [A.ACCEPTED]
-    assert world.stored == records_of(items)
-
-
-def test_two_lists_are_never_mixed_if_the_second_count_is_lost() -> None:
-    """To Mission Planner the repeated request for item 1 answers its new MISSION_COUNT: it sends item 0."""
-    world, station = holding()
-    receiving(world, station, waypoints(5, seed=1), 1)
-    items = waypoints(5, seed=2)
-    for seq, item in enumerate(items):
-        station.send(item_message(seq, item))
-    world.run(0.001)
-    assert acks(station) == []
-    for seq in range(5):
-        world.wait_until(lambda _, seq=seq: seq in requested(station), 2)  # type: ignore[misc]
-        station.send(item_message(seq, items[seq]))
-    world.wait_until(lambda _: bool(acks(station)), 5)
-    assert acks(station) == [A.ACCEPTED]
-    assert world.stored == records_of(items)
-
-
-def answers_requests(world: World, station: GroundStation, items: list[MissionItem]) -> None:
-    """From now on the station answers each request with an item of this list, as MAVProxy and QGroundControl do."""
-
-    def answer(message: Message) -> None:
-        if message.get_type() == "MISSION_REQUEST":
-            station.send(item_message(message.seq, items[message.seq]))
-
-    station.on_message[:] = [answer]
-
-
-@pytest.mark.parametrize("changed", [range(1, 12), range(3, 4), range(9, 10)])
-def test_two_lists_are_never_mixed_if_the_first_was_stuck_and_the_second_count_is_lost(changed: range) -> None:
-    """Both have the same home and length; the ground station sends MISSION_COUNT once."""
-    world, station = holding()
-    former = waypoints(12, 1)
-    latter = [replace(item, alt_m=item.alt_m + 5) if item.seq in changed else item for item in former]
-    receiving(world, station, former, 6)
-    world.run(3.0)
-    answers_requests(world, station, latter)
-    world.wait_until(lambda _: bool(acks(station)), 20)
-    assert acks(station) == [A.ACCEPTED]
-    assert world.stored == records_of(latter)
 
 
 class PlannerWrite:
@@ -598,38 +460,6 @@ def test_mission_planner_goes_on_after_a_gap_in_the_wifi(gap_s: float, at_s: flo
     station.radio.loss = 0.0
     world.wait_until(lambda _: bool(acks(station)), 60)
     assert acks(station) == [A.ACCEPTED]
-    assert world.stored == records_of(items)
-
-
-def test_an_item_that_was_once_doubtful_is_doubted_again() -> None:
-    """The network duplicates a MISSION_COUNT; later the ground station begins a second list of the same length."""
-    world, station = holding()
-    first, second = waypoints(12, 1), waypoints(12, 2)
-    receiving(world, station, first, 6)
-    for _ in range(2):
-        station.send(count_message(12))
-        station.send(item_message(6, second[6]))
-        world.run(0.001)
-        assert requested(station)[-1] == 0
-        # An item that is known resolves the doubt.
-        station.send(item_message(3, first[3]))
-        world.run(0.2)
-    answers_requests(world, station, first)
-    world.wait_until(lambda _: bool(acks(station)), 20)
-    assert world.stored == records_of(first)
-
-
-def test_two_lists_are_never_mixed_if_the_only_count_is_lost() -> None:
-    """MAVProxy sends it once, and answers the former list's repeated request with its present list's item."""
-    world, station = holding()
-    former, items = waypoints(9, 1), [*waypoints(1, 1), *waypoints(9, 2)[1:]]
-    receiving(world, station, former, 4)
-    station.radio = Radio(loss=1.0)
-    upload = Upload(station, items, tries=0)
-    station.radio = Radio()
-    upload.gave_up = False
-    station.send(item_message(3, items[3]))
-    assert upload.run() is A.ACCEPTED
     assert world.stored == records_of(items)
 
 
@@ -748,28 +578,6 @@ def test_an_upload_to_another_flight_controller_is_unsupported() -> None:
     refused(world, GroundStation(world), 5, A.UNSUPPORTED, "stores no missions")
 
 
-def test_a_refusal_is_remembered_for_ten_seconds() -> None:
-    world, station = holding()
-    refused(world, station, 147, A.NO_SPACE, "only 146 fit")
-    world.run(10.5)
-    station.take()
-    station.send(partial_list_message())
-    world.run(1)
-    assert acks(station) == [A.UNSUPPORTED]
-    assert "A mission can only be written as a whole" in station.texts()
-
-
-def test_items_of_an_upload_begun_before_a_restart_are_refused_at_once() -> None:
-    world, station = holding()
-    for _ in range(3):
-        for seq in (11, 12, 13):
-            station.send(item_message(seq, OLD[seq]))
-        world.run(0.45)
-    assert [message.type for message in station.messages("MISSION_ACK")] == [A.OPERATION_CANCELLED] * 9
-    assert station.texts() == ["Unknown upload: write it again"]
-    assert Upload(station, waypoints(5)).run() is A.ACCEPTED
-
-
 def test_a_write_fast_with_lost_items_is_reported_repeatedly() -> None:
     """Mission Planner reports success regardless and ends with its own MISSION_ACK."""
     world, station = holding()
@@ -840,95 +648,6 @@ def test_each_item_is_requested_once_with_mission_request(as_int: bool) -> None:
     assert stored_at_ack == [records_of(items if as_int else rounded(items))]
     assert {(m.target_system, m.target_component) for m in station.messages("MISSION_REQUEST")} == {(255, 190)}
     world.assert_line_was_clean()
-
-
-def test_a_list_may_mix_float_and_int_items() -> None:
-    world, station = holding()
-    items = waypoints(10)
-    receiving(world, station, items, 0)
-    for seq, item in enumerate(items):
-        station.send(item_message(seq, item, as_int=bool(seq % 2)))
-    world.run(1)
-    assert acks(station) == [A.ACCEPTED]
-
-
-def test_a_burst_of_items_is_acknowledged_item_by_item() -> None:
-    """Mission Planner's "Write Fast" sends ten at once, then waits for the request for the eleventh."""
-    world, station = holding()
-    items = waypoints(40)
-    receiving(world, station, items, 0)
-    for first in range(0, 40, 10):
-        station.take()
-        for seq in range(first, first + 10):
-            station.send(item_message(seq, items[seq]))
-        world.run(0.001)
-        assert requested(station) == list(range(first + 1, min(first + 11, 40)))
-    world.run(1)
-    assert acks(station) == [A.ACCEPTED]
-    assert world.stored == records_of(items)
-
-
-def test_items_out_of_order_are_kept_and_the_missing_one_is_requested() -> None:
-    world, station = holding()
-    items = waypoints(8)
-    receiving(world, station, items, 0)
-    for seq, wanted in [(0, 1), (2, 1), (3, 1), (7, 1), (1, 4), (5, 4), (6, 4)]:
-        station.take()
-        station.send(item_message(seq, items[seq]))
-        world.run(0.001)
-        assert requested(station) == [wanted]
-    station.send(item_message(4, items[4]))
-    world.run(1)
-    assert acks(station) == [A.ACCEPTED]
-    assert world.stored == records_of(items)
-
-
-def test_a_repeated_item_gets_one_request_and_is_ignored() -> None:
-    world, station = holding()
-    items = waypoints(8)
-    receiving(world, station, items, 5)
-    for seq in (1, 4, 4, 2):
-        world.run(0.12)
-        station.take()
-        station.send(item_message(seq, items[seq]))
-        world.run(0.001)
-        assert requested(station) == [5]
-    for seq in range(5, 8):
-        station.send(item_message(seq, items[seq]))
-    world.run(1)
-    assert world.stored == records_of(items)
-
-
-def test_duplicates_from_the_network_do_not_multiply_requests() -> None:
-    world, station = holding()
-    items = waypoints(40)
-    station.radio = Radio(repeat=0.1, delay_s=0.03, spread_s=0.02)
-
-    def answer(message: Message) -> None:
-        if message.get_type() == "MISSION_REQUEST":
-            station.send(item_message(message.seq, items[message.seq]))
-
-    station.on_message.append(answer)
-    station.send(count_message(len(items)))
-    world.run(10)
-    assert world.stored == records_of(items)
-    # Only the duplicates that the link itself adds.
-    assert len(requested(station)) <= 1.4 * len(items)
-
-
-def test_an_item_beyond_the_list_is_an_invalid_sequence_and_the_transfer_continues() -> None:
-    world, station = holding()
-    items = waypoints(8)
-    receiving(world, station, items, 3)
-    for seq in (8, 9, 65535):
-        station.take()
-        station.send(item_message(seq, items[0]))
-        world.run(0.001)
-        assert acks(station) == [A.INVALID_SEQUENCE]
-    for seq in range(3, 8):
-        station.send(item_message(seq, items[seq]))
-    world.run(1)
-    assert acks(station)[-1] is A.ACCEPTED
 
 
 @pytest.mark.parametrize("sent", [0, 3])
@@ -1084,75 +803,6 @@ def test_clear_all_during_an_upload_clears(sent: int) -> None:
     world.run(2)
     assert acks(station)[-1] is A.ACCEPTED
     assert world.stored == ()
-
-
-def test_a_repeated_last_item_gets_no_reply_until_the_final_ack() -> None:
-    world, station = holding(SimOptions(flash_erase_ms=1200))
-    items = waypoints(146)
-    receiving(world, station, items, 146)
-    for _ in range(3):
-        station.send(item_message(145, items[145]))
-        world.run(0.3)
-        assert state(world) is Delivering
-        assert acks(station) == []
-        assert requested(station) == []
-    world.wait_until(lambda _: bool(acks(station)), 3)
-    world.run(1)
-    for _ in range(4):
-        station.take()
-        station.send(item_message(145, items[145]))
-        world.run(0.45)
-        assert acks(station) == [A.ACCEPTED]
-        assert state(world) is None
-    # Only the last item.
-    station.take()
-    station.send(item_message(20, items[20]))
-    world.run(0.45)
-    assert acks(station) == []
-    assert world.naze.counters.flash_writes == 2
-
-
-def test_a_lost_final_ack_is_sent_again() -> None:
-    world, station = holding()
-    items = waypoints(20)
-    receiving(world, station, items, 19)
-    station.radio.loss = 1.0
-    world.receive_from(station, station.pack(item_message(19, items[19])))
-    world.run(1.5)
-    station.radio.loss = 0.0
-    assert acks(station) == []
-    station.send(item_message(19, items[19]))
-    world.run(0.1)
-    assert acks(station) == [A.ACCEPTED]
-
-
-@pytest.mark.parametrize("next_message", [None, list_message(), count_message(5), ack_message(A.ACCEPTED)])
-def test_the_final_ack_is_repeated_until_the_station_goes_on(next_message: Message | None) -> None:
-    """QGroundControl never asks for it again, and reports a failure after 1.5 s."""
-    world, station = holding()
-    receiving(world, station, waypoints(8), 8)
-    began = world.now
-    if next_message is not None:
-        world.after(0.3, lambda: station.send(next_message))
-    world.run(5)
-    times = [at - began for at, message in station.received if message.get_type() == "MISSION_ACK"]
-    if next_message is None:
-        first, *again = times
-        assert [at - first for at in again] == pytest.approx([0.4, 0.9], abs=0.01)
-        assert again[-1] < 1.4
-    else:
-        assert len([at for at in times if at < 4]) == 1
-
-
-def test_the_final_ack_comes_within_two_seconds_of_the_last_item() -> None:
-    """With a flash that stalls for 300 ms and a slow store."""
-    world, station = holding(SimOptions(flash_erase_ms=300))
-    world.store.delay_s = 0.3
-    items = waypoints(146)
-    receiving(world, station, items, 145)
-    station.send(item_message(145, items[145]))
-    assert world.wait_until(lambda _: bool(acks(station)), 5) <= 2.0
-    assert acks(station) == [A.ACCEPTED]
 
 
 def test_a_list_that_breaks_a_rule_is_refused_at_once() -> None:

@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A list arrives item by item: whole and in order, never mixed with another one."""
+
+from dataclasses import replace
+from functools import partial
+
+import pytest
+
+from bridge.transfers.upload_states import Receiving
+from protocols.mavlink.dialect import Message
+from protocols.mission_item import MissionItem
+from tests.bridge.transfers.test_uploads import A, acks, holding, receiving, requested, state
+from tests.support.conversations import Upload, count_message, item_message, records_of, waypoints
+from tests.support.world import GroundStation, Radio, World
+
+
+def test_two_lists_are_never_mixed_if_a_burst_loses_its_first_item() -> None:
+    """Mission Planner's "Write Fast" again, with another list of the same length."""
+    world, station = holding()
+    before, after = waypoints(12, 1), waypoints(12, 2)
+    receiving(world, station, before, 6)
+    station.send(count_message(12))
+    for seq in range(1, 10):
+        station.send(item_message(seq, after[seq]))
+    world.run(0.5)
+    assert requested(station)[-1] == 0
+    for seq in range(12):
+        station.send(item_message(seq, after[seq]))
+    world.run(2)
+    assert acks(station) == [A.ACCEPTED]
+    assert world.stored == records_of(after)
+
+
+@pytest.mark.parametrize("answered", [8, 18])
+@pytest.mark.parametrize("repeat", [0.0, 1.0])
+def test_two_lists_are_never_mixed_if_a_request_is_on_its_way(repeat: float, answered: int) -> None:
+    """MAVProxy answers the request for an item of the former list with one of the new list, which has the same home."""
+    world, station = holding()
+    station.radio = Radio(repeat=repeat, delay_s=0.05)
+    former = Upload(station, waypoints(20, 1))
+    world.wait_until(lambda _: answered in former.requested, 10)
+    former.stop()
+    items = [*waypoints(1, 1), *waypoints(20, 2)[1:]]
+    assert Upload(station, items).run() is A.ACCEPTED
+    assert world.stored == records_of(items)
+
+
+@pytest.mark.parametrize("count", [9, 16])
+def test_two_lists_are_never_mixed_if_items_of_the_former_are_late(count: int) -> None:
+    """MAVProxy had answered two requests for item 2, and both answers arrive after its next MISSION_COUNT."""
+    world, station = holding()
+    former, items = waypoints(16, 1), [*waypoints(1, 1), *waypoints(count, 2)[1:]]
+    receiving(world, station, former, 2)
+    station.radio = Radio(delay_s=0.02)
+    upload = Upload(station, items)
+    world.wait_until(lambda _: bool(upload.requested), 1)
+    for _ in range(2):
+        world.at(world.now, partial(world.receive_from, station, station.pack(item_message(2, former[2]))))
+    assert upload.run() is A.ACCEPTED
+    assert world.stored == records_of(items)
+
+
+def test_two_lists_are_never_mixed_if_a_request_and_its_repeat_are_on_their_way() -> None:
+    """MAVProxy answers both with its new list's last item."""
+    world, station = holding()
+    former, items = waypoints(5, 1), [*waypoints(1, 1), *waypoints(5, 2)[1:]]
+    receiving(world, station, former, 4)
+    world.wait_until(lambda _: 4 in requested(station), 2)
+    station.send(count_message(5))
+    for _ in range(2):
+        station.send(item_message(4, items[4]))
+        world.run(0.01)
+        assert state(world) is Receiving
+    answers_requests(world, station, items)
+    world.wait_until(lambda _: bool(acks(station)), 20)
+    assert acks(station) == [A.ACCEPTED]
+    assert world.stored == records_of(items)
+
+
+def test_two_lists_are_never_mixed_if_the_second_count_is_lost() -> None:
+    """To Mission Planner the repeated request for item 1 answers its new MISSION_COUNT: it sends item 0."""
+    world, station = holding()
+    receiving(world, station, waypoints(5, seed=1), 1)
+    items = waypoints(5, seed=2)
+    for seq, item in enumerate(items):
+        station.send(item_message(seq, item))
+    world.run(0.001)
+    assert acks(station) == []
+    for seq in range(5):
+        world.wait_until(lambda _, seq=seq: seq in requested(station), 2)  # type: ignore[misc]
+        station.send(item_message(seq, items[seq]))
+    world.wait_until(lambda _: bool(acks(station)), 5)
+    assert acks(station) == [A.ACCEPTED]
+    assert world.stored == records_of(items)
+
+
+def answers_requests(world: World, station: GroundStation, items: list[MissionItem]) -> None:
+    """From now on the station answers each request with an item of this list, as MAVProxy and QGroundControl do."""
+
+    def answer(message: Message) -> None:
+        if message.get_type() == "MISSION_REQUEST":
+            station.send(item_message(message.seq, items[message.seq]))
+
+    station.on_message[:] = [answer]
+
+
+@pytest.mark.parametrize("changed", [range(1, 12), range(3, 4), range(9, 10)])
+def test_two_lists_are_never_mixed_if_the_first_was_stuck_and_the_second_count_is_lost(changed: range) -> None:
+    """Both have the same home and length; the ground station sends MISSION_COUNT once."""
+    world, station = holding()
+    former = waypoints(12, 1)
+    latter = [replace(item, alt_m=item.alt_m + 5) if item.seq in changed else item for item in former]
+    receiving(world, station, former, 6)
+    world.run(3.0)
+    answers_requests(world, station, latter)
+    world.wait_until(lambda _: bool(acks(station)), 20)
+    assert acks(station) == [A.ACCEPTED]
+    assert world.stored == records_of(latter)
+
+
+def test_an_item_that_was_once_doubtful_is_doubted_again() -> None:
+    """The network duplicates a MISSION_COUNT; later the ground station begins a second list of the same length."""
+    world, station = holding()
+    first, second = waypoints(12, 1), waypoints(12, 2)
+    receiving(world, station, first, 6)
+    for _ in range(2):
+        station.send(count_message(12))
+        station.send(item_message(6, second[6]))
+        world.run(0.001)
+        assert requested(station)[-1] == 0
+        # An item that is known resolves the doubt.
+        station.send(item_message(3, first[3]))
+        world.run(0.2)
+    answers_requests(world, station, first)
+    world.wait_until(lambda _: bool(acks(station)), 20)
+    assert world.stored == records_of(first)
+
+
+def test_two_lists_are_never_mixed_if_the_only_count_is_lost() -> None:
+    """MAVProxy sends it once, and answers the former list's repeated request with its present list's item."""
+    world, station = holding()
+    former, items = waypoints(9, 1), [*waypoints(1, 1), *waypoints(9, 2)[1:]]
+    receiving(world, station, former, 4)
+    station.radio = Radio(loss=1.0)
+    upload = Upload(station, items, tries=0)
+    station.radio = Radio()
+    upload.gave_up = False
+    station.send(item_message(3, items[3]))
+    assert upload.run() is A.ACCEPTED
+    assert world.stored == records_of(items)
+
+
+def test_a_list_may_mix_float_and_int_items() -> None:
+    world, station = holding()
+    items = waypoints(10)
+    receiving(world, station, items, 0)
+    for seq, item in enumerate(items):
+        station.send(item_message(seq, item, as_int=bool(seq % 2)))
+    world.run(1)
+    assert acks(station) == [A.ACCEPTED]
+
+
+def test_a_burst_of_items_is_acknowledged_item_by_item() -> None:
+    """Mission Planner's "Write Fast" sends ten at once, then waits for the request for the eleventh."""
+    world, station = holding()
+    items = waypoints(40)
+    receiving(world, station, items, 0)
+    for first in range(0, 40, 10):
+        station.take()
+        for seq in range(first, first + 10):
+            station.send(item_message(seq, items[seq]))
+        world.run(0.001)
+        assert requested(station) == list(range(first + 1, min(first + 11, 40)))
+    world.run(1)
+    assert acks(station) == [A.ACCEPTED]
+    assert world.stored == records_of(items)
+
+
+def test_items_out_of_order_are_kept_and_the_missing_one_is_requested() -> None:
+    world, station = holding()
+    items = waypoints(8)
+    receiving(world, station, items, 0)
+    for seq, wanted in [(0, 1), (2, 1), (3, 1), (7, 1), (1, 4), (5, 4), (6, 4)]:
+        station.take()
+        station.send(item_message(seq, items[seq]))
+        world.run(0.001)
+        assert requested(station) == [wanted]
+    station.send(item_message(4, items[4]))
+    world.run(1)
+    assert acks(station) == [A.ACCEPTED]
+    assert world.stored == records_of(items)
+
+
+def test_a_repeated_item_gets_one_request_and_is_ignored() -> None:
+    world, station = holding()
+    items = waypoints(8)
+    receiving(world, station, items, 5)
+    for seq in (1, 4, 4, 2):
+        world.run(0.12)
+        station.take()
+        station.send(item_message(seq, items[seq]))
+        world.run(0.001)
+        assert requested(station) == [5]
+    for seq in range(5, 8):
+        station.send(item_message(seq, items[seq]))
+    world.run(1)
+    assert world.stored == records_of(items)
+
+
+def test_duplicates_from_the_network_do_not_multiply_requests() -> None:
+    world, station = holding()
+    items = waypoints(40)
+    station.radio = Radio(repeat=0.1, delay_s=0.03, spread_s=0.02)
+
+    def answer(message: Message) -> None:
+        if message.get_type() == "MISSION_REQUEST":
+            station.send(item_message(message.seq, items[message.seq]))
+
+    station.on_message.append(answer)
+    station.send(count_message(len(items)))
+    world.run(10)
+    assert world.stored == records_of(items)
+    # Only the duplicates that the link itself adds.
+    assert len(requested(station)) <= 1.4 * len(items)
+
+
+def test_an_item_beyond_the_list_is_an_invalid_sequence_and_the_transfer_continues() -> None:
+    world, station = holding()
+    items = waypoints(8)
+    receiving(world, station, items, 3)
+    for seq in (8, 9, 65535):
+        station.take()
+        station.send(item_message(seq, items[0]))
+        world.run(0.001)
+        assert acks(station) == [A.INVALID_SEQUENCE]
+    for seq in range(3, 8):
+        station.send(item_message(seq, items[seq]))
+    world.run(1)
+    assert acks(station)[-1] is A.ACCEPTED

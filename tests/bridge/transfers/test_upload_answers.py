@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The final ack: once, repeated if it is lost, and none to a station that went on."""
+
+import pytest
+
+from bridge.transfers.upload_states import Delivering
+from protocols.mavlink.dialect import Message
+from simulator.board.options import SimOptions
+from tests.bridge.transfers.test_uploads import (
+    OLD,
+    A,
+    acks,
+    holding,
+    partial_list_message,
+    receiving,
+    refused,
+    requested,
+    state,
+)
+from tests.support.conversations import Upload, ack_message, count_message, item_message, list_message, waypoints
+
+
+def test_a_refusal_is_remembered_for_ten_seconds() -> None:
+    world, station = holding()
+    refused(world, station, 147, A.NO_SPACE, "only 146 fit")
+    world.run(10.5)
+    station.take()
+    station.send(partial_list_message())
+    world.run(1)
+    assert acks(station) == [A.UNSUPPORTED]
+    assert "A mission can only be written as a whole" in station.texts()
+
+
+def test_items_of_an_upload_begun_before_a_restart_are_refused_at_once() -> None:
+    world, station = holding()
+    for _ in range(3):
+        for seq in (11, 12, 13):
+            station.send(item_message(seq, OLD[seq]))
+        world.run(0.45)
+    assert [message.type for message in station.messages("MISSION_ACK")] == [A.OPERATION_CANCELLED] * 9
+    assert station.texts() == ["Unknown upload: write it again"]
+    assert Upload(station, waypoints(5)).run() is A.ACCEPTED
+
+
+def test_a_repeated_last_item_gets_no_reply_until_the_final_ack() -> None:
+    world, station = holding(SimOptions(flash_erase_ms=1200))
+    items = waypoints(146)
+    receiving(world, station, items, 146)
+    for _ in range(3):
+        station.send(item_message(145, items[145]))
+        world.run(0.3)
+        assert state(world) is Delivering
+        assert acks(station) == []
+        assert requested(station) == []
+    world.wait_until(lambda _: bool(acks(station)), 3)
+    world.run(1)
+    for _ in range(4):
+        station.take()
+        station.send(item_message(145, items[145]))
+        world.run(0.45)
+        assert acks(station) == [A.ACCEPTED]
+        assert state(world) is None
+    # Only the last item.
+    station.take()
+    station.send(item_message(20, items[20]))
+    world.run(0.45)
+    assert acks(station) == []
+    assert world.naze.counters.flash_writes == 2
+
+
+def test_a_lost_final_ack_is_sent_again() -> None:
+    world, station = holding()
+    items = waypoints(20)
+    receiving(world, station, items, 19)
+    station.radio.loss = 1.0
+    world.receive_from(station, station.pack(item_message(19, items[19])))
+    world.run(1.5)
+    station.radio.loss = 0.0
+    assert acks(station) == []
+    station.send(item_message(19, items[19]))
+    world.run(0.1)
+    assert acks(station) == [A.ACCEPTED]
+
+
+@pytest.mark.parametrize("next_message", [None, list_message(), count_message(5), ack_message(A.ACCEPTED)])
+def test_the_final_ack_is_repeated_until_the_station_goes_on(next_message: Message | None) -> None:
+    """QGroundControl never asks for it again, and reports a failure after 1.5 s."""
+    world, station = holding()
+    receiving(world, station, waypoints(8), 8)
+    began = world.now
+    if next_message is not None:
+        world.after(0.3, lambda: station.send(next_message))
+    world.run(5)
+    times = [at - began for at, message in station.received if message.get_type() == "MISSION_ACK"]
+    if next_message is None:
+        first, *again = times
+        assert [at - first for at in again] == pytest.approx([0.4, 0.9], abs=0.01)
+        assert again[-1] < 1.4
+    else:
+        assert len([at for at in times if at < 4]) == 1
+
+
+def test_the_final_ack_comes_within_two_seconds_of_the_last_item() -> None:
+    """With a flash that stalls for 300 ms and a slow store."""
+    world, station = holding(SimOptions(flash_erase_ms=300))
+    world.store.delay_s = 0.3
+    items = waypoints(146)
+    receiving(world, station, items, 145)
+    station.send(item_message(145, items[145]))
+    assert world.wait_until(lambda _: bool(acks(station)), 5) <= 2.0
+    assert acks(station) == [A.ACCEPTED]
