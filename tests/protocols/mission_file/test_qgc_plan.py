@@ -203,7 +203,7 @@ json_values = st.recursive(
 )
 def test_any_json_is_read_or_refused(items: list[Any]) -> None:
     refused = refusal(plan(*items))
-    assert refused is None or (refused.isprintable() and len(refused) < 200)
+    assert refused is None or refused.isprintable()
 
 
 @settings(max_examples=200)

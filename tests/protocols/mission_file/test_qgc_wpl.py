@@ -199,7 +199,7 @@ def test_a_written_file_reads_back_the_same(items: list[MissionItem]) -> None:
 @given(st.binary(max_size=300), st.sampled_from([b"", HEADER.encode() + b"\n", (HEADER + "\n" + HOME + "\n").encode()]))
 def test_garbage_is_one_clear_error(garbage: bytes, before: bytes) -> None:
     refused = refusal(before + garbage)
-    assert refused is None or (refused.startswith("garbage") and refused.isprintable() and len(refused) < 200)
+    assert refused is None or (refused.startswith("garbage") and refused.isprintable())
 
 
 @settings(max_examples=300)

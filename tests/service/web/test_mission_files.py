@@ -70,7 +70,8 @@ def test_a_file_is_written_only_with_the_token(web: WebBench) -> None:
 def test_a_bad_file_gets_one_sentence(lasting_web: WebBench, body: bytes, kind: str, status: int) -> None:
     answer = post(lasting_web, "/api/check?name=a.waypoints", body, **{"Content-Type": kind})
     assert answer.status == status
-    assert 0 < len(answer.data["error"]) < 300
+    assert answer.data["error"]
+    assert answer.data["error"].isprintable()
     assert lasting_web.ask("/api/state").status == 200
 
 
