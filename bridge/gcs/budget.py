@@ -36,16 +36,23 @@ class TokenBucket:
 
     def take(self, now: float) -> bool:
         """Count one if it is allowed."""
-        used = max(0.0, self._used - max(0.0, now - self._counted_at) * self.rate.per_s)
-        self._counted_at = now
-        is_allowed = used + 1.0 <= self.rate.burst
-        self._used = used + 1.0 if is_allowed else used
-        return is_allowed
+        if not self.has(now):
+            return False
+        self._used += 1.0
+        return True
 
     @property
     def used(self) -> float:
         """The uses that were not regained when it was last asked."""
         return self._used
+
+
+class _Buckets(dict[Cost, TokenBucket]):
+    """One for each cost, made when it is first needed."""
+
+    def __missing__(self, cost: Cost) -> TokenBucket:
+        bucket = self[cost] = TokenBucket(LIMITS[cost].each)
+        return bucket
 
 
 class Budget:
@@ -55,14 +62,11 @@ class Budget:
     is_own = True
 
     def __init__(self) -> None:
-        self._buckets: dict[Cost, TokenBucket] = {}
+        self._buckets = _Buckets()
 
     def allows(self, cost: Cost, now: float) -> bool:
         """Count work; False if it exceeds the limit."""
-        bucket = self._buckets.get(cost)
-        if bucket is None:
-            bucket = self._buckets[cost] = TokenBucket(LIMITS[cost].each)
-        return bucket.take(now)
+        return self._buckets[cost].take(now)
 
 
 class HostBudget(Budget):
@@ -82,10 +86,7 @@ class HostBudget(Budget):
         self.wrote_at = -inf
 
     def allows(self, cost: Cost, now: float) -> bool:
-        limit = LIMITS[cost]
-        bucket = self._buckets.get(cost)
-        if bucket is None:
-            bucket = self._buckets[cost] = TokenBucket(limit.each)
+        bucket, limit = self._buckets[cost], LIMITS[cost]
         if self.is_own:
             return bucket.take(now)
         parts, total = max(self._hosts.without_seat, 1), self._hosts.totals[cost]

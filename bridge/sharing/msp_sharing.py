@@ -240,9 +240,8 @@ class MspSharing:
         """Count a request that got no reply; "warning" if that is news."""
         kind = program.host, is_change
         self._count(f"{command}: {why}")
-        if now < self._reported.get(kind, -inf) + _REPORT_INTERVAL_S or not self._reports.has(now):
+        if now < self._reported.get(kind, -inf) + _REPORT_INTERVAL_S or not self._reports.take(now):
             return "debug"
-        self._reports.spend()
         if len(self._reported) >= _MAX_REPORTED:
             del self._reported[next(iter(self._reported))]
         self._reported.pop(kind, None)
