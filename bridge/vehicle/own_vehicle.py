@@ -6,7 +6,6 @@ same vehicle.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from contextlib import suppress
 from math import inf
 
 from bridge.fc.msp_telemetry import POLL_FOR
@@ -155,9 +154,8 @@ class OwnVehicle:
                 self._send_current(stations)
             elif stations:
                 at = at or self._moment()
-                for make_message in row.makers:
-                    with suppress(make.Unknown):
-                        self._ground.multicast(pack(make_message(at)), stations)
+                for message in at.made(row.makers):
+                    self._ground.multicast(pack(message), stations)
 
     def also_want(self, readings: Mapping[type[Reading], float]) -> None:
         """Set the poll intervals for consumers other than ground stations: seconds by reading."""
