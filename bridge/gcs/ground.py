@@ -123,8 +123,8 @@ class Ground:
         """Forget a station; a configured one starts from scratch."""
         self._unheard.pop(peer, None)
         station = self._heard.pop(peer, None)
-        if station is not None:
-            self._places_of(station).remove(station)
+        if station is not None and station.places is not None:
+            station.places.remove(station)
             station.leaves()
         self._everyone = None
         if peer in self._default_peers:
@@ -197,10 +197,11 @@ class Ground:
         """Note a frame from a station, which counts as connected from now on."""
         peer = station.peer
         self.frames_received[peer.link, frame.msgid] += 1
-        if is_unknown := not station.is_heard:
+        is_unknown = station.places is None
+        if station.places is None:
             self._takes_place(station, now)
         else:
-            self._places_of(station).stations.move_to_end(peer)
+            station.places.stations.move_to_end(peer)
         if station.heard(frame, sender, now):
             self._on_newcomer(station, now)
         if is_unknown:
@@ -222,10 +223,9 @@ class Ground:
 
     def has_shown_key(self, station: GroundStation) -> None:
         """A station has sent its first valid signature."""
-        places = self._places_of(station)
         station.has_key = True
-        if station.is_heard:
-            places.remove(station)
+        if station.places is not None:
+            station.places.remove(station)
             station.leaves()
         station.settle_rights()
         if station.is_heard:
@@ -301,7 +301,7 @@ class Ground:
             return False
         return (
             now >= old.heard_at + _STILL_S
-            and self._places_of(new) is self._places_of(old)
+            and new.places is old.places
             and ids in new.speakers
             and new.came_at >= old.heard_at
         )

@@ -3,6 +3,7 @@
 
 from collections.abc import Iterable
 from math import inf
+from typing import TYPE_CHECKING
 
 from bridge.gcs.budget import Budget, HostBudget
 from bridge.gcs.cost import Cost
@@ -12,6 +13,9 @@ from bridge.gcs.rights import LinkAccess, Standing
 from bridge.gcs.station import RECORDER, Peer, Station
 from protocols.mavlink.codec import FrameWriter, Packed
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+
+if TYPE_CHECKING:
+    from bridge.gcs.places import Places
 
 #: After such a silence a station may have been restarted: all send a heartbeat each second.
 _RETURNS_S = 3.0
@@ -42,6 +46,8 @@ class GroundStation:
         self.splitter = MavlinkSplitter()
         self.writer = FrameWriter(sysid, compid, access.signer)
         self.is_heard = False
+        #: Those of its link among which it has one; None until it is heard.
+        self.places: Places | None = None
         #: The highest MAVLink version that it has sent, and the one of answers: everything signed is MAVLink 2.
         self.version = 0
         self.frame_version = 2

@@ -57,11 +57,13 @@ class Places:
 
     def add(self, station: GroundStation) -> None:
         self.stations[station.peer] = station
+        station.places = self
         self._hosts[station.peer.host] += 1
 
     def remove(self, station: GroundStation) -> None:
         host = station.peer.host
         del self.stations[station.peer]
+        station.places = None
         self._hosts[host] -= 1
         if not self._hosts[host]:
             del self._hosts[host]
