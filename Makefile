@@ -14,6 +14,7 @@
 #   make fuzz           10,500,000 random inputs over UDP, TCP and UART and in files: hours (EXAMPLES=500: a 26th of them)
 #   make deb            build the Debian packages for amd64, arm64 and armhf in dist/ (ARCH=arm64: only that one)
 #   make image-check    the first hour in a bare Debian with systemd: install, setup, a verified mission (root)
+#   make release VERSION=0.3.0  cut the changelog, tag, and build everything in dist/0.3.0 with checksums; pushes nothing
 #   make deb-trial      install, use and purge it in a bare Debian with systemd (root; SUITE=trixie: Debian 13)
 #   make lock           pin the newest packages that pyproject.toml allows (needs uv)
 #   make message-table  regenerate protocols/mavlink/message_table.py from pymavlink's definitions
@@ -33,7 +34,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .NOTPARALLEL:
-.PHONY: rules-page rights-page demo test lint bench pictures real-board soak fuzz deb deb-trial image-check lock message-table config-sample cli-page inav-page zenoh-schemas clean
+.PHONY: rules-page rights-page demo test lint bench pictures real-board soak fuzz deb release deb-trial image-check lock message-table config-sample cli-page inav-page zenoh-schemas clean
 
 # Installed if missing and if run as root, like the compilers of firmware/; systemd checks its own unit.
 BROWSER_PACKAGES := chromium chromium-driver
@@ -94,6 +95,10 @@ fuzz: $(VENV)/.test-ready
 deb: $(VENV)/.demo-ready
 	$(BIN)/python -m deb.build $(ARCH)
 	! command -v lintian >/dev/null || lintian --allow-root --fail-on error,warning $(or $(ARCH:%=dist/*_%.deb),dist/*.deb)
+
+release: $(VENV)/.demo-ready
+	@test -n '$(VERSION)' || { echo 'Say which version: make release VERSION=0.3.0' >&2; exit 1; }
+	$(BIN)/python -m deb.release $(VERSION)
 
 deb-trial image-check: ARCH = $(shell dpkg --print-architecture)
 deb-trial: deb

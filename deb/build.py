@@ -16,7 +16,6 @@ import re
 import shutil
 import subprocess
 import sys
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -43,8 +42,8 @@ def build(architecture: str, pythons: Sequence[str] = PYTHONS, folder: Path = _D
     work = _WORK / architecture
     shutil.rmtree(work, ignore_errors=True)
     wheels = work / "wheels"
-    project = tomllib.loads((_PROJECT / "pyproject.toml").read_text())["project"]
-    _run(*_PIP, "wheel", "--no-build-isolation", "--no-deps", "--wheel-dir", wheels, _PROJECT)
+    own = _wheel(wheels)
+    version = own.name.split("-")[1]
     libraries = {}
     for python in pythons:
         fetch(architecture, python, wheels)
@@ -52,14 +51,31 @@ def build(architecture: str, pythons: Sequence[str] = PYTHONS, folder: Path = _D
         # Only from the wheels, whose hashes were just checked; build tools are left out.
         libraries[python] = work / python
         from_wheels = ("--no-index", "--find-links", wheels, "--no-compile", "--target", libraries[python])
-        requirement = f"{project['name']}=={project['version']}"
-        _run(*_PIP, "install", "--no-warn-conflicts", *from_wheels, *target, requirement)
+        _run(*_PIP, "install", "--no-warn-conflicts", *from_wheels, *target, f"naze-bridge=={version}")
     root = work / "root"
-    lay_out(root, libraries, _PROJECT, project["version"], architecture)
+    lay_out(root, libraries, _PROJECT, debian_version(version), architecture)
     folder.mkdir(exist_ok=True)
-    package = folder / f"naze-bridge_{project['version']}_{architecture}.deb"
+    package = folder / f"naze-bridge_{debian_version(version)}_{architecture}.deb"
     _run("dpkg-deb", "--root-owner-group", "-Zxz", "--build", root, package)
     return package
+
+
+def build_python(folder: Path) -> list[Path]:
+    """Build the wheel and the source archive in `folder`."""
+    _run(sys.executable, "-m", "hatchling", "build", "--target", "sdist", "--directory", folder)
+    return [_wheel(folder), *folder.glob("*.tar.gz")]
+
+
+def _wheel(folder: Path) -> Path:
+    _run(*_PIP, "wheel", "--no-build-isolation", "--no-deps", "--wheel-dir", folder, _PROJECT)
+    (made,) = folder.glob("naze_bridge-*.whl")
+    return made
+
+
+def debian_version(version: str) -> str:
+    """A Python version for dpkg, where ~ sorts before the release: 0.2.1.dev12+g1234567 is 0.2.1~dev12+g1234567."""
+    public, plus, local = version.partition("+")
+    return re.sub(r"\.?(dev|a|b|rc)(?=\d)", r"~\1", public) + plus + local
 
 
 def fetch(architecture: str, python: str, wheels: Path) -> None:
@@ -91,12 +107,14 @@ def _target(python: str, machine: str) -> list[str]:
 
 def _run(*command: str | Path) -> None:
     # The wheel's files get the commit's time, so that builds are reproducible.
-    subprocess.run(command, check=True, env=os.environ | {"SOURCE_DATE_EPOCH": _commit_time()})
+    subprocess.run(command, check=True, cwd=_PROJECT, env=os.environ | {"SOURCE_DATE_EPOCH": _commit_time()})
 
 
 def _commit_time() -> str:
     command = ("git", "-C", str(_PROJECT), "log", "-1", "--format=%ct")
-    return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+    asked = subprocess.run(command, check=False, capture_output=True, text=True)
+    # A source archive has the commit's time on its files.
+    return asked.stdout.strip() or str(int((_PROJECT / "pyproject.toml").stat().st_mtime))
 
 
 if __name__ == "__main__":

@@ -57,7 +57,7 @@ def lay_out(root: Path, libraries: Mapping[str, Path], project: Path, version: s
     shutil.copytree(project / _SCHEMAS, documents / _SCHEMAS, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copytree(project / "examples", documents / "examples", ignore=shutil.ignore_patterns("__pycache__"))
     (documents / "changelog.gz").write_bytes(gzip.compress((project / "CHANGELOG.md").read_bytes(), mtime=0))
-    _write(root / "usr/share/man/man1/naze-bridge.1.gz", gzip.compress(man_page().encode(), mtime=0))
+    _write(root / "usr/share/man/man1/naze-bridge.1.gz", gzip.compress(man_page(version).encode(), mtime=0))
     _write(root / "usr/share/bash-completion/completions/naze-bridge", _completion("bash").encode())
     _write(root / "usr/share/zsh/vendor-completions/_naze-bridge", _completion("zsh").encode())
     _copy(_HERE / "lintian-overrides", root / "usr/share/lintian/overrides", "naze-bridge")

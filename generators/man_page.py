@@ -31,10 +31,10 @@ Stored missions and telemetry logs.
 """
 
 
-def man_page() -> str:
+def man_page(version: str) -> str:
     """The page in roff."""
     sections = "".join(f".SH {_escaped(name.upper())}\n.nf\n{_escaped(text)}\n.fi\n" for name, text in helps(main))
-    return _HEAD.format(version=version()) + sections + _TAIL
+    return _HEAD.format(version=version) + sections + _TAIL
 
 
 def _escaped(text: str) -> str:
@@ -43,4 +43,4 @@ def _escaped(text: str) -> str:
 
 
 if __name__ == "__main__":
-    sys.stdout.write(man_page())
+    sys.stdout.write(man_page(version()))
