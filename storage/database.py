@@ -11,8 +11,8 @@ import sqlite3
 import stat
 import struct
 import zlib
-from collections.abc import Iterable
-from contextlib import ExitStack, closing
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, closing, contextmanager
 from datetime import UTC, datetime
 from importlib import resources
 from pathlib import Path
@@ -27,6 +27,8 @@ SUMMARY = (
 )
 #: The columns of `mission_contents` that its crc32 covers.
 CONTENTS = ("items", "findings", "stored_items", "roi_commands", "records", "sent_seqs")
+#: The columns of `settings_backups` that its crc32 covers.
+BACKUP = "number, board, kind, taken_at, occasion, setting_count, changed_count, contents"
 
 # SQLite's auxiliary files of a database. The log holds commits that are not in the main file yet.
 _LOG = "-wal"
@@ -99,8 +101,22 @@ def memory_database() -> sqlite3.Connection:
     return connection
 
 
+@contextmanager
+def transaction(connection: sqlite3.Connection, failure: str) -> Iterator[None]:
+    """A transaction; once it returns, the data is on disk. StoreError begins with `failure`."""
+    with explained(failure):
+        connection.execute("BEGIN IMMEDIATE")
+        try:
+            yield
+            connection.execute("COMMIT")
+        except BaseException:
+            if connection.in_transaction:  # SQLite itself has rolled back after some errors
+                connection.execute("ROLLBACK")
+            raise
+
+
 def row_crc32(*values: object) -> int:
-    """The checksum of a row of `missions`, over the columns of SUMMARY."""
+    """The checksum of a row of `missions`, over the columns of SUMMARY, or of `settings_backups`, over BACKUP."""
     return zlib.crc32(repr(values).encode(errors="backslashreplace"))
 
 

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every received mission, accepted or not: as sent, as stored, and the outcome."""
+"""Every received mission, accepted or not: as sent, as stored, and the outcome; the settings' backups with them."""
 
 import builtins
 import json
 import sqlite3
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -18,8 +17,10 @@ from storage.database import (
     open_database,
     read_database,
     row_crc32,
+    transaction,
 )
 from storage.salvage import salvage
+from storage.settings_backups import SettingsBackups
 from storage.store_error import StoreError, explained
 
 PENDING = "PENDING"  # the outcome until conclude(); it stays if the daemon dies before
@@ -104,6 +105,7 @@ class MissionStore:
         self._connection = connection
         self._path = path
         self._budget = budget
+        self.backups = SettingsBackups(connection, path)
 
     def __enter__(self) -> Self:
         return self
@@ -286,18 +288,8 @@ class MissionStore:
         )
         return int((pages - free) * page_size)
 
-    @contextmanager
-    def _transaction(self, failure: str) -> Iterator[None]:
-        """A transaction; once it returns, the data is on disk."""
-        with explained(f"{failure} in {self._path}"):
-            self._connection.execute("BEGIN IMMEDIATE")
-            try:
-                yield
-                self._connection.execute("COMMIT")
-            except BaseException:
-                if self._connection.in_transaction:  # SQLite itself has rolled back after some errors
-                    self._connection.execute("ROLLBACK")
-                raise
+    def _transaction(self, failure: str) -> AbstractContextManager[None]:
+        return transaction(self._connection, f"{failure} in {self._path}")
 
 
 @dataclass(frozen=True, slots=True)

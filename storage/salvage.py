@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Copies intact missions from a damaged store into a new one.
+"""Copies intact missions and backups of settings from a damaged store into a new one.
 
-A mission is intact if both its rows match their checksums. Missions are looked up by number, so a damaged page loses
-only the missions on it.
+A mission is intact if both its rows match their checksums. Rows are looked up by number, so a damaged page loses
+only the rows on it.
 """
 
 import shutil
@@ -11,16 +11,25 @@ from contextlib import closing, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from storage.database import CONTENTS, SUMMARY, configured, contents_crc32, migrate, row_crc32
+from storage.database import BACKUP, CONTENTS, SUMMARY, configured, contents_crc32, migrate, row_crc32
 from storage.store_error import FAILURES
 
 #: A damaged table may claim any number; a store within its budget holds fewer.
 _MOST = 200_000
 _WAL = "-wal"
+_MISSION_NUMBERS = (
+    "SELECT max(number) FROM missions",
+    "SELECT max(number) FROM mission_contents",
+    "SELECT seq FROM sqlite_sequence WHERE name = 'missions'",
+)
+_BACKUP_NUMBERS = (
+    "SELECT max(number) FROM settings_backups",
+    "SELECT seq FROM sqlite_sequence WHERE name = 'settings_backups'",
+)
 
 
 def salvage(damaged: Path, store: sqlite3.Connection) -> int:
-    """Copy the intact missions from the file `damaged`, which is not changed; returns their number.
+    """Copy the intact rows from the file `damaged`, which is not changed; returns the number of missions.
 
     SQLite reads a copy in the same directory, because opening applies the log, and /tmp may be too small.
     """
@@ -44,9 +53,12 @@ def _copy_missions(path: Path, store: sqlite3.Connection) -> int:
             migrate(source)
         store.execute("BEGIN IMMEDIATE")
         try:
-            for number in range(1, _last_number(source) + 1):
+            for number in range(1, _last(source, _MISSION_NUMBERS) + 1):
                 with suppress(*FAILURES, TypeError):  # TypeError: there is no such row
                     copied += _copy_mission(number, source, store)
+            for number in range(1, _last(source, _BACKUP_NUMBERS) + 1):
+                with suppress(*FAILURES, TypeError):
+                    _copy_backup(number, source, store)
             store.execute("COMMIT")
         except BaseException:
             store.execute("ROLLBACK")
@@ -54,17 +66,19 @@ def _copy_missions(path: Path, store: sqlite3.Connection) -> int:
     return copied
 
 
-def _last_number(source: sqlite3.Connection) -> int:
+def _last(source: sqlite3.Connection, questions: tuple[str, ...]) -> int:
     last = 0
-    for question in (
-        "SELECT max(number) FROM missions",
-        "SELECT max(number) FROM mission_contents",
-        "SELECT seq FROM sqlite_sequence WHERE name = 'missions'",
-    ):
+    for question in questions:
         with suppress(*FAILURES, TypeError, ValueError):
             (found,) = source.execute(question).fetchone() or (0,)
             last = max(last, int(found or 0))
     return min(last, _MOST)
+
+
+def _copy_backup(number: int, source: sqlite3.Connection, store: sqlite3.Connection) -> None:
+    *row, crc32 = source.execute(f"SELECT {BACKUP}, crc32 FROM settings_backups WHERE number = ?", (number,)).fetchone()  # noqa: S608
+    if row_crc32(*row) == crc32:
+        _insert(store, f"settings_backups ({BACKUP}, crc32)", (*row, crc32))
 
 
 def _copy_mission(number: int, source: sqlite3.Connection, store: sqlite3.Connection) -> int:

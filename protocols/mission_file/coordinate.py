@@ -3,7 +3,8 @@
 
 import math
 
-from protocols.mission_file.error import MissionFileError, shown
+from protocols.file_error import shown
+from protocols.mission_file.error import MissionFileError
 from protocols.mission_item import degrees_to_e7
 
 

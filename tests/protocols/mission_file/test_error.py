@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocols.mission_file.error import MissionFileError, refuse_other_plans, shown
+from protocols.file_error import shown
+from protocols.mission_file.error import MissionFileError, refuse_other_plans
 
 
 @given(found=st.text() | st.binary() | st.floats() | st.lists(st.text()) | st.dictionaries(st.text(), st.text()))

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Two tables of settings side by side: files, backups, flight controllers."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from protocols.param_file import is_equal
+
+#: By name; a text where the setting is one.
+SettingValues = Mapping[str, float | str]
+#: More than any setting; single precision ends here.
+_MOST = 3e38
+
+
+@dataclass(frozen=True, slots=True)
+class SettingRow:
+    """A setting that differs. None: that side does not have it."""
+
+    name: str
+    left: float | str | None
+    right: float | str | None
+
+
+def settings_difference(left: SettingValues, right: SettingValues) -> list[SettingRow]:
+    """The settings that differ, in the order of `left`, then those only in `right`."""
+    rows = [SettingRow(name, value, right.get(name)) for name, value in left.items()]
+    rows += [SettingRow(name, None, value) for name, value in right.items() if name not in left]
+    return [row for row in rows if row.left is None or row.right is None or not is_equal(row.left, row.right)]
+
+
+def setting_values(data: object) -> SettingValues:
+    """Read a table of settings from plain data; ValueError gives the reason. Without those that are NaN (null)."""
+    if not isinstance(data, dict):
+        raise ValueError("settings must be an object")
+    data = {str(name): value for name, value in data.items() if value is not None}
+    for name, value in data.items():
+        is_number = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= _MOST
+        if not is_number and not isinstance(value, str):
+            raise ValueError(f"the setting {name} must be a number or a text")
+    return {name: value if isinstance(value, str) else float(value) for name, value in data.items()}

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Files of settings, as Mission Planner (.param), MAVProxy (.parm) and QGroundControl (.params) write them.
+
+One setting a line: `NAME,VALUE`, or with white space between them; QGroundControl has system, component, NAME, VALUE
+and type, separated by tabs (ParameterManager.cc). A # begins a comment. Two comments are our own, and ground stations
+drop them when they write the file again: `# board: ...` names the flight controller that the settings are from, and
+`# text: NAME,VALUE` is a setting that is a text.
+"""
+
+import math
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from protocols.file_error import FileError, shown
+from protocols.float32 import is_single
+from protocols.plain_text import plain_text
+
+_NAME = re.compile(r"[!$-+\--~]{1,64}")
+# float() also accepts underscores and digits of any script.
+_NUMBER = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:e[-+]?\d+)?", re.ASCII | re.IGNORECASE)
+_BOARD, _TEXT = "# board: ", "# text: "
+_QGC_FIELDS = 5
+_MISSION = "QGC WPL"
+#: Digits that show any single-precision number exactly.
+_MOST_DIGITS = 9
+_MOST_WHOLE = 2**32
+
+
+class ParamFileError(FileError):
+    """A file of settings cannot be read or written."""
+
+
+@dataclass(frozen=True, slots=True)
+class ParamFile:
+    """The values by name, in the file's order. board: the flight controller they are from; "" if the file lacks it."""
+
+    values: Mapping[str, float | str]
+    board: str = ""
+
+
+def read_param_file(data: bytes, name: str) -> ParamFile:
+    """Read a file of settings; ParamFileError names the file `name` and the line."""
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        number = data.count(b"\n", 0, error.start) + 1
+        raise ParamFileError(name, f"line {number}", "this is not UTF-8 text", "give a .param file") from None
+    values: dict[str, float | str] = {}
+    seen_at: dict[str, int] = {}
+    board = ""
+    for number, line in enumerate(text.split("\n"), start=1):
+        if line.startswith(_BOARD):
+            board = plain_text(line.removeprefix(_BOARD)).strip()
+        if line.startswith(_TEXT):
+            fields = line.removeprefix(_TEXT).rstrip("\r").split(",", 1)
+        else:
+            fields = line.partition("#")[0].replace(",", " ").split()
+        if not fields:
+            continue
+        setting, value = _setting(fields, line, name, f"line {number}")
+        if (first := seen_at.setdefault(setting, number)) != number and values[setting] != value:
+            what = f"{setting} is {shown_value(values[setting])} in line {first} and {shown_value(value)} here"
+            raise ParamFileError(name, f"line {number}", what, "delete one of the lines")
+        values[setting] = value
+    if not values:
+        raise ParamFileError(name, "", "the file has no settings", "save it again")
+    return ParamFile(values, board)
+
+
+def write_param_file(values: Mapping[str, float | str], board: str = "", comments: Iterable[str] = ()) -> str:
+    """The text of a Mission Planner .param file; `read_param_file` reads equal values, see is_equal.
+
+    NaN, as a board with damaged settings may have, is left out.
+    """
+    heading = [_BOARD + board] if board else []
+    heading += [f"# {comment}" for comment in comments]
+    lines = (
+        f"{_TEXT if isinstance(value, str) else ''}{name},{shown_value(value)}"
+        for name, value in values.items()
+        if isinstance(value, str) or math.isfinite(value)
+    )
+    return "".join(f"{line}\n" for line in (*heading, *lines))
+
+
+def shown_value(value: float | str) -> str:
+    """The shortest text of the value; of a fraction, the shortest that is equal in single precision."""
+    if isinstance(value, str):
+        return plain_text(value)
+    if value.is_integer() and abs(value) <= _MOST_WHOLE:
+        return f"{value:.0f}"
+    texts = (f"{value:.{digits}g}" for digits in range(1, _MOST_DIGITS))
+    return next((text for text in texts if is_single(value, float(text))), f"{value:.{_MOST_DIGITS}g}")
+
+
+def is_equal(value: float | str, other: float | str) -> bool:
+    """True if both are the same number in single precision, which ground stations keep; whole numbers: exactly."""
+    if isinstance(value, str) or isinstance(other, str) or value == other:
+        return value == other
+    is_whole = value.is_integer() and other.is_integer() and abs(value) <= _MOST_WHOLE
+    return not is_whole and is_single(value, other)
+
+
+def _setting(fields: list[str], line: str, name: str, where: str) -> tuple[str, float | str]:
+    if line.startswith(_MISSION):
+        raise ParamFileError(name, where, "this file holds a mission", "give a .param file")
+    if len(fields) == _QGC_FIELDS and all(field.isdecimal() for field in (*fields[:2], fields[4])):
+        fields = fields[2:4]
+    if len(fields) != 2:
+        remedy = "write NAME,VALUE, with a decimal point"
+        raise ParamFileError(name, where, f"{shown(line)} is not a name and a value", remedy)
+    setting, number = fields
+    if not _NAME.fullmatch(setting):
+        raise ParamFileError(name, where, f"{shown(setting)} is not a setting's name", "write NAME,VALUE")
+    if line.startswith(_TEXT):
+        return setting, plain_text(number)
+    value = float(number) if _NUMBER.fullmatch(number) else math.nan
+    if not math.isfinite(value):
+        raise ParamFileError(name, where, f"{setting} is {shown(number)}, not a number", "write NAME,VALUE")
+    return setting, value

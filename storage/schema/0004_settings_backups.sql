@@ -1,0 +1,13 @@
+-- Tables of a flight controller's settings, one for each change. Times are unix seconds.
+CREATE TABLE settings_backups (
+    number        INTEGER PRIMARY KEY AUTOINCREMENT,  -- a number is never given twice
+    board         TEXT    NOT NULL,                   -- tells two boards of one kind apart
+    kind          TEXT    NOT NULL,                   -- the firmware and its version
+    taken_at      REAL    NOT NULL,
+    occasion      TEXT    NOT NULL,                   -- why it was taken
+    setting_count INTEGER NOT NULL,
+    changed_count INTEGER,                            -- since this board's last one; NULL for its first
+    contents      TEXT    NOT NULL,                   -- JSON: the values by name
+    crc32         INTEGER NOT NULL                    -- over the columns above, in their order
+) STRICT;
+CREATE INDEX settings_backups_of_board ON settings_backups (board, kind);
