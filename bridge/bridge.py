@@ -5,13 +5,13 @@ The service feeds in bytes, time and the store's answers, and then takes the out
 The path of a byte from the UART:
     fc_received -> FcSession -> MspLink -> Vehicle -> OwnVehicle -> Ground -> take_datagrams
 The path of a mission item to the flight controller, and back for verification:
-    gcs_received -> Incoming -> GroundStation -> Guard -> MessageRouter -> MissionUploads -> ListCheck
+    gcs_received -> Incoming -> GroundStation -> MessageRouter -> MissionUploads -> ListCheck
         -> MissionService.deliver -> FcMissionStore.push -> MspLink
 An autopilot that speaks MAVLink itself is not represented but passed through, both ways:
     FcSession <-> Routes <-> Ground
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import count
 from math import inf
@@ -27,6 +27,7 @@ from bridge.gcs.guard import Guard
 from bridge.gcs.rights import LinkAccess
 from bridge.gcs.routes import Routes
 from bridge.gcs.station import Peer, Severity
+from bridge.line.conversation import StoreEffect
 from bridge.line.msp_link import RoundTrips
 from bridge.line.runner import Runner
 from bridge.missions.mission_service import NO_LINK, EndingListener, HeldMission, MissionService, MissionTransfer
@@ -34,7 +35,9 @@ from bridge.model.events import Armed, Disarmed, Emit
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.settings import SettingsState
 from bridge.model.vehicle import FlightState, Health, MissionLeg, Readiness
+from bridge.model.vehicle_groups import Group
 from bridge.sharing.msp_sharing import MspSharing
+from bridge.sharing.program import Program
 from bridge.transfers.downloads import MissionDownloads
 from bridge.transfers.local_missions import LocalMissions
 from bridge.transfers.mission_watch import MissionWatch
@@ -95,6 +98,9 @@ class Bridge:
         self._config, owner = config, config.settings
         self._emit = emit
         self._was_armed = False
+        #: True if `take_fc_output` must be called even without `fc_output`.
+        self.has_line_changed = True
+        self._line_due = now  # of the line itself, as of the last `take_fc_output`
         #: The armed craft, for the BridgeConfig of a restarted bridge; it changes rarely. None: it is not armed.
         self.flight = config.flight
         #: True while an autopilot speaks MAVLink itself: the bridge then sends nothing in its name.
@@ -114,7 +120,7 @@ class Bridge:
             {name: replace(access, passes_everything=passes_everything) for name, access in config.links.items()},
             LinkAccess(passes_everything=passes_everything),
         )
-        self.guard = Guard(self.ground, emit)
+        self.guard = Guard(emit)
         self.runner = Runner()
         self.session = FcSession(
             config.speeds,
@@ -129,6 +135,8 @@ class Bridge:
         )
         #: Its readings, which are kept when it is lost.
         self.vehicle = self.session.vehicle
+        #: The requests to the flight controller that were not taken yet.
+        self.fc_output = self.session.output
         self.missions = MissionService(self.vehicle, self.runner, on_ending)
         self.local = LocalMissions(self.missions, self.ground, emit, incidents)
         self.sharing = MspSharing(self.session, self.runner, self.missions, emit, self._say_refused)
@@ -172,29 +180,42 @@ class Bridge:
         )
 
         # The front door: calls that one part answers.
-        #: When the port is opened; when it is gone, with the reason, None if the bridge closed it itself.
-        self.fc_opened, self.fc_closed = self.session.opened, self.session.closed
-        #: The bytes to be written to the port at `fc_speed`.
-        self.take_fc_output = self.session.take_output
         self.take_datagrams = self.ground.take_datagrams
         self.displaced = self.ground.displaced
         self.add_default_peer, self.remove_default_peer = self.ground.add_default_peer, self.ground.remove_default_peer
+        self.program_joined, self.program_left = self.sharing.join, self.sharing.leave
         #: Requests of the command line, the page and zenoh.
         self.push, self.pull, self.check = self.local.push, self.local.pull, self.local.check
-        #: The store's work, in order, and its answers.
-        self.store_effects, self.store_answered = self.runner.store_effects, self.runner.store_answered
-        #: End the running conversation cleanly.
-        self.abort = self.runner.stop
+        #: The store's work, in order.
+        self.store_effects = self.runner.store_effects
         self.report, self.group = self._reporter.whole, self._reporter.group
-        self.watch, self.take_fresh = self._reporter.watch, self._reporter.take_fresh
+        self.take_fresh = self._reporter.take_fresh
 
     # The flight controller's side.
 
+    def fc_opened(self, now: float) -> None:
+        self.has_line_changed = True
+        self.session.opened(now)
+
+    def fc_closed(self, now: float, why: str | None) -> None:
+        """The port is gone; `why` is None if the bridge closed it itself."""
+        self.has_line_changed = True
+        self.session.closed(now, why)
+
     def fc_received(self, data: bytes, now: float) -> bool:
         """Handle bytes from the port; False if they ended inside a frame and nothing else has changed."""
+        self.has_line_changed = True
         self.session.received(data, now)
         self._follow_line(now)
         return not self.session.state.is_mid_frame
+
+    def take_fc_output(self) -> list[bytes]:
+        """The bytes to be written to the port at `fc_speed`. Sets when the line itself is due again."""
+        self.has_line_changed = False
+        self._line_due = self.session.state.due
+        output = [*self.fc_output]
+        self.fc_output.clear()
+        return output
 
     @property
     def fc_speed(self) -> int | None:
@@ -230,6 +251,12 @@ class Bridge:
         """Show a text to each ground station that connects from now on."""
         self.ground.notices.append(text)
 
+    # Other programs, on a share.
+
+    def program_received(self, program: Program, data: bytes, now: float) -> None:
+        self.has_line_changed = True
+        self.sharing.received(program, data, now)
+
     # Missions.
 
     @property
@@ -252,7 +279,12 @@ class Bridge:
         self.sharing.stop()
         self._uploads.end(STOPPED, now)
 
-    # For metrics and the status.
+    # For metrics, the status and other followers.
+
+    def watch(self, groups: Iterable[Group]) -> None:
+        """Poll for these groups from now on; `take_fresh` returns the updated ones."""
+        self.has_line_changed = True
+        self._reporter.watch(groups)
 
     def counters(self) -> Counters:
         state = self.session.state
@@ -278,19 +310,30 @@ class Bridge:
 
     def restart(self, why: str, now: float) -> None:
         """Recover from a bug: end the running conversation and search for the flight controller again."""
+        self.has_line_changed = True
         self.runner.reset(now)
         self.session.restart(why, now)
+
+    def abort(self, now: float) -> None:
+        """End the running conversation cleanly."""
+        self.has_line_changed = True
+        self.runner.stop(now)
+
+    def store_answered(self, effect: StoreEffect, answer: object, now: float) -> None:
+        self.has_line_changed = True
+        self.runner.store_answered(effect, answer, now)
 
     @property
     def due(self) -> float:
         """The time of the next `tick`."""
-        due = self.session.state.due
+        due = self._line_due
         for part in self._parts:  # a loop: this is asked after every reply
             if (part_due := part.due) < due:
                 due = part_due
         return due
 
     def tick(self, now: float) -> None:
+        self.has_line_changed = True
         self.session.tick(now)
         for part in self._parts:
             if now >= part.due:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tables of docs/rights.md, from protocols/rights/ and bridge/gcs/guard.py (`make rights-page`)."""
+"""The tables of docs/rights.md, from protocols/rights/ and bridge/gcs/rights.py (`make rights-page`)."""
 
 import sys
 from collections.abc import Collection, Mapping

@@ -61,6 +61,8 @@ class FcSession:
         #: The flight controller's readings, kept when it is lost.
         self.vehicle = self._port.vehicle
         self.polls = self._port.polls
+        #: The bytes to be written to the port at the state's `speed`, in order.
+        self.output = self._port.output
         self._emit = emit
         self._incidents = incidents
         #: From the port's opening or a loss until a flight controller is found.
@@ -109,12 +111,6 @@ class FcSession:
         event = self.state.tick(now)
         if event is not None:
             self._handle(event, now)
-
-    def take_output(self) -> list[bytes]:
-        """The bytes to be written to the port at the state's `speed`."""
-        output = [*self._port.output]
-        self._port.output.clear()
-        return output
 
     def settle_telemetry(self) -> None:
         """Update the vehicle from the messages of a passed-through autopilot."""

@@ -183,8 +183,7 @@ class Ground:
         if datagram and splitter.is_waiting:
             frames += splitter.reset()
         self.bad_frames += splitter.bad_frames - bad_before
-        # Our own frames come back from a broadcast, or from a router that floods.
-        return [frame for frame in frames if frame.sender != self._ids]
+        return frames
 
     def admits(self, station: GroundStation, now: float) -> bool:
         """False if a station's first frame must be ignored, because it comes from one of too many new addresses."""
@@ -197,7 +196,7 @@ class Ground:
         """Note a frame from a station, which counts as connected from now on."""
         peer = station.peer
         self.frames_received[peer.link, frame.msgid] += 1
-        is_unknown = station.places is None
+        is_unknown = not station.is_heard
         if station.places is None:
             self._takes_place(station, now)
         else:
@@ -220,16 +219,6 @@ class Ground:
         self._heard[station.peer] = station
         self._everyone = None
         self.due = min(self.due, now + _EXPIRY_INTERVAL_S)
-
-    def has_shown_key(self, station: GroundStation) -> None:
-        """A station has sent its first valid signature."""
-        station.has_key = True
-        if station.places is not None:
-            station.places.remove(station)
-            station.leaves()
-        station.settle_rights()
-        if station.is_heard:
-            self._takes_place(station, station.heard_at)
 
     def record(self, station: GroundStation, frame: MavlinkFrame) -> None:
         if self.on_frames is not _drop and not station.is_listener and station.allows(Cost.RECORDED):
@@ -317,7 +306,7 @@ class Ground:
         """Send messages in one datagram to one ground station, unless it has left."""
         receiver = self._heard.get(station.peer) or self._unheard.get(station.peer)
         if receiver is not None:
-            self._send(receiver, [receiver.frame(pack(message)) for message in together])
+            self._send(receiver, receiver.writer, together)
 
     def mission_ack(self, station: Station, result: MissionResult, mission_type: int = 0) -> None:
         """Send a MISSION_ACK."""
@@ -330,10 +319,12 @@ class Ground:
 
     def to_as(self, ids: tuple[int, int], receiver: GroundStation, message: Message) -> None:
         """Send a message to one ground station under the ids that it addressed."""
-        frame = FrameWriter(*ids, receiver.access.signer).frame(pack(message), receiver.frame_version)
-        self._send(receiver, [frame])
+        self._send(receiver, FrameWriter(*ids, receiver.access.signer), [message])
 
-    def _send(self, receiver: GroundStation, frames: list[bytes]) -> None:
+    def _send(self, receiver: GroundStation, writer: FrameWriter, together: Iterable[Message]) -> None:
+        version, frames = receiver.frame_version, []
+        for message in together:  # a loop: a comprehension is a call
+            frames.append(writer.frame(pack(message), version))  # noqa: PERF401
         self._datagrams.append((receiver.peer, b"".join(frames)))
         if self.on_frames is not _drop and not receiver.is_listener:
             self.on_frames(frames)

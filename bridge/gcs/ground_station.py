@@ -9,10 +9,12 @@ from bridge.gcs.budget import Budget, HostBudget
 from bridge.gcs.cost import Cost
 from bridge.gcs.message_rates import MessageRates
 from bridge.gcs.recent_texts import RecentTexts
-from bridge.gcs.rights import LinkAccess, Standing
+from bridge.gcs.rights import FrameRefusal, LinkAccess, Standing
 from bridge.gcs.station import RECORDER, Peer, Station
-from protocols.mavlink.codec import FrameWriter, Packed
+from protocols.mavlink.codec import FrameWriter
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+from protocols.mavlink.signing import Check
+from protocols.rights.effect import Effect
 
 if TYPE_CHECKING:
     from bridge.gcs.places import Places
@@ -24,6 +26,12 @@ _STEADY_BEATS = 3
 _BEAT_S = 0.7
 #: Ids remembered behind one address: a router may carry a fleet, but made-up ids must not fill the memory.
 _MAX_SPEAKERS = 64
+_SETUP = "set the key in naze-bridge's settings"
+_ADDRESS = "this address may only read"
+#: At most 50 characters with "Refused: ".
+_NOT_OVER_OPEN_LINK = "open link; see pass_through in settings"
+#: Ground stations and radios repeat these.
+_ROUTINE = Effect.RATE, Effect.SILENCE
 
 
 class GroundStation:
@@ -41,8 +49,9 @@ class GroundStation:
         #: None until a datagram was accepted: made-up addresses must cost no memory.
         self.host = host
         self._own_budget: Budget | None = None
+        #: It has sent a valid signature.
         self.has_key = False
-        self.settle_rights()
+        self._settle_rights()
         self.splitter = MavlinkSplitter()
         self.writer = FrameWriter(sysid, compid, access.signer)
         self.is_heard = False
@@ -71,8 +80,39 @@ class GroundStation:
 
     # Rights and limits.
 
-    def settle_rights(self) -> None:
-        """Determine the rights again after `has_key` has changed."""
+    def refusal(self, frame: MavlinkFrame, effect: Effect) -> FrameRefusal | None:
+        """The reason for refusing a frame with this effect; None if it is accepted. Every frame passes here first."""
+        # Read requests are checked, too: each valid one invalidates older recordings.
+        signing = self.access.signing
+        check = Check.VALID if signing is None else signing.check(frame)
+        if signing is not None and check is Check.VALID:
+            if not self.has_key:
+                self._has_shown_key()
+        elif self.has_key:
+            # A duplicate made by the network, or another sender posing as this station.
+            return FrameRefusal(str(check.value), effect in _ROUTINE, is_forged=True)
+        if effect in self.rights.own:
+            return None
+        why = _SETUP if effect is Effect.KEY else _ADDRESS if check is Check.VALID else str(check.value)
+        return FrameRefusal(why, effect in _ROUTINE)
+
+    def passing_refusal(self, effect: Effect) -> FrameRefusal | None:
+        """The reason for not passing an accepted frame to an autopilot that speaks MAVLink itself."""
+        if effect in self.rights.autopilot:
+            return None
+        if self.is_listener:
+            return FrameRefusal(_ADDRESS, is_routine=True)
+        return FrameRefusal(_NOT_OVER_OPEN_LINK, effect in _ROUTINE)
+
+    def _has_shown_key(self) -> None:
+        """Its first valid signature. It loses the place of a listener, and takes another as soon as it is heard."""
+        if self.places is not None:
+            self.places.remove(self)
+            self.leaves()
+        self.has_key = True
+        self._settle_rights()
+
+    def _settle_rights(self) -> None:
         self.standing = self.access.standing(self.peer, has_key=self.has_key)
         self.rights = self.access.rights(self.standing)
         self.is_listener = self.standing is Standing.LISTENER
@@ -139,6 +179,3 @@ class GroundStation:
     def is_like_mavsdk(self) -> bool:
         """True for a station that asks by commands only, and in MAVLink 2, as MAVSDK does from its connection on."""
         return self.version == 2 and self.uses_commands and not self.uses_streams
-
-    def frame(self, packed: Packed) -> bytes:
-        return self.writer.frame(packed, self.frame_version)

@@ -41,6 +41,19 @@ RIGHTS: Mapping[Standing, Rights] = {
 }
 
 
+class FrameRefusal(NamedTuple):
+    """The reason for refusing a frame.
+
+    `is_routine`: ground stations repeat it, so it is not reported. `is_forged`: the station has the key, but this frame
+    is not signed with it, or is a copy. It gets no answer and has no effect, not even on the time the station was last
+    heard.
+    """
+
+    why: str
+    is_routine: bool
+    is_forged: bool = False
+
+
 @dataclass(frozen=True, slots=True)
 class LinkAccess:
     """The conditions for writing over a link. `signing`: a signature with its key; `may_write`: the right address.

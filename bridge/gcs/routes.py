@@ -14,7 +14,6 @@ from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import GroundStation
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame
-from protocols.mavlink.target import has_target_field, target_of
 
 #: Mission Planner, QGroundControl, MAVSDK and MAVProxy read several frames in a datagram; MAVROS cuts at 296 bytes.
 MAX_DATAGRAM_SIZE = 280
@@ -62,7 +61,7 @@ class Routes:
 
         `to_stations` False: it reaches no other station.
         """
-        system, component = target_of(frame)
+        system, component = frame.target
         there = self._ground.everyone() if system == 0 else self._stations_of(system, component)
         others = [other for other in there if other is not station]
         if to_stations:
@@ -79,7 +78,7 @@ class Routes:
 
     def _is_for_all(self, kind: bytes, frame: MavlinkFrame) -> bool:
         """Meet a new kind of message from a component aboard; True if it has no target field."""
-        if has_target_field(frame.msgid):
+        if frame.has_target_field:
             return False
         self._aboard.add(frame.sender)
         if len(self._for_all) < _MAX_KINDS:
@@ -90,7 +89,7 @@ class Routes:
         self._aboard.add(frame.sender)
         if frame.msgid == _NEVER_FORWARDED:
             return
-        system, component = target_of(frame)
+        system, component = frame.target
         if system == 0:
             self._send([frame.raw])
             return

@@ -3,11 +3,13 @@
 
 from collections.abc import Callable
 from functools import partial
+from itertools import product
 
 from bridge.gcs.cost import Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import GroundStation
-from bridge.gcs.guard import Guard, GuardRefusal, denial
+from bridge.gcs.guard import Guard, denial
+from bridge.gcs.rights import FrameRefusal
 from bridge.gcs.routes import Routes
 from bridge.gcs.station import Peer, Severity, Station
 from bridge.vehicle.message_router import MessageRouter
@@ -15,8 +17,8 @@ from bridge.vehicle.parameters import Parameters
 from protocols.mavlink.codec import MavlinkDecoder
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame
-from protocols.mavlink.target import target_of
 from protocols.rights.effect import Effect
+from protocols.rights.mavlink import effect_of
 
 
 class Incoming:
@@ -41,6 +43,7 @@ class Incoming:
         self._parameters = parameters
         self._send_to_autopilot = send_to_autopilot
         self._ids = sysid, compid
+        self._our_targets = frozenset(product((0, sysid), (0, compid)))
         self._decoder = MavlinkDecoder()
         self.routes: Routes | None = None
 
@@ -50,32 +53,29 @@ class Incoming:
         if sender is None:
             return False
         for frame in self._ground.split(sender, data, datagram=datagram):
-            judged = self._guard.judge(sender, frame)
-            if isinstance(judged, GuardRefusal) and judged.is_forged:
-                self._guard.report(judged, sender, frame)
+            ids, target, msgid = frame.sender, frame.target, frame.msgid
+            if ids == self._ids:
+                # It comes back from a broadcast, or from a router that floods.
                 continue
+            effect = effect_of(frame)
+            refused = sender.refusal(frame, effect)
+            if refused is not None:
+                self._guard.count(refused, sender)
+                if refused.is_forged:
+                    self._guard.report(refused, sender, frame)
+                    continue
             if not (sender.is_heard or self._ground.admits(sender, now)):
                 return False
-            ids = frame.sender
             self._ground.heard(sender, frame, ids, now)
-            if isinstance(judged, GuardRefusal):
-                self._answer_refused(judged, sender, frame)
+            if refused is not None:
+                self._answer_refused(refused, sender, frame)
             elif self.routes is not None:
-                self._pass_on(self.routes, sender, frame, judged)
+                self._pass_on(self.routes, sender, frame, effect)
             else:
                 self._ground.record(sender, frame)
-                self._answer(sender, frame, Station(peer, *ids), now)
+                if target in self._our_targets:
+                    self._router.take(sender, Station(peer, *ids), frame, msgid, now)
         return True
-
-    def _answer(self, sender: GroundStation, frame: MavlinkFrame, station: Station, now: float) -> None:
-        cost = self._router.cost(frame.msgid)
-        if (
-            cost is not None
-            and self._is_ours(*target_of(frame))
-            and (message := self._decoder.decode(frame)) is not None
-            and sender.allows(cost)
-        ):
-            self._router.take(station, message, now)
 
     def _pass_on(self, routes: Routes, sender: GroundStation, frame: MavlinkFrame, effect: Effect) -> None:
         """Send a frame on to its targets, within its sender's rights."""
@@ -84,23 +84,24 @@ class Incoming:
         to_stations = effect in sender.rights.stations
         is_for_autopilot = routes.from_station(sender, frame, to_stations=to_stations)
         if is_for_autopilot or not to_stations:
-            refused = self._guard.passing_refusal(sender, effect)
+            refused = sender.passing_refusal(effect)
             if refused is not None:
+                if not sender.is_listener:
+                    self._guard.count(refused, sender)
                 self._answer_refused(refused, sender, frame)
                 return
         self._ground.record(sender, frame)
         if is_for_autopilot:
             self._send_to_autopilot(frame.raw)
 
-    def _answer_refused(self, refused: GuardRefusal, sender: GroundStation, frame: MavlinkFrame) -> None:
+    def _answer_refused(self, refused: FrameRefusal, sender: GroundStation, frame: MavlinkFrame) -> None:
         """Answer a refused frame under the ids that it addressed, if these are the vehicle's."""
         is_first = self._guard.report(refused, sender, frame)
         station = Station(sender.peer, *frame.sender)
-        system, component = target_of(frame)
         answers = partial(self._ground.to, station)
-        is_vehicle = self._is_ours(system, component)
+        is_vehicle = frame.target in self._our_targets
         if self.routes is not None:
-            asked = self.routes.addressed(system, component)
+            asked = self.routes.addressed(*frame.target)
             is_vehicle = asked is not None
             if asked is not None:
                 answers = partial(self._ground.to_as, asked, sender)
@@ -115,7 +116,3 @@ class Incoming:
             self._parameters.send_one(station, message.param_id, -1)
         if is_first:
             answers(m.MAVLink_statustext_message(Severity.WARNING, f"Refused: {refused.why}".encode()))
-
-    def _is_ours(self, system: int, component: int) -> bool:
-        sysid, compid = self._ids
-        return system in (0, sysid) and component in (0, compid)

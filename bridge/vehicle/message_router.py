@@ -1,19 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Dispatches the messages of ground stations to the parts that answer them. Sans-IO."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import partial
 from math import inf
 
 from bridge.gcs.cost import Cost
 from bridge.gcs.ground import Ground
+from bridge.gcs.ground_station import GroundStation
 from bridge.gcs.station import Severity, Station
 from bridge.transfers.downloads import MissionDownloads
 from bridge.transfers.uploads import MissionUploads
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.parameters import Parameters
+from protocols.mavlink.codec import MavlinkDecoder
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
+from protocols.mavlink.frame import MavlinkFrame
 from protocols.mavlink.ftp import refuse
 from protocols.mavlink.mission_messages import item_from_float_message, item_from_int_message
 from protocols.mission_item import MissionItem, MissionResult
@@ -65,10 +69,11 @@ class MessageRouter:
         self._commands = commands
         self._uploads = uploads
         self._downloads = downloads
-        self._handlers: dict[int, _Handler] = {
+        self._decoder = MavlinkDecoder()
+        self.handlers: Mapping[int, _Handler] = {
             m.MAVLINK_MSG_ID_MISSION_COUNT: lambda s, msg, now: uploads.count(s, msg.count, now),
-            m.MAVLINK_MSG_ID_MISSION_ITEM: lambda s, msg, now: self._item(s, msg, item_from_float_message(msg), now),
-            m.MAVLINK_MSG_ID_MISSION_ITEM_INT: lambda s, msg, now: self._item(s, msg, item_from_int_message(msg), now),
+            m.MAVLINK_MSG_ID_MISSION_ITEM: partial(self._item, item_from_float_message),
+            m.MAVLINK_MSG_ID_MISSION_ITEM_INT: partial(self._item, item_from_int_message),
             m.MAVLINK_MSG_ID_MISSION_ACK: lambda s, msg, now: uploads.ack(s, msg.type, now),
             m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL: lambda s, msg, now: uploads.clear_all(s, msg.mission_type, now),
             m.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST: lambda s, _, now: uploads.answers.partial_list(s, now),
@@ -104,15 +109,13 @@ class MessageRouter:
             m.MAVLINK_MSG_ID_TIMESYNC: self._timesync,
         }
 
-    def cost(self, msgid: int) -> Cost | None:
-        """The kind of work that a message causes; None if it is not understood."""
-        if msgid not in self._handlers:
-            return None
-        return Cost.TRANSFER if msgid in _OF_A_TRANSFER else Cost.ANSWER
-
-    def take(self, station: Station, message: Message, now: float) -> None:
-        """Handle a message for which `cost` is not None."""
-        msgid = message.get_msgId()
+    def take(self, sender: GroundStation, station: Station, frame: MavlinkFrame, msgid: int, now: float) -> None:
+        """Handle a frame for the bridge's vehicle, if it is understood and its sender has not sent too many."""
+        handler = self.handlers.get(msgid)
+        if handler is None or (message := self._decoder.decode(frame)) is None:
+            return
+        if not sender.allows(Cost.TRANSFER if msgid in _OF_A_TRANSFER else Cost.ANSWER):
+            return
         mission_type = getattr(message, "mission_type", m.MAV_MISSION_TYPE_MISSION)
         clears_all = msgid == m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL and mission_type == m.MAV_MISSION_TYPE_ALL
         if msgid in _READS or msgid in _ENDS_DOWNLOAD:
@@ -122,18 +125,18 @@ class MessageRouter:
                 self._uploads.reads(station, now)
             if msgid in _ENDS_DOWNLOAD:
                 self._downloads.forget(station)
-            self._handlers[msgid](station, message, now)
+            handler(station, message, now)
         elif msgid != m.MAVLINK_MSG_ID_MISSION_ACK:
             if msgid == m.MAVLINK_MSG_ID_MISSION_COUNT:
                 self._ground.say(Severity.ERROR, "No fences or rally points: only missions are stored", station)
             self._ground.mission_ack(station, MissionResult.UNSUPPORTED, mission_type)
 
-    def _item(self, station: Station, message: Message, item: MissionItem, now: float) -> None:
+    def _item(self, convert: Callable[[Message], MissionItem], station: Station, message: Message, now: float) -> None:
         if message.current in _GUIDED and not self._uploads.is_writing(station):
             self._commands.refuse(station, m.MAV_CMD_NAV_WAYPOINT)
             self._ground.mission_ack(station, MissionResult.DENIED)
         else:
-            self._uploads.item(station, item, now)
+            self._uploads.item(station, convert(message), now)
 
     def _set_current(self, station: Station, _message: Message, now: float) -> None:
         self._commands.refuse(station, m.MAV_CMD_DO_SET_MISSION_CURRENT)

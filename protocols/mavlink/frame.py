@@ -33,6 +33,15 @@ _CRC_EXTRA_V1 = {
     if known.base_size is not None
     for size in range(known.base_size, known.full_size + 1)
 }
+#: Offsets of target_system and target_component in the payload, by the message id's bytes in the header: three in
+#: MAVLink 2, one in MAVLink 1.
+_TARGETS = {
+    msgid.to_bytes(size, "little"): (known.target_system_at, known.target_component_at)
+    for msgid, known in MESSAGE_FORMATS.items()
+    if known.target_system_at is not None
+    for size in (1, 3)
+    if msgid < 256**size
+}
 
 
 @dataclass(slots=True)  # not frozen: that doubles the time to create one, and there are thousands per second
@@ -70,6 +79,26 @@ class MavlinkFrame:
     def msgid(self) -> int:
         raw = self.raw
         return raw[7] | raw[8] << 8 | raw[9] << 16 if raw[0] == MAGIC_V2 else raw[5]
+
+    @property
+    def target(self) -> tuple[int, int]:
+        """The target system and component. 0 means all: the message has no such field, or MAVLink 2 has omitted it."""
+        raw = self.raw
+        is_v2 = raw[0] == MAGIC_V2
+        places = _TARGETS.get(raw[7:10] if is_v2 else raw[5:6])
+        if places is None:
+            return 0, 0
+        start = _HEADER_V2 if is_v2 else _HEADER_V1
+        size = raw[1]
+        system_at, component_at = places
+        system = raw[start + system_at] if system_at < size else 0
+        component = raw[start + component_at] if component_at is not None and component_at < size else 0
+        return system, component
+
+    @property
+    def has_target_field(self) -> bool:
+        raw = self.raw
+        return (raw[7:10] if raw[0] == MAGIC_V2 else raw[5:6]) in _TARGETS
 
     @property
     def is_signed(self) -> bool:

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame
-from protocols.mavlink.target import has_target_field
 from protocols.rights.effect import Effect
 
 
@@ -145,6 +144,6 @@ def effect_of(frame: MavlinkFrame) -> Effect:
     """The effect of a frame on the vehicle that it is for."""
     row = MESSAGES.get(frame.msgid)
     if row is None:
-        return Effect.UNKNOWN if has_target_field(frame.msgid) else Effect.REPORT
+        return Effect.UNKNOWN if frame.has_target_field else Effect.REPORT
     # MAVLink 2 omits trailing zeros.
     return row if isinstance(row, Effect) else row.judge(frame.payload.ljust(_PAYLOAD_SIZE, b"\0"))

@@ -139,7 +139,7 @@ class Daemon:
                 if str(address) not in self.settings.access:
                     self.gcs.warn(address)
             for share in self.settings.share:
-                stack.callback(await open_share(share, self.bridge.sharing, self.flush))
+                stack.callback(await open_share(share, self.bridge, self.flush))
             self._signing.start()
             self.started.set()
             self._tick()
@@ -168,7 +168,8 @@ class Daemon:
         """Carry out the outputs that the bridge has after an input."""
         bridge = self.bridge
         self._forward()  # first: telemetry is shown without delay
-        self.fc.carry_out()
+        if bridge.has_line_changed or bridge.fc_output:
+            self.fc.carry_out()
         while effects := bridge.store_effects:
             self._carry_out(effects.popleft())
         if bridge.flight is not self._flight.saved:

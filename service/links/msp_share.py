@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable
 from typing import cast
 
-from bridge.sharing.msp_sharing import MspSharing
+from bridge.bridge import Bridge
 from bridge.sharing.program import Program
 from service.links.gcs_links import LinkError
 from service.settings.addresses import family_of
@@ -20,7 +20,7 @@ _MAX_UNSENT = 65536
 _MAX_PROGRAMS = 8
 
 
-async def open_share(share: ShareSettings, sharing: MspSharing, flush: Callable[[], None]) -> Callable[[], None]:
+async def open_share(share: ShareSettings, bridge: Bridge, flush: Callable[[], None]) -> Callable[[], None]:
     """Listen, on tcpin or udpin; LinkError if that fails. Returns a function that closes the port and its connections.
 
     `flush` carries out the bridge's outputs.
@@ -28,7 +28,7 @@ async def open_share(share: ShareSettings, sharing: MspSharing, flush: Callable[
     loop = asyncio.get_running_loop()
     address = share.address
     where, family = (address.host, address.port), family_of(address.host)
-    port = _SharePort(sharing, flush, may_write=share.write)
+    port = _SharePort(bridge, flush, may_write=share.write)
     server: asyncio.BaseTransport | asyncio.Server
     try:
         if address.kind == "udpin":
@@ -48,8 +48,8 @@ async def open_share(share: ShareSettings, sharing: MspSharing, flush: Callable[
 class _SharePort:
     """The programs on one port."""
 
-    def __init__(self, sharing: MspSharing, flush: Callable[[], None], *, may_write: bool) -> None:
-        self._sharing = sharing
+    def __init__(self, bridge: Bridge, flush: Callable[[], None], *, may_write: bool) -> None:
+        self._bridge = bridge
         self._flush = flush
         self._may_write = may_write
         self._loop = asyncio.get_running_loop()
@@ -73,18 +73,18 @@ class _SharePort:
         name = f"[{host}]:{number}" if ":" in host else f"{host}:{number}"
         program = Program(name, host, send, close, may_write=self._may_write)
         self._programs[program] = forget
-        self._sharing.join(program)
+        self._bridge.program_joined(program)
         return program
 
     def received(self, program: Program, data: bytes) -> None:
         if program in self._programs:
             self._programs[program] = self._programs.pop(program)
-            self._sharing.received(program, data, self._loop.time())
+            self._bridge.program_received(program, data, self._loop.time())
             self._flush()
 
     def leave(self, program: Program) -> None:
         if self._programs.pop(program, None) is not None:
-            self._sharing.leave(program)
+            self._bridge.program_left(program)
 
     def close(self) -> None:
         for program, forget in tuple(self._programs.items()):

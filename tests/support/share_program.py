@@ -23,7 +23,7 @@ class ShareProgram:
         self._parser = MspParser(takes_low_v2=True)
         close = None if over_udp else self._close
         self.program = Program(name, name.partition(":")[0], self._arrived, close, may_write=may_write)
-        world.bridge.sharing.join(self.program)
+        world.bridge.program_joined(self.program)
 
     def ask(self, command: int, payload: bytes = b"", *, is_v2: bool = False) -> None:
         frame = MspFrame(Direction.REQUEST, command, payload, is_v2=is_v2)
@@ -40,7 +40,7 @@ class ShareProgram:
         """Ask, and wait for the reply or the end of the connection, which is left then; None if there is no reply."""
         self.ask(command, payload, is_v2=is_v2)
         self.world.run_until(lambda _: bool(self.replies) or self.closed_at is not None, _LONGEST_WAIT_S)
-        self.world.bridge.sharing.leave(self.program)
+        self.world.bridge.program_left(self.program)
         return self.replies[0][1] if self.replies else None
 
     def ask_every(self, interval_s: float, *requests: tuple[int, bytes]) -> None:

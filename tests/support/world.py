@@ -253,7 +253,7 @@ class World:
 
     def receive_from_program(self, program: Program, data: bytes) -> None:
         """Let bytes from a program on a share arrive now."""
-        self.bridge.sharing.received(program, data, self.now)
+        self.bridge.program_received(program, data, self.now)
         self._flush()
 
     def push(self, items: Sequence[Any]) -> list[Any]:
@@ -322,8 +322,10 @@ class World:
             raise AssertionError(f"the bridge spins at {self.now}: {self.bridge.session.state}")
 
     def _flush(self) -> None:
-        for data in self.bridge.take_fc_output():
-            self._write(data)
+        if self.bridge.has_line_changed or self.bridge.fc_output:
+            for data in self.bridge.take_fc_output():
+                self._write(data)
+        assert self.bridge.due <= self.bridge.session.state.due, "the line is due before the bridge"
         for peer, frame in self.bridge.take_datagrams():
             station = self.stations.get(peer)
             if station is not None:

@@ -151,7 +151,9 @@ class HarakiriCheck(ListCheck):
         self._note(item, "command", item.command, DROPPED, why)
 
     def _drops(self, item: MissionItem, rule: CommandRule) -> bool:
-        if rule.needs_height and not math.isfinite(item.alt_m):
+        # RETURN_TO_LAUNCH gets the lowest altitude instead.
+        needs_height = rule.height is not UNUSED and rule.record is not WpCommand.RETURN_TO_LAUNCH
+        if needs_height and not math.isfinite(item.alt_m):
             self._note(item, "alt_m", given(item.alt_m), DROPPED, "Alt is not a number")
             return True
         if item.seq and rule.position and (missing := missing_coordinate(item)):
@@ -178,6 +180,8 @@ class HarakiriCheck(ListCheck):
         if item.seq == 0:
             self._note_home(item)
         no_nose = rule.p4 is NOSE_ON_ROI and not self._roi_known
+        lat_e7, lon_e7 = self._place(item) if rule.position else (0, 0)
+        height_news = self._height_news(item, rule)
         p1 = self._fit(item, "p1", rule.p1)
         # Filled-in defaults are not reported, nor is the radius of home, which is not flown to.
         p2 = self._fit(item, "p2", rule.p2, News.NOTICE if item.seq and given(item.p2) else News.NONE)
@@ -185,8 +189,7 @@ class HarakiriCheck(ListCheck):
         p4 = self._fit(item, "p4", NO_ROI_KNOWN if no_nose else rule.p4)
         if not rule.position:
             self._no_position(item)
-        lat_e7, lon_e7 = self._place(item) if rule.position else (0, 0)
-        height_m = self._fit(item, "alt_m", rule.height, self._height_news(item, rule))
+        height_m = self._fit(item, "alt_m", rule.height, height_news)
         has_turns = rule.record is WpCommand.LOITER_TURNS
         if rule.record is WpCommand.SETROI:
             self._roi_known = True

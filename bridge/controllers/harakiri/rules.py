@@ -71,11 +71,6 @@ class CommandRule:
         """The command's name in Mission Planner's list."""
         return "ROI" if self.record is WpCommand.SETROI else self.record.name
 
-    @property
-    def needs_height(self) -> bool:
-        """True if the item needs a finite altitude; RETURN_TO_LAUNCH gets the lowest one instead."""
-        return self.height is not UNUSED and self.record is not WpCommand.RETURN_TO_LAUNCH
-
 
 def command_rules(wp_radius_cm: int, takeoff_max_m: int) -> Mapping[int, CommandRule]:
     """The table: MAV_CMD number to rule; a command without a rule cannot be stored.

@@ -172,7 +172,9 @@ class Polling(MspLine):
         event = super().tick(now)
         if event is None:
             self.port.polls.ask(self.link, now, beside_missions=self.port.runner.needs_line)
-            if now >= self._check_at and not self.port.runner.is_busy:
+            if now >= self._check_at and self.port.runner.is_busy:
+                self._check_at = now + _FIRST_CHECK_S
+            elif now >= self._check_at:
                 self._check_at = inf
                 self.port.runner.start(_identify(self.port.profiles), self._checked, now)
         return event
@@ -183,8 +185,7 @@ class Polling(MspLine):
             return 0.0
         is_torn = self.link.parser.skipped_bytes > self._foreign.skipped_before
         silent_at = self.link.last_heard_at + (self._silence_s() if is_torn else self._longest_silence_s)
-        deadline = min(self.link.due, self.port.polls.due(self.link), silent_at)
-        return deadline if deadline <= self._check_at or self.port.runner.is_busy else self._check_at
+        return min(self.link.due, self.port.polls.due(self.link), silent_at, self._check_at)
 
     def _checked(self, board: FlightController | LinkLost | None, now: float) -> None:
         if isinstance(board, FlightController) and board.profile is not self.controller.profile:

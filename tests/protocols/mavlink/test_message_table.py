@@ -13,7 +13,6 @@ from protocols.mavlink import message_table
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mavlink.message_table import MESSAGE_FORMATS
-from protocols.mavlink.target import target_of
 
 #: Dialects of autopilots that users may have, in order of precedence for an id.
 DIALECTS = ("common", "ardupilotmega", "all")
@@ -58,7 +57,7 @@ def test_frames_of_all_messages_are_found_with_their_targets(version: int) -> No
                 system if "target_system" in kind.fieldnames else 0,
                 component if "target_component" in kind.fieldnames else 0,
             )
-            assert target_of(frame) == named, kind.msgname
+            assert frame.target == named, kind.msgname
 
 
 def test_a_mavlink_1_frame_without_extensions_has_no_target_in_them() -> None:
@@ -66,4 +65,4 @@ def test_a_mavlink_1_frame_without_extensions_has_no_target_in_them() -> None:
     ack = mavlink_1.MAVLink_command_ack_message(400, 0)
     raw = bytes(ack.pack(mavlink_1.MAVLink(None, srcSystem=7, srcComponent=8)))
     (frame,) = MavlinkSplitter().feed(raw)
-    assert target_of(frame) == (0, 0)
+    assert frame.target == (0, 0)
