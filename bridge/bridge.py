@@ -389,7 +389,7 @@ class Bridge:
         if self.vehicle.news:
             news, self.vehicle.news = self.vehicle.news, set()
             if is_watched:
-                self._reporter.heard(news)
+                self._reporter.heard(news, now)
             if not self.is_passing_through:
                 self._vehicle.heard(news, now)
                 if Health in news or Readiness in news:

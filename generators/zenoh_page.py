@@ -33,6 +33,7 @@ _INNER = {
     "missions": "stored mission",
     "mission": "mission",
     "settings": "settings",
+    "last_heard": "last heard",
     "positions": "logged position",
     "events": "event",
 }

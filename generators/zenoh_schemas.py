@@ -77,7 +77,7 @@ _SUMMARY_FIELDS = {
 _WHAT = {
     "state": "The whole vehicle: the newest values of every group.",
     "overview": "The state in 60 bytes, for programs that watch thousands of vehicles: always CBOR, all numbers whole. "
-    "null: not known, or not heard for 10 s.",
+    "null: not known, or stale.",
     "event": "An event, as in the daemon's log.",
     "history": "The reply to a query about a time range.",
     "mission_current": "The flight controller's mission. All fields are null while it is unknown.",

@@ -6,14 +6,12 @@ from typing import Annotated
 
 from payloads.mission_data import Json
 
-#: Older values are left out: there are no ages to judge them by.
-_OLDEST_S = 10.0
 _GREATEST = 0xFFFFFFFF
 
 
 @dataclass(frozen=True, slots=True)
 class Overview:
-    """Made from the state. None: not known, or not heard for 10 s."""
+    """Made from the state. None: not known, or stale."""
 
     link: Annotated[str, "as in link's state"]
     armed: bool | None
@@ -32,7 +30,7 @@ class Overview:
 
 
 def overview_of(state: Json) -> Overview:
-    status, battery, position = (_fresh(state[group]) for group in ("status", "battery", "position"))
+    status, battery, position = (state[group] for group in ("status", "battery", "position"))
     mission = state["mission"] or {}
     checksum = mission.get("checksum")
     return Overview(
@@ -71,10 +69,6 @@ def state_of(overview: Json) -> Json:
             "checksum": f"{checksum:08x}" if isinstance(checksum, int) and 0 <= checksum <= _GREATEST else None,
         },
     }
-
-
-def _fresh(group: Json) -> Json:
-    return group if group["age_s"] is not None and group["age_s"] <= _OLDEST_S else {}
 
 
 def _whole(value: float | None, scale: float) -> int | None:

@@ -7,17 +7,18 @@ kept as bytes until `settle`.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 
 from bridge.fc.msp_telemetry import velocity
 from bridge.model.flight_mode import FlightMode, active_boxes, flight_mode, names_of_active
 from bridge.model.vehicle import (
+    Charge,
     Fix,
     FlightState,
     GlobalPosition,
     GpsFix,
     Health,
     Height,
+    Mode,
     Orientation,
     Power,
     Pressure,
@@ -61,8 +62,8 @@ class MavlinkTelemetry:
     def __init__(self, vehicle: Vehicle, *, is_harakiri: bool) -> None:
         self._vehicle = vehicle
         self._is_harakiri = is_harakiri
-        #: From a Harakiri's heartbeat; None until one is heard, up to a second after arming.
-        self._is_level: bool | None = None
+        #: From a Harakiri's heartbeat, with its time; None until one is heard, up to a second after arming.
+        self._is_level: tuple[bool, float] | None = None
         self._decoder = MavlinkDecoder()
         self._unread: dict[int, tuple[MavlinkFrame, float]] = {}
         self._readers: Mapping[int, Callable[[Message, float], None]] = {
@@ -134,30 +135,28 @@ class MavlinkTelemetry:
 
     def _heartbeat(self, message: Message, now: float) -> None:
         armed = bool(message.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED)
-        mode: FlightMode | str | None = None
         if self._is_harakiri:
-            self._is_level = bool(message.base_mode & m.MAV_MODE_FLAG_STABILIZE_ENABLED)
-            mode = self._harakiri_mode()
+            self._is_level = bool(message.base_mode & m.MAV_MODE_FLAG_STABILIZE_ENABLED), now
+            self._hear_harakiri_mode()
         elif message.base_mode & m.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
-            mode = str(message.custom_mode)
-        self._vehicle.hear(FlightState(now, Source.MAVLINK, armed, mode))
+            self._vehicle.hear(Mode(now, Source.MAVLINK, str(message.custom_mode)))
+        self._vehicle.hear(FlightState(now, Source.MAVLINK, armed))
 
-    def _harakiri_mode(self) -> FlightMode:
+    def _hear_harakiri_mode(self) -> None:
         """Its heartbeat says only whether it levels itself; the rest follows from the pilot's switches."""
-        switches, sticks, state = (
-            self._vehicle.last(Switches),
-            self._vehicle.last(Sticks),
-            self._vehicle.last(FlightState),
-        )
-        if switches is not None and sticks is None and state is not None and isinstance(state.mode, FlightMode):
-            # Just after a restart of the bridge in flight.
-            return state.mode
+        switches, sticks = self._vehicle.last(Switches), self._vehicle.last(Sticks)
+        is_resumed = switches is not None and sticks is None and self._vehicle.flight_mode is not None
+        if self._is_level is None or is_resumed:  # just after a restart of the bridge in flight
+            return
+        is_level, heard_at = self._is_level
+        mode = FlightMode.STABILIZE if is_level else FlightMode.ACRO
         if switches is not None and sticks is not None:
+            heard_at = min(heard_at, sticks.heard_at)
             flags = active_boxes(switches.activation, sticks.channels_us[_STICKS:])
-            mode = flight_mode(names_of_active(flags, switches.boxes))
-            if mode not in (FlightMode.STABILIZE, FlightMode.ACRO):
-                return mode
-        return FlightMode.STABILIZE if self._is_level else FlightMode.ACRO
+            by_switches = flight_mode(names_of_active(flags, switches.boxes))
+            if by_switches not in (FlightMode.STABILIZE, FlightMode.ACRO):
+                mode = by_switches
+        self._vehicle.hear(Mode(heard_at, Source.MAVLINK, mode))
 
     def _attitude(self, message: Message, now: float) -> None:
         roll, pitch, yaw = map(math.degrees, (message.roll, message.pitch, message.yaw))
@@ -189,13 +188,14 @@ class MavlinkTelemetry:
             )
 
     def _global_position_int(self, message: Message, now: float) -> None:
-        if not (message.lat or message.lon):
-            return
         north, east, up = message.vx / 100, message.vy / 100, -message.vz / 100
         self._vehicle.hear(Height(now, Source.MAVLINK, message.relative_alt / 1000, up))
-        self._vehicle.hear(
-            GlobalPosition(now, Source.MAVLINK, message.lat, message.lon, message.alt / 1000, north, east)
-        )
+        gps = self._vehicle.fresh(GpsFix, now)
+        if (message.lat or message.lon) and (gps is None or gps.fix is not Fix.NO_FIX):
+            # Without a fix ArduPilot repeats the last place.
+            self._vehicle.hear(
+                GlobalPosition(now, Source.MAVLINK, message.lat, message.lon, message.alt / 1000, north, east)
+            )
 
     def _vfr_hud(self, message: Message, now: float) -> None:
         if self._is_harakiri and math.isfinite(message.alt) and math.isfinite(message.climb):
@@ -212,17 +212,14 @@ class MavlinkTelemetry:
         sensors = Sensor(sum(sensor for bit, sensor in _SENSORS.items() if bit & well))
         self._vehicle.hear(Health(now, Source.MAVLINK, sensors))
         current = None if message.current_battery < 0 else message.current_battery / 100
-        before = self._vehicle.last(Power)
-        drawn = None if before is None or before.source is not Source.MAVLINK else before.drawn_mah
         voltage = _scaled(message.voltage_battery, 1000) or None
         remaining = None if message.battery_remaining < 0 else min(message.battery_remaining, 100)
-        self._vehicle.hear(Power(now, Source.MAVLINK, voltage, current, drawn, remaining_percent=remaining))
+        self._vehicle.hear(Power(now, Source.MAVLINK, voltage, current, remaining_percent=remaining))
 
-    def _battery_status(self, message: Message, _now: float) -> None:
-        power = self._vehicle.last(Power)
+    def _battery_status(self, message: Message, now: float) -> None:
         # SYS_STATUS has the voltage of the first battery.
-        if power is not None and message.id == 0 and message.current_consumed >= 0:
-            self._vehicle.hear(replace(power, drawn_mah=message.current_consumed))
+        if message.id == 0 and message.current_consumed >= 0:
+            self._vehicle.hear(Charge(now, Source.MAVLINK, message.current_consumed))
 
     def _scaled_pressure(self, message: Message, now: float) -> None:
         self._vehicle.hear(Pressure(now, Source.MAVLINK, message.press_abs, message.temperature / 100))
@@ -238,9 +235,7 @@ class MavlinkTelemetry:
         if channels:
             self._vehicle.hear(Sticks(now, Source.MAVLINK, tuple(channels)))
         if self._is_harakiri:
-            state = self._vehicle.last(FlightState)
-            if state is not None and self._is_level is not None and state.mode != self._harakiri_mode():
-                self._vehicle.hear(replace(state, mode=self._harakiri_mode()))
+            self._hear_harakiri_mode()
             if message.rssi or self._vehicle.last(Signal) is not None:
                 self._vehicle.hear(Signal(now, Source.MAVLINK, message.rssi / _HARAKIRI_MAX_RSSI))
         elif message.rssi != _UNKNOWN_U8:

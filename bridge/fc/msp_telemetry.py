@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from bridge.fc.profile import Decoder, FlightController
 from bridge.model.flight_mode import ARM_BOX, FAILSAFE_BOX, flight_mode, names_of_active
 from bridge.model.vehicle import (
+    Charge,
     Fix,
     FlightState,
     GlobalPosition,
@@ -15,6 +16,7 @@ from bridge.model.vehicle import (
     Height,
     ImuSample,
     MissionLeg,
+    Mode,
     Motors,
     Orientation,
     Power,
@@ -51,8 +53,10 @@ POLL_FOR: Mapping[type[Reading], Msp] = {
     GlobalPosition: Msp.RAW_GPS,
     Height: Msp.ALTITUDE,
     FlightState: Msp.STATUS,
+    Mode: Msp.STATUS,
     Health: Msp.STATUS,
     Power: Msp.ANALOG,
+    Charge: Msp.ANALOG,
     Signal: Msp.ANALOG,
     Sticks: Msp.RC,
     Motors: Msp.MOTOR,
@@ -137,9 +141,7 @@ def _status(vehicle: Vehicle, payload: bytes, controller: FlightController, now:
     status = decode_status(payload)
     if status is None:
         return
-    before = vehicle.last(Health)
-    load = None if before is None else before.cpu_load
-    vehicle.hear(Health(now, Source.MSP, status.sensors, status.cycle_time_us, status.i2c_errors, load))
+    vehicle.hear(Health(now, Source.MSP, status.sensors, status.cycle_time_us, status.i2c_errors))
     hear_box_flags(vehicle, status.box_flags, controller, now, known=_STATUS_FLAGS)
 
 
@@ -149,9 +151,10 @@ def hear_box_flags(vehicle: Vehicle, flags: int, controller: FlightController, n
     if before is not None and before.is_failsafe and FAILSAFE_BOX in controller.boxes[known:]:
         active.add(FAILSAFE_BOX)
     armed = ARM_BOX in active if ARM_BOX in controller.boxes else None
-    mode = flight_mode(active) if controller.boxes else None
+    if controller.boxes:
+        vehicle.hear(Mode(now, Source.MSP, flight_mode(active)))
     # While disarmed, the box only means that there is no RC link.
-    vehicle.hear(FlightState(now, Source.MSP, armed, mode, bool(armed) and FAILSAFE_BOX in active))
+    vehicle.hear(FlightState(now, Source.MSP, armed, bool(armed) and FAILSAFE_BOX in active))
 
 
 def _analog(vehicle: Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
@@ -164,7 +167,8 @@ def _analog(vehicle: Vehicle, payload: bytes, controller: FlightController, now:
         vehicle.hear(Power(now, Source.MSP, voltage))
     else:
         current_a = reply.current / controller.profile.currents_per_a
-        vehicle.hear(Power(now, Source.MSP, voltage, current_a, reply.drawn_mah))
+        vehicle.hear(Power(now, Source.MSP, voltage, current_a))
+        vehicle.hear(Charge(now, Source.MSP, reply.drawn_mah or 0))
     if reply.rssi or vehicle.last(Signal) is not None:
         vehicle.hear(Signal(now, Source.MSP, min(reply.rssi / _MAX_RSSI, 1.0)))
 

@@ -228,6 +228,9 @@ class PollSchedule:
             slot = max(ready, key=lambda slot: (now - slot.asked_at) / slot.interval_s)
             if slot.is_asked:
                 slot.misses += 1
+                if slot.backoff > 1:
+                    # The board does not answer it: that is no loss of the line.
+                    self._quality = min(self._quality / _LOSS_FACTOR, 1.0)
                 self._set_intervals()
             slot.asked(now)
             self._free_at = max(self._free_at, now - _BURST_S) + slot.cost / self._budget

@@ -2,10 +2,11 @@
 """The vehicle: everything known about it, whichever protocol the flight controller speaks at the moment.
 
 Decoders fill it (bridge/fc), and everything shown anywhere is made from it: MAVLink messages, zenoh, the status page,
-metrics. Units are SI, angles are in degrees. None means unknown. A reading keeps its arrival time,
-which separates old values from current ones; a lost link clears nothing.
+metrics. Units are SI, angles are in degrees. None means unknown. Values that arrive together are one reading with its
+arrival time, and `Vehicle.fresh` alone decides whether it is current; a lost link clears nothing.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
 from typing import Protocol, TypeVar
@@ -109,9 +110,15 @@ class Power(Reading):
 
     voltage_v: float | None
     current_a: float | None = None
-    drawn_mah: int | None = None
     cells: int | None = None
     remaining_percent: int | None = None
+
+
+@dataclass(slots=True)
+class Charge(Reading):
+    """Taken from the battery. MAVLink sends it separately from the voltage."""
+
+    drawn_mah: int
 
 
 @dataclass(slots=True)
@@ -138,27 +145,36 @@ class Signal(Reading):
 
 @dataclass(slots=True)
 class FlightState(Reading):
-    """armed: None if the flight controller cannot tell. mode: a FlightMode, or another autopilot's mode number.
+    """armed: None if the flight controller cannot tell.
 
     is_failsafe: True if it is armed and has taken over from the pilot, as far as it reports that.
     """
 
     armed: bool | None
-    mode: FlightMode | str | None = None
     is_failsafe: bool = False
 
 
 @dataclass(slots=True)
-class Health(Reading):
-    """The flight controller itself. sensors: fitted and answering. i2c_errors: sensor reads that failed since boot.
+class Mode(Reading):
+    """A FlightMode, or another autopilot's mode number. If made from several messages, heard_at is the oldest one's."""
 
-    cpu_load: 0..1.
-    """
+    mode: FlightMode | str
+
+
+@dataclass(slots=True)
+class Health(Reading):
+    """The flight controller itself. sensors: fitted and answering. i2c_errors: sensor reads that failed since boot."""
 
     sensors: Sensor
     cycle_time_us: int | None = None
     i2c_errors: int | None = None
-    cpu_load: float | None = None
+
+
+@dataclass(slots=True)
+class Load(Reading):
+    """The flight controller's CPU load, 0..1."""
+
+    cpu_load: float
 
 
 @dataclass(slots=True)
@@ -235,6 +251,8 @@ class Vehicle:
         #: The firmware version: major, minor, patch level.
         self.version: tuple[int, int, int] | None = None
         self.home: Home | None = None
+        #: The ages at which readings become stale, if not STALE_S: the line may be too slow to poll them so often.
+        self.stale_s: Mapping[type[Reading], float] = {}
         #: When any reading was last heard.
         self.heard_at: float | None = None
         self.track = GroundTrack()
@@ -244,6 +262,8 @@ class Vehicle:
         self._cells = 1
         #: False before the first arming, while home is only the place of the craft.
         self.is_home_settled = False
+        #: As last heard, however long ago.
+        self.armed: bool | None = None
         #: When it was armed, or first heard armed; None unless armed.
         self.armed_at: float | None = None
         #: True from `resume` until the craft is heard.
@@ -251,20 +271,24 @@ class Vehicle:
 
     def memory(self, family: str, now: float) -> FlightMemory | None:
         """What a restarted bridge must know about the craft; None unless it is armed."""
-        state, switches = self.last(FlightState), self.last(Switches)
-        if state is None or self.armed_at is None:
+        switches = self.last(Switches)
+        if self.last(FlightState) is None or self.armed_at is None:
             return None
-        mode = state.mode if isinstance(state.mode, FlightMode) else None
         ranges = ((), ()) if switches is None else (switches.boxes, switches.activation)
         home = self.home if self.is_home_settled else None
-        return FlightMemory(family, self.armed_at, now, mode, home, *ranges, self.airframe, self.version, self._cells)
+        return FlightMemory(
+            family, self.armed_at, now, self.flight_mode, home, *ranges, self.airframe, self.version, self._cells
+        )
 
     def resume(self, memory: FlightMemory) -> None:
         """Continue a flight that a former bridge has seen. Readings that contradict it undo this."""
         self.airframe, self.version, self._cells = memory.airframe, memory.version, memory.cells
         self.home, self.is_home_settled = memory.home, memory.home is not None
         self.armed_at, self._is_resumed = memory.armed_at, True
-        self._readings[FlightState] = FlightState(memory.made_at, Source.MSP, True, memory.mode)
+        self._readings[FlightState] = FlightState(memory.made_at, Source.MSP, True)
+        self.armed = True
+        if memory.mode is not None:
+            self._readings[Mode] = Mode(memory.made_at, Source.MSP, memory.mode)
         if memory.boxes:
             self._readings[Switches] = Switches(memory.made_at, Source.MSP, memory.boxes, memory.activation)
 
@@ -276,15 +300,15 @@ class Vehicle:
     def _end_flight(self) -> None:
         """Forget what was known from an earlier flight."""
         self.home, self.is_home_settled, self.armed_at = None, False, None
-        self._is_resumed = False
-        self._readings.pop(Switches, None)
-        self._readings.pop(FlightState, None)
+        self.armed, self._is_resumed = None, False
+        for kind in (Switches, FlightState, Mode):
+            self._readings.pop(kind, None)
 
     @property
-    def armed(self) -> bool | None:
-        """As last heard, however long ago."""
-        state = self.last(FlightState)
-        return None if state is None else state.armed
+    def flight_mode(self) -> FlightMode | None:
+        """As last heard, however long ago; None for another autopilot's."""
+        last = self.last(Mode)
+        return last.mode if last is not None and isinstance(last.mode, FlightMode) else None
 
     def hear(self, reading: Reading) -> None:
         """Store a reading in place of the previous one of its kind."""
@@ -293,19 +317,15 @@ class Vehicle:
             self._follow_arming(reading.armed, reading.heard_at)
         if isinstance(reading, Power):
             reading = self._estimated(reading)
-        before = self._readings.get(kind)
         self._readings[kind] = reading
         self.news.add(kind)
         if self.heard_at is None or reading.heard_at > self.heard_at:
             self.heard_at = reading.heard_at
         if isinstance(reading, FlightState):
-            was_armed = before.armed if isinstance(before, FlightState) else None
+            was_armed, self.armed = self.armed, reading.armed
             self._place_home(has_armed=was_armed is False and reading.armed is True)
         elif kind is GlobalPosition or kind is Height:
             self._place_home(has_armed=False)
-        elif isinstance(reading, GpsFix) and reading.fix is Fix.NO_FIX:
-            # What is sent with each position is sent without one, too: it has the height.
-            self.news.add(GlobalPosition)
 
     def _follow_arming(self, armed: bool, now: float) -> None:
         if self._is_resumed and not armed:
@@ -343,10 +363,11 @@ class Vehicle:
         if unix_s > _EARLIEST_UNIX_S:
             self.hear(GpsTime(now, source, unix_s))
 
-    def fresh(self, kind: type[ReadingT], now: float, stale_s: float = STALE_S) -> ReadingT | None:
+    def fresh(self, kind: type[ReadingT], now: float, stale_s: float | None = None) -> ReadingT | None:
         """The latest reading of a kind, unless it is stale."""
         reading = self.last(kind)
-        return reading if reading is not None and now <= reading.heard_at + stale_s else None
+        limit_s = self.stale_s.get(kind, STALE_S) if stale_s is None else stale_s
+        return reading if reading is not None and now <= reading.heard_at + limit_s else None
 
     def home_or_position(self) -> Home | None:
         """Home; before it is known, the current position, at the altitude of the launch."""

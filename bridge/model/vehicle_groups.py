@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The published state of a vehicle, in groups of named values: for zenoh, the web page and the command line.
 
-None means "not known". The notes on the fields are part of the published schemas (payloads/schemas).
+None means "not known", or not heard recently (`Vehicle.fresh`). The notes on the fields are part of the published
+schemas (payloads/schemas).
 """
 
 from dataclasses import dataclass
@@ -25,7 +26,10 @@ class Group(Enum):
 
 
 #: A field of every group.
-Age = Annotated[float | None, "seconds since it was heard; above 1.5 it is stale"]
+Age = Annotated[
+    float | None,
+    "age of the oldest of its values, seconds; if all are null, since the last one was heard; null: never heard",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +44,7 @@ class Attitude:
 
 @dataclass(frozen=True, slots=True)
 class Position:
-    """The vehicle's position. All values except height and climb need a GPS fix."""
+    """The vehicle's position. Height and climb come from the barometer, all others need a GPS fix."""
 
     lat_deg: Annotated[float | None, "WGS 84"] = None
     lon_deg: Annotated[float | None, "WGS 84"] = None
@@ -131,6 +135,19 @@ class SettingsIdentity:
 
 
 @dataclass(frozen=True, slots=True)
+class LastHeard:
+    """What matters once the craft is silent: the last known values, however old."""
+
+    armed: bool | None = None
+    armed_age_s: Annotated[float | None, "seconds since it was heard"] = None
+    mode: Annotated[str | None, "as in status"] = None
+    mode_age_s: Annotated[float | None, "seconds since it was heard"] = None
+    lat_deg: Annotated[float | None, "WGS 84"] = None
+    lon_deg: Annotated[float | None, "WGS 84"] = None
+    place_age_s: Annotated[float | None, "seconds since it was heard"] = None
+
+
+@dataclass(frozen=True, slots=True)
 class VehicleReport:
     """All groups together."""
 
@@ -143,3 +160,4 @@ class VehicleReport:
     link: Link
     mission: MissionIdentity | None
     settings: SettingsIdentity | None
+    last_heard: LastHeard

@@ -19,7 +19,7 @@ from bridge.missions.mission_service import MissionService
 from bridge.model.flight_memory import Home
 from bridge.model.flight_mode import FlightMode
 from bridge.model.mission_progress import FlownMission, MissionProgress, Progress
-from bridge.model.vehicle import STALE_S, FlightState, Health, MissionLeg, Readiness, Reading
+from bridge.model.vehicle import STALE_S, FlightState, Health, MissionLeg, Mode, Readiness, Reading
 from bridge.model.verdict import SentSeqs
 from bridge.vehicle import vehicle_messages as make
 from bridge.vehicle.arming_reasons import ArmingReasons
@@ -77,7 +77,6 @@ class OwnVehicle:
         self._progress = MissionProgress()
         self._announced_home: Home | None = None
         self._also_wanted: Mapping[type[Reading], float] = {}
-        self._stale_s: Mapping[type[Reading], float] = {}
         self._newcomers_due = inf
         self._polls_set_at, self._polls_due = -inf, inf
         #: Armed, mode, failsafe and lost as last announced.
@@ -139,10 +138,11 @@ class OwnVehicle:
         if Readiness in news or FlightState in news:
             self.arming_reasons.follow(now)
         for reading in news:
-            self._send_due(self._rows.get(reading, ()))
+            if rows := self._rows.get(reading):
+                self._send_due(rows)
         if MissionLeg in news:
             self._follow_mission()
-        if FlightState in news:
+        if FlightState in news or Mode in news:
             self._follow_state()
 
     def _send_due(self, rows: Iterable[Row]) -> None:
@@ -250,11 +250,13 @@ class OwnVehicle:
         for row in TELEMETRY:
             interval_s = intervals_s[row.msgid]
             if interval_s < inf:
-                self._rows.setdefault(row.reading, []).append(row)
+                for trigger in row.readings:
+                    self._rows.setdefault(trigger, []).append(row)
             _want(wanted, row.poll, interval_s)
         polls = self._session.polls
         polls.want(wanted)
-        self._stale_s = {} if self._session.state.link is None else _stale_ages_s(polls.line_interval_s)
+        is_polled = self._session.state.link is not None
+        self._session.vehicle.stale_s = _stale_ages_s(polls.line_interval_s) if is_polled else {}
 
     def _moment(self, sent_seqs: SentSeqs = ()) -> Moment:
         boot_ms = int((self._now - self._started_at) * 1000) & 0xFFFFFFFF
@@ -262,7 +264,6 @@ class OwnVehicle:
             self._session.vehicle,
             self._now,
             boot_ms,
-            self._stale_s,
             self._flown_mission,
             self._unix_time_s,
             sent_seqs,
@@ -274,8 +275,12 @@ class OwnVehicle:
         held = self._missions.held
         if held is None:
             return FlownMission()
-        seq = self._missions.seq_of(self._progress.number)
-        return FlownMission(held.items, seq, self._progress.progress if held.items else Progress.NO_MISSION)
+        if not held.items:
+            return FlownMission(held.items, 0, Progress.NO_MISSION)
+        vehicle = self._session.vehicle
+        if vehicle.last(MissionLeg) is not None and vehicle.fresh(MissionLeg, self._now) is None:
+            return FlownMission(held.items)
+        return FlownMission(held.items, self._missions.seq_of(self._progress.number), self._progress.progress)
 
     def _follow_state(self) -> None:
         """Send a heartbeat as soon as something in it has changed; report the failsafe."""
@@ -283,7 +288,9 @@ class OwnVehicle:
         if state is None:
             return
         announced, was_failsafe = self._announced, self._announced is not None and self._announced[2]
-        self._announced = state.armed, state.mode, state.is_failsafe, self._announcer.is_lost
+        mode = self._session.vehicle.last(Mode)
+        shown = None if mode is None else mode.mode
+        self._announced = state.armed, shown, state.is_failsafe, self._announcer.is_lost
         if self._announced == announced:
             return
         if state.is_failsafe and not was_failsafe:

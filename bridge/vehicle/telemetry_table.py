@@ -32,7 +32,7 @@ EXTRA1, EXTRA2, EXTRA3 = 10, 11, 12
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One message. It is sent as soon as `reading` is heard, or by the clock if None.
+    """One message. It is sent as soon as `reading` or `other` is heard, or by the clock if None.
 
     `interval_s`: the default; infinite: only on request.
     """
@@ -42,19 +42,24 @@ class Row:
     interval_s: float
     stream: int
     makers: tuple[make.Maker, ...]
+    other: type[Reading] | None = None
 
     @property
     def poll(self) -> Msp | None:
         """The request whose reply holds the reading."""
         return None if self.reading is None else POLL_FOR.get(self.reading)
 
+    @property
+    def readings(self) -> tuple[type[Reading] | None, ...]:
+        return (self.reading,) if self.other is None else (self.reading, self.other)
+
 
 TELEMETRY = (
     Row(m.MAVLINK_MSG_ID_ATTITUDE, Orientation, 0.04, EXTRA1, (make.attitude,)),
     Row(m.MAVLINK_MSG_ID_GPS_RAW_INT, GpsFix, 0.2, EXTENDED_STATUS, (make.gps_raw_int,)),
-    Row(m.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, GlobalPosition, 0.2, POSITION, (make.global_position_int,)),
-    Row(m.MAVLINK_MSG_ID_VFR_HUD, Height, 0.2, EXTRA2, (make.vfr_hud,)),
-    Row(m.MAVLINK_MSG_ID_SYS_STATUS, Health, 0.5, EXTENDED_STATUS, (make.sys_status,)),
+    Row(m.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, GlobalPosition, 0.2, POSITION, (make.global_position_int,), Height),
+    Row(m.MAVLINK_MSG_ID_VFR_HUD, Height, 0.2, EXTRA2, (make.vfr_hud,), GpsFix),
+    Row(m.MAVLINK_MSG_ID_SYS_STATUS, Health, 0.5, EXTENDED_STATUS, (make.sys_status,), Power),
     Row(m.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, FlightState, 1.0, EXTENDED_STATUS, (make.extended_sys_state,)),
     Row(m.MAVLINK_MSG_ID_NAMED_VALUE_INT, Health, 1.0, EXTRA3, (make.cycle_time, make.i2c_errors)),
     Row(m.MAVLINK_MSG_ID_BATTERY_STATUS, Power, 0.5, EXTRA3, (make.battery_status,)),

@@ -5,8 +5,8 @@ An unknown or stale value is sent as MAVLink's "unknown"; a message whose fields
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from typing import NamedTuple, TypeVar
 
 from bridge.model.airframe import Airframe
@@ -17,6 +17,7 @@ from bridge.model.mission_progress import FlownMission, Progress
 from bridge.model.vehicle import (
     STALE_S,
     Airspeed,
+    Charge,
     Fix,
     FlightState,
     GlobalPosition,
@@ -24,11 +25,12 @@ from bridge.model.vehicle import (
     Health,
     Height,
     ImuSample,
+    Load,
+    Mode,
     Motors,
     Orientation,
     Power,
     Pressure,
-    Reading,
     ReadingT,
     Signal,
     Sticks,
@@ -111,7 +113,7 @@ def known(value: T | None) -> T:
 
 @dataclass(slots=True)
 class Moment:
-    """The vehicle at one moment. now: monotonic s. stale_s: ages at which readings are unknown, if not STALE_S.
+    """The vehicle at one moment. now: monotonic s.
 
     unix_time_s: the Pi's clock at a monotonic time, None if it is not set. sent_seqs: the item numbers of the receiver,
     if they are not those of the list as read back. is_lost: the flight controller is silent, or was never found.
@@ -121,7 +123,6 @@ class Moment:
     vehicle: Vehicle
     now: float
     boot_ms: int
-    stale_s: Mapping[type[Reading], float] = field(default_factory=dict)
     mission: Callable[[], FlownMission] = FlownMission
     unix_time_s: Callable[[float], float | None] = lambda _now: None
     sent_seqs: SentSeqs = ()
@@ -131,12 +132,13 @@ class Moment:
     def fresh(self, kind: type[ReadingT]) -> ReadingT | None:
         """The latest reading of a kind, unless it is stale."""
         reading = self.vehicle.last(kind)
-        return reading if reading and self.now <= reading.heard_at + self.stale_s.get(kind, STALE_S) else None
+        limit_s = self.vehicle.stale_s.get(kind, STALE_S)
+        return reading if reading is not None and self.now <= reading.heard_at + limit_s else None
 
     def need(self, kind: type[ReadingT]) -> ReadingT:
         """The latest reading of a kind; Unknown if there is none or it is stale."""
         reading = self.vehicle.last(kind)
-        if reading is None or self.now > reading.heard_at + self.stale_s.get(kind, STALE_S):
+        if reading is None or self.now > reading.heard_at + self.vehicle.stale_s.get(kind, STALE_S):
             raise Unknown
         return reading
 
@@ -169,7 +171,8 @@ def heartbeat(at: Moment) -> Message:
     """
     vehicle = at.vehicle
     state = vehicle.last(FlightState)
-    mode = state.mode if state is not None and isinstance(state.mode, FlightMode) else FlightMode.STABILIZE
+    last = vehicle.last(Mode)
+    mode = last.mode if last is not None and isinstance(last.mode, FlightMode) else FlightMode.STABILIZE
     base_mode = messages.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED | messages.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
     if mode is not FlightMode.ACRO:
         base_mode |= messages.MAV_MODE_FLAG_STABILIZE_ENABLED
@@ -190,7 +193,7 @@ def heartbeat(at: Moment) -> Message:
 
 
 def current_mode(at: Moment) -> Message:
-    mode = at.need(FlightState).mode
+    mode = at.need(Mode).mode
     if not isinstance(mode, FlightMode):
         raise Unknown
     return mode_messages.current_mode(_custom_mode(at.vehicle, mode), _standard_mode(at.vehicle, mode))
@@ -335,7 +338,7 @@ def sys_status(at: Moment) -> Message:
     if health is not None:
         present |= messages.MAV_SYS_STATUS_SENSOR_3D_GYRO
         present |= sum(bit for sensor, bit in _SENSORS.items() if sensor & health.sensors)
-    gps, sticks, signal = at.fresh(GpsFix), at.fresh(Sticks), at.vehicle.last(Signal)
+    gps, sticks, signal = at.fresh(GpsFix), at.fresh(Sticks), at.fresh(Signal)
     if gps is None:
         unknown |= messages.MAV_SYS_STATUS_SENSOR_GPS
     elif gps.fix is not Fix.THREE_D:
@@ -353,11 +356,12 @@ def sys_status(at: Moment) -> Message:
     if at.blockers:
         healthy &= ~_PREARM
     voltage, current, remaining = _battery(at)
+    load = at.fresh(Load)
     return messages.MAVLink_sys_status_message(
         present,
         enabled,
         healthy | _NEVER_ILL,
-        0 if health is None else round((health.cpu_load or 0.0) * 1000),
+        0 if load is None else round(load.cpu_load * 1000),
         voltage,
         current,
         remaining,
@@ -372,13 +376,13 @@ def sys_status(at: Moment) -> Message:
 
 def battery_status(at: Moment) -> Message:
     """BATTERY_STATUS: mV (Mission Planner reads the voltage only from here), cA and mAh."""
-    drawn = at.need(Power).drawn_mah
+    charge = at.fresh(Charge)
     voltage, current, remaining = _battery(at)
     if voltage == _UNKNOWN_U16:
         raise Unknown
     voltages = [voltage, *[_UNKNOWN_U16] * 9]
     return messages.MAVLink_battery_status_message(
-        0, 0, 0, 32767, voltages, current, -1 if drawn is None else drawn, -1, remaining
+        0, 0, 0, 32767, voltages, current, -1 if charge is None else charge.drawn_mah, -1, remaining
     )
 
 
@@ -468,7 +472,7 @@ def nav_controller_output(at: Moment) -> Message:
     if item is not None and item.lat_e7 and item.lon_e7:
         target = Home(item.lat_e7, item.lon_e7)
         climb_m = 0.0 if height is None else item.alt_m - height.height_m
-    elif state.mode is FlightMode.RTL:
+    elif at.vehicle.flight_mode is FlightMode.RTL:
         target = known(at.vehicle.home)
     else:
         raise Unknown

@@ -3,6 +3,7 @@
 
 from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import cache
+from math import inf
 from typing import Any
 
 from bridge.fc.session import FcSession
@@ -11,12 +12,15 @@ from bridge.missions.mission_service import MissionService
 from bridge.model.flight_mode import FlightMode
 from bridge.model.ground_track import bearing_deg, distance_m
 from bridge.model.vehicle import (
+    STALE_S,
+    Charge,
     Fix,
     FlightState,
     GlobalPosition,
     GpsFix,
     Health,
     Height,
+    Mode,
     Orientation,
     Power,
     Reading,
@@ -29,6 +33,7 @@ from bridge.model.vehicle_groups import (
     Battery,
     Gps,
     Group,
+    LastHeard,
     Link,
     MissionIdentity,
     Position,
@@ -41,17 +46,24 @@ from bridge.vehicle.settings_seal import SettingsSeal
 from protocols.msp.telemetry import Sensor
 
 #: The readings of each group, and their poll intervals while the group is watched, seconds. A group is published when
-#: its first reading arrives.
+#: its first reading arrives; when another one does, unless it was published just before; and when one becomes stale.
 _SHOWS: Mapping[Group, Mapping[type[Reading], float]] = {
     Group.ATTITUDE: {Orientation: 0.1},
     Group.POSITION: {GlobalPosition: 0.2, Height: 0.2},
     Group.GPS: {GpsFix: 0.2},
-    Group.BATTERY: {Power: 1.0},
-    Group.RC: {Sticks: 0.5},
-    Group.STATUS: {FlightState: 0.25},
+    Group.BATTERY: {Power: 1.0, Charge: 1.0},
+    Group.RC: {Sticks: 0.5, Signal: 1.0},
+    Group.STATUS: {FlightState: 0.25, Mode: 0.25, Health: 0.25},
     Group.LINK: {},
 }
-_NEWS_OF = {next(iter(readings)): group for group, readings in _SHOWS.items() if readings}
+#: By reading: its group, and how long ago the group was last published, seconds, for the reading to publish it again.
+_NEWS_OF: Mapping[type[Reading], tuple[Group, float]] = {
+    reading: (group, 0.0 if number == 0 else 1.5 * next(iter(readings.values())))
+    for group, readings in _SHOWS.items()
+    for number, reading in enumerate(readings)
+}
+#: A reading is fresh up to and including its last moment.
+_SOON_S = 1e-3
 _FIXES = {Fix.NO_FIX: "none", Fix.TWO_D: "2D", Fix.THREE_D: "3D"}
 
 
@@ -75,13 +87,36 @@ class VehicleReporter:
         self.fresh: set[Group] = set()
         #: The groups in use: they are polled, and `take_fresh` returns the updated ones.
         self.watched: frozenset[Group] = frozenset()
+        self._published_at: dict[Group, float] = {}
+        #: The readings that were fresh, and when the first of them becomes stale.
+        self._current: set[type[Reading]] = set()
+        self._stale_due = inf
         self._makers: Mapping[Group, Callable[[float], Any]] = {
             group: getattr(self, f"_{group.value}") for group in Group
         }
 
-    def heard(self, news: Collection[type[Reading]]) -> None:
+    def heard(self, news: Collection[type[Reading]], now: float) -> None:
         """The vehicle has new readings. To be called while groups are watched."""
-        self.fresh.update(group for reading, group in _NEWS_OF.items() if reading in news)
+        for reading in news:
+            group, pause_s = _NEWS_OF.get(reading, (Group.LINK, inf))
+            if now >= self._published_at.get(group, -inf) + pause_s:
+                self.fresh.add(group)
+                self._published_at[group] = now
+        self._current.update(news)
+        if self._stale_due == inf:
+            self._follow_ages(now)
+
+    def _follow_ages(self, now: float) -> None:
+        """Publish the groups of readings that have become stale."""
+        before, fresh = self._current, self._session.vehicle.fresh
+        readings = {kind: fresh(kind, now) for kind, (group, _) in _NEWS_OF.items() if group in self.watched}
+        self._current = {kind for kind, reading in readings.items() if reading is not None}
+        self.fresh.update(_NEWS_OF[kind][0] for kind in before - self._current if kind in readings)
+        stale_s = self._session.vehicle.stale_s
+        ages = (reading.heard_at + stale_s.get(kind, STALE_S) for kind, reading in readings.items() if reading)
+        due = min(ages, default=inf)
+        # A little later: it is fresh until then. One that is heard meanwhile is fresh for STALE_S at least.
+        self._stale_due = due if due == inf else min(due, now + STALE_S) + _SOON_S
 
     def watch(self, groups: Iterable[Group]) -> None:
         """Poll for these groups from now on; `take_fresh` returns the updated ones."""
@@ -91,8 +126,10 @@ class VehicleReporter:
             wanted |= _SHOWS[group]
         self._want(wanted)
 
-    def take_fresh(self) -> frozenset[Group]:
+    def take_fresh(self, now: float) -> frozenset[Group]:
         """The watched groups updated since the last call."""
+        if now >= self._stale_due:
+            self._follow_ages(now)
         fresh = self.watched & self.fresh
         self.fresh.clear()
         return fresh
@@ -109,20 +146,43 @@ class VehicleReporter:
         if (sealed := self._settings.state) is not None:
             settings = SettingsIdentity(str(sealed.seal), None if sealed.change is None else sealed.change.text())
         groups = {group.value: self.group(group, now) for group in Group}
-        return VehicleReport(**groups, mission=mission, settings=settings)
+        return VehicleReport(**groups, last_heard=self._last_heard(now), mission=mission, settings=settings)
 
-    def _last(self, kind: type[ReadingT]) -> ReadingT | None:
-        return self._session.vehicle.last(kind)
+    def _fresh(self, kind: type[ReadingT], now: float) -> ReadingT | None:
+        return self._session.vehicle.fresh(kind, now)
+
+    def _age_s(self, group: Group, now: float) -> float | None:
+        """As in bridge.model.vehicle_groups.Age."""
+        vehicle = self._session.vehicle
+        fresh = [reading.heard_at for kind in _SHOWS[group] if (reading := vehicle.fresh(kind, now)) is not None]
+        if fresh:
+            return _age_s(min(fresh), now)
+        heard = [reading.heard_at for kind in _SHOWS[group] if (reading := vehicle.last(kind)) is not None]
+        return _age_s(max(heard), now) if heard else None
+
+    def _last_heard(self, now: float) -> LastHeard:
+        vehicle = self._session.vehicle
+        state, mode, place = vehicle.last(FlightState), vehicle.last(Mode), vehicle.last(GlobalPosition)
+        return LastHeard(
+            armed=None if state is None else state.armed,
+            armed_age_s=None if state is None else _age_s(state.heard_at, now),
+            mode=_mode_name(mode),
+            mode_age_s=None if mode is None else _age_s(mode.heard_at, now),
+            lat_deg=None if place is None else place.lat_e7 / 1e7,
+            lon_deg=None if place is None else place.lon_e7 / 1e7,
+            place_age_s=None if place is None else _age_s(place.heard_at, now),
+        )
 
     def _attitude(self, now: float) -> Attitude:
-        attitude = self._last(Orientation)
+        attitude, age_s = self._fresh(Orientation, now), self._age_s(Group.ATTITUDE, now)
         if attitude is None:
-            return Attitude()
+            return Attitude(age_s=age_s)
         heading_deg = _direction(attitude.heading_deg) if attitude.is_north_known else None
-        return Attitude(_rounded(attitude.roll_deg), _rounded(attitude.pitch_deg), heading_deg, _age_s(attitude, now))
+        return Attitude(_rounded(attitude.roll_deg), _rounded(attitude.pitch_deg), heading_deg, age_s)
 
     def _position(self, now: float) -> Position:
-        home, here, height = self._session.vehicle.home, self._last(GlobalPosition), self._last(Height)
+        home = self._session.vehicle.home
+        here, height = self._fresh(GlobalPosition, now), self._fresh(Height, now)
         return Position(
             lat_deg=None if here is None else here.lat_e7 / 1e7,
             lon_deg=None if here is None else here.lon_e7 / 1e7,
@@ -135,39 +195,43 @@ class VehicleReporter:
             home_lon_deg=None if home is None else home.lon_e7 / 1e7,
             home_distance_m=None if home is None or here is None else round(distance_m(here, home), 1),
             home_direction_deg=None if home is None or here is None else _direction(bearing_deg(here, home)),
-            age_s=_age_s(here or height, now),
+            age_s=self._age_s(Group.POSITION, now),
         )
 
     def _gps(self, now: float) -> Gps:
-        gps = self._last(GpsFix)
+        gps, age_s = self._fresh(GpsFix, now), self._age_s(Group.GPS, now)
         if gps is None:
-            return Gps()
-        course_deg = _direction(gps.course_deg)
-        return Gps(_FIXES[gps.fix], gps.satellites, gps.hdop, gps.ground_speed_m_s, course_deg, _age_s(gps, now))
+            return Gps(age_s=age_s)
+        return Gps(_FIXES[gps.fix], gps.satellites, gps.hdop, gps.ground_speed_m_s, _direction(gps.course_deg), age_s)
 
     def _battery(self, now: float) -> Battery:
-        power = self._last(Power)
-        if power is None:
-            return Battery()
-        more = power.cells, power.remaining_percent, _age_s(power, now)
-        return Battery(power.voltage_v, power.current_a, power.drawn_mah, *more)
+        power, charge = self._fresh(Power, now), self._fresh(Charge, now)
+        return Battery(
+            voltage_v=None if power is None else power.voltage_v,
+            current_a=None if power is None else power.current_a,
+            drawn_mah=None if charge is None else charge.drawn_mah,
+            cells=None if power is None else power.cells,
+            remaining_percent=None if power is None else power.remaining_percent,
+            age_s=self._age_s(Group.BATTERY, now),
+        )
 
     def _rc(self, now: float) -> Rc:
-        sticks, signal = self._last(Sticks), self._last(Signal)
-        if sticks is None:
-            return Rc()
-        return Rc(sticks.channels_us, None if signal is None else round(signal.strength * 100, 1), _age_s(sticks, now))
+        sticks, signal = self._fresh(Sticks, now), self._fresh(Signal, now)
+        return Rc(
+            channels_us=None if sticks is None else sticks.channels_us,
+            rssi_percent=None if signal is None else round(signal.strength * 100, 1),
+            age_s=self._age_s(Group.RC, now),
+        )
 
     def _status(self, now: float) -> Status:
-        state, health = self._last(FlightState), self._last(Health)
-        mode = None if state is None else state.mode
+        state, mode, health = self._fresh(FlightState, now), self._fresh(Mode, now), self._fresh(Health, now)
         return Status(
             armed=None if state is None else state.armed,
-            mode=mode.name if isinstance(mode, FlightMode) else mode,
+            mode=_mode_name(mode),
             sensors=None if health is None else _names(health.sensors),
             cycle_time_us=None if health is None else health.cycle_time_us,
             i2c_errors=None if health is None else health.i2c_errors,
-            age_s=_age_s(state, now),
+            age_s=self._age_s(Group.STATUS, now),
         )
 
     def _link(self, _now: float) -> Link:
@@ -184,8 +248,14 @@ class VehicleReporter:
         )
 
 
-def _age_s(reading: Reading | None, now: float) -> float | None:
-    return None if reading is None else max(round(now - reading.heard_at, 1), 0.0)
+def _age_s(heard_at: float, now: float) -> float:
+    return max(round(now - heard_at, 1), 0.0)
+
+
+def _mode_name(mode: Mode | None) -> str | None:
+    if mode is None:
+        return None
+    return mode.mode.name if isinstance(mode.mode, FlightMode) else mode.mode
 
 
 def _rounded(value: float | None) -> float | None:

@@ -188,7 +188,7 @@ class Daemon:
         self.gcs.send()
         if self._tlog is not None:
             self._tlog.record()
-        if self._followers and (fresh := self.bridge.take_fresh()):
+        if self._followers and (fresh := self.bridge.take_fresh(self._loop.time())):
             for follower in self._followers:
                 follower.telemetry(fresh)
 

@@ -17,6 +17,7 @@ from bridge.line.msp_link import BOUNDS_S, RoundTrips
 from bridge.missions.mission_service import DeliveryResult
 from bridge.model.events import BridgeEvent, PushEnded, PushStarted, UploadEnded, UploadRefused, UploadStarted
 from bridge.model.mission_log import ArrivedMission
+from bridge.model.vehicle_groups import VehicleReport
 from payloads.names import host_name
 from service.daemon.daemon import Daemon, Follower
 from service.machine.package import version
@@ -161,21 +162,26 @@ class _State(Collector):
             yield _round_trips(counters.fc_round_trips)
 
     def _vehicle(self) -> Iterator[Metric]:
-        report = self._daemon.report()
-        records = None if report.mission is None else report.mission.count
-        known: dict[str, tuple[str, float | None]] = {
-            "armed": ("1 while it is armed.", report.status.armed),
-            "battery_volts": ("Battery.", report.battery.voltage_v),
-            "latitude_degrees": ("By GPS, WGS 84.", report.position.lat_deg),
-            "longitude_degrees": ("By GPS, WGS 84.", report.position.lon_deg),
-            "height_meters": ("Above the launch point.", report.position.height_m),
-            "gps_fix": ("0, 2 or 3 dimensions.", _FIXES.get(report.gps.fix or "")),
-            "satellites": ("Satellites in use.", report.gps.satellites),
-            "mission_records": ("Records that the flight controller holds.", records),
-        }
-        for name, (meaning, value) in known.items():
+        for name, (meaning, value) in vehicle_gauges(self._daemon.report()).items():
             if value is not None:
                 yield _gauge(name, meaning, {}, value)
+
+
+def vehicle_gauges(report: VehicleReport) -> Mapping[str, tuple[str, float | None]]:
+    """Meaning and value by name; those without a value are left out."""
+    return {
+        "armed": ("1 while it is armed.", report.status.armed),
+        "battery_volts": ("Battery.", report.battery.voltage_v),
+        "latitude_degrees": ("By GPS, WGS 84.", report.position.lat_deg),
+        "longitude_degrees": ("By GPS, WGS 84.", report.position.lon_deg),
+        "height_meters": ("Above the launch point.", report.position.height_m),
+        "gps_fix": ("0, 2 or 3 dimensions.", _FIXES.get(report.gps.fix or "")),
+        "satellites": ("Satellites in use.", report.gps.satellites),
+        "mission_records": (
+            "Records that the flight controller holds.",
+            None if report.mission is None else report.mission.count,
+        ),
+    }
 
 
 def _round_trips(measured: RoundTrips) -> Metric:

@@ -7,7 +7,7 @@ from math import inf
 from bridge.fc.msp_telemetry import hear_box_flags
 from bridge.fc.profile import Decoder, FlightController
 from bridge.line.poll_schedule import Poll
-from bridge.model.vehicle import Airspeed, Health, Power, Readiness, Signal, Source, Vehicle
+from bridge.model.vehicle import Airspeed, Charge, Health, Load, Power, Readiness, Signal, Source, Vehicle
 from protocols.msp.commands import Msp
 from protocols.msp.frame import request
 from protocols.msp.inav import (
@@ -47,8 +47,8 @@ _BOX_FLAGS = 64
 def _inav_status(vehicle: Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
     reply = decode_inav_status(payload)
     if reply is not None:
-        load = reply.load_percent / 100
-        vehicle.hear(Health(now, Source.MSP, reply.sensors, reply.cycle_time_us, reply.i2c_errors, load))
+        vehicle.hear(Health(now, Source.MSP, reply.sensors, reply.cycle_time_us, reply.i2c_errors))
+        vehicle.hear(Load(now, Source.MSP, reply.load_percent / 100))
         vehicle.hear(Readiness(now, Source.MSP, reply.blockers))
         hear_box_flags(vehicle, reply.box_flags, controller, now, known=_BOX_FLAGS)
 
@@ -66,7 +66,8 @@ def _inav_analog(vehicle: Vehicle, payload: bytes, _controller: FlightController
         return
     if reply.cells and reply.battery_cv:
         volts, amperes = reply.battery_cv / 100, reply.current_ca / 100
-        vehicle.hear(Power(now, Source.MSP, volts, amperes, reply.drawn_mah, reply.cells, reply.percent))
+        vehicle.hear(Power(now, Source.MSP, volts, amperes, reply.cells, reply.percent))
+        vehicle.hear(Charge(now, Source.MSP, reply.drawn_mah))
     else:
         vehicle.hear(Power(now, Source.MSP, reply.battery_cv / 100 or None))
     _hear_signal(vehicle, reply.rssi, now)

@@ -119,9 +119,8 @@ class Port:
         self.vehicle.version = controller.version or self.vehicle.version
 
     def hear_armed(self, source: Source, now: float) -> None:
-        """Only an armed craft sends this. Its mode is the last known one."""
-        known = self.vehicle.last(FlightState)
-        self.vehicle.hear(FlightState(now, source, True, None if known is None else known.mode))
+        """Only an armed craft sends this."""
+        self.vehicle.hear(FlightState(now, source, True))
 
 
 class State(ABC):

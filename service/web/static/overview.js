@@ -8,15 +8,15 @@ let before = null; // the byte counts of the previous state, and the time of its
 
 export function showOverview(state) {
   setText(byId("version"), state.version);
-  const armed = state.status.armed;
+  const { armed, armed_age_s, mode } = state.last_heard;
   const rates = ratesOf(state.traffic);
-  const isOld = state.status.age_s > STALE_S;
+  const isOld = armed_age_s > STALE_S;
   byId("vehicle-age").hidden = !isOld;
-  if (isOld) setText(byId("vehicle-age"), `Last heard ${age(state.status.age_s)} ago.`);
+  if (isOld) setText(byId("vehicle-age"), `Last heard ${age(armed_age_s)} ago.`);
   setClass(byId("vehicle"), isOld ? "old" : "");
   pairs("vehicle", [
     ["State", armed === null ? "unknown" : armed ? "ARMED" : "disarmed", armed ? "bad" : ""],
-    ["Mode", state.status.mode ?? "–"],
+    ["Mode", mode ?? "–"],
     ["Battery", battery(state.battery), ""],
     ["Satellites", `${known(state.gps.satellites)} (fix ${state.gps.fix ?? "–"})`],
     ["Height", known(state.position.height_m, " m", 1)],

@@ -65,7 +65,8 @@ async function showHeld(state) {
     showProfile(byId("profile"), held.items);
   }
   follow(state.position);
-  map.show({ items: held.items, position: state.position, attitude: state.attitude, trail });
+  const { lat_deg, lon_deg } = state.last_heard; // the map also shows where the craft was lost
+  map.show({ items: held.items, position: { ...state.position, lat_deg, lon_deg }, attitude: state.attitude, trail });
 }
 
 async function showNewest(state) {

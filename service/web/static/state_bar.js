@@ -22,7 +22,7 @@ export function showStateBar(state, silent_s) {
 }
 
 function badgesOf(state, silent_s) {
-  const armed = state?.status.armed ?? null;
+  const { armed, armed_age_s } = state?.last_heard ?? { armed: null };
   const wasArmed = armed ? [badge("bad", "WAS ARMED")] : [];
   if (silent_s !== null) return [badge("bad", "NO REPLY FROM THE PI", silent_s), ...wasArmed];
   if (state.link.flight_controller === null) {
@@ -31,7 +31,7 @@ function badgesOf(state, silent_s) {
     return [what, ...wasArmed];
   }
   const known = armed === null ? badge("soft", "ARMED STATE UNKNOWN") : armed ? badge("bad", "ARMED") : badge("good", "DISARMED");
-  return state.status.age_s > STALE_S ? [known, badge("bad", "STALE", state.status.age_s)] : [known];
+  return armed_age_s > STALE_S ? [known, badge("bad", "STALE", armed_age_s)] : [known];
 }
 
 const badge = (kind, name, age_s = null) => ({ kind, name, text: age_s === null ? name : `${name} ${age(age_s)}` });
@@ -42,7 +42,7 @@ function headline(state) {
   if (state === null) return "";
   if (state.port.trouble) return state.port.trouble;
   if (state.link.flight_controller === null) return `Looking for a flight controller on ${state.port.address}`;
-  return [state.link.flight_controller, state.status.mode, state.battery.voltage_v && `${state.battery.voltage_v.toFixed(1)} V`].filter(Boolean).join(", ");
+  return [state.link.flight_controller, state.last_heard.mode, state.battery.voltage_v && `${state.battery.voltage_v.toFixed(1)} V`].filter(Boolean).join(", ");
 }
 
 function showTransfer(transfer) {

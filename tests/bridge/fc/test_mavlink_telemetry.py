@@ -29,7 +29,7 @@ def test_groups_are_made_from_a_mavlink_autopilot() -> None:
     autopilot.outgoing += m.MAVLink_attitude_message(1, 1.0, 1.0, 1.0, 0, 0, 0).pack(gimbal)
     world.run(0.05)
     bridge = world.bridge
-    assert bridge.take_fresh() == {
+    assert bridge.take_fresh(world.now) == {
         Group.ATTITUDE, Group.POSITION, Group.GPS, Group.BATTERY, Group.RC, Group.STATUS
     }  # fmt: skip
     assert without_age(bridge.group(Group.ATTITUDE, world.now)) == Attitude(
@@ -146,9 +146,35 @@ def test_a_voltage_is_not_renewed_by_the_consumption() -> None:
         autopilot.send(m.MAVLink_battery_status_message(battery, 0, 0, 0, [65535] * 10, 100, consumed, -1, 50))
     world.run(0.05)
     power = world.bridge.group(Group.BATTERY, world.now)
+    assert power.voltage_v is None
+    assert (power.drawn_mah, power.age_s) == (None, 5.0)
+    autopilot.send(m.MAVLink_battery_status_message(0, 0, 0, 0, [65535] * 10, 100, 502, -1, 50))
+    world.run(0.05)
+    power = world.bridge.group(Group.BATTERY, world.now)
+    assert (power.voltage_v, power.drawn_mah) == (None, 502)
     assert power.age_s is not None
-    assert power.age_s > 9
-    assert power.drawn_mah == 500
+    assert power.age_s <= 0.1
+
+
+def test_a_consumption_is_not_renewed_by_the_voltage() -> None:
+    world, autopilot, _ = passing()
+    autopilot.send(m.MAVLink_battery_status_message(0, 0, 0, 0, [65535] * 10, 100, 500, -1, 50))
+    for _ in range(5):
+        world.run(0.5)
+        autopilot.send(m.MAVLink_sys_status_message(7, 7, 6, 0, 12600, 100, -1, 0, 0, 0, 0, 0, 0))
+    world.run(0.05)
+    power = world.bridge.group(Group.BATTERY, world.now)
+    assert (power.voltage_v, power.drawn_mah) == (12.6, None)
+
+
+def test_without_a_fix_a_repeated_place_is_no_position_but_the_height_is_one() -> None:
+    world, autopilot, _ = passing()
+    where = m.MAVLink_global_position_int_message(1, 453838000, 84733000, 131000, 20000, 0, 0, 0, 9000)
+    autopilot.send(m.MAVLink_gps_raw_int_message(1, 1, 0, 0, 0, 120, 65535, 65535, 65535, 3))
+    autopilot.send(where)
+    world.run(0.05)
+    position = world.bridge.group(Group.POSITION, world.now)
+    assert (position.lat_deg, position.height_m, position.age_s) == (None, 20.0, 0.0)
 
 
 @given(st.data())

@@ -69,35 +69,42 @@ def test_everything_is_unknown_before_a_flight_controller_is_found() -> None:
     assert bridge.report(world.now).mission is None
 
 
-def test_a_lost_link_keeps_the_last_values() -> None:
+def test_after_a_lost_link_only_what_matters_is_kept_with_its_age() -> None:
     world = World()
     world.wait_ready()
     world.run(3.0)
     bridge = world.bridge
-    known = {group: without_age(bridge.group(group, world.now)) for group in EMPTY}
-    assert None not in (known[Group.POSITION].lat_deg, known[Group.ATTITUDE].roll_deg)
+    known = bridge.report(world.now)
+    assert None not in (known.position.lat_deg, known.attitude.roll_deg, known.status.mode)
     world.unplug()
     world.run(10)
-    assert {group: without_age(bridge.group(group, world.now)) for group in EMPTY} == known
-    assert all(bridge.group(group, world.now).age_s > 9 for group in EMPTY)
+    home = {name: getattr(known.position, name) for name in ("home_lat_deg", "home_lon_deg")}
+    expected = EMPTY | {Group.POSITION: Position(**home)}
+    assert {group: without_age(bridge.group(group, world.now)) for group in EMPTY} == expected
+    assert all(bridge.group(group, world.now).age_s > 9 for group in EMPTY if group is not Group.BATTERY)
+    last = bridge.report(world.now).last_heard
+    assert (last.armed, last.mode) == (False, known.status.mode)
+    assert (last.lat_deg, last.lon_deg) == (known.position.lat_deg, known.position.lon_deg)
+    assert None not in (last.armed_age_s, last.mode_age_s, last.place_age_s)
+    assert min(last.armed_age_s or 0, last.mode_age_s or 0, last.place_age_s or 0) > 9
 
 
 def test_watched_groups_are_polled_and_published_with_each_reply() -> None:
     world = World()
     world.wait_ready()
     bridge = world.bridge
-    assert bridge.take_fresh() == frozenset()
+    assert bridge.take_fresh(world.now) == frozenset()
     bridge.watch({Group.ATTITUDE})
     found = 0
     for _ in range(100):
         world.run(0.02)
-        fresh = bridge.take_fresh()
+        fresh = bridge.take_fresh(world.now)
         assert fresh <= {Group.ATTITUDE}
         found += len(fresh)
     assert 15 <= found <= 25
     bridge.watch(())
     world.run(2.0)
-    assert bridge.take_fresh() == frozenset()
+    assert bridge.take_fresh(world.now) == frozenset()
 
 
 def test_the_age_of_a_value_grows_while_the_bridge_hears_nothing_and_has_nothing_to_do() -> None:

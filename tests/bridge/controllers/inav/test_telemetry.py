@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from bridge.model.vehicle import GpsTime, Health, MissionLeg, Power
+from bridge.model.vehicle import Charge, GpsTime, Load, MissionLeg, Power
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.nav import NavMode
@@ -91,11 +91,13 @@ def test_a_failsafe_is_critical_at_once_and_only_in_flight(platform: int, failsa
 
 def test_load_battery_percentage_and_cells_come_from_the_board() -> None:
     _, world, station = introduced()
-    power, health = world.bridge.vehicle.last(Power), world.bridge.vehicle.last(Health)
+    vehicle = world.bridge.vehicle
+    power, charge, load = vehicle.last(Power), vehicle.last(Charge), vehicle.last(Load)
     assert power is not None
-    assert health is not None
-    assert (power.cells, power.remaining_percent, power.drawn_mah) == (3, 88, 120)
-    assert health.cpu_load == pytest.approx(0.07)
+    assert charge is not None
+    assert load is not None
+    assert (power.cells, power.remaining_percent, charge.drawn_mah) == (3, 88, 120)
+    assert load.cpu_load == pytest.approx(0.07)
     status = station.messages("SYS_STATUS")[-1]
     assert (status.load, status.battery_remaining) == (70, 88)
     assert 12_000 < status.voltage_battery < 12_700

@@ -11,7 +11,7 @@ from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile
 from bridge.missions.list_check import check_list
 from bridge.model.mission_log import Outcome
-from bridge.model.vehicle import Power
+from bridge.model.vehicle_groups import Group
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from protocols.msp.nav import LAST, Nav, NavAction
@@ -309,6 +309,5 @@ def test_multiwii_reports_the_current_in_tenths_of_an_ampere() -> None:
     board.answers = {**board.answers, 110: struct.pack("<BHHH", 120, 500, 0, 125)}
     world, _ = found(board)
     world.run(2)
-    power = world.bridge.vehicle.last(Power)
-    assert power is not None
-    assert (power.current_a, power.drawn_mah) == (12.5, 500)
+    battery = world.bridge.group(Group.BATTERY, world.now)
+    assert (battery.current_a, battery.drawn_mah) == (12.5, 500)
