@@ -30,6 +30,7 @@ from protocols.msp.nav import WP_SIZE, NavRecord, encode_read_wp, encode_set_wp
 from service.daemon.daemon import Daemon
 from service.settings import Settings
 from service.settings.addresses import FcAddress, GcsAddress, SerialFc, TcpFc
+from tests.support.inside import inside
 from tests.support.programs import free_port
 
 _COUNT = 120
@@ -125,7 +126,7 @@ async def _push_all(fc: FcAddress, turn: int) -> list[float]:
     daemon = Daemon(Settings(fc, [GcsAddress("udpout", "127.0.0.1", free_port())]))
     running = asyncio.create_task(daemon.run())
     try:
-        while isinstance(daemon.bridge.missions.fc_store, Refusal) or daemon.bridge.is_busy:  # noqa: ASYNC110 - as in push
+        while isinstance(inside(daemon.bridge).missions.fc_store, Refusal) or daemon.bridge.is_busy:  # noqa: ASYNC110 - as in push
             await asyncio.sleep(0.01)
         return [await _push(daemon, _records(turn * _RUNS + run)) for run in range(_RUNS)]
     finally:
@@ -136,12 +137,12 @@ async def _push_all(fc: FcAddress, turn: int) -> list[float]:
 async def _push(daemon: Daemon, records: tuple[NavRecord, ...]) -> float:
     """Push one list; returns the seconds from the first record's frame to the proof of the last."""
     loop = asyncio.get_running_loop()
-    fc_store = daemon.bridge.missions.fc_store
+    fc_store = inside(daemon.bridge).missions.fc_store
     assert not isinstance(fc_store, Refusal)
     proven_at: list[float] = []
     done: asyncio.Future[object] = loop.create_future()
     push = fc_store.push(records, lambda _number: proven_at.append(loop.time()))
-    daemon.bridge.runner.start(push, lambda result, _: done.set_result(result), loop.time())
+    inside(daemon.bridge).runner.start(push, lambda result, _: done.set_result(result), loop.time())
     daemon.flush()
     result = await done
     if len(proven_at) != _COUNT or getattr(result, "failure", True):

@@ -30,6 +30,7 @@ from protocols.msp.mission import RECORD_SIZE, MissionCommand, WpRecord
 from service.daemon.daemon import Daemon
 from service.settings import Settings
 from service.settings.addresses import GcsAddress, SerialFc
+from tests.support.inside import inside
 from tests.support.programs import free_port
 
 _BAUD = 115200
@@ -60,7 +61,7 @@ async def _push_all(link: Path) -> list[float]:
     daemon = Daemon(settings)
     running = asyncio.create_task(daemon.run())
     try:
-        while isinstance(daemon.bridge.missions.fc_store, Refusal):  # noqa: ASYNC110 - only the daemon's log says so
+        while isinstance(inside(daemon.bridge).missions.fc_store, Refusal):  # noqa: ASYNC110 - only the daemon's log says so
             await asyncio.sleep(0.01)
         return [await _push(daemon, _records(seed)) for seed in range(_RUNS)]
     finally:
@@ -77,12 +78,12 @@ def _records(seed: int) -> tuple[WpRecord, ...]:
 async def _push(daemon: Daemon, records: tuple[WpRecord, ...]) -> float:
     """Push one list; returns the seconds from the first CHUNK to the verified checksum."""
     loop = asyncio.get_running_loop()
-    fc_store = daemon.bridge.missions.fc_store
+    fc_store = inside(daemon.bridge).missions.fc_store
     assert not isinstance(fc_store, Refusal)
     begun_at: list[float] = []
     done: asyncio.Future[tuple[PushResult | LinkLost, float]] = loop.create_future()
     push = _noting_first_chunk(fc_store.push(records, lambda _: None), lambda: begun_at.append(loop.time()))
-    daemon.bridge.runner.start(push, lambda result, _: done.set_result((result, loop.time())), loop.time())
+    inside(daemon.bridge).runner.start(push, lambda result, _: done.set_result((result, loop.time())), loop.time())
     daemon.flush()
     result, ended_at = await done
     if isinstance(result, LinkLost) or result.failure or result.unchanged:

@@ -175,7 +175,7 @@ def _noise() -> list[Figure]:
     while not any(isinstance(event, FcFound) for event in events):
         now += 0.01
         bridge.tick(now)
-        for data in bridge.take_fc_output():
+        for data in output.data if (output := bridge.take_fc_output()) else ():
             bridge.fc_received(b"".join(controller.answers(data)), now)
     bridge.gcs_received(ground, _frame(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3)), now, datagram=True)
     events.clear()

@@ -174,7 +174,8 @@ class _Fed:
         # An hour ahead: no timer of the loop runs before its simulated time.
         self._now = asyncio.get_running_loop().time() + 3600
         daemon.bridge.fc_opened(self._now)
-        while daemon.bridge.vehicle.last(Orientation) is None:
+        vehicle = daemon.bridge.vehicle
+        while vehicle.last(Orientation) is None:
             self.step()
 
     def step(self) -> int:
@@ -183,8 +184,8 @@ class _Fed:
         self._now += 0.01
         bridge.tick(self._now)
         # A reply may trigger the next request; flush() would write it to a port that is not open.
-        while output := bridge.take_fc_output():
-            bridge.fc_received(b"".join(self._controller.answers(b"".join(output))), self._now)
+        while (output := bridge.take_fc_output()) and output.data:
+            bridge.fc_received(b"".join(self._controller.answers(b"".join(output.data))), self._now)
         self._daemon.flush()
         return self._controller.asked - before
 

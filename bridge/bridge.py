@@ -11,13 +11,14 @@ An autopilot that speaks MAVLink itself is not represented but passed through, b
     FcSession <-> Routes <-> Ground
 """
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from itertools import count
 from math import inf
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from bridge.config import BridgeConfig, PassThroughRule
+from bridge.counters import Counters
 from bridge.fc.actions import FcActions
 from bridge.fc.profile import FlightController, RuleSettings, Spoken
 from bridge.fc.session import FcSession
@@ -28,12 +29,10 @@ from bridge.gcs.rights import LinkAccess
 from bridge.gcs.routes import Routes
 from bridge.gcs.station import Peer, Severity
 from bridge.line.conversation import StoreEffect
-from bridge.line.msp_link import RoundTrips
 from bridge.line.runner import Runner
 from bridge.missions.mission_service import NO_LINK, EndingListener, HeldMission, MissionService, MissionTransfer
 from bridge.model.events import Armed, Disarmed, Emit
 from bridge.model.refusal import ARMED, Refusal
-from bridge.model.settings import SettingsState
 from bridge.model.vehicle import FlightState, Health, MissionLeg, Readiness
 from bridge.model.vehicle_groups import Group
 from bridge.sharing.msp_sharing import MspSharing
@@ -55,22 +54,15 @@ from protocols.mavlink.frame import MavlinkFrame
 from protocols.mission_item import MissionResult
 
 
-@dataclass(frozen=True, slots=True)
-class Counters:
-    """Since the start; those of the flight controller since it was found, None without MSP."""
+class FcOutput(NamedTuple):
+    """For the flight controller's port: the bytes to write, in order, and the speed it must have, None if it has none.
 
-    ground_stations: int
-    #: Frames of ground stations, by link and message id; damaged ones; refused ones, by link and reason.
-    frames_received: Mapping[tuple[str, int], int]
-    bad_frames: int
-    refused: Mapping[tuple[str, str], int]
-    #: Requests of programs on a share, by reason.
-    refused_by_share: Mapping[str, int]
-    fc_bad_checksums: int
-    fc_requests_lost: int | None
-    fc_round_trips: RoundTrips | None
-    firmware_version: tuple[int, int, int] | None
-    settings: SettingsState | None
+    `may_gather`: so much is read that waiting a little for more saves time.
+    """
+
+    data: Sequence[bytes]
+    speed: int | None
+    may_gather: bool
 
 
 class TimedPart(Protocol):
@@ -85,7 +77,10 @@ class TimedPart(Protocol):
 
 
 class Bridge:
-    """Wires the parts and routes events between them."""
+    """Wires the parts and routes events between them; service/ uses only what is public here.
+
+    After each input, take the output: `take_datagrams`, `take_fc_output`, `store_effects`; then call `tick` at `due`.
+    """
 
     def __init__(
         self,
@@ -98,20 +93,20 @@ class Bridge:
         self._config, owner = config, config.settings
         self._emit = emit
         self._was_armed = False
-        #: True if `take_fc_output` must be called even without `fc_output`.
-        self.has_line_changed = True
+        #: The line's state, speed or polls may have changed since the last `take_fc_output`.
+        self._has_line_changed = True
         self._line_due = now  # of the line itself, as of the last `take_fc_output`
         #: The armed craft, for the BridgeConfig of a restarted bridge; it changes rarely. None: it is not armed.
         self.flight = config.flight
         #: True while an autopilot speaks MAVLink itself: the bridge then sends nothing in its name.
         self.is_passing_through = False
         self._announcer = LinkAnnouncer(
-            self._say, lambda: self.session.state.trouble, now, was_found=self.flight is not None
+            self._say, lambda: self._session.state.trouble, now, was_found=self.flight is not None
         )
         incidents = count(1)
 
         passes_everything = owner.pass_through is PassThroughRule.EVERYTHING
-        self.ground = Ground(
+        ground = self._ground = Ground(
             owner.sysid,
             config.compid,
             emit,
@@ -120,12 +115,12 @@ class Bridge:
             {name: replace(access, passes_everything=passes_everything) for name, access in config.links.items()},
             LinkAccess(passes_everything=passes_everything),
         )
-        self.guard = Guard(emit)
-        self.runner = Runner()
-        self.session = FcSession(
+        self._guard = Guard(emit)
+        runner = self._runner = Runner()
+        session = self._session = FcSession(
             config.speeds,
             config.profiles,
-            self.runner,
+            runner,
             emit,
             incidents,
             self._controller_changed,
@@ -134,171 +129,158 @@ class Bridge:
             config.flight,
         )
         #: Its readings, which are kept when it is lost.
-        self.vehicle = self.session.vehicle
-        #: The requests to the flight controller that were not taken yet.
-        self.fc_output = self.session.output
-        self.missions = MissionService(self.vehicle, self.runner, on_ending)
-        self.local = LocalMissions(self.missions, self.ground, emit, incidents)
-        self.sharing = MspSharing(self.session, self.runner, self.missions, emit, self._say_refused)
-        self._vehicle = OwnVehicle(self.session, self.missions, self.ground, self._announcer, config.unix_time_s, now)
+        self.vehicle = self._session.vehicle
+        missions = self._missions = MissionService(self.vehicle, runner, on_ending)
+        self._local = LocalMissions(missions, ground, emit, incidents)
+        self._sharing = MspSharing(session, runner, missions, emit, self._say_refused)
+        own = self._own_vehicle = OwnVehicle(session, missions, ground, self._announcer, config.unix_time_s, now)
         #: The seal of the flight controller's settings.
-        self.settings = SettingsSeal(
-            self.session, self.missions, self.ground, emit, config.seals, lambda: self.transfer is not None
-        )
-        self.sharing.on_change = self.settings.changed_here
-        self._reporter = VehicleReporter(
-            self.session, self.missions, self.ground, self.settings, self._vehicle.also_want
-        )
-        self._uploads = MissionUploads(self.missions, self.ground, emit, incidents, self._vehicle.let_read)
-        self._watch = MissionWatch(self.missions, self.ground, emit)
-        downloads = MissionDownloads(self.missions, self.ground)
-        self._parameters = Parameters(self.missions, self.ground, owner.sysid)
-        actions = FcActions(self.session, self.missions, self.runner)
-        self._calibration = Calibration(self.ground, self.runner, self._announcer)
-        commands = CommandService(self.ground, self._vehicle, actions, self.session, self._calibration, config.version)
-        router = MessageRouter(self.ground, self._uploads, downloads, self._parameters, commands, self._vehicle)
+        self._settings = SettingsSeal(session, missions, ground, emit, config.seals, lambda: self.transfer is not None)
+        self._sharing.on_change = self._settings.changed_here
+        self._reporter = VehicleReporter(session, missions, ground, self._settings, own.also_want)
+        self._uploads = MissionUploads(missions, ground, emit, incidents, own.let_read)
+        self._watch = MissionWatch(missions, ground, emit)
+        downloads = MissionDownloads(missions, ground)
+        parameters = self._parameters = Parameters(missions, ground, owner.sysid)
+        actions = FcActions(session, missions, runner)
+        self._calibration = Calibration(ground, runner, self._announcer)
+        commands = CommandService(ground, own, actions, session, self._calibration, config.version)
+        router = MessageRouter(ground, self._uploads, downloads, parameters, commands, own)
         self._incoming = Incoming(
-            self.guard,
-            self.ground,
+            self._guard,
+            ground,
             router,
-            self._parameters,
-            self.session.send_mavlink,
+            parameters,
+            session.send_mavlink,
             owner.sysid,
             config.compid,
         )
         #: Served in this order, after the line itself.
         self._parts: tuple[TimedPart, ...] = (
-            self.runner,
-            self.sharing,
+            runner,
+            self._sharing,
             self._uploads,
             self._watch,
-            self.settings,
-            self.ground,
+            self._settings,
+            ground,
             self._announcer,
             self._calibration,
-            self._vehicle,
+            own,
         )
 
-        # The front door: calls that one part answers.
-        self.take_datagrams = self.ground.take_datagrams
-        self.displaced = self.ground.displaced
-        self.add_default_peer, self.remove_default_peer = self.ground.add_default_peer, self.ground.remove_default_peer
-        self.program_joined, self.program_left = self.sharing.join, self.sharing.leave
+        # The front door: calls that one part answers. First the ground stations' side.
+        self.gcs_received, self.take_datagrams = self._incoming.received, ground.take_datagrams
+        self.add_default_peer, self.remove_default_peer = ground.add_default_peer, ground.remove_default_peer
+        self.displaced = ground.displaced
+        #: Other programs, on a share.
+        self.program_joined, self.program_left = self._sharing.join, self._sharing.leave
         #: Requests of the command line, the page and zenoh.
-        self.push, self.pull, self.check = self.local.push, self.local.pull, self.local.check
+        self.push, self.pull, self.check = self._local.push, self._local.pull, self._local.check
         #: The store's work, in order.
-        self.store_effects = self.runner.store_effects
-        self.report, self.group = self._reporter.whole, self._reporter.group
-        self.take_fresh = self._reporter.take_fresh
+        self.store_effects = runner.store_effects
+        self.report, self.group, self.take_fresh = self._reporter.whole, self._reporter.group, self._reporter.take_fresh
 
     # The flight controller's side.
 
     def fc_opened(self, now: float) -> None:
-        self.has_line_changed = True
-        self.session.opened(now)
+        self._has_line_changed = True
+        self._session.opened(now)
 
     def fc_closed(self, now: float, why: str | None) -> None:
         """The port is gone; `why` is None if the bridge closed it itself."""
-        self.has_line_changed = True
-        self.session.closed(now, why)
+        self._has_line_changed = True
+        self._session.closed(now, why)
 
     def fc_received(self, data: bytes, now: float) -> bool:
         """Handle bytes from the port; False if they ended inside a frame and nothing else has changed."""
-        self.has_line_changed = True
-        self.session.received(data, now)
+        self._has_line_changed = True
+        self._session.received(data, now)
         self._follow_line(now)
-        return not self.session.state.is_mid_frame
+        return not self._session.state.is_mid_frame
 
-    def take_fc_output(self) -> list[bytes]:
-        """The bytes to be written to the port at `fc_speed`. Sets when the line itself is due again."""
-        self.has_line_changed = False
-        self._line_due = self.session.state.due
-        output = [*self.fc_output]
-        self.fc_output.clear()
+    def take_fc_output(self) -> FcOutput | None:
+        """The output for the port; None if there is none, as after most data of ground stations."""
+        if not (self._session.output or self._has_line_changed):
+            return None
+        state = self._session.state
+        self._has_line_changed, self._line_due = False, state.due
+        output = FcOutput([*self._session.output], state.speed, self.is_passing_through)
+        self._session.output.clear()
         return output
-
-    @property
-    def fc_speed(self) -> int | None:
-        """The speed that the port must have, baud; None where it has none."""
-        return self.session.state.speed
 
     @property
     def fc_trouble(self) -> str:
         """Why the board cannot be used and what the pilot must do; empty if nothing."""
-        return self.session.state.trouble
+        return self._session.state.trouble
 
     @property
     def is_searching(self) -> bool:
         """True while a port is open and the flight controller is not identified yet."""
-        return self.session.state.is_searching
+        return self._session.state.is_searching
 
     # The ground stations' side.
 
-    def gcs_received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> bool:
-        """Handle bytes from a ground station; False if they are dropped. A datagram holds whole frames only."""
-        return self._incoming.received(peer, data, now, datagram=datagram)
-
     def gcs_gone(self, peer: Peer, now: float) -> None:
         self._uploads.peer_gone(peer, now)
-        self.ground.gone(peer)
+        self._ground.gone(peer)
 
     def link_closed(self, name: str, now: float) -> None:
         """A link is closed, and all ground stations on it are gone."""
-        for peer in self.ground.remove_link(name):
+        for peer in self._ground.remove_link(name):
             self._uploads.peer_gone(peer, now)
 
     def notify(self, text: str) -> None:
         """Show a text to each ground station that connects from now on."""
-        self.ground.notices.append(text)
+        self._ground.notices.append(text)
 
     # Other programs, on a share.
 
     def program_received(self, program: Program, data: bytes, now: float) -> None:
-        self.has_line_changed = True
-        self.sharing.received(program, data, now)
+        self._has_line_changed = True
+        self._sharing.received(program, data, now)
 
     # Missions.
 
     @property
     def held(self) -> HeldMission | None:
         """The flight controller's mission, as last read."""
-        return self.missions.held
+        return self._missions.held
 
     @property
     def others(self) -> tuple[HeldMission, ...]:
-        return self.missions.others
+        return self._missions.others
 
     @property
     def transfer(self) -> MissionTransfer | None:
         """The mission being received or written."""
-        return self.missions.writing or self._uploads.receiving
+        return self._missions.writing or self._uploads.receiving
 
     def stop_missions(self, now: float) -> None:
         """Accept no more transfers. An upload that still receives items ends; a running push continues."""
-        self.missions.close()
-        self.sharing.stop()
+        self._missions.close()
+        self._sharing.stop()
         self._uploads.end(STOPPED, now)
 
     # For metrics, the status and other followers.
 
     def watch(self, groups: Iterable[Group]) -> None:
         """Poll for these groups from now on; `take_fresh` returns the updated ones."""
-        self.has_line_changed = True
+        self._has_line_changed = True
         self._reporter.watch(groups)
 
     def counters(self) -> Counters:
-        state = self.session.state
+        state = self._session.state
         return Counters(
-            ground_stations=len(self.ground.peers()),
-            frames_received=self.ground.frames_received,
-            bad_frames=self.ground.bad_frames,
-            refused=self.guard.refused,
-            refused_by_share=self.sharing.refused,
+            ground_stations=len(self._ground.peers()),
+            frames_received=self._ground.frames_received,
+            bad_frames=self._ground.bad_frames,
+            refused=self._guard.refused,
+            refused_by_share=self._sharing.refused,
             fc_bad_checksums=state.bad_checksums or 0,
             fc_requests_lost=None if state.link is None else state.link.requests_lost,
             fc_round_trips=None if state.link is None else state.link.round_trips,
             firmware_version=self.vehicle.version,
-            settings=self.settings.state,
+            settings=self._settings.state,
         )
 
     # Time.
@@ -306,22 +288,22 @@ class Bridge:
     @property
     def is_busy(self) -> bool:
         """True while a conversation with the flight controller runs or waits."""
-        return self.runner.is_busy
+        return self._runner.is_busy
 
     def restart(self, why: str, now: float) -> None:
         """Recover from a bug: end the running conversation and search for the flight controller again."""
-        self.has_line_changed = True
-        self.runner.reset(now)
-        self.session.restart(why, now)
+        self._has_line_changed = True
+        self._runner.reset(now)
+        self._session.restart(why, now)
 
     def abort(self, now: float) -> None:
         """End the running conversation cleanly."""
-        self.has_line_changed = True
-        self.runner.stop(now)
+        self._has_line_changed = True
+        self._runner.stop(now)
 
     def store_answered(self, effect: StoreEffect, answer: object, now: float) -> None:
-        self.has_line_changed = True
-        self.runner.store_answered(effect, answer, now)
+        self._has_line_changed = True
+        self._runner.store_answered(effect, answer, now)
 
     @property
     def due(self) -> float:
@@ -333,8 +315,8 @@ class Bridge:
         return due
 
     def tick(self, now: float) -> None:
-        self.has_line_changed = True
-        self.session.tick(now)
+        self._has_line_changed = True
+        self._session.tick(now)
         for part in self._parts:
             if now >= part.due:
                 part.tick(now)
@@ -344,25 +326,25 @@ class Bridge:
 
     def _say(self, severity: Severity, text: str) -> None:
         if not self.is_passing_through:
-            self.ground.say(severity, text)
+            self._ground.say(severity, text)
 
     def _say_refused(self, text: str) -> None:
         """A program's request was refused. In flight a warning would cover what concerns the craft."""
-        self.ground.say(Severity.NOTICE if self.vehicle.armed else Severity.WARNING, text)
+        self._ground.say(Severity.NOTICE if self.vehicle.armed else Severity.WARNING, text)
 
     def _newcomer(self, station: GroundStation, now: float) -> None:
         if not self.is_passing_through:
-            self._vehicle.newcomer(station, now)
+            self._own_vehicle.newcomer(station, now)
 
     def _controller_changed(self, controller: FlightController | None, now: float) -> None:
         self.is_passing_through = controller is not None and controller.profile.spoken is Spoken.OTHER_MAVLINK
-        self._incoming.routes = Routes(self.ground) if self.is_passing_through else None
+        self._incoming.routes = Routes(self._ground) if self.is_passing_through else None
         # A passed-through autopilot represents itself.
-        self._vehicle.due = inf if self.is_passing_through else min(self._vehicle.due, now)
-        self.settings.found(controller, now)
+        self._own_vehicle.due = inf if self.is_passing_through else min(self._own_vehicle.due, now)
+        self._settings.found(controller, now)
         if controller is None:
-            trouble = self.session.state.trouble
-            self.missions.use(Refusal(MissionResult.DENIED, trouble) if trouble else NO_LINK, now, is_same_board=True)
+            trouble = self._session.state.trouble
+            self._missions.use(Refusal(MissionResult.DENIED, trouble) if trouble else NO_LINK, now, is_same_board=True)
             self._uploads.end(FC_LOST, now)
             self._announcer.lost(now if self.vehicle.heard_at is None else self.vehicle.heard_at)
             return
@@ -370,7 +352,7 @@ class Bridge:
         rules = RuleSettings(self._config.settings.takeoff_max_m)
         store = missions if isinstance(missions, Refusal) else missions(controller, self.vehicle, rules)
         # On a port that was opened since, an armed board may be another one.
-        self.missions.use(store, now, is_same_board=self.session.met_family == controller.profile.family)
+        self._missions.use(store, now, is_same_board=self._session.met_family == controller.profile.family)
         self._announcer.found(controller, now)
         self._calibration.controller_found(now)
         if not isinstance(store, Refusal):
@@ -385,27 +367,27 @@ class Bridge:
         """Pass on new readings, and serve programs, which may use the line when no poll is due."""
         is_watched = self._reporter.watched
         if is_watched:
-            self.session.settle_telemetry()
+            self._session.settle_telemetry()
         if self.vehicle.news:
             news, self.vehicle.news = self.vehicle.news, set()
             if is_watched:
                 self._reporter.heard(news, now)
             if not self.is_passing_through:
-                self._vehicle.heard(news, now)
+                self._own_vehicle.heard(news, now)
                 if Health in news or Readiness in news:
                     self._parameters.follow()
             if MissionLeg in news and (leg := self.vehicle.last(MissionLeg)) is not None:
-                self.missions.follow(leg.status)
+                self._missions.follow(leg.status)
             if FlightState in news:
                 self._follow_arming(now)
                 self._remember_flight(now)
-        if self.sharing.due < inf:
-            self.sharing.tick(now)
+        if self._sharing.due < inf:
+            self._sharing.tick(now)
 
     def _remember_flight(self, now: float) -> None:
         if self.vehicle.armed is None or self.is_passing_through:
             return
-        before, memory = self.flight, self.session.flight_memory(now)
+        before, memory = self.flight, self._session.flight_memory(now)
         if before is None or memory is None or replace(memory, made_at=before.made_at, mode=before.mode) != before:
             self.flight = memory
 
@@ -418,6 +400,6 @@ class Bridge:
         if armed and self._uploads.due < inf:
             self._uploads.end(ARMED, now)
         if armed:
-            self.settings.armed()
-        self.ground.record_flight(on=armed and not self.is_passing_through)
+            self._settings.armed()
+        self._ground.record_flight(on=armed and not self.is_passing_through)
         self._emit(Armed() if armed else Disarmed())

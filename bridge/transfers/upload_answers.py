@@ -54,7 +54,7 @@ class UploadAnswers:
     that the pilot must read.
     """
 
-    def __init__(self, ground: Ground, let_read: Callable[[Peer], None]) -> None:
+    def __init__(self, ground: Ground, let_read: Callable[[Peer, float], None]) -> None:
         self._ground = ground
         self._let_read = let_read
         self._answers: dict[Station, _Answer] = {}  # oldest first
@@ -89,7 +89,7 @@ class UploadAnswers:
             self._forget_strangers()
         self._ground.mission_ack(station, ack, mission_type)
 
-    def report(self, station: Station, verdict: Verdict[Any], delivery: DeliveryResult) -> None:
+    def report(self, station: Station, verdict: Verdict[Any], delivery: DeliveryResult, now: float) -> None:
         """Report everything to the sender, and the change on the aircraft to other ground stations.
 
         The summary is last, and the only warning: Mission Planner shows the last one, and its voice says the first.
@@ -109,7 +109,7 @@ class UploadAnswers:
             severity = Severity.WARNING
         self._ground.say(severity, delivery.text, station)
         if severity is not Severity.INFO:
-            self._let_read(station.peer)
+            self._let_read(station.peer, now)
         if delivery.change:
             severity = Severity.WARNING if verdict.result is Result.CLEARED else Severity.INFO
             self._ground.say_to_others(severity, f"{delivery.change}, by {station.peer}", station)

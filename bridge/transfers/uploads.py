@@ -70,7 +70,7 @@ class MissionUploads:
         ground: Ground,
         emit: Emit,
         incidents: Iterator[int],
-        let_read: Callable[[Peer], None],
+        let_read: Callable[[Peer, float], None],
     ) -> None:
         self._missions = missions
         self._ground = ground
@@ -314,7 +314,7 @@ class MissionUploads:
         accepted = delivery.ack is MissionResult.ACCEPTED
         if verdict.result is not Result.REJECTED and accepted and not delivery.change:
             self._ground.not_written(upload.station)
-        self.answers.report(upload.station, verdict, delivery)
+        self.answers.report(upload.station, verdict, delivery, now)
         if upload in self._queue.uploads:
             self._answer(upload, delivery.ack, now)
             self._handle(upload, Delivered(), now)
@@ -337,7 +337,7 @@ class MissionUploads:
             whole = WholeList(items, Verdict(Result.REJECTED, refusal.ack, findings=(finding,)))
             self._missions.run(self._delivery(upload, whole), lambda _result, _at: None, now)
         self._ground.say(Severity.ERROR, refusal.text, upload.station)
-        self._let_read(upload.station.peer)
+        self._let_read(upload.station.peer, now)
         self._answer(upload, refusal.ack, now)
         if items and upload.state.seems_written:
             self.answers.remind(upload.station, refusal.text, now)

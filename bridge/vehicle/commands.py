@@ -108,7 +108,7 @@ class CommandService:
             sender.uses_commands = True
         action = _action(command, params)
         if action is None:
-            self._acknowledge(station, command, self._do(station, command, params))
+            self._acknowledge(station, command, self._do(station, command, params, now))
         elif action in (self._actions.present, self._calibration.action):
             # Repeated by the user or duplicated by the network.
             self._acknowledge(station, command, CommandResult.IN_PROGRESS)
@@ -143,12 +143,12 @@ class CommandService:
             self._acknowledge(station, command, result)
         self._calibration.begin(station, command, action, now, restarts=outcome is ActionResult.FREEZES)
 
-    def _do(self, station: Station, command: int, params: Sequence[float]) -> CommandResult:
+    def _do(self, station: Station, command: int, params: Sequence[float], now: float) -> CommandResult:
         match command:
             case messages.MAV_CMD_REQUEST_MESSAGE if params[0] == messages.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
                 return self._tell_interval(station, _msgid(params[1]))
             case messages.MAV_CMD_REQUEST_MESSAGE:
-                return self._send_once(station, _msgid(params[0]), max(_msgid(params[1]), 0))
+                return self._send_once(station, _msgid(params[0]), now, max(_msgid(params[1]), 0))
             case messages.MAV_CMD_SET_MESSAGE_INTERVAL:
                 return self._set_interval(station, _msgid(params[0]), params[1])
             case messages.MAV_CMD_GET_MESSAGE_INTERVAL:
@@ -157,7 +157,7 @@ class CommandService:
                 controller = self._session.state.controller
                 name = "no flight controller" if controller is None else controller.name
                 self._ground.say(Severity.INFO, f"naze-bridge {self._version}: {name}", station)
-                self._vehicle.send_once(station, messages.MAVLINK_MSG_ID_HOME_POSITION)
+                self._vehicle.send_once(station, messages.MAVLINK_MSG_ID_HOME_POSITION, now)
                 return CommandResult.ACCEPTED
             case messages.MAV_CMD_PREFLIGHT_STORAGE if params[0] == 1:
                 # Mission Planner sends it 10 s after any PARAM_SET, also in flight. Every change is written at once.
@@ -177,14 +177,14 @@ class CommandService:
                 self._ground.say(Severity.ERROR, _AT_START, station)
                 return CommandResult.DENIED
         if command in _ASKS_FOR:
-            return self._send_once(station, _ASKS_FOR[command])
+            return self._send_once(station, _ASKS_FOR[command], now)
         if command in _REFUSED:
             self.refuse(station, command)
             return CommandResult.DENIED
         return CommandResult.UNSUPPORTED
 
-    def _send_once(self, station: Station, msgid: int, index: int = 0) -> CommandResult:
-        is_known = self._vehicle.send_once(station, msgid, index)
+    def _send_once(self, station: Station, msgid: int, now: float, index: int = 0) -> CommandResult:
+        is_known = self._vehicle.send_once(station, msgid, now, index)
         if is_known is None:
             return CommandResult.UNSUPPORTED
         return CommandResult.ACCEPTED if is_known else CommandResult.TEMPORARILY_REJECTED

@@ -92,8 +92,8 @@ class MessageRouter:
             ),
             m.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: self._data_stream,
             m.MAVLINK_MSG_ID_SET_MODE: lambda s, _msg, _now: commands.refuse(s, m.MAV_CMD_DO_SET_MODE),
-            m.MAVLINK_MSG_ID_AUTOPILOT_VERSION_REQUEST: lambda s, _msg, _now: vehicle.send_once(
-                s, m.MAVLINK_MSG_ID_AUTOPILOT_VERSION
+            m.MAVLINK_MSG_ID_AUTOPILOT_VERSION_REQUEST: lambda s, _msg, now: vehicle.send_once(
+                s, m.MAVLINK_MSG_ID_AUTOPILOT_VERSION, now
             ),
             m.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: lambda s, _msg, _now: parameters.send_all(s),
             m.MAVLINK_MSG_ID_PARAM_REQUEST_READ: lambda s, msg, _: parameters.send_one(

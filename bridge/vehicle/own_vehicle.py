@@ -6,6 +6,7 @@ same vehicle.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from functools import partial
 from math import inf
 
 from bridge.fc.msp_telemetry import POLL_FOR
@@ -69,7 +70,7 @@ class OwnVehicle:
         self._announcer = announcer
         self.arming_reasons = ArmingReasons(session, announcer, ground)
         self._unix_time_s = unix_time_s
-        self._started_at = self._now = now
+        self._started_at = now
         #: The time of the next `tick`.
         self.due = self._second_ends = now
         #: The messages that any ground station wants, by the reading that triggers them.
@@ -87,11 +88,10 @@ class OwnVehicle:
         station.greeted_until, station.is_informed = now + _NEWCOMER_S, False
         self._newcomers_due = min(self._newcomers_due, now + _NEWCOMER_INTERVAL_S)
         self.due = min(self.due, self._newcomers_due)
-        self._ground.beat(self._heartbeat(), [station])
+        self._ground.beat(self._heartbeat(now), [station])
         self._follow_requests()
 
     def tick(self, now: float) -> None:
-        self._now = now
         if now >= self._newcomers_due:
             self._greet(now)
         if now >= self._second_ends:
@@ -108,24 +108,24 @@ class OwnVehicle:
         self._set_polls(everyone)
         self._polls_set_at = now
         self.arming_reasons.follow(now)
-        self._ground.beat(self._heartbeat(), everyone)
-        self._send_due(self._rows.get(None, ()))
+        self._ground.beat(self._heartbeat(now), everyone)
+        self._send_due(self._rows.get(None, ()), now)
         if self._session.vehicle.fresh(Health, now, _SILENT_S) is None:
             # No reading triggers it now: the flight controller is lost, or sends FrSky telemetry.
-            self._send_due((_SYS_STATUS,))
-        self._announce_home()
-        self._inform_newcomers(everyone)
+            self._send_due((_SYS_STATUS,), now)
+        self._announce_home(now)
+        self._inform_newcomers(everyone, now)
 
     def _greet(self, now: float) -> None:
         """Of a crowd, greet a few: the others get a heartbeat a second."""
         newcomers = [station for station in self._ground.everyone() if now < station.greeted_until][:SEATS]
         self._newcomers_due = now + _NEWCOMER_INTERVAL_S if newcomers else inf
-        self._ground.beat(self._heartbeat(), newcomers)
+        self._ground.beat(self._heartbeat(now), newcomers)
 
-    def _inform_newcomers(self, everyone: Sequence[GroundStation]) -> None:
+    def _inform_newcomers(self, everyone: Sequence[GroundStation], now: float) -> None:
         """Tell home and the reasons not to arm: to a crowd, each second to some."""
         newcomers = [station for station in everyone if not station.is_informed][:SEATS]
-        for message in self._moment().made((make.home_position,)) if newcomers else ():
+        for message in self._moment(now).made((make.home_position,)) if newcomers else ():
             self._ground.multicast(pack(message), newcomers)
         for station in newcomers:
             station.is_informed = True
@@ -134,26 +134,25 @@ class OwnVehicle:
 
     def heard(self, news: Collection[type[Reading]], now: float) -> None:
         """Send the messages that new readings trigger, where due."""
-        self._now = now
         if Readiness in news or FlightState in news:
             self.arming_reasons.follow(now)
         for reading in news:
             if rows := self._rows.get(reading):
-                self._send_due(rows)
+                self._send_due(rows, now)
         if MissionLeg in news:
-            self._follow_mission()
+            self._follow_mission(now)
         if FlightState in news or Mode in news:
-            self._follow_state()
+            self._follow_state(now)
 
-    def _send_due(self, rows: Iterable[Row]) -> None:
+    def _send_due(self, rows: Iterable[Row], now: float) -> None:
         everyone = self._ground.everyone()
         at: Moment | None = None
         for row in rows:
-            stations = take_due(everyone, row.msgid, row.interval_s, self._now)
+            stations = take_due(everyone, row.msgid, row.interval_s, now)
             if stations and row.msgid == messages.MAVLINK_MSG_ID_MISSION_CURRENT:
-                self._send_current(stations)
+                self._send_current(stations, now)
             elif stations:
-                at = at or self._moment()
+                at = at or self._moment(now)
                 for message in at.made(row.makers):
                     self._ground.multicast(pack(message), stations)
 
@@ -164,7 +163,7 @@ class OwnVehicle:
 
     # Requests of ground stations.
 
-    def send_once(self, station: Station, msgid: int, index: int = 0) -> bool | None:
+    def send_once(self, station: Station, msgid: int, now: float, index: int = 0) -> bool | None:
         """Send one message to a ground station; False: its values are unknown, None: no such message.
 
         `index`: of the flight mode in AVAILABLE_MODES, from 1; 0: all.
@@ -176,9 +175,9 @@ class OwnVehicle:
                 return None
         elif msgid == messages.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
             # A restarted station would otherwise show home at 0, 0.
-            made = [make.autopilot_version(self._session.vehicle), *self._moment().made((make.home_position,))]
+            made = [make.autopilot_version(self._session.vehicle), *self._moment(now).made((make.home_position,))]
         elif (row := _ROWS.get(msgid)) is not None:
-            made = self._moment(self._sent_seqs(self._ground.station(station.peer))).made(row.makers)
+            made = self._moment(now, self._sent_seqs(self._ground.station(station.peer))).made(row.makers)
         else:
             return None
         for message in made:
@@ -202,18 +201,18 @@ class OwnVehicle:
         """
         sender = self._ground.station(station.peer)
         if sender is not None and sender.uses_streams:
-            self.send_once(station, messages.MAVLINK_MSG_ID_MISSION_CURRENT)
+            self.send_once(station, messages.MAVLINK_MSG_ID_MISSION_CURRENT, now)
         elif sender is not None:
             sender.rates.due[messages.MAVLINK_MSG_ID_MISSION_CURRENT] = now + _NO_CURRENT_S
 
-    def let_read(self, peer: Peer) -> None:
+    def let_read(self, peer: Peer, now: float) -> None:
         """Withhold SYS_STATUS from a ground station for as long as Mission Planner shows a text, while disarmed.
 
         An unhealthy sensor, indoors always the GPS, would replace the text after half a second.
         """
         station = self._ground.station(peer)
         if station is not None and not self._session.vehicle.armed:
-            station.rates.due[messages.MAVLINK_MSG_ID_SYS_STATUS] = self._now + _SHOWN_S
+            station.rates.due[messages.MAVLINK_MSG_ID_SYS_STATUS] = now + _SHOWN_S
 
     def set_stream(self, peer: Peer, stream: int, interval_s: float) -> None:
         """Set the interval of all messages of one of ArduPilot's streams."""
@@ -258,31 +257,31 @@ class OwnVehicle:
         is_polled = self._session.state.link is not None
         self._session.vehicle.stale_s = _stale_ages_s(polls.line_interval_s) if is_polled else {}
 
-    def _moment(self, sent_seqs: SentSeqs = ()) -> Moment:
-        boot_ms = int((self._now - self._started_at) * 1000) & 0xFFFFFFFF
+    def _moment(self, now: float, sent_seqs: SentSeqs = ()) -> Moment:
+        boot_ms = int((now - self._started_at) * 1000) & 0xFFFFFFFF
         return Moment(
             self._session.vehicle,
-            self._now,
+            now,
             boot_ms,
-            self._flown_mission,
+            partial(self._flown_mission, now),
             self._unix_time_s,
             sent_seqs,
             self._announcer.is_lost,
             self.arming_reasons.current,
         )
 
-    def _flown_mission(self) -> FlownMission:
+    def _flown_mission(self, now: float) -> FlownMission:
         held = self._missions.held
         if held is None:
             return FlownMission()
         if not held.items:
             return FlownMission(held.items, 0, Progress.NO_MISSION)
         vehicle = self._session.vehicle
-        if vehicle.last(MissionLeg) is not None and vehicle.fresh(MissionLeg, self._now) is None:
+        if vehicle.last(MissionLeg) is not None and vehicle.fresh(MissionLeg, now) is None:
             return FlownMission(held.items)
         return FlownMission(held.items, self._missions.seq_of(self._progress.number), self._progress.progress)
 
-    def _follow_state(self) -> None:
+    def _follow_state(self, now: float) -> None:
         """Send a heartbeat as soon as something in it has changed; report the failsafe."""
         state = self._session.vehicle.last(FlightState)
         if state is None:
@@ -297,28 +296,28 @@ class OwnVehicle:
             self._ground.say(Severity.CRITICAL, "Failsafe: the flight controller has taken over")
         elif was_failsafe and not state.is_failsafe and state.armed:
             self._ground.say(Severity.NOTICE, "Failsafe ended: the pilot has control")
-        self._ground.broadcast(self._heartbeat())
+        self._ground.broadcast(self._heartbeat(now))
 
-    def _heartbeat(self) -> Message:
-        return make.heartbeat(self._moment())
+    def _heartbeat(self, now: float) -> Message:
+        return make.heartbeat(self._moment(now))
 
-    def _follow_mission(self) -> None:
+    def _follow_mission(self, now: float) -> None:
         """Report a reached waypoint and the next one at once."""
         leg = self._session.vehicle.last(MissionLeg)
         before = self._progress.number, self._progress.progress
         reached = None if leg is None else self._progress.take(leg.status)
         everyone = self._ground.everyone()
         if before != (self._progress.number, self._progress.progress):
-            self._send_current(everyone)
+            self._send_current(everyone, now)
         seq = self._missions.seq_of(reached or 0)
         if seq:
             for sent_seqs, stations in self._by_item_numbers(everyone):
                 number = (sent_seqs[seq] or 0) if sent_seqs else seq
                 self._ground.multicast(pack(make.mission_item_reached(number)), stations)
 
-    def _send_current(self, receivers: Sequence[GroundStation]) -> None:
+    def _send_current(self, receivers: Sequence[GroundStation], now: float) -> None:
         for sent_seqs, stations in self._by_item_numbers(receivers):
-            self._ground.multicast(pack(make.mission_current(self._moment(sent_seqs))), stations)
+            self._ground.multicast(pack(make.mission_current(self._moment(now, sent_seqs))), stations)
 
     def _by_item_numbers(self, stations: Sequence[GroundStation]) -> Iterable[tuple[SentSeqs, Sequence[GroundStation]]]:
         """The stations that count the items alike; () stands for the numbers of the list as read back."""
@@ -338,12 +337,12 @@ class OwnVehicle:
         known = (held.sent_seqs.get(sender.identity) for sender in station.senders())
         return next(filter(None, known), ())
 
-    def _announce_home(self) -> None:
+    def _announce_home(self, now: float) -> None:
         """Broadcast HOME_POSITION whenever it changes; it can also be requested at any time."""
         home = self._session.vehicle.home
         if home == self._announced_home:
             return
-        for message in self._moment().made((make.home_position,)):
+        for message in self._moment(now).made((make.home_position,)):
             self._announced_home = home
             self._ground.broadcast(message)
 

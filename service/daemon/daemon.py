@@ -168,8 +168,8 @@ class Daemon:
         """Carry out the outputs that the bridge has after an input."""
         bridge = self.bridge
         self._forward()  # first: telemetry is shown without delay
-        if bridge.has_line_changed or bridge.fc_output:
-            self.fc.carry_out()
+        if (output := bridge.take_fc_output()) is not None:
+            self.fc.carry_out(output)
         while effects := bridge.store_effects:
             self._carry_out(effects.popleft())
         if bridge.flight is not self._flight.saved:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import structlog
 
-from bridge.bridge import Bridge
+from bridge.bridge import Bridge, FcOutput
 from bridge.model.events import BridgeEvent, FcFound, FcInCommandLine, FcLost, PortLost
 from protocols.uart_capture import UartAction
 from service.links.fc_device import device_opener
@@ -100,15 +100,13 @@ class FcConnection:
         if self.capture is not None:
             self.capture.close()
 
-    def carry_out(self) -> None:
-        bridge = self._bridge
-        speed = bridge.fc_speed
-        if speed != self._speed:
-            self._speed = speed
-            self._port.set_speed(speed)
-        self._port.may_gather = bridge.is_passing_through
-        if output := bridge.take_fc_output():
-            data = b"".join(output)
+    def carry_out(self, output: FcOutput) -> None:
+        if output.speed != self._speed:
+            self._speed = output.speed
+            self._port.set_speed(output.speed)
+        self._port.may_gather = output.may_gather
+        if output.data:
+            data = b"".join(output.data)
             if self.capture is not None:
                 self.capture.note(UartAction.WRITE, self._speed, data)
             self._port.write(data)

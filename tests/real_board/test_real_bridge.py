@@ -86,21 +86,21 @@ def test_arming_into_mavlink_on_a_slow_line(image: Image, flash: bytes, figure: 
     bench = RealBench(image, flash)
     bench.configure(tele_prot=tele_prot, serial_baudrate=_SLOW_BAUD)
     world = World(peer=EmulatedNaze(image, flash=memoryview(bytearray(bench.flash))))
-    world.wait_until(lambda w: isinstance(w.bridge.session.state, Identifying), _FOUND_WITHIN_S + _LONGEST_SEARCH_S)
+    world.wait_until(lambda w: isinstance(w.inside.session.state, Identifying), _FOUND_WITHIN_S + _LONGEST_SEARCH_S)
     world.naze.faults.armed = True
     world.wait_until(lambda w: w.naze.armed, _STICKS_S)
     at_arming = world.now
     world.wait_until(
-        lambda w: isinstance(w.bridge.session.state, HarakiriMavlink) and w.bridge.vehicle.armed is True,
+        lambda w: isinstance(w.inside.session.state, HarakiriMavlink) and w.bridge.vehicle.armed is True,
         _FOUND_WITHIN_S,
     )
     found_s = world.now - at_arming
     world.run(_FLIGHT_S)
-    assert isinstance(world.bridge.session.state, HarakiriMavlink)
+    assert isinstance(world.inside.session.state, HarakiriMavlink)
     world.naze.faults.armed = False
     world.wait_until(lambda w: not w.naze.armed, _STICKS_S)
     back_s = world.wait_until(
-        lambda w: isinstance(w.bridge.session.state, Polling) and w.bridge.vehicle.armed is False,
+        lambda w: isinstance(w.inside.session.state, Polling) and w.bridge.vehicle.armed is False,
         _FOUND_WITHIN_S,
     )
     figure(f"armed at {_SLOW_BAUD} baud with tele_prot {tele_prot}", f"found in {found_s:.1f} s, MSP in {back_s:.1f} s")
@@ -119,7 +119,7 @@ def test_the_mission_is_readable_while_armed(image: Image, flash: bytes, figure:
     world.wait_until(lambda w: w.is_found and w.bridge.vehicle.armed is True, _FOUND_WITHIN_S)
     world.run(_SETTLED_S)
     if tele_prot == 0:
-        world.bridge.missions.held = None
+        world.inside.missions.held = None
     operations, began = world.naze.flash_operations, world.now
     download = Download(GroundStation(world, "reader", sysid=254))
     items = download.run()
@@ -140,10 +140,10 @@ def test_the_cli_is_recognised_and_left_alone(world: World, station: GroundStati
     world.run(_SETTLED_S)
     world.naze.receive(b"\r\r\r", world.now)
     began = world.now
-    world.wait_until(lambda w: isinstance(w.bridge.session.state, Cli), 5)
+    world.wait_until(lambda w: isinstance(w.inside.session.state, Cli), 5)
     figure("its command line is recognised", f"after {world.now - began:.2f} s")
     world.run(8)
-    assert isinstance(world.bridge.session.state, Cli)
+    assert isinstance(world.inside.session.state, Cli)
     assert Upload(station, _OLD).run() is MissionResult.DENIED
     # On the tree Webstore1 the first one is appended to the bridge's requests.
     for _ in range(2):

@@ -21,7 +21,7 @@ def test_reading_a_stored_list_does_not_overflow_the_send_ring(after_s: float) -
         world.run(after_s)
         world.faults.armed = True
         world.run(6)
-        assert world.bridge.session.state.speed == 9600
+        assert world.inside.session.state.speed == 9600
         assert world.naze.counters.tx_overflows == 0
         world.faults.armed = False
         world.run(5)

@@ -97,4 +97,4 @@ def test_a_damaged_capture_does_not_stop_the_bridge(name: str, data: st.DataObje
     player = CapturePlayer(read_capture(b"".join(part[at:] + part[:at])))
     world = World(peer=player)
     world.run(player.duration_s + 5)
-    assert not isinstance(world.bridge.session.state, Closed)
+    assert not isinstance(world.inside.session.state, Closed)

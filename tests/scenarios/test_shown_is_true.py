@@ -189,7 +189,7 @@ def on_the_ground(board: str | TelemetryProtocol) -> Screen:
 
 
 def is_found(world: World) -> bool:
-    return world.bridge.session.state.controller is not None
+    return world.inside.session.state.controller is not None
 
 
 def arm(screen: Screen) -> None:

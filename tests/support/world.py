@@ -49,6 +49,7 @@ from simulator.board.line import garble
 from simulator.board.options import Faults, SimOptions
 from simulator.naze.board import SimulatedNaze
 from simulator.naze.mission_slots import MissionSlots, flash_size, slot_pages
+from tests.support.inside import Inside
 
 #: Limit on waiting conversations: a flood of requests must not fill the bridge's memory.
 MAX_QUEUED = 12
@@ -233,7 +234,7 @@ class World:
     def wait_until(self, done: "Callable[[World], bool]", seconds: float) -> float:
         """Like `run_until`, but fail on timeout; return the elapsed time."""
         began = self.now
-        assert self.run_until(done, seconds), f"not within {seconds} s, state {self.bridge.session.state}"
+        assert self.run_until(done, seconds), f"not within {seconds} s, state {self.inside.session.state}"
         return self.now - began
 
     def wait_ready(self, seconds: float = 20.0) -> float:
@@ -266,13 +267,17 @@ class World:
     # State for tests.
 
     @property
+    def inside(self) -> Inside:
+        return Inside(self.bridge)
+
+    @property
     def kind(self) -> Profile | None:
-        controller = self.bridge.session.state.controller
+        controller = self.inside.session.state.controller
         return None if controller is None else controller.profile
 
     @property
     def is_found(self) -> bool:
-        return isinstance(self.bridge.session.state, Polling | MavlinkLine)
+        return isinstance(self.inside.session.state, Polling | MavlinkLine)
 
     @property
     def stored(self) -> tuple[WpRecord, ...]:
@@ -302,14 +307,14 @@ class World:
         self.now = max(self.now, wanted)
         data = self.naze.advance(self.now)
         if data and self._plugged:
-            speed = self.bridge.session.state.speed
+            speed = self.inside.session.state.speed
             received = garble(data, self.naze.baud, speed) if speed else data
             if received:
                 self.bridge.fc_received(received, self.now)
                 self._flush()
         while self._events and self._events[0][0] <= self.now:
             heapq.heappop(self._events)[2]()
-        assert len(self.bridge.runner._queue) <= MAX_QUEUED
+        assert len(self.inside.runner._queue) <= MAX_QUEUED
         if self.bridge.due + self._lateness_s > self.now:
             return
         self._lateness_s = self.random.random() * self._late_s
@@ -319,13 +324,13 @@ class World:
             self.bridge.tick(self.now)
             self._flush()
         else:
-            raise AssertionError(f"the bridge spins at {self.now}: {self.bridge.session.state}")
+            raise AssertionError(f"the bridge spins at {self.now}: {self.inside.session.state}")
 
     def _flush(self) -> None:
-        if self.bridge.has_line_changed or self.bridge.fc_output:
-            for data in self.bridge.take_fc_output():
+        if (output := self.bridge.take_fc_output()) is not None:
+            for data in output.data:
                 self._write(data)
-        assert self.bridge.due <= self.bridge.session.state.due, "the line is due before the bridge"
+        assert self.bridge.due <= self.inside.session.state.due, "the line is due before the bridge"
         for peer, frame in self.bridge.take_datagrams():
             station = self.stations.get(peer)
             if station is not None:
@@ -344,7 +349,7 @@ class World:
             (sent,) = MavlinkSplitter().feed(data)
             assert sent.raw == data
         else:
-            rubbed_out = b"\x7f" if isinstance(self.bridge.session.state, Cli) else b""
+            rubbed_out = b"\x7f" if isinstance(self.inside.session.state, Cli) else b""
             frames = MspParser().feed(data)
             assert b"".join(frame.encode() for frame in frames) == data.rstrip(rubbed_out), (
                 f"not whole frames: {data.hex()}"
@@ -352,13 +357,13 @@ class World:
             assert is_clean(data) or self.kind in (inav.PROFILE, multiwii.PROFILE), data.hex()
             for frame in frames:
                 self._assert_has_right(frame)
-        speed = self.bridge.session.state.speed
+        speed = self.inside.session.state.speed
         self.written.append((self.now, speed, data))
         self.naze.receive(garble(data, speed, self.naze.baud) if speed else data, self.now)
 
     def _assert_has_right(self, frame: MspFrame) -> None:
         """A board is asked what its kind is only as far as that is known."""
-        controller = self.bridge.session.state.controller
+        controller = self.inside.session.state.controller
         boards = Firmware if controller is None else (controller.firmware,)
         effects = {msp_right(firmware, frame.command, frame.payload).effect for firmware in boards}
         assert effects & ({Effect.READ} if controller is None else {Effect.READ, Effect.CHANGE}), (boards, frame)

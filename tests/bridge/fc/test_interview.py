@@ -26,13 +26,13 @@ MOMENTS = 12
 def begun(baud: int, protocol: TelemetryProtocol) -> World:
     """A world in which identification has just begun."""
     world = World(SimOptions(baud=baud, tele_prot=protocol))
-    world.wait_until(lambda w: isinstance(w.bridge.session.state, Identifying), 20)
+    world.wait_until(lambda w: isinstance(w.inside.session.state, Identifying), 20)
     return world
 
 
 @cache
 def identification_s(baud: int, protocol: TelemetryProtocol) -> float:
-    return begun(baud, protocol).wait_until(lambda w: not w.bridge.session.state.is_searching, 20)
+    return begun(baud, protocol).wait_until(lambda w: not w.inside.session.state.is_searching, 20)
 
 
 def identifying(baud: int, seed: int, protocol: TelemetryProtocol = TelemetryProtocol.MSP) -> World:
@@ -40,12 +40,12 @@ def identifying(baud: int, seed: int, protocol: TelemetryProtocol = TelemetryPro
     world = begun(baud, protocol)
     if seed:
         world.run(identification_s(baud, protocol) * random.Random(seed).random())
-    assert isinstance(world.bridge.session.state, Identifying)
+    assert isinstance(world.inside.session.state, Identifying)
     return world
 
 
 def is_known(world: World) -> bool:
-    return world.bridge.session.state.controller is not None
+    return world.inside.session.state.controller is not None
 
 
 @pytest.mark.parametrize("baud", ALL_SPEEDS)

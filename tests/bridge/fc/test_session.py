@@ -44,8 +44,8 @@ def world_of(state: type[State]) -> World:
 )
 def test_a_bug_in_any_state_starts_a_new_search(state: type[State]) -> None:
     world = world_of(state)
-    world.wait_until(lambda w: type(w.bridge.session.state) is state, 30)
-    broken = world.bridge.session.state
+    world.wait_until(lambda w: type(w.inside.session.state) is state, 30)
+    broken = world.inside.session.state
 
     def bug(*_args: object) -> None:
         raise BugError
@@ -54,5 +54,5 @@ def test_a_bug_in_any_state_starts_a_new_search(state: type[State]) -> None:
     with pytest.raises(BugError):
         world.run(30)
     world.bridge.restart("internal error", world.now)
-    assert isinstance(world.bridge.session.state, Searching)
-    world.wait_until(lambda w: w.bridge.session.state is not broken and type(w.bridge.session.state) is state, 30)
+    assert isinstance(world.inside.session.state, Searching)
+    world.wait_until(lambda w: w.inside.session.state is not broken and type(w.inside.session.state) is state, 30)

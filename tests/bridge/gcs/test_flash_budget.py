@@ -134,7 +134,7 @@ def writes_left(world: World, station: GroundStation) -> int:
     for _ in range(4):  # to get a seat
         station.send(HELLO)
         world.run(1)
-    return sum(world.bridge.ground.allows_write(at(station), world.now) for _ in range(500))
+    return sum(world.inside.ground.allows_write(at(station), world.now) for _ in range(500))
 
 
 def test_an_unchanged_list_is_not_counted() -> None:
@@ -177,7 +177,7 @@ def test_the_pilots_list_precedes_those_of_frequent_writers(hosts: int, lists: i
     for station in strangers:
         write(station)
     # All want to write their second list, in a queue of several seconds.
-    world.wait_until(lambda world: all(0 < world.bridge.ground.wrote_at(at(each)) < inf for each in strangers), 30)
+    world.wait_until(lambda world: all(0 < world.inside.ground.wrote_at(at(each)) < inf for each in strangers), 30)
     for seed in range(-lists, 0):
         began = world.now
         assert Upload(pilot, waypoints(20, seed), repeat_s=0.7).run(5) is MissionResult.ACCEPTED

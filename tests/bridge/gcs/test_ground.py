@@ -137,7 +137,7 @@ def test_a_station_silent_for_a_minute_gets_no_more_messages() -> None:
     station.take()
     world.run(5)
     assert station.received == []
-    assert world.bridge.ground.peers() == []
+    assert world.inside.ground.peers() == []
     station.send(gcs_heartbeat())
     world.run(2)
     assert station.messages("HEARTBEAT")
@@ -196,7 +196,7 @@ def test_hundreds_of_strangers_leave_room_for_a_new_station() -> None:
         world.bridge.gcs_received(Peer("udp", ("10.0.0.1", number)), frame, world.now, datagram=True)
         if number % 50 == 49:
             world.run(6)
-    assert len(world.bridge.ground.peers()) <= MAX_PEERS
+    assert len(world.inside.ground.peers()) <= MAX_PEERS
     world.run(6)
     # Once they are silent, there is room for a new one.
     station.send(gcs_heartbeat())
@@ -246,8 +246,8 @@ def test_a_stream_may_be_split_over_reads_and_is_forgotten_at_its_end() -> None:
     world.run(0.01)
     assert len(station.messages("COMMAND_ACK")) == 2
     world.bridge.gcs_gone(station.peer, world.now)
-    assert world.bridge.ground.peers() == []
-    assert world.bridge.ground.station(station.peer) is None
+    assert world.inside.ground.peers() == []
+    assert world.inside.ground.station(station.peer) is None
 
 
 def test_a_truncated_datagram_does_not_affect_the_next() -> None:
@@ -266,10 +266,10 @@ def test_our_own_frames_are_not_taken_for_a_station() -> None:
     station.send(gcs_heartbeat())
     world.run(2)
     echo = list(station.frames)
-    before = len(world.bridge.ground.peers())
+    before = len(world.inside.ground.peers())
     for frame in echo:
         world.bridge.gcs_received(Peer("udp", "echo"), frame, world.now, datagram=True)
-    assert len(world.bridge.ground.peers()) == before
+    assert len(world.inside.ground.peers()) == before
 
 
 def test_each_kind_of_station_gets_pieces_of_a_long_text_as_it_shows_them() -> None:
@@ -286,7 +286,7 @@ def test_each_kind_of_station_gets_pieces_of_a_long_text_as_it_shows_them() -> N
     for long in (text, text[:50], text[:51], text[:50] * 2):
         for station in (mavsdk, planner, old):
             station.take()
-        world.bridge.ground.say(Severity.WARNING, long)
+        world.inside.ground.say(Severity.WARNING, long)
         world.run(0.1)
         pieces = [piece.text.rstrip("\0") for piece in mavsdk.messages("STATUSTEXT")]
         assert "".join(pieces) == long
@@ -294,7 +294,7 @@ def test_each_kind_of_station_gets_pieces_of_a_long_text_as_it_shows_them() -> N
         assert len(pieces) == 1 or len(pieces[-1]) < 50
     for station in (mavsdk, planner, old):
         station.take()
-    world.bridge.ground.say(Severity.WARNING, text)
+    world.inside.ground.say(Severity.WARNING, text)
     world.run(0.1)
     words = text.split()
     for station in (planner, old):
@@ -337,7 +337,7 @@ def test_the_pieces_of_a_long_text_can_be_joined_or_read_alone() -> None:
         station.take()
     long = "Mission rejected: the first half of a sentence of more than fifty characters, and the rest of it"
     for text in (long, "short", long):
-        world.bridge.ground.say(Severity.WARNING, text)
+        world.inside.ground.say(Severity.WARNING, text)
     world.run(0.1)
     chunks = [(text.id, text.chunk_seq) for text in stations[0].messages("STATUSTEXT")]
     (first, _), (second, _) = chunks[0], chunks[3]
@@ -355,7 +355,7 @@ def test_any_payload_in_any_message_raises_nothing(seed: int) -> None:
     world = ready_world()
     station = GroundStation(world)
     draw = random.Random(seed)
-    understood = [msgid for msgid in CRC_EXTRA if msgid in world.bridge._incoming._router.handlers]
+    understood = [msgid for msgid in CRC_EXTRA if msgid in world.inside.incoming._router.handlers]
     assert len(understood) > 15
     for number in range(1500):
         msgid = draw.choice(understood)

@@ -118,7 +118,7 @@ ANSWERS = ("MISSION_ACK", "COMMAND_ACK", "PARAM_VALUE", "FILE_TRANSFER_PROTOCOL"
 
 
 def refusals(world: World) -> dict[str, int]:
-    return {why: count for (_, why), count in world.bridge.guard.refused.items()}
+    return {why: count for (_, why), count in world.inside.guard.refused.items()}
 
 
 # With a key.
@@ -256,7 +256,7 @@ def test_a_listener_gets_no_texts_for_others(access: LinkAccess) -> None:
     for station in (pilot, listener):
         station.send(READS[0])
     world.run(0.1)
-    world.bridge.ground.say(Severity.INFO, "for everyone")
+    world.inside.ground.say(Severity.INFO, "for everyone")
     world.run(0.1)
     assert (pilot.texts(), listener.texts()) == (["for everyone"], [])
 
@@ -271,7 +271,7 @@ def test_listeners_do_not_displace_a_station_with_the_key() -> None:
         for _ in range(2):
             listener.send(READS[0])
         world.run(0.1)
-    peers = world.bridge.ground.peers()
+    peers = world.inside.ground.peers()
     assert pilot.peer in peers
     assert len(peers) < 20
 
@@ -503,7 +503,7 @@ def test_signed_frames_reach_the_autopilot_unchanged() -> None:
 def test_setup_signing_is_never_forwarded(access: LinkAccess) -> None:
     logged: list[bytes] = []
     world, autopilot = passing({"udp": access})
-    world.bridge.ground.on_frames = lambda frames: logged.extend(tlog_record(frame, 0) for frame in frames)
+    world.inside.ground.on_frames = lambda frames: logged.extend(tlog_record(frame, 0) for frame in frames)
     GroundStation(world, "other", sysid=250).send(READS[0])
     world.run(0.1)
     autopilot.received.clear()
@@ -521,7 +521,7 @@ def test_setup_signing_is_never_forwarded(access: LinkAccess) -> None:
         received,
         b"".join(logged),
         repr(world.log_event).encode(),
-        repr(world.bridge.ground._access).encode(),
+        repr(world.inside.ground._access).encode(),
     ):
         assert KEY not in place
         assert KEY.hex().encode() not in place

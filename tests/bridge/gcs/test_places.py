@@ -98,7 +98,7 @@ def test_a_flood_does_not_affect_a_pilot_who_connected_before_it() -> None:
     assert longest_gap_s(pilot, began) <= 1.1
     # Few of them are remembered.
     assert len(world.events("gcs.found")) < 3 * MAX_PEERS
-    assert len(world.bridge.ground.peers()) <= MAX_PEERS
+    assert len(world.inside.ground.peers()) <= MAX_PEERS
     assert remembered() < 1500
 
 
@@ -163,12 +163,12 @@ def test_a_lost_final_ack_is_repeated_in_a_flood(
 @pytest.mark.parametrize("ids_of_one", [True, False])
 def test_an_answer_to_a_peer_with_standing_is_kept(*, ids_of_one: bool) -> None:
     """Even a refusal. A peer with standing makes up ids, or other hosts get lists accepted."""
-    ground = ready_world().bridge.ground
+    ground = ready_world().inside.ground
     pilot, rival = (Station(Peer("udp", (f"10.0.0.{number}", 14550)), 255, 190) for number in (1, 2))
     others = (Peer("udp", (f"10.1.{number // 250}.{number % 250}", 14550)) for number in range(2000))
     for station in (pilot, rival, *(Station(Peer("udp", (f"10.0.1.{each}", 1)), 9, 9) for each in range(14))):
         hear(ground, station, 0.0)
-    answers = UploadAnswers(ground, lambda _peer: None)
+    answers = UploadAnswers(ground, lambda _peer, _now: None)
     answers.end(pilot, MissionResult.DENIED, 9, 0.0)
     for number, other in enumerate(others):
         peer = rival.peer if ids_of_one else other
@@ -213,7 +213,7 @@ def test_a_sender_over_its_limit_is_not_read() -> None:
     for number in range(10_000):
         world.after(number / 10_000, lambda: world.receive_from(stranger, data))
     world.run(1.1)
-    read = world.bridge.ground.frames_received["udp", m.MAVLINK_MSG_ID_HEARTBEAT]
+    read = world.inside.ground.frames_received["udp", m.MAVLINK_MSG_ID_HEARTBEAT]
     assert 1000 < read < 5000
 
 
@@ -251,7 +251,7 @@ def test_of_too_many_uploads_the_oldest_without_items_ends(monkeypatch: pytest.M
     monkeypatch.setattr(uploads_module, "_MOST_UPLOADS", 64)
     world = ready_world()
     for number in range(16):
-        hear(world.bridge.ground, Station(Peer("udp", f"first {number}"), 255, 190), world.now)
+        hear(world.inside.ground, Station(Peer("udp", f"first {number}"), 255, 190), world.now)
     stations = [GroundStation(world, f"host {number}", sysid=number + 1) for number in range(80)]
     for station in stations:
         station.send(count_message(3))

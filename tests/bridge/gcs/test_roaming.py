@@ -74,7 +74,7 @@ def test_the_new_address_is_served_at_once_and_the_old_one_dropped() -> None:
     old.take()
     world.run(3)
     assert old.received == []
-    assert world.bridge.ground.peers() == [new.peer]
+    assert world.inside.ground.peers() == [new.peer]
 
 
 def test_a_station_may_move_away_and_back() -> None:
@@ -116,7 +116,7 @@ def test_a_silent_station_with_shared_ids_is_kept_for_a_minute() -> None:
     station.send(heartbeat())
     send_heartbeats(other, [other])
     world.run(EXPIRY_S - 2)
-    assert station.peer in world.bridge.ground.peers()
+    assert station.peer in world.inside.ground.peers()
 
 
 def test_a_station_behind_a_router_moves_only_with_all_others() -> None:
@@ -128,11 +128,11 @@ def test_a_station_behind_a_router_moves_only_with_all_others() -> None:
     world.run(1)
     send_heartbeats(away, [away])
     world.run(MOVED_S + 3)
-    assert router.peer in world.bridge.ground.peers()
+    assert router.peer in world.inside.ground.peers()
     also_away = GroundStation(world, "away", sysid=250)
     send_heartbeats(also_away, [also_away])
     world.run(MOVED_S + 3)
-    assert world.bridge.ground.peers() == [away.peer]
+    assert world.inside.ground.peers() == [away.peer]
 
 
 @pytest.mark.parametrize("seed", range(12))

@@ -204,7 +204,7 @@ def test_our_own_signed_answers_prove_nothing(sysid: int) -> None:
         thief = on_link(GroundStation(world, f"thief on {link}"), link)
         for frame in signed:
             world.receive_from(thief, frame)
-        assert (station := world.bridge.ground.station(thief.peer)) is None or station.standing is Standing.LISTENER
+        assert (station := world.inside.ground.station(thief.peer)) is None or station.standing is Standing.LISTENER
     assert bytes(autopilot.received) == b""
 
 
@@ -230,10 +230,10 @@ def test_recorded_frames_of_the_pilot_act_once() -> None:
             world.receive_from(thief, frame)
             # Without the flag, and without the signature.
             world.receive_from(thief, frame[:2] + b"\0" + frame[3:-13])
-        assert (station := world.bridge.ground.station(thief.peer)) is None or station.standing is Standing.LISTENER
+        assert (station := world.inside.ground.station(thief.peer)) is None or station.standing is Standing.LISTENER
     # The world reads by pieces: only whole frames of the pilot count.
     assert bytes(autopilot.received) == once
-    assert {why for _, why in world.bridge.guard.refused} == {Check.REPLAYED.value}
+    assert {why for _, why in world.inside.guard.refused} == {Check.REPLAYED.value}
 
 
 def test_made_up_addresses_cannot_flood_the_log() -> None:
@@ -242,7 +242,7 @@ def test_made_up_addresses_cannot_flood_the_log() -> None:
     for number in range(2000):
         peer = Peer("udp", (f"10.0.{number >> 8}.{number & 255}", 14550))
         world.bridge.gcs_received(peer, frame, world.now + number / 1000, datagram=True)
-    assert world.bridge.guard.refused["udp", "not signed"] == 2000
+    assert world.inside.guard.refused["udp", "not signed"] == 2000
     assert 0 < len(world.events("gcs.refused")) < 20
 
 

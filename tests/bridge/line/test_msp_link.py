@@ -46,7 +46,7 @@ def test_a_download_during_a_configuration_write_is_complete(stall_ms: float) ->
         options = SimOptions(config_write_ms=stall_ms, config_write_delay_ms=draw.random() * 300)
         world = World(options, speeds=(115200,), flash=FULL_FLASH)
         world.wait_ready()
-        world.bridge.missions.held = None
+        world.inside.missions.held = None
         station = GroundStation(world)
         station.send(messages.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", 300.0 + seed, 9))
         world.run(draw.random() * 0.3)
@@ -63,7 +63,7 @@ def test_a_push_with_downloads_and_telemetry_fits_the_ring(baud: int) -> None:
     outcome = world.push(waypoints(60))
     for number in range(40):
         world.after(number * 0.1, lambda: station.send(messages.MAVLink_mission_request_list_message(1, 1, 0)))
-        world.after(number * 0.1, lambda: setattr(world.bridge.missions, "held", None))
+        world.after(number * 0.1, lambda: setattr(world.inside.missions, "held", None))
     world.wait_until(lambda _: bool(outcome), 60)
     world.run(30)
     assert station.messages("MISSION_COUNT")

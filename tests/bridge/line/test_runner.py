@@ -37,7 +37,7 @@ def world() -> World:
 
 def break_store(world: World, method: str) -> None:
     """The store of the flight controller fails until the line is searched again."""
-    setattr(world.bridge.missions.fc_store, method, bug)
+    setattr(world.inside.missions.fc_store, method, bug)
 
 
 def recover(world: World) -> None:
@@ -83,7 +83,7 @@ def test_a_parameter_can_be_set_again(world: World) -> None:
     station.send(wanted)
     recover(world)
     station.send(wanted)
-    fc_store = world.bridge.missions.fc_store
+    fc_store = world.inside.missions.fc_store
     assert isinstance(fc_store, HarakiriMissions)
     world.wait_until(lambda _: fc_store.wp_radius_cm == 300, 10)
 

@@ -186,8 +186,8 @@ def test_a_rejected_list_changes_nothing_and_has_a_reason(craft: Craft) -> None:
 
 def test_item_by_item_and_whole_list_checks_agree(craft: Craft) -> None:
     found: list[Any] = []
-    craft.world.bridge.runner.start(
-        craft.world.bridge.missions.preflight(), lambda report, _: found.append(report), craft.world.now
+    craft.world.inside.runner.start(
+        craft.world.inside.missions.preflight(), lambda report, _: found.append(report), craft.world.now
     )
     craft.world.wait_until(lambda _: bool(found), 10)
     rules = found[0].rules
@@ -222,7 +222,7 @@ def test_nothing_is_sent_to_an_armed_craft(craft: Craft) -> None:
 @pytest.mark.parametrize("craft", [harakiri.MAVLINK.name, multiwii.PROFILE.name], indirect=True)
 def test_an_armed_craft_is_not_asked_for_its_list(craft: Craft) -> None:
     craft.arm()
-    craft.world.bridge.missions.held = None
+    craft.world.inside.missions.held = None
     answers: list[HeldMission | Refusal] = []
     craft.world.bridge.pull(answers.append, craft.world.now)
     craft.world.wait_until(lambda _: bool(answers), TIMEOUT_S)

@@ -56,18 +56,18 @@ def test_identification_delayed_by_many_missions_is_repeated() -> None:
     world = ready_world()
     world.store.delay_s = NEVER
     for _ in range(10):
-        world.bridge.runner.start(save(ArrivedMission("", (), CLEARED_LIST)), lambda *_: None, world.now)
+        world.inside.runner.start(save(ArrivedMission("", (), CLEARED_LIST)), lambda *_: None, world.now)
     world.unplug()
     world.plug()
-    world.wait_until(lambda w: isinstance(w.bridge.session.state, Identifying), 8)
-    world.wait_until(lambda w: not isinstance(w.bridge.session.state, Identifying), 15.1)
+    world.wait_until(lambda w: isinstance(w.inside.session.state, Identifying), 8)
+    world.wait_until(lambda w: not isinstance(w.inside.session.state, Identifying), 15.1)
     assert world.kind is None
     world.wait_until(lambda w: w.kind is harakiri.PATCHED, 30)
 
 
 def test_a_list_whose_board_is_gone_when_the_store_answers_is_not_kept() -> None:
     world, _ = holding()
-    world.bridge.missions.held = None
+    world.inside.missions.held = None
     world.store.delay_s = 2.0
     answers: list[HeldMission | Refusal] = []
     world.bridge.pull(answers.append, world.now)

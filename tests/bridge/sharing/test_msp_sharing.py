@@ -132,7 +132,7 @@ def test_a_program_that_repeats_a_refused_change_is_reported_once() -> None:
         world.run(0.5)
     assert sum("192.0.2.7" in text for text in station.texts()) == 1
     assert len(world.events("share.refused")) == 20
-    assert sum(world.bridge.sharing.refused.values()) == 20
+    assert sum(world.inside.sharing.refused.values()) == 20
 
 
 def test_forged_addresses_do_not_flood_the_stations_with_texts() -> None:
@@ -173,7 +173,7 @@ def test_mwp_connects_although_the_clock_is_not_set(command: int) -> None:
     assert program.wait_for(command, bytes(2), is_v2=True).direction is Direction.ERROR
     assert program.closed_at is None
     assert command not in board.commands
-    assert world.bridge.sharing.refused == {}
+    assert world.inside.sharing.refused == {}
 
 
 def test_a_change_is_forwarded_after_a_look_at_the_arm_flag() -> None:

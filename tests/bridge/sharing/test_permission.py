@@ -67,7 +67,7 @@ def test_a_display_stays_live_in_flight(kind: str, loop: tuple[int, ...], is_con
     assert min(counts.values()) >= 10
     # Polls, and the watch of the mission.
     sent = {frame.command for _, _, data in world.written for frame in MspParser().feed(data)}
-    assert sent <= {*world.bridge.session.polls.commands, WP_GETINFO}
+    assert sent <= {*world.inside.session.polls.commands, WP_GETINFO}
 
 
 def test_values_in_flight_are_the_boards_last() -> None:

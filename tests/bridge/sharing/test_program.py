@@ -117,7 +117,7 @@ def test_many_ports_of_a_host_gain_it_nothing() -> None:
     honest.replies.clear()
     world.run(5)
     assert 249 <= len(honest.replies) <= 251
-    assert world.bridge.sharing.refused["too many requests"] > 1000
+    assert world.inside.sharing.refused["too many requests"] > 1000
 
 
 def test_reads_that_are_never_answered_do_not_slow_telemetry() -> None:
@@ -219,7 +219,7 @@ def test_requests_during_a_transfer_wait_for_its_end(kind: str, baud: int) -> No
         world.run(0.05)
         program = ShareProgram(world)
         greet(program, polled)
-        assert world.bridge.runner.needs_line  # it still runs
+        assert world.inside.runner.needs_line  # it still runs
         assert outcome == []
         greet(program, others)
         assert outcome != []

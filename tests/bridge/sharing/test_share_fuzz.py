@@ -56,7 +56,7 @@ def fill(draw: random.Random) -> bytes:
 
 def answer(world: World, command: int, payload: bytes, *, is_v2: bool = False) -> bytes | None:
     """The payload of the reply; None if the request is refused."""
-    controller = world.bridge.session.state.controller
+    controller = world.inside.session.state.controller
     assert controller is not None
     replies = [ShareProgram(world).outcome(command, payload, is_v2=version) for version in (is_v2, not is_v2)]
     assert (replies[0] is None) == (replies[1] is None)

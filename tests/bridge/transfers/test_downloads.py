@@ -364,7 +364,7 @@ def test_another_boards_mission_is_not_served() -> None:
 
 def test_a_mission_whose_write_was_interrupted_is_not_served() -> None:
     world, _ = disarmed(TelemetryProtocol.MAVLINK)
-    world.bridge.missions.pending.append(PendingMission(None, None))
+    world.inside.missions.pending.append(PendingMission(None, None))
     arm(world)
     download = Download(GroundStation(world))
     download.run(5)

@@ -43,7 +43,7 @@ def holding(options: SimOptions | None = None, faults: Faults | None = None) -> 
 
 def state(world: World) -> type[UploadState] | None:
     """The state of the first upload; None if there is none."""
-    uploads = list(world.bridge._uploads._queue.uploads)
+    uploads = list(world.inside.uploads._queue.uploads)
     return type(uploads[0].state) if uploads else None
 
 
@@ -352,7 +352,7 @@ def test_a_station_that_disconnects_before_the_ack_is_forgotten() -> None:
     world.run(3)
     assert acks(station) == []
     assert world.stored == records_of(waypoints(60))
-    assert world.bridge.ground.station(station.peer) is None
+    assert world.inside.ground.station(station.peer) is None
 
 
 def hanging_push(world: World) -> None:

@@ -188,8 +188,8 @@ def test_a_radius_refused_for_flash_wear_is_reported() -> None:
     world, station = radius_world()
     for radius_cm in range(301, 301 + 250):
         ended: list[object] = []
-        change = world.bridge.missions.fc_store.set_wp_radius(radius_cm)  # type: ignore[union-attr]
-        world.bridge.runner.start(change, lambda failure, _, ended=ended: ended.append(failure), world.now)  # type: ignore[misc]
+        change = world.inside.missions.fc_store.set_wp_radius(radius_cm)  # type: ignore[union-attr]
+        world.inside.runner.start(change, lambda failure, _, ended=ended: ended.append(failure), world.now)  # type: ignore[misc]
         world.wait_until(lambda _, ended=ended: bool(ended), 5)  # type: ignore[misc]
         assert ended == [None]
     station.send(param_set(b"WPNAV_RADIUS", 400.0))
@@ -256,6 +256,6 @@ def test_a_late_reply_to_the_first_set_does_not_confirm_the_second() -> None:
         world.run(3)
         radius_cm = values(station.messages())[-1][1]
         assert radius_cm == values(answers((world, station), m.MAVLink_param_request_list_message(1, 1)))[-1][1]
-        info = world.bridge.missions.fc_store
+        info = world.inside.missions.fc_store
         assert isinstance(info, HarakiriMissions)
         assert world.naze._firmware._board.wp_radius_cm == info.wp_radius_cm == radius_cm

@@ -17,6 +17,7 @@ from service.daemon.daemon import Daemon
 from service.settings import Settings
 from service.settings.addresses import SerialFc, SimulatedFc
 from tests.support.benches import Starter
+from tests.support.inside import inside
 from tests.support.programs import NAZE_BRIDGE, REPOSITORY, free_port, until
 
 LOSSES = {"fc.lost", "fc.port_lost"}
@@ -96,19 +97,19 @@ async def test_an_exception_in_the_bridge_is_logged_and_the_line_restarted(tmp_p
 
         async def found() -> None:
             async with asyncio.timeout(20):
-                while daemon.bridge.session.state.controller is None:  # noqa: ASYNC110
+                while inside(daemon.bridge).session.state.controller is None:  # noqa: ASYNC110
                     await asyncio.sleep(0.01)
 
         await found()
-        healthy = daemon.bridge.session.tick
+        healthy = inside(daemon.bridge).session.tick
 
         def faulty(_now: float) -> None:
-            daemon.bridge.session.tick = healthy  # type: ignore[method-assign]
+            inside(daemon.bridge).session.tick = healthy  # type: ignore[method-assign]
             raise AttributeError("link")
 
-        daemon.bridge.session.tick = faulty  # type: ignore[assignment,method-assign]
+        inside(daemon.bridge).session.tick = faulty  # type: ignore[assignment,method-assign]
         async with asyncio.timeout(20):
-            while daemon.bridge.session.state.controller is not None:  # noqa: ASYNC110
+            while inside(daemon.bridge).session.state.controller is not None:  # noqa: ASYNC110
                 await asyncio.sleep(0)
         await found()
         running.cancel()

@@ -12,11 +12,12 @@ from service.links.fc_port import STOPPED, FcPort
 from service.links.traffic import Traffic
 from service.settings import Settings
 from service.settings.addresses import SimulatedFc
+from tests.support.inside import inside
 from tests.support.programs import TIMEOUT_S, until_async
 
 
 def is_found(daemon: Daemon) -> bool:
-    return daemon.bridge.session.state.controller is not None
+    return inside(daemon.bridge).session.state.controller is not None
 
 
 @pytest.mark.parametrize("event", ["opened", "closed"])

@@ -19,6 +19,7 @@ from service.settings.share import ShareSettings, parse_share
 from simulator.board.options import Faults
 from simulator.naze.board import SimulatedNaze
 from terminal.mission_source import load_mission
+from tests.support.inside import inside
 from tests.support.programs import TIMEOUT_S, free_port
 
 #: Repeat like configurators, because the bridge also gives up late replies.
@@ -98,7 +99,7 @@ async def test_requests_are_answered_alongside_telemetry(is_v2: bool) -> None:
         async with asyncio.timeout(TIMEOUT_S):
             while daemon.traffic["fc"].pieces_received < polled + 30:  # noqa: ASYNC110
                 await asyncio.sleep(0.01)
-        assert daemon.bridge.session.state.controller is not None
+        assert inside(daemon.bridge).session.state.controller is not None
 
 
 @pytest.mark.parametrize(
@@ -135,7 +136,7 @@ async def test_no_change_is_passed_on_while_armed(monkeypatch: pytest.MonkeyPatc
         (reply,) = await program.ask(IDENT)  # the bridge knows it
         assert reply.direction is Direction.REPLY
         assert await program.is_closed_after(EEPROM_WRITE)
-        assert list(daemon.bridge.sharing.refused) == ["EEPROM_WRITE: armed"]
+        assert list(inside(daemon.bridge).sharing.refused) == ["EEPROM_WRITE: armed"]
 
 
 async def test_a_mission_transfer_is_not_disturbed() -> None:
@@ -150,7 +151,7 @@ async def test_a_mission_transfer_is_not_disturbed() -> None:
             (waiting,) = await program.ask(PID)
             assert {known.direction, waiting.direction} == {Direction.REPLY}
             assert (await pushing)["ack"] == "MAV_MISSION_ACCEPTED"
-        assert daemon.bridge.sharing.refused == {}
+        assert inside(daemon.bridge).sharing.refused == {}
 
 
 async def test_over_udp_each_program_gets_its_own_replies() -> None:
@@ -176,7 +177,7 @@ async def test_over_udp_each_program_gets_its_own_replies() -> None:
             answered, other = await asyncio.gather(ask(first, question), ask(second, pid))
     assert (answered.direction, answered.payload[0]) == (Direction.REPLY, 211)
     assert (other.direction, other.command) == (Direction.REPLY, PID)
-    assert daemon.bridge.sharing.refused.total() == 1
+    assert inside(daemon.bridge).sharing.refused.total() == 1
 
 
 async def test_a_further_client_displaces_the_silent_one(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -229,7 +230,7 @@ async def test_noise_is_not_passed_on() -> None:
         program._writer.write(b"###\r\r\rRRR#\n" * 100)
         (reply,) = await program.ask(IDENT)
         assert reply.direction is Direction.REPLY
-        assert daemon.bridge.sharing.refused == {}
+        assert inside(daemon.bridge).sharing.refused == {}
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from service.settings import Settings
 from service.settings.addresses import AutoFc
 from simulator.links.pty_link import PtyLink
 from simulator.naze.board import SimulatedNaze
+from tests.support.inside import inside
 from tests.support.pi_with_ports import Pi
 from tests.support.programs import until_async
 
@@ -57,7 +58,7 @@ async def test_the_flight_controller_is_found_after_a_gps_receiver(pi: Pi, tmp_p
 
     talking = asyncio.create_task(gps())
     async with running(pi, state) as (daemon, jobs):
-        await until_async(lambda: daemon.bridge.session.state.controller, "the flight controller")
+        await until_async(lambda: inside(daemon.bridge).session.state.controller, "the flight controller")
         status = jobs.status()
         assert status["port"] == "/dev/ttyUSB1"
         assert status["ports_passed_over"] == ["/dev/ttyUSB0: a GPS receiver (NMEA) was heard there"]
@@ -68,7 +69,7 @@ async def test_the_flight_controller_is_found_after_a_gps_receiver(pi: Pi, tmp_p
     assert kept["flight_controller"] == "usb 1-2 10c4:ea60"
     # After a restart its port is tried first, and a GPS receiver is remembered even while silent.
     async with running(pi, state) as (daemon, jobs):
-        await until_async(lambda: daemon.bridge.session.state.controller, "the flight controller")
+        await until_async(lambda: inside(daemon.bridge).session.state.controller, "the flight controller")
         assert jobs.status()["ports_passed_over"] == []
         naze.unplug()
         await until_async(lambda: jobs.status()["ports_passed_over"], "the other port's turn")
@@ -81,7 +82,7 @@ async def test_a_silent_port_is_skipped(pi: Pi, tmp_path: Path, monkeypatch: pyt
     pi.usb("ttyACM0", "1-1.4", ("0483", "5740", "STMicroelectronics", "STM32 Virtual ComPort"))
     plug_naze(pi, "ttyACM0")
     async with running(pi, tmp_path) as (daemon, jobs):
-        await until_async(lambda: daemon.bridge.session.state.controller, "the flight controller")
+        await until_async(lambda: inside(daemon.bridge).session.state.controller, "the flight controller")
         assert jobs.status()["port"] == "/dev/ttyACM0"
         assert jobs.status()["ports_passed_over"] == ["/dev/ttyAMA0: no flight controller answers"]
         # Only complete identification requests were sent.

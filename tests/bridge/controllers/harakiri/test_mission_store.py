@@ -163,7 +163,7 @@ def test_a_pull_over_a_bad_line_is_exact_or_fails() -> None:
         outcome = world.push(NEW)
         world.wait_until(lambda _, outcome=outcome: bool(outcome), 5)  # type: ignore[misc]
         world.faults.bit_error_rate = 1e-3
-        world.bridge.missions.held = None
+        world.inside.missions.held = None
         answers: list[HeldMission | Refusal] = []
         world.bridge.pull(answers.append, world.now)
         world.wait_until(lambda _, answers=answers: bool(answers), 60)  # type: ignore[misc]

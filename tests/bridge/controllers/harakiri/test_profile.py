@@ -19,7 +19,7 @@ def test_bit_errors_delay_identification_but_never_change_it(rate: float, extens
         faults = Faults(bit_error_rate=rate, extension=extension)
         world = World(SimOptions(seed=seed), faults, speeds=(115200,))
         world.run_until(lambda w: w.kind is not None, 8)
-        controller = world.bridge.session.state.controller
+        controller = world.inside.session.state.controller
         if controller is None:
             continue
         found += 1

@@ -174,12 +174,12 @@ def test_polls_to_a_slow_board_are_not_lost() -> None:
     """The board serves one request per 10 ms."""
     _, world, station = board_with(serial_task_ms=10.0)
     assert Upload(station, plan(41)).run() is ACCEPTED
-    assert world.bridge.session.state.link is not None
-    lost = world.bridge.session.state.link.requests_lost
+    assert world.inside.session.state.link is not None
+    lost = world.inside.session.state.link.requests_lost
     for _ in range(5):
         station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
         world.run(1)
-    assert world.bridge.session.state.link.requests_lost == lost
+    assert world.inside.session.state.link.requests_lost == lost
     assert len(station.messages("ATTITUDE")) > 5 * 18
 
 

@@ -18,6 +18,6 @@ from tests.support.fake_inav import FakeInav, FakeMultiwii
 def test_the_board_is_recognised_by_its_answers(make: Callable[[], FakeInav], kind: Profile, capacity: int) -> None:
     world, _ = found(make())
     assert world.kind is kind
-    assert world.bridge.session.state.controller is not None
-    assert world.bridge.session.state.controller.capacity == capacity
+    assert world.inside.session.state.controller is not None
+    assert world.inside.session.state.controller.capacity == capacity
     assert world.bridge.vehicle.armed is False

@@ -300,9 +300,9 @@ def test_while_the_other_missions_cannot_be_read_nothing_is_written() -> None:
 
     def receive_others(data: bytes, now: float) -> None:
         for frame in frames.feed(data):
-            if bench.world.bridge.missions.writing and not lost:
+            if bench.world.inside.missions.writing and not lost:
                 store(bench, *sets(5, 7))
-            if bench.world.bridge.missions.writing and frame.command == Nav.WP and len(lost) < 5:
+            if bench.world.inside.missions.writing and frame.command == Nav.WP and len(lost) < 5:
                 lost.append(frame.command)
             else:
                 receive(frame.encode(), now)

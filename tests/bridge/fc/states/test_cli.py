@@ -26,7 +26,7 @@ TROUBLE = "Board in its CLI: type exit, or unplug it"
 
 
 def is_in_cli(world: World) -> bool:
-    return isinstance(world.bridge.session.state, Cli)
+    return isinstance(world.inside.session.state, Cli)
 
 
 def open_command_line(world: World) -> None:
@@ -83,7 +83,7 @@ def test_it_is_recognised_when_the_port_is_opened(kind: str) -> None:
     world.run(30)
     assert is_in_cli(world)
     assert station.texts().count(TROUBLE) == 4
-    assert world.bridge.session.state.trouble == TROUBLE
+    assert world.inside.session.state.trouble == TROUBLE
     assert not world.events("fc.found")
     assert Upload(station, waypoints(5)).run() is MissionResult.DENIED
     assert station.texts()[-1] == TROUBLE
@@ -121,8 +121,8 @@ def test_it_is_found_again_after_unplugging(kind: str) -> None:
     world.wait_until(is_in_cli, 2)
     world.run(10)
     world.power_off()
-    world.wait_until(lambda w: isinstance(w.bridge.session.state, Searching), 10)
-    assert world.bridge.session.state.trouble == ""
+    world.wait_until(lambda w: isinstance(w.inside.session.state, Searching), 10)
+    assert world.inside.session.state.trouble == ""
     world.power_on()
     world.wait_until(lambda w: w.is_found, 20)
     world.run(1)
@@ -162,7 +162,7 @@ def test_a_list_that_looks_like_an_echo_is_not_mistaken_for_one() -> None:
     station = GroundStation(world)
     items = [replace(item, lat_e7=at) for item in waypoints(40)]
     assert Upload(station, items).run() is MissionResult.ACCEPTED
-    world.bridge.missions.held = None
+    world.inside.missions.held = None
     for _ in range(5):
         world.push(items)
         world.run(3)

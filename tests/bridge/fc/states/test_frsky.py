@@ -30,7 +30,7 @@ def test_msp_is_used_again_once_the_board_answers_it() -> None:
     board.is_deaf, faults.armed = True, True
     world.wait_until(lambda w: w.kind is harakiri.FRSKY, 8)
     board.is_deaf = False
-    world.wait_until(lambda w: w.kind is harakiri.PATCHED and w.bridge.session.state.speed == 9600, 8)
+    world.wait_until(lambda w: w.kind is harakiri.PATCHED and w.inside.session.state.speed == 9600, 8)
     world.assert_line_was_clean()
 
 
@@ -44,7 +44,7 @@ def test_a_deaf_board_is_recognised_by_its_frsky_telemetry(after_s: float) -> No
     world.run(after_s)
     faults.armed = True
     world.wait_until(lambda w: w.kind is not harakiri.MAVLINK, 8)
-    world.wait_until(lambda w: w.bridge.session.state.controller is not None, 20)
+    world.wait_until(lambda w: w.inside.session.state.controller is not None, 20)
     assert world.kind is harakiri.FRSKY
     world.run(20)
     assert world.kind is harakiri.FRSKY

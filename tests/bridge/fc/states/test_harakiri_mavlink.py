@@ -81,7 +81,7 @@ def test_ground_stations_see_one_vehicle_while_frsky_is_sent(board: type[Simulat
     for _ in range(2):
         station.received.clear()
         faults.armed = True
-        world.wait_until(lambda w: w.bridge.session.state.speed == 9600 and w.kind is wanted, 5)
+        world.wait_until(lambda w: w.inside.session.state.speed == 9600 and w.kind is wanted, 5)
         world.run(60)
         assert world.kind is wanted
         assert station.messages("HEARTBEAT")[-1].base_mode & 128
@@ -94,7 +94,7 @@ def test_ground_stations_see_one_vehicle_while_frsky_is_sent(board: type[Simulat
         assert world.now - next(at for at, message in reversed(station.received) if message is status) <= 1.1
         assert Upload(station, waypoints(13)).run() is MissionResult.DENIED
         faults.armed = False
-        world.wait_until(lambda w: w.kind is harakiri.PATCHED and w.bridge.session.state.speed == 115200, 5)
+        world.wait_until(lambda w: w.kind is harakiri.PATCHED and w.inside.session.state.speed == 115200, 5)
         world.run(3)
         assert max(heartbeat_gaps(station)) <= 1.5
         assert not [text for text in station.texts() if "lost" in text]

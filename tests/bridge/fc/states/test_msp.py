@@ -27,7 +27,7 @@ def test_a_board_is_found_within_3_s_of_booting_after_any_power_cycle(baud: int,
         began = world.now
 
         def answers(world: World, began: float = began) -> bool:
-            link = world.bridge.session.state.link
+            link = world.inside.session.state.link
             return link is not None and link.last_heard_at > began
 
         assert world.wait_until(answers, 20) <= 3

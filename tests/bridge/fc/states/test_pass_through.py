@@ -292,7 +292,7 @@ def test_a_companion_with_the_autopilots_system_id_is_heard_but_echoes_are_not(s
 def test_a_crowd_does_not_multiply_frames() -> None:
     """Two hundred strangers are heard once; one of them then broadcasts 200 frames a second, like the autopilot."""
     world, autopilot, (pilot, _) = passing()
-    ground = world.bridge.ground
+    ground = world.inside.ground
     stranger = GroundStation(world, "stranger", sysid=99)
     hello = stranger.pack(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
     for number in range(200):
@@ -353,6 +353,6 @@ def test_an_autopilot_with_all_ids_does_not_fill_the_memory() -> None:
             world.receive_from_fc(autopilot.sent[-1])
     world.run(0.1)
     assert station.frames == autopilot.sent
-    routes = world.bridge._incoming.routes
+    routes = world.inside.incoming.routes
     assert routes is not None
     assert len(routes._for_all) <= 1024

@@ -24,7 +24,7 @@ ALL_SPEEDS = sorted(set(SPEEDS), reverse=True)
 
 
 def verdict(world: World) -> bool:
-    return not isinstance(world.bridge.session.state, Closed | Searching)
+    return not isinstance(world.inside.session.state, Closed | Searching)
 
 
 def reports_armed(world: World) -> bool | None:
@@ -42,7 +42,7 @@ def test_a_board_is_found_within_seconds_at_every_speed(baud: int, extension: bo
         assert world.wait_until(verdict, 20) <= (1.5 if baud == SPEEDS[0] else 8)
         world.wait_ready()
         assert world.kind is (harakiri.PATCHED if extension else harakiri.UNPATCHED)
-        assert world.bridge.session.state.speed == baud
+        assert world.inside.session.state.speed == baud
         found = world.events("fc.found")
         assert [event.facts["speed_baud"] for event in found] == [baud]
         assert "two equal answers" in str(found[0].facts["why"])
@@ -78,7 +78,7 @@ def test_losing_the_end_of_a_frame_later_does_not_lose_the_board(extension: bool
         world.naze.receive(frame[:length], world.now)
         world.run(3)
         assert world.events("fc.lost") == []
-        link = world.bridge.session.state.link
+        link = world.inside.session.state.link
         assert link is not None
         assert world.now - link.last_heard_at < 0.5
         world.assert_line_was_clean()
@@ -102,7 +102,7 @@ def test_a_board_is_found_within_3_s_of_the_ports_return(baud: int) -> None:
         # The speed may already be known when the port is lost.
         world.run(draw.random() * draw.choice((0.2, 4)))
         world.unplug()
-        assert isinstance(world.bridge.session.state, Closed)
+        assert isinstance(world.inside.session.state, Closed)
         world.run(draw.choice((0.001, draw.random() * 8)))
         world.plug()
         assert world.wait_until(verdict, 20) <= 3
@@ -129,11 +129,11 @@ def test_frsky_telemetry_while_armed_is_ignored() -> None:
     world = World(SimOptions(tele_prot=TelemetryProtocol.FRSKY_9600))
     world.wait_ready()
     world.faults.armed = True
-    world.wait_until(lambda w: w.bridge.session.state.speed == 9600 and w.kind is harakiri.PATCHED, 15)
+    world.wait_until(lambda w: w.inside.session.state.speed == 9600 and w.kind is harakiri.PATCHED, 15)
     world.run(30)
     assert world.bridge.vehicle.armed
     world.faults.armed = False
-    world.wait_until(lambda w: w.bridge.session.state.speed == 115200 and w.kind is harakiri.PATCHED, 8)
+    world.wait_until(lambda w: w.inside.session.state.speed == 115200 and w.kind is harakiri.PATCHED, 8)
     assert {event.facts["protocol"] for event in world.events("fc.found")} == {"MSP"}
     world.assert_line_was_clean()
 
@@ -164,7 +164,7 @@ def test_an_empty_heartbeat_is_ignored() -> None:
 def test_an_empty_line_yields_no_flight_controller(peer: Callable[[], QuietLine]) -> None:
     world = World(peer=peer())
     world.run(60)
-    assert isinstance(world.bridge.session.state, Searching)
+    assert isinstance(world.inside.session.state, Searching)
     assert world.events("fc.found") == world.events("fc.in_command_line") == []
 
 
