@@ -132,7 +132,8 @@ async def test_a_change_is_passed_on_if_allowed() -> None:
 
 async def test_no_change_is_passed_on_while_armed(monkeypatch: pytest.MonkeyPatch) -> None:
     async with shared(write=True) as (daemon, program):
-        monkeypatch.setattr(type(daemon.bridge.vehicle), "armed", True)
+        armed = property(lambda _: True, lambda _vehicle, _value: None)  # whatever the board reports
+        monkeypatch.setattr(type(daemon.bridge.vehicle), "armed", armed, raising=False)
         (reply,) = await program.ask(IDENT)  # the bridge knows it
         assert reply.direction is Direction.REPLY
         assert await program.is_closed_after(EEPROM_WRITE)
