@@ -19,7 +19,6 @@ _LIB = Path("usr/lib/naze-bridge")
 _PAGES = (
     *("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE"),
     *("firmware/README.md", "systemd/naze-bridge.service", "systemd/60-naze-bridge.rules"),
-    "systemd/config.toml",
 )
 _SCHEMAS = "payloads/schemas"
 _SCRIPTS = ("postinst", "prerm", "postrm")
@@ -46,8 +45,9 @@ def lay_out(root: Path, libraries: Mapping[str, Path], project: Path, version: s
     _copy(project / "systemd/naze-bridge.service", root / "usr/lib/systemd/system")
     _copy(project / "systemd/60-naze-bridge.rules", root / "usr/lib/udev/rules.d")
     _copy(project / "systemd/naze-bridge.sysusers", root / "usr/lib/sysusers.d", "naze-bridge.conf")
-    _copy(project / "systemd/config.toml", root / "etc/naze-bridge")
-    (root / "etc/naze-bridge/conf.d").mkdir()
+    (root / "etc/naze-bridge/conf.d").mkdir(parents=True)
+    # Not in /etc: dpkg asks about changed files that a package brings. postinst copies it if there is none.
+    _copy(_HERE / "config.toml", root / "usr/share/naze-bridge")
     documents = root / "usr/share/doc/naze-bridge"
     _copy(_HERE / "copyright", documents)
     # As in the repository, so that the pages' links work.
@@ -112,7 +112,6 @@ def _describe(root: Path, version: str, architecture: str) -> None:
     fields = (_HERE / "control").read_text().format(version=version, architecture=architecture, kilobytes=size // 1024)
     (folder / "control").write_text(fields)
     (folder / "md5sums").write_text("".join(sums))
-    (folder / "conffiles").write_text("/etc/naze-bridge/config.toml\n")
     for script in _SCRIPTS:
         shutil.copyfile(_HERE / script, folder / script)
         (folder / script).chmod(0o755)

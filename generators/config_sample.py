@@ -11,8 +11,9 @@ from service.settings.key import Key
 from service.settings.table import KEYS, TABLES
 
 _HEAD = (
-    "naze-bridge's settings. Commented-out lines show the default, or an example.",
-    "Files in conf.d/, in this folder, override it in the order of their names.",
+    "All settings of naze-bridge. Commented-out lines show the default, or an example.",
+    "Copy what you change to config.toml (the service's is /etc/naze-bridge/config.toml).",
+    "It overrides setup.toml, the answers to `naze-bridge setup`; conf.d/*.toml override both.",
     "Environment variables (NAZE_BRIDGE_SYSID, NAZE_BRIDGE_ZENOH_PREFIX) and flags override all files.",
     "`naze-bridge run --check-config --config FILE` checks the settings.",
     '`systemctl reload naze-bridge` applies settings marked "live"; the others need a restart.',

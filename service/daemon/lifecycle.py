@@ -119,7 +119,8 @@ async def _reload_on_request(
 
 def _take_over(daemon: Daemon, new: Settings) -> None:
     old = daemon.settings
-    changed = {field.name for field in fields(Settings) if getattr(old, field.name) != getattr(new, field.name)}
+    compared = [field.name for field in fields(Settings) if field.compare]
+    changed = {name for name in compared if getattr(old, name) != getattr(new, name)}
     live: set[str] = set()
     if "log_level" in changed:
         set_log_level(new.log_level)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The configuration file and its `conf.d`: TOML files, in the order of their names; later ones win."""
+"""The configuration files of one folder: setup's answers, the configuration file, and its `conf.d`; later ones win."""
 
 import difflib
 import tomllib
@@ -14,6 +14,8 @@ from storage.bounded_file import read_bounded
 from storage.os_error import reason
 
 DROP_INS = "conf.d"
+#: The answers to `naze-bridge setup`: first, so that everything written by hand overrides them.
+SETUP_FILE = "setup.toml"
 _MAX_BYTES = 1 << 20
 #: Reported per file, in case another program's file was named by mistake.
 _MOST_UNKNOWN = 20
@@ -36,9 +38,10 @@ class Given:
 
 
 def read_files(config: Path, problems: list[Problem]) -> dict[str, Given]:
-    """Read a configuration file and its drop-ins: values by key name, and True for each table present."""
+    """Read a configuration file and those beside it: values by key name, and True for each table present."""
     found: dict[str, Given] = {}
-    for path in (config, *_drop_ins(config.parent / DROP_INS, problems)):
+    answers = config.parent / SETUP_FILE
+    for path in (*([answers] if answers.exists() else []), config, *_drop_ins(config.parent / DROP_INS, problems)):
         found |= _read_file(path, problems)
     return found
 

@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from payloads.names import ZenohSettingsError
-from service.settings.addresses import GcsAddress, SerialFc, parse_gcs, split_gcs
+from service.settings.addresses import AddressError, GcsAddress, SerialFc, parse_gcs, split_gcs
 from service.settings.config_files import Given, nearest, read_files
 from service.settings.key import ENVIRONMENT_PREFIX, Problem, SettingsError, Unfit
 from service.settings.ports import port_conflicts
 from service.settings.settings import DEFAULT_GCS, Settings
 from service.settings.table import KEYS
 from service.settings.web import WebSettings
-from service.settings.write_access import WriteAccess
+from service.settings.write_access import WriteAccess, signing_access
 from service.settings.zenoh import ZenohSettings
 
 #: The environment variable for the configuration file itself.
@@ -69,12 +69,16 @@ def load_settings(
     problems += [Problem(links_are_from, text) for text in conflicts]
     if zenoh is not None:
         problems += _zenoh_problems(zenoh, given)
+    key = _key(values.get("key_file"), given, problems)
     if problems:
         raise SettingsError(problems)
+    # A link that is also given by a flag keeps the file's access rules.
+    own_access = {str(address): access for address, access in links}
+    access = {link: own_access.get(link, WriteAccess()).with_key(key) for link in map(str, addresses)}
     composed = {
         "gcs": addresses,
-        # A link that is also given by a flag keeps the file's access rules.
-        "access": {str(address): access for address, access in links if not access.is_open},
+        "access": {link: rules for link, rules in access.items() if not rules.is_open},
+        "sources": {name: found.where for name, found in given.items()},
         "state_dir": values.get("state_dir") or default_state_dir(),
         "zenoh": zenoh,
         "web": web,
@@ -133,6 +137,15 @@ def _read_values(given: Mapping[str, Given], problems: list[Problem]) -> dict[st
         except ValueError as error:
             problems.append(Problem(found.where, str(error)))
     return values
+
+
+def _key(file: Path | None, given: Mapping[str, Given], problems: list[Problem]) -> WriteAccess:
+    """The key for links without their own."""
+    try:
+        return WriteAccess() if file is None else signing_access(file)
+    except AddressError as error:
+        problems.append(Problem(given["key_file"].where, str(error)))
+        return WriteAccess()
 
 
 def _named_links(gcs: Sequence[str], problems: list[Problem]) -> list[GcsAddress]:

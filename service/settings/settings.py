@@ -9,7 +9,7 @@ from typing import Annotated
 
 from bridge.config import BridgeSettings
 from service.settings.addresses import AutoFc, FcAddress, GcsAddress, parse_fc
-from service.settings.key import LIVE, Default, Example, several, text
+from service.settings.key import LIVE, Default, Example, file_name, several, text
 from service.settings.share import ShareSettings, parse_share
 from service.settings.web import WebSettings
 from service.settings.write_access import WriteAccess, parse_link
@@ -43,8 +43,8 @@ _TLOG = TlogLimits()
 class Settings(BridgeSettings):
     """The settings of a daemon. Without `state_dir` nothing is stored.
 
-    `access`: write permission per link, by its address as text; links not in it are open. `zenoh` None: not used.
-    `web` None: no status page.
+    `access`: write permission per link, by its address as text; links not in it are open. `sources`: where each given
+    key was found ("FILE:LINE", a variable or a flag). `zenoh` None: not used. `web` None: no status page.
     """
 
     fc: Annotated[
@@ -62,6 +62,13 @@ class Settings(BridgeSettings):
         Default(f'["{DEFAULT_GCS}"]'),
         LIVE,
     ] = ()
+    key_file: Annotated[
+        Path | None,
+        file_name(in_config_folder=True),
+        "File with the MAVLink signing passphrase required for changes on every ground station link; a link's own "
+        "key_file comes first.",
+        Example('"gcs.key"'),
+    ] = None
     state_dir: Annotated[
         Path | None,
         "Folder for stored missions and telemetry logs. By default systemd's StateDirectory, else "
@@ -97,6 +104,7 @@ class Settings(BridgeSettings):
         LogLevel.INFO
     )
     access: Mapping[str, WriteAccess] = field(default_factory=dict)
+    sources: Mapping[str, str] = field(default_factory=dict, compare=False)
     zenoh: Annotated[
         ZenohSettings | None,
         "Eclipse zenoh: telemetry and missions for subscribers anywhere, off without this table.",

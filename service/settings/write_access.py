@@ -9,7 +9,7 @@ gcs = [
 
 import os
 import stat
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from ipaddress import IPv4Network, IPv6Address, IPv6Network, ip_address, ip_network
 from pathlib import Path
 
@@ -39,6 +39,10 @@ class WriteAccess:
     def is_open(self) -> bool:
         return self.key is None and self.writers is None
 
+    def with_key(self, other: "WriteAccess") -> "WriteAccess":
+        """These rules, with the other's key if they have none."""
+        return self if self.key is not None else replace(other, writers=self.writers)
+
     def has_address(self, peer: Peer) -> bool:
         assert self.writers is not None
         assert isinstance(peer.key, tuple)
@@ -62,11 +66,14 @@ def parse_link(entry: object, folder: Path) -> tuple[GcsAddress, WriteAccess]:
     networks = None if writers is None else tuple(_network(address, writer) for writer in writers)
     if key_file is None:
         return address, WriteAccess(writers=networks)
-    passphrase = read_passphrase(folder / key_file)
+    return address, replace(signing_access(folder / key_file), writers=networks)
+
+
+def signing_access(path: Path) -> WriteAccess:
+    """Access with the key whose passphrase is in a file; AddressError if it cannot be used."""
+    passphrase = read_passphrase(path)
     weak = weakness(passphrase)
-    return address, WriteAccess(
-        key_from_passphrase(passphrase), networks, None if weak is None else f"the key in {folder / key_file} {weak}"
-    )
+    return WriteAccess(key_from_passphrase(passphrase), weak_key=None if weak is None else f"the key in {path} {weak}")
 
 
 def read_passphrase(path: Path) -> str:

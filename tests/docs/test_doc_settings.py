@@ -68,7 +68,7 @@ def test_environment_variables_exist() -> None:
 def options(command: click.Command) -> Iterator[str]:
     """All options of a command and of those below it."""
     for parameter in command.params:
-        yield from parameter.opts
+        yield from (*parameter.opts, *parameter.secondary_opts)
     if isinstance(command, click.Group):
         context = click.Context(command)
         for name in command.list_commands(context):

@@ -6,10 +6,12 @@ It is built once, for this machine and two Pythons, because pip is slow. `make d
 
 import os
 import re
+import shutil
 import struct
 import subprocess
 import tarfile
 from collections.abc import Iterator
+from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 
@@ -40,6 +42,17 @@ sed -n 's/^ExecStart=/exec /p' /usr/lib/systemd/system/naze-bridge.service > /ru
 for turn in $(seq 300); do naze-bridge status 2>/dev/null | grep -q ', MSP' && exit 0; sleep 0.1; done
 cat /run/log; exit 1
 """
+#: What setup leaves outside the package.
+_AS_AFTER_SETUP = """
+cd /etc
+mkdir -p NetworkManager/system-connections avahi/services udev/rules.d
+touch NetworkManager/system-connections/naze-bridge-hotspot.nmconnection avahi/services/naze-bridge.service
+touch udev/rules.d/59-naze-bridge-others.rules naze-bridge/setup.toml naze-bridge/gcs.key naze-bridge/undo.json
+"""
+_FORMER_ANSWERS = (
+    '# Written by `naze-bridge setup`, which can be run again.\nfc = "auto"\n'
+    'gcs = [{address = "udpin:0.0.0.0:14550", key_file = "/etc/naze-bridge/gcs.key"}]'
+)
 _STOP = "kill $(cat /run/pid); while grep -q . /proc/$(cat /run/pid)/cmdline; do sleep 0.1; done"
 
 
@@ -56,6 +69,42 @@ def root(package: Path, tmp_path: Path) -> Iterator[BareRoot]:
     with BareRoot(tmp_path) as root:
         root.put(package, "/root/naze-bridge.deb")
         yield root
+
+
+def with_version(package: Path, version: str, folder: Path) -> Path:
+    """The package under another version."""
+    with unpacked(package, folder) as control:
+        control.write_text(re.sub(r"^Version: .*", f"Version: {version}", control.read_text(), flags=re.MULTILINE))
+    return folder / "repacked.deb"
+
+
+def as_before_0_2_1(package: Path, folder: Path) -> Path:
+    """The package as it was: config.toml is a conffile with all settings, and the scripts do not know setup.toml."""
+    with unpacked(package, folder) as control:
+        control.write_text(re.sub(r"^Version: .*", "Version: 0.2.0", control.read_text(), flags=re.MULTILINE))
+        shutil.copy(_REPOSITORY / "examples" / "config.toml", control.parents[1] / "etc/naze-bridge")
+        (control.parent / "conffiles").write_text("/etc/naze-bridge/config.toml\n")
+        for script in ("postinst", "prerm"):
+            (control.parent / script).write_text("#!/bin/sh\n")
+    return folder / "repacked.deb"
+
+
+@contextmanager
+def unpacked(package: Path, folder: Path) -> Iterator[Path]:
+    """Unpack the package, yield its control file, and pack it again as repacked.deb."""
+    contents = folder / "contents"
+    subprocess.run(["dpkg-deb", "--raw-extract", package, contents], check=True)
+    yield contents / "DEBIAN" / "control"
+    command: list[str | Path] = [
+        "dpkg-deb",
+        "--root-owner-group",
+        "-Znone",
+        "--build",
+        contents,
+        folder / "repacked.deb",
+    ]
+    subprocess.run(command, check=True, capture_output=True)
+    shutil.rmtree(contents)
 
 
 def files_of(package: Path) -> dict[str, tarfile.TarInfo]:
@@ -75,7 +124,8 @@ def test_the_package_has_the_expected_files(package: Path) -> None:
         "/usr/lib/systemd/system/naze-bridge.service",
         "/usr/lib/udev/rules.d/60-naze-bridge.rules",
         "/usr/lib/sysusers.d/naze-bridge.conf",
-        "/etc/naze-bridge/config.toml",
+        "/usr/share/naze-bridge/config.toml",
+        "/usr/share/doc/naze-bridge/examples/config.toml",
         "/usr/share/doc/naze-bridge/copyright",
         "/usr/share/doc/naze-bridge/changelog.gz",
         "/usr/share/man/man1/naze-bridge.1.gz",
@@ -131,14 +181,14 @@ def test_the_package_has_no_paths_of_the_build_machine(package: Path) -> None:
 
 
 @pytest.mark.timeout(1800)  # dpkg compiles all libraries three times: a minute on an idle machine
-def test_it_is_installed_used_upgraded_removed_and_purged(root: BareRoot) -> None:
+def test_it_is_installed_used_upgraded_removed_and_purged(package: Path, root: BareRoot, tmp_path: Path) -> None:
     assert "sudo naze-bridge setup" in root.run("dpkg --install /root/naze-bridge.deb")
     assert root.run("id --name --user naze-bridge") == "naze-bridge\n"
     # Not enabled by default.
     assert "naze-bridge" not in root.run("ls /etc/systemd/system/multi-user.target.wants")
     # The byte code is installed, because the service cannot write it.
     assert root.run("find /usr/lib/naze-bridge -name 'daemon.cpython-*.pyc'")
-    root.run("sed -i 's/^#fc = .*/fc = \"sim:\"/' /etc/naze-bridge/config.toml")
+    root.run("echo 'fc = \"sim:\"' >> /etc/naze-bridge/config.toml")
     root.put(_MISSION, "/root/naze-field.waypoints")
 
     printed = root.run("naze-bridge demo --once")
@@ -149,9 +199,13 @@ def test_it_is_installed_used_upgraded_removed_and_purged(root: BareRoot) -> Non
     assert "VERIFIED" in root.run("naze-bridge missions list")
     root.run(_STOP)
 
-    # An upgrade asks no questions and keeps the changed configuration and the missions.
-    root.run("dpkg --install /root/naze-bridge.deb")
-    assert 'fc = "sim:"' in root.run("cat /etc/naze-bridge/config.toml")
+    # An upgrade and a downgrade ask no questions and keep the changed configuration and the missions.
+    for version in ("99.0", "99.0~dev7"):
+        root.put(with_version(package, version, tmp_path), "/root/other.deb")
+        root.run("apt-get install --yes --allow-downgrades /root/other.deb </dev/null")
+        assert version in root.run("dpkg-query --showformat '${Version} ' --show naze-bridge")
+        assert 'fc = "sim:"' in root.run("cat /etc/naze-bridge/config.toml")
+    root.run(_AS_AFTER_SETUP)
     root.run("ln -s /usr/lib/systemd/system/naze-bridge.service /etc/systemd/system/multi-user.target.wants/")
     root.run("dpkg --remove naze-bridge")
     assert "naze-bridge" not in root.run("ls /etc/systemd/system/multi-user.target.wants")
@@ -163,3 +217,22 @@ def test_it_is_installed_used_upgraded_removed_and_purged(root: BareRoot) -> Non
     assert "missions.db" in root.run("ls /var/lib/private/naze-bridge")
     left = root.run("find /etc /usr /var /opt -xdev -name '*naze-bridge*' -not -path '/var/lib/private/*'")
     assert left == ""
+
+
+@pytest.mark.timeout(1800)
+def test_the_settings_of_an_older_release_survive_an_upgrade_and_the_way_back(
+    package: Path, root: BareRoot, tmp_path: Path
+) -> None:
+    root.put(as_before_0_2_1(package, tmp_path), "/root/old.deb")
+    root.run("dpkg --install /root/old.deb")
+    root.run("sed -i 's/^#sysid.*/sysid = 7/' /etc/naze-bridge/config.toml")
+    root.run(f"echo '{_FORMER_ANSWERS}' > /etc/naze-bridge/conf.d/setup.toml")
+    root.run("dpkg --install /root/naze-bridge.deb </dev/null")
+    assert "sysid = 7" in root.run("cat /etc/naze-bridge/config.toml")
+    assert 'key_file = "/etc/naze-bridge/gcs.key"' in root.run("cat /etc/naze-bridge/setup.toml").splitlines()
+    root.run("dpkg --install /root/old.deb </dev/null")
+    assert root.run("cat /etc/naze-bridge/conf.d/setup.toml") == f"{_FORMER_ANSWERS}\n"
+    assert "sysid = 7" in root.run("cat /etc/naze-bridge/config.toml")
+    root.run("dpkg --install /root/naze-bridge.deb </dev/null")
+    root.run("dpkg --purge naze-bridge")
+    root.run("ls /etc/naze-bridge", status=2)

@@ -28,25 +28,40 @@ class WriteFile:
 
 
 @dataclass(frozen=True, slots=True)
+class RemoveFile:
+    """Remove a file, if it exists."""
+
+    path: str
+
+    def describe(self) -> str:
+        return f"remove {self.path}"
+
+
+@dataclass(frozen=True, slots=True)
 class Run:
-    """Run a program and wait until it exits."""
+    """Run a program and wait until it exits. `undo`: the command that reverts it, empty if none is needed."""
 
     command: tuple[str, ...]
+    undo: tuple[str, ...] = ()
 
     def describe(self) -> str:
         return f"run {' '.join(self.command)}"
 
 
-Change = WriteFile | Run
+Change = WriteFile | RemoveFile | Run
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """Changes with one purpose. `needs_reboot`: they take effect after a reboot."""
+    """Changes with one purpose.
+
+    `needs_reboot`: they take effect after a reboot. `cuts_network`: they may end the pilot's own connection.
+    """
 
     purpose: str
     changes: Sequence[Change]
     needs_reboot: bool = False
+    cuts_network: bool = False
 
 
 class Machine:
@@ -61,13 +76,17 @@ class Machine:
             return
         path = self._host.path(change.path)
         try:
+            if isinstance(change, RemoveFile):
+                path.unlink(missing_ok=True)
+                return
             path.parent.mkdir(parents=True, exist_ok=True)
             # Readable from its first moment: Avahi reads a new file at once.
             replace_file(path, change.text.encode(), 0o600 if change.secret else 0o644)
         except OSError as error:
-            raise SetupError(f"{change.path} cannot be written: {reason(error)}") from error
+            raise SetupError(f"{change.path} cannot be changed: {reason(error)}") from error
 
-    def run(self, command: Sequence[str]) -> None:
+    def run(self, command: Sequence[str]) -> str:
+        """Run a program; returns its output."""
         try:
             done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)  # noqa: S603  # our own words
         except (OSError, subprocess.TimeoutExpired) as error:
@@ -76,6 +95,7 @@ class Machine:
             said = (done.stderr or done.stdout).strip().splitlines()
             why = said[-1] if said else f"exit code {done.returncode}"
             raise SetupError(f"`{' '.join(command)}` failed: {why}")
+        return done.stdout
 
 
 def is_root() -> bool:

@@ -5,14 +5,18 @@ import re
 import socket
 import time
 from contextlib import suppress
+from difflib import unified_diff
 from pathlib import Path
 
 import click
 
 from service.cli.doctor.command import diagnose
-from service.cli.setup.change import Machine, SetupError, Step, is_root
+from service.cli.setup.answers import GCS_PORT, PAGE_PORT, SetupChoices, current_key, earlier_choices, shadowed
+from service.cli.setup.change import Machine, Run, SetupError, Step, WriteFile, is_root
+from service.cli.setup.hotspot import ADDRESS, JOIN_S, hotspot_name
 from service.cli.setup.state_folder import page_token
-from service.cli.setup.steps import GCS_PORT, PAGE_PORT, SetupChoices, current_key, missing_steps
+from service.cli.setup.steps import missing_steps
+from service.cli.setup.undo import UndoLog, forget_last, undo_steps
 from service.daemon.client import STATUS, ControlError, ask_daemon
 from service.machine.host import Host
 from service.machine.raspberry_pi import pi_model
@@ -20,50 +24,55 @@ from service.settings.addresses import AddressError, parse_fc
 from service.settings.passphrase import STRONGER, new_passphrase, weakness
 from storage.os_error import reason
 from terminal.options import PATH
-from terminal.sentences import complain, fail
+from terminal.sentences import complain, fail, say
 
 _LEAST_PASSWORD, _MOST_PASSWORD, _MOST_SSID = 8, 63, 32
 #: The search spends 9 s on a port: three are tried by then.
 _SEARCH_S = 30
 _NEEDS_ROOT = "setup needs root: run `sudo naze-bridge setup`, or see the changes with --dry-run"
 _HOST_NAME = re.compile("[A-Za-z0-9](?:[A-Za-z0-9-]{0,61}[A-Za-z0-9])?")
-_ADDRESS_OF_HOTSPOT = "10.42.0.1"
 
 
 @click.command()
-@click.option("--fc", default="auto", show_default=True, metavar="FC", help="The flight controller, as for `run`.")
+@click.option("--fc", metavar="FC", help="The flight controller, as for `run`. Default: the last answer, else auto.")
 @click.option("--hotspot", metavar="SSID", help="Open a Wi-Fi network of this name. Default: keep the current one.")
 @click.option("--password-file", type=PATH, help="File with the hotspot's password.")
 @click.option("--country", metavar="CC", help="Wi-Fi country, such as DE: the radio stays off without one.")
 @click.option("--name", metavar="HOST", help="Name of this machine on the network: HOST.local.")
-@click.option("--no-page", is_flag=True, help="Do not serve the status page.")
+@click.option("--page/--no-page", default=None, help="Serve the status page, or not.")
 @click.option("--key-file", type=PATH, help="File with a MAVLink signing passphrase: required for changes.")
 @click.option("--new-key", is_flag=True, help="Make such a passphrase and show it; it replaces the present one.")
-@click.option("--yes", is_flag=True, help="Ask no questions: use the options and their defaults.")
+@click.option("--undo", is_flag=True, help="Revert the changes of the last setup.")
+@click.option("--yes", is_flag=True, help="Ask no questions: use the options, the last answers and the defaults.")
 @click.option("--dry-run", is_flag=True, help="Show the changes without making them.")
 @click.option("--root", type=PATH, default="/", hidden=True)
 def setup(
-    fc: str,
+    fc: str | None,
     hotspot: str | None,
     password_file: Path | None,
     country: str | None,
     name: str | None,
-    no_page: bool,
+    page: bool | None,
     key_file: Path | None,
     new_key: bool,
+    undo: bool,
     yes: bool,
     dry_run: bool,
     root: Path,
 ) -> None:
-    """Set this Raspberry Pi up: UART, settings, Wi-Fi, status page, service. May be run again at any time.
+    """Set this Raspberry Pi up: UART, settings, Wi-Fi, status page, service.
 
-    Exit code 0: done, 1: a change failed, or doctor found a problem.
+    May be run again at any time: earlier answers are kept, and an option changes one. Exit code 0: done, 1: a change
+    failed, or doctor found a problem.
     """
     if not (yes or dry_run or is_root()):
         fail(_NEEDS_ROOT)  # before its questions
     host = Host(root)
+    if undo:
+        _undo(host, yes=yes, dry_run=dry_run)
+        return
     try:
-        fc = str(parse_fc(fc))
+        fc = None if fc is None else str(parse_fc(fc))
     except AddressError as error:
         raise click.UsageError(str(error)) from error
     click.echo(f"This is a {model.name}." if (model := pi_model(host)) else "This is not a known Raspberry Pi model.")
@@ -71,12 +80,16 @@ def setup(
     key = None if key_file is None else _line_of(key_file)
     if key is not None and new_key:
         raise click.UsageError("give either --key-file or --new-key")
-    page = not no_page
-    if not yes and not dry_run:
+    earlier = earlier_choices(host)
+    if earlier is not None:
+        fc, page = earlier.fc if fc is None else fc, earlier.page if page is None else page
+        _print_kept(host, fc, page=page)
+    elif not yes and not dry_run:
         if hotspot is None and click.confirm("Open a Wi-Fi hotspot, for the field? (no: keep the current network)"):
             hotspot = click.prompt("Its name", default=socket.gethostname())
             country = country or click.prompt("Your country, two letters")
-        page = page and click.confirm("Serve the status page to browsers on the network?", default=True)
+        if page is None:
+            page = click.confirm("Serve the status page to browsers on the network?", default=True)
         if key is None and not new_key and not current_key(host):
             new_key = click.confirm("Make a key, without which nobody on the network can change missions or settings?")
     if hotspot is not None and password is None:
@@ -89,8 +102,8 @@ def setup(
     if name is not None and not _HOST_NAME.fullmatch(name):
         raise click.UsageError(f"{name!r} is not a host name: letters, digits and hyphens, at most 63")
     answers = SetupChoices(
-        fc=fc,
-        page=page,
+        fc=None if fc == "auto" else fc,
+        page=page is not False,
         hotspot=None if hotspot is None or password is None else (hotspot, password),
         country=None if country is None else country.upper(),
         name=name,
@@ -99,31 +112,89 @@ def setup(
     used = answers.key or current_key(host)
     if used and (weak := weakness(used)) is not None:
         complain(f"warning: the key {weak}; {STRONGER}")
+    for sentence in shadowed(host, answers):
+        complain(f"warning: {sentence}")
     steps = missing_steps(host, answers)
-    _show(steps)
+    _show(host, steps)
     if dry_run:
         return
+    log = UndoLog(host, Machine(host))
     if steps:
-        if not is_root():
-            fail(_NEEDS_ROOT)
-        if not yes and not click.confirm("Make these changes?", default=True):
-            raise click.Abort
-        _carry_out(steps, Machine(host))
+        _agree(yes=yes)
+        _carry_out([step for step in steps if not step.cuts_network], log)
     _print_addresses(host, answers)
     if new_key:
         click.echo(f"\nThe key, for ground stations that may change something: {answers.key}")
         click.echo("In Mission Planner: Setup, Advanced, MAVLink Signing, Add")
         _print_code(str(answers.key))
+    is_well = True
     if any(step.needs_reboot for step in steps):
         click.echo("\nReboot once for the UART: sudo reboot. After that: naze-bridge doctor")
     elif host.path("/run/systemd/system").exists():
         if steps:
             _await_flight_controller()
-        if not diagnose():
-            raise SystemExit(1)
+        is_well = diagnose()
+    _switch_network([step for step in steps if step.cuts_network], log, hotspot, ask=not yes)
+    if not is_well:
+        raise SystemExit(1)
 
 
-def _show(steps: list[Step]) -> None:
+def _switch_network(steps: list[Step], log: UndoLog, hotspot: str | None, *, ask: bool) -> None:
+    """Open the hotspot last: it may end the connection over which setup is run."""
+    if not steps:
+        return
+    if all(not isinstance(change, Run) for step in steps for change in step.changes):
+        _carry_out(steps, log)
+        return
+    click.echo(
+        f"\nNow the Wi-Fi changes to the hotspot {hotspot!r}, and a connection over the present Wi-Fi network ends.\n"
+        f"Join it within {JOIN_S // 60} minutes: if no device does, the Pi returns to the present network."
+    )
+    if ask:
+        click.prompt("Press Enter when you have noted the above", default="", show_default=False)
+    _carry_out(steps, log)
+
+
+def _undo(host: Host, *, yes: bool, dry_run: bool) -> None:
+    try:
+        steps, kept = undo_steps(host)
+    except SetupError as error:
+        fail(str(error))
+    for path in kept:
+        complain(f"{path} was changed since the last setup, and is kept as it is")
+    if not steps:
+        click.echo("There is nothing to undo.")
+        return
+    _show(host, steps)
+    if dry_run:
+        return
+    _agree(yes=yes)
+    machine = Machine(host)
+    forget_last(host, machine)
+    _carry_out(steps, machine)
+    if any(step.needs_reboot for step in steps):
+        click.echo("Reboot once for the UART: sudo reboot")
+
+
+def _agree(*, yes: bool) -> None:
+    if not is_root():
+        fail(_NEEDS_ROOT)
+    if not yes and not click.confirm("Make these changes?", default=True):
+        raise click.Abort
+
+
+def _print_kept(host: Host, fc: str | None, *, page: bool | None) -> None:
+    hotspot = hotspot_name(host)
+    kept = [
+        f"flight controller {fc or 'auto'}",
+        f"status page {'on' if page else 'off'}",
+        "a key is required for changes" if current_key(host) else "no key: anyone on the network can make changes",
+        *([f"hotspot {hotspot!r}"] if hotspot else []),
+    ]
+    click.echo(f"Set up before: {', '.join(kept)}. Options change this: naze-bridge setup --help")
+
+
+def _show(host: Host, steps: list[Step]) -> None:
     if not steps:
         click.echo("Everything is set up already.")
         return
@@ -132,9 +203,14 @@ def _show(steps: list[Step]) -> None:
         click.echo(f"{number}. {step.purpose}{' (needs a reboot)' if step.needs_reboot else ''}")
         for change in step.changes:
             click.echo(f"     {change.describe()}")
+            if isinstance(change, WriteFile) and not change.secret:
+                before, after = host.read(change.path).splitlines(), change.text.splitlines()
+                for line in list(unified_diff(before, after, lineterm="", n=0))[2:]:
+                    if not line.startswith("@@"):
+                        say(line, prefix="       ", indent=7)
 
 
-def _carry_out(steps: list[Step], machine: Machine) -> None:
+def _carry_out(steps: list[Step], machine: Machine | UndoLog) -> None:
     for step in steps:
         click.echo(f"{step.purpose} ... ", nl=False)
         try:
@@ -157,7 +233,7 @@ def _await_flight_controller() -> None:
 
 
 def _print_addresses(host: Host, answers: SetupChoices) -> None:
-    addresses = [_ADDRESS_OF_HOTSPOT] if answers.hotspot else host.ipv4_addresses()
+    addresses = [ADDRESS] if answers.hotspot else host.ipv4_addresses()
     name = answers.name or host.read("/etc/hostname").strip()
     local = [f"{name}.local"] if name and host.path("/etc/avahi").exists() else []
     where = " or ".join([*local, *addresses]) or "this machine's address"

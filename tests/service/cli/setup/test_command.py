@@ -8,45 +8,15 @@ from pathlib import Path
 
 import pytest
 import segno
-from click.testing import CliRunner, Result
+from click.testing import Result
 
-from service.cli.main import main
 from service.cli.setup import command
-from service.cli.setup.change import Machine
-from service.cli.setup.steps import KEY_FILE, SETTINGS_FILE
+from service.cli.setup.answers import KEY_FILE, SETTINGS_FILE
 from service.settings.passphrase import weakness
+from tests.support.setup_pi import Pi
 
 _SHOWN = re.compile(r"^The key, .*: (\S+)$", re.MULTILINE)
 _WANTED_BY = "etc/systemd/system/multi-user.target.wants"
-
-
-class Pi:
-    """A machine's files; programs are not run, but recorded."""
-
-    def __init__(self, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.root = root
-        self.ran: list[str] = []
-        monkeypatch.setattr(command, "is_root", lambda: True)
-        monkeypatch.setattr(command, "diagnose", lambda: True)
-        monkeypatch.setattr(command, "_await_flight_controller", lambda: None)
-        monkeypatch.setattr(Machine, "run", lambda _, words: self.ran.append(" ".join(words)))
-
-    @property
-    def key_file(self) -> Path:
-        return self.root / KEY_FILE.lstrip("/")
-
-    def is_running(self) -> None:
-        (self.root / "run/systemd/system").mkdir(parents=True)
-        (self.root / _WANTED_BY).mkdir(parents=True)
-        (self.root / _WANTED_BY / "naze-bridge.service").symlink_to("x")
-
-    def setup(self, *options: str, answers: str = "") -> Result:
-        return CliRunner().invoke(main, ["setup", "--root", str(self.root), *options], input=answers)
-
-
-@pytest.fixture
-def pi(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pi:
-    return Pi(tmp_path, monkeypatch)
 
 
 def shown_key(done: Result) -> str:
@@ -66,16 +36,17 @@ def test_a_new_key_is_stored_for_the_service_and_shown_with_its_code(pi: Pi) -> 
     segno.make(key, error="l").terminal(code, compact=True)
     assert code.getvalue() in done.output
     settings = tomllib.loads((pi.root / SETTINGS_FILE.lstrip("/")).read_text())
-    assert settings["gcs"][0]["key_file"] == KEY_FILE
+    assert settings["key_file"] == KEY_FILE
     assert key not in pi.setup("--yes").output
 
 
-def test_the_pilot_is_asked_for_a_key_until_there_is_one(pi: Pi) -> None:
+def test_the_pilot_is_asked_once(pi: Pi) -> None:
     hotspot, page, key, go = "n\n", "y\n", "y\n", "y\n"
     first = shown_key(pi.setup(answers=hotspot + page + key + go))
-    again = pi.setup(answers=hotspot + page + go)
+    again = pi.setup(answers=go)
     assert again.exit_code == 0, again.output
-    assert "Make a key" not in again.output
+    assert again.output.count("?") == 1  # Make these changes?
+    assert "Set up before: flight controller auto, status page on, a key is required" in again.output
     assert pi.key_file.read_text() == f"{first}\n"
 
 
@@ -113,3 +84,29 @@ def test_an_empty_key_and_two_keys_are_refused(pi: Pi, tmp_path: Path) -> None:
     file.write_text("x\n")
     assert "either" in pi.setup("--yes", "--key-file", str(file), "--new-key").output
     assert not pi.key_file.exists()
+
+
+def test_everything_is_printed_before_the_wifi_changes(pi: Pi, tmp_path: Path) -> None:
+    pi.is_running()
+    password = tmp_path / "password"
+    password.write_text("long-enough\n")
+    done = pi.setup("--hotspot", "kite", "--password-file", str(password), answers="y\n" * 3 + "\n")
+    assert done.exit_code == 0, done.output
+    order = ["Status page:", "The key, ", "Now the Wi-Fi changes to the hotspot 'kite'", "Press Enter"]
+    places = [done.output.index(words) for words in order]
+    assert places == sorted(places)
+    # Closing the terminal must not leave it half done: another process opens it.
+    assert pi.ran[-1].startswith("systemd-run ")
+    assert not [command for command in pi.ran if "connection up" in command]
+
+
+def test_doctors_verdict_does_not_keep_the_hotspot_closed(
+    pi: Pi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(command, "diagnose", lambda: False)
+    pi.is_running()
+    password = tmp_path / "password"
+    password.write_text("long-enough\n")
+    done = pi.setup("--yes", "--hotspot", "kite", "--password-file", str(password))
+    assert done.exit_code == 1
+    assert pi.ran[-1].startswith("systemd-run ")

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from service.cli.setup.answers import SetupChoices
 from service.cli.setup.state_folder import page_token
-from service.cli.setup.steps import SetupChoices, missing_steps
+from service.cli.setup.steps import missing_steps
 from tests.service.cli.setup.test_steps import FreshPi
 
 OTHERS = "/etc/udev/rules.d/59-naze-bridge-others.rules"

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Wi-Fi hotspot: a NetworkManager connection, opened by a process of its own.
+
+Opening it ends the Wi-Fi connection over which setup may be run. So setup reports everything first and then starts
+this module as a transient unit: `python -m service.cli.setup.hotspot`. If no device joins in time, the former network
+returns.
+"""
+
+import re
+import sys
+import time
+import uuid
+from collections.abc import Callable, Iterator
+
+from service.cli.setup.change import Change, Machine, RemoveFile, Run, SetupError, Step, WriteFile
+from service.machine.host import Host
+
+CONNECTION = "naze-bridge-hotspot"
+HOTSPOT_FILE = f"/etc/NetworkManager/system-connections/{CONNECTION}.nmconnection"
+ADDRESS = "10.42.0.1"
+JOIN_S = 180
+_CARD = "wlan0"
+#: A file for each device, which names its active connection.
+_NM_DEVICES = "/run/NetworkManager/devices"
+#: NetworkManager's DHCP server notes here which devices joined.
+_LEASES = f"/var/lib/NetworkManager/dnsmasq-{_CARD}.leases"
+_OFF, _ON = "autoconnect=false", "autoconnect=true"
+#: Time for setup's last lines to reach the pilot.
+_DELAY_S = 3
+_RELOAD = ("nmcli", "connection", "reload")
+
+
+def hotspot_steps(host: Host, hotspot: tuple[str, str] | None) -> Iterator[Step]:
+    if hotspot is None:
+        return
+    ssid, password = hotspot
+    identity = uuid.uuid5(uuid.NAMESPACE_DNS, ssid)
+    text = (
+        "# Written by `naze-bridge setup`.\n"
+        f"[connection]\nid={CONNECTION}\nuuid={identity}\ntype=wifi\n"
+        f"interface-name={_CARD}\n{_ON}\nautoconnect-priority=100\n\n"
+        f"[wifi]\nmode=ap\nband=bg\nssid={_keyfile(ssid)}\n\n[wifi-security]\nkey-mgmt=wpa-psk\n"
+        f"psk={_keyfile(password)}\n\n"
+        f"[ipv4]\nmethod=shared\naddress1={ADDRESS}/24\n\n[ipv6]\nmethod=disabled\n"
+    )
+    purpose = f"open the Wi-Fi hotspot {ssid!r}"
+    if not host.path("/run/systemd/system").exists():
+        if host.read(HOTSPOT_FILE) != text:
+            yield Step(purpose, [WriteFile(HOTSPOT_FILE, text, secret=True)])
+        return
+    devices = [host.read(f"{_NM_DEVICES}/{name}") for name in host.names(_NM_DEVICES)]
+    is_open = any(f"connection-uuid={identity}" in device for device in devices)
+    if host.read(HOTSPOT_FILE) == text and is_open:
+        return
+    # Not opened at boot before a device has joined it once.
+    changes: list[Change] = [WriteFile(HOTSPOT_FILE, text.replace(_ON, _OFF), secret=True), Run(_RELOAD, undo=_RELOAD)]
+    unit = ("systemd-run", "--quiet", "--collect", f"--unit={CONNECTION}", f"--on-active={_DELAY_S}")
+    changes.append(Run((*unit, sys.executable, "-I", "-m", "service.cli.setup.hotspot")))
+    yield Step(purpose, changes, cuts_network=True)
+
+
+def hotspot_name(host: Host) -> str | None:
+    """The name of the hotspot's network; None without one."""
+    found = re.search(r"^ssid=(.*)$", host.read(HOTSPOT_FILE), re.MULTILINE)
+    return found and found[1].replace("\\s", " ").replace("\\\\", "\\")
+
+
+def _keyfile(text: str) -> str:
+    """A value in the syntax of NetworkManager's key files (GKeyFile)."""
+    escaped = text.replace("\\", "\\\\")
+    return escaped.replace(" ", "\\s", 1) if escaped.startswith(" ") else escaped
+
+
+def open_hotspot(host: Host, machine: Machine, sleep: Callable[[float], None] = time.sleep) -> str:
+    """Open the hotspot, and return to the former Wi-Fi network if no device joins; returns the outcome, a sentence."""
+    active = machine.run(("nmcli", "--terse", "--fields", "UUID,DEVICE", "connection", "show", "--active"))
+    former = next((line.split(":")[0] for line in active.splitlines() if line.endswith(f":{_CARD}")), None)
+    leases = host.read(_LEASES)
+    try:
+        machine.run(("nmcli", "connection", "up", CONNECTION))
+    except SetupError as error:
+        return f"{error}; {_return_to(former, machine)}"
+    for _ in range(JOIN_S if former is not None else 0):
+        if host.read(_LEASES) != leases or _has_neighbour(host):
+            break
+        sleep(1)
+    else:
+        if former is not None:
+            return f"no device joined the hotspot within {JOIN_S} s; {_return_to(former, machine)}"
+    machine.carry_out(WriteFile(HOTSPOT_FILE, host.read(HOTSPOT_FILE).replace(_OFF, _ON), secret=True))
+    machine.run(_RELOAD)
+    return "the hotspot is open"
+
+
+def _return_to(former: str | None, machine: Machine) -> str:
+    """Close the hotspot; the connection is removed, so that a restart does not open it either."""
+    machine.carry_out(RemoveFile(HOTSPOT_FILE))
+    machine.run(_RELOAD)
+    if former is None:
+        return "there was no other network"
+    machine.run(("nmcli", "connection", "up", former))
+    return "back on the former network"
+
+
+def _has_neighbour(host: Host) -> bool:
+    """True if a device in the hotspot's network answered (/proc/net/arp: address, type, flags, ..., card)."""
+    network = ADDRESS.rpartition(".")[0] + "."
+    rows = [line.split() for line in host.read("/proc/net/arp").splitlines()[1:]]
+    return any(row[0].startswith(network) and row[2] == "0x2" and row[-1] == _CARD for row in rows)
+
+
+if __name__ == "__main__":
+    machine_itself = Host()
+    sys.stdout.write(f"{open_hotspot(machine_itself, Machine(machine_itself))}\n")

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The change from a Wi-Fi network to the hotspot, with a NetworkManager made of files."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+
+from service.cli.setup.change import Machine, SetupError
+from service.cli.setup.hotspot import CONNECTION, HOTSPOT_FILE, JOIN_S, hotspot_name, hotspot_steps, open_hotspot
+from service.machine.host import Host
+from tests.support.faulty_machine import FaultyMachine
+
+_LEASES = "/var/lib/NetworkManager/dnsmasq-wlan0.leases"
+_ARP = "IP address HW type Flags HW address Mask Device\n"
+
+
+class NetworkManager(Machine):
+    """Keeps the active connection of wlan0; `former` is the home network's."""
+
+    def __init__(self, host: Host, former: str | None = "home-uuid", *, radio_works: bool = True) -> None:
+        super().__init__(host)
+        self.active = former
+        self._radio_works = radio_works
+
+    def run(self, command: Sequence[str]) -> str:
+        match tuple(command):
+            case ("nmcli", "connection", "up", name):
+                if name == CONNECTION and not self._radio_works:
+                    raise SetupError("`nmcli connection up` failed: no radio")
+                self.active = name
+            case ("nmcli", "--terse", *_):
+                return f"lo-uuid:lo\n{self.active}:wlan0\n" if self.active else "lo-uuid:lo\n"
+        return ""
+
+
+@pytest.fixture
+def pi(tmp_path: Path) -> FaultyMachine:
+    host = FaultyMachine(tmp_path)
+    host.write("/run/systemd/system/.keep")
+    host.write(_LEASES, "1 aa:bb 10.42.0.7 old-phone *\n")
+    (step,) = hotspot_steps(host, (" naze\\field", "long-enough"))
+    Machine(host).carry_out(step.changes[0])
+    return host
+
+
+def opens_at_boot(pi: FaultyMachine) -> bool:
+    return "autoconnect=true" in pi.read(HOTSPOT_FILE)
+
+
+def after(seconds: int, happens: Callable[[], object]) -> Callable[[float], None]:
+    """A sleep during which something happens."""
+    left = [seconds]
+
+    def sleep(_: float) -> None:
+        left[0] -= 1
+        if left[0] == 0:
+            happens()
+
+    return sleep
+
+
+def test_it_stays_open_once_a_device_has_joined(pi: FaultyMachine) -> None:
+    manager = NetworkManager(pi)
+    assert not opens_at_boot(pi)
+    joins = after(100, lambda: pi.write(_LEASES, "2 aa:bb 10.42.0.7 old-phone *\n"))
+    assert open_hotspot(pi, manager, joins) == "the hotspot is open"
+    assert manager.active == CONNECTION
+    assert opens_at_boot(pi)
+    assert pi.path(HOTSPOT_FILE).stat().st_mode & 0o777 == 0o600
+
+
+def test_a_device_with_its_own_address_counts(pi: FaultyMachine) -> None:
+    row = "10.42.0.9 0x1 {} aa:bb * wlan0\n"
+    pi.write("/proc/net/arp", _ARP + row.format("0x0") + "192.168.1.1 0x1 0x2 cc:dd * wlan0\n")
+    manager = NetworkManager(pi)
+    joins = after(9, lambda: pi.write("/proc/net/arp", _ARP + row.format("0x2")))
+    assert open_hotspot(pi, manager, joins) == "the hotspot is open"
+
+
+def test_without_a_device_the_former_network_returns(pi: FaultyMachine) -> None:
+    manager = NetworkManager(pi)
+    slept: list[float] = []
+    told = open_hotspot(pi, manager, slept.append)
+    assert told == f"no device joined the hotspot within {JOIN_S} s; back on the former network"
+    assert manager.active == "home-uuid"
+    assert sum(slept) == JOIN_S
+    assert not pi.path(HOTSPOT_FILE).exists()
+
+
+def test_a_hotspot_that_cannot_open_leaves_the_former_network(pi: FaultyMachine) -> None:
+    manager = NetworkManager(pi, radio_works=False)
+    assert open_hotspot(pi, manager, lambda _: None).endswith("no radio; back on the former network")
+    assert manager.active == "home-uuid"
+
+
+def test_without_a_former_network_it_waits_for_nobody(pi: FaultyMachine) -> None:
+    manager = NetworkManager(pi, former=None)
+    assert open_hotspot(pi, manager, lambda _: pytest.fail("it waited")) == "the hotspot is open"
+    assert opens_at_boot(pi)
+
+
+def test_its_name_is_read_back(pi: FaultyMachine) -> None:
+    assert hotspot_name(pi) == " naze\\field"
