@@ -8,7 +8,8 @@
 #   make lint           check style, format and types
 #   make bench          measure speed and memory
 #   make pictures       retake the docs' pictures of the status page
-#   make real-board IMAGE=X.elf  run Harakiri with the patch, built by you, on the emulated board (CUTS=20: fewer power cuts)
+#   make real-board IMAGE=X.elf  run Harakiri with the patch, built by you, on the emulated board (CUTS=20: fewer power cuts;
+#                       FLY=1: flights too)
 #   make soak           kill -9 and damaged stores by the hundred, then the daemon through all kinds of events and attacks
 #                       for 30 min (MINUTES=10: for ten; SOAK_SEED=7: others)
 #   make fuzz           10,500,000 random inputs over UDP, TCP and UART and in files: hours (EXAMPLES=500: a 26th of them)
@@ -82,7 +83,7 @@ pictures: $(VENV)/.test-ready
 
 real-board: $(VENV)/.test-ready
 	@test -n '$(IMAGE)' || { echo 'Say which image: make real-board IMAGE=path/to/X.elf' >&2; exit 1; }
-	NAZE_IMAGE='$(IMAGE)' NAZE_CUTS=$(or $(CUTS),200) $(BIN)/python -m pytest tests/real_board --timeout 0 $(ARGS)
+	NAZE_IMAGE='$(IMAGE)' NAZE_CUTS=$(or $(CUTS),200) NAZE_FLY='$(FLY)' $(BIN)/python -m pytest tests/real_board --timeout 0 $(ARGS)
 
 soak: $(VENV)/.test-ready
 	STORE_KILLS=200 STORE_DAMAGES=300 $(BIN)/python -m pytest --timeout 0 \

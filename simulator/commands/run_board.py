@@ -27,6 +27,8 @@ class Running:
     control: Path | None = None
     hang_after: float | None = None
     power_cut_after: float | None = None
+    #: Control lines, and when they are executed.
+    script: tuple[tuple[float, str], ...] = ()
 
 
 async def run_board(board: SimulatedBoard, name: str, running: Running, is_alive: Callable[[], bool]) -> None:
@@ -45,10 +47,17 @@ async def run_board(board: SimulatedBoard, name: str, running: Running, is_alive
         plug = PtyLink(board, running.link, loop)
         place = f"{running.link}, {board.baud} baud"
     control = Control(board, plug, loop)
+
+    def execute(line: str) -> None:
+        if (answer := control.execute(line)) != "ok":
+            click.echo(f"script: {line}: {answer}", err=True)
+
     if running.hang_after is not None:
         loop.call_later(running.hang_after, control.execute, "hang 1")
     if running.power_cut_after is not None:
         loop.call_later(running.power_cut_after, control.execute, "power off")
+    for at, line in running.script:
+        loop.call_later(at, execute, line)
     try:
         plug.plug()
         if running.control:

@@ -17,12 +17,14 @@ from simulator.commands.image import run_image
 from simulator.commands.other_boards import run_other_board
 from simulator.commands.play import play_capture
 from simulator.commands.run_board import Running, run_board
+from simulator.commands.stick_script import read_script
 from simulator.inav.boxes import BOXES
 from simulator.naze.board import SimulatedNaze
 from simulator.naze.compiled_core import CORE_CAPACITY, load_core
 from simulator.naze.mission_commands import MissionCommands
 from simulator.naze.mission_slots import flash_size
 from simulator.naze.missions import BootMissions
+from simulator.sky.sky import Weather
 
 _BAUD = click.Choice(["1200", "2400", "4800", "9600", "19200", "38400", "57600", "115200"])
 _RATE = click.FloatRange(0, 1)
@@ -42,8 +44,10 @@ def _load_core(path: Path, capacity: int) -> BootMissions:
 #: The options that --image and --play allow: the rest depends on the firmware, or is recorded.
 _WITH_IMAGE = {
     "image", "link", "tcp", "armed", "bit_errors", "lost_bytes", "seed", "hang_after", "power_cut_after", "state",
-    "control",
+    "control", "fly", "wind", "script",
 }  # fmt: skip
+#: Options of a flight.
+_WITH_FLY = {"wind", "script"}
 _WITH_PLAY = {"play", "link", "speed"}
 #: Options of Harakiri and its mission extension, of --image and of --play.
 _OF_THE_NAZE = {
@@ -111,7 +115,16 @@ def _address(_: click.Context, __: click.Parameter, value: str | None) -> tuple[
 @click.option(
     "--image",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    help="Emulate the chip and run this firmware (ELF). Needs naze-bridge[emulator].",
+    help="Emulate the chip and run this firmware (.elf, .hex or .bin). Needs naze-bridge[emulator].",
+)
+@click.option("--fly", is_flag=True, help="With --image: put the board into a quadcopter that flies.")
+@click.option(
+    "--wind", type=click.FloatRange(0, 20), default=0.0, help="With --fly: wind from the west, m/s, with gusts."
+)
+@click.option(
+    "--script",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="With --fly: sticks and switches, lines of SECONDS NAME VALUE (docs/simulator.md).",
 )
 @click.option("--state", "--flash", "state", type=_PATH, help="File that keeps the flash's contents.")
 @click.option("--control", type=_PATH, help="Unix socket for control commands (docs/simulator.md).")
@@ -143,6 +156,9 @@ def sim(
     power_cut_after: float | None,
     core: Path | None,
     image: Path | None,
+    fly: bool,
+    wind: float,
+    script: Path | None,
     state: Path | None,
     control: Path | None,
     play: Path | None,
@@ -152,10 +168,14 @@ def sim(
     if (link is None) == (tcp is None):
         raise click.UsageError("specify the connection: --link PATH or --tcp HOST:PORT")
     faults = Faults(armed=armed, extension=not no_extension, bit_error_rate=bit_errors, lost_byte_rate=lost_bytes)
-    running = Running(link, tcp, control, hang_after, power_cut_after)
+    running = Running(link, tcp, control, hang_after, power_cut_after, read_script(script) if script else ())
+    if fly and image is None:
+        raise click.UsageError("--fly needs a firmware: add --image FILE")
+    if not fly:
+        _refuse_options("a board that does not fly", lambda name: name in _WITH_FLY)
     if image is not None:
         _refuse_options("--image", lambda name: name not in _WITH_IMAGE)
-        run_image(image, faults, running, state, seed)
+        run_image(image, faults, running, state, seed, Weather(wind=wind, seed=seed) if fly else None)
         return
     if kind != "naze":
         _refuse_options(f"--kind {kind}", lambda name: name in _OF_THE_NAZE)

@@ -5,11 +5,11 @@ Time is passed in (seconds of any monotonic clock), as for the simulated Naze.
 """
 
 import logging
+from collections.abc import Callable
 from math import inf
 
 from simulator.board.simulated_board import Power, SimulatedBoard
-from simulator.emulated_naze.chip import Chip
-from simulator.emulated_naze.cpu import CpuFaultError
+from simulator.emulated_naze.chip import Chip, CpuFaultError
 from simulator.emulated_naze.harakiri_memory import HarakiriMemory, SpokenProtocol
 from simulator.emulated_naze.image import FLASH_SIZE, Image
 from simulator.emulated_naze.switches import EmulatedCounters, EmulatedFaults
@@ -19,6 +19,9 @@ BOOT_S = 8.0
 #: How often a client's bytes are exchanged.
 _STEP_S = 0.002
 _STICK_LOW_US, _STICK_HIGH_US = 1000, 2000
+#: Between the defaults of esc_moff and esc_min.
+_MOTORS_STOPPED_US = 1050
+_BOOT_STEP_S = 0.25
 
 _log = logging.getLogger(__name__)
 
@@ -50,23 +53,30 @@ class EmulatedNaze(SimulatedBoard):
         flash[: len(image.program)] = image.program
         self.flash = flash
         self.counters = EmulatedCounters()
-        self._chip = Chip(flash, len(image.program), self.faults, self.counters, seed)
+        self._chip = self._make_chip(len(image.program), seed)
         self._chip.flash_controller.on_power_cut = self._on_power_cut
-        self._memory = HarakiriMemory(image, self._chip.cpu, flash)
+        self._memory = HarakiriMemory(image, self._chip, flash)
         self._longest_step_s = longest_step_s
         # The callers' time when the chip's clock was zero.
         self._offset_s = 0.0
         self._lost_power = False
+        self.on_boot: Callable[[float], None] = lambda _: None
+
+    def _make_chip(self, program_size: int, seed: int) -> Chip:
+        return Chip(self.flash, program_size, self.faults, self.counters, seed)
 
     # -- its state -------------------------------------------------------------------------------------------
 
     @property
     def baud(self) -> int:
-        return self._chip.usart1.baud
+        return self._chip.baud(1)
 
     @property
     def armed(self) -> bool:
-        return self.power is Power.RUNNING and self._memory.armed
+        if self.power is not Power.RUNNING:
+            return False
+        armed = self._memory.armed
+        return max(self._chip.motors_us()) > _MOTORS_STOPPED_US if armed is None else armed
 
     @property
     def protocol(self) -> SpokenProtocol | None:
@@ -82,18 +92,22 @@ class EmulatedNaze(SimulatedBoard):
 
     def peek(self, address: int, size: int) -> bytes:
         """Bytes of the chip's RAM, as a debugger would see them."""
-        return self._chip.cpu.load(address, size)
+        return self._chip.load(address, size)
 
     def poke(self, address: int, data: bytes) -> None:
         """Overwrite bytes of the chip's RAM, as a debugger would."""
-        self._chip.cpu.store(address, data)
+        self._chip.store(address, data)
 
     # -- controls --------------------------------------------------------------------------------------------
 
     def power_on_booted(self, now: float) -> None:
-        """Switch the power on and let the board boot at once."""
+        """Switch the power on and let the board boot at once; `on_boot` gets the part done, 0 to 1."""
         super().power_on_booted(now)
-        self._run_chip_until(now)
+        begun = now - self._boot_s
+        while begun < now:
+            begun = min(begun + _BOOT_STEP_S, now)
+            self._run_chip_until(begun)
+            self.on_boot(1 - (now - begun) / self._boot_s)
 
     def next_wakeup(self, now: float) -> float:
         return now + _STEP_S if self.power is Power.RUNNING else inf
@@ -101,18 +115,18 @@ class EmulatedNaze(SimulatedBoard):
     # -- time ------------------------------------------------------------------------------------------------
 
     def _run_until(self, now: float) -> None:
-        late_s = now - self._offset_s - self._chip.clock.now_ns / 1e9 - self._longest_step_s
+        late_s = now - self._offset_s - self._chip.now_ns / 1e9 - self._longest_step_s
         if late_s > 0:
             self._offset_s += late_s
         self._run_chip_until(now)
 
     def _run_chip_until(self, now: float) -> None:
         """Run the core up to a time, unless something stops it."""
-        chip, end_ns = self._chip, int((now - self._offset_s) * 1e9)
+        chip, end_ns = self._chip, self._chip_ns(now)
         self._move_sticks()
-        while self.power is Power.RUNNING and not self.faults.hang and chip.clock.now_ns < end_ns:
+        while self.power is Power.RUNNING and not self.faults.hang and chip.now_ns < end_ns:
             try:
-                chip.cpu.run_until(end_ns, self._goes_on)
+                chip.run(end_ns)
             except CpuFaultError as error:
                 _log.error("the core has crashed: %s", error)
                 self.counters.crashes += 1
@@ -125,18 +139,21 @@ class EmulatedNaze(SimulatedBoard):
                 self.counters.bootloader_entered = True
                 self.power = Power.BOOTLOADER
         if self.power is not Power.OFF:
-            chip.clock.advance(end_ns)
+            chip.advance(end_ns)
 
-    def _goes_on(self) -> bool:
-        chip = self._chip
-        return not (self._lost_power or chip.wants_reset or chip.is_in_boot_loader)
+    def _chip_ns(self, now: float) -> int:
+        """The chip's time at a caller's time, and back."""
+        return round((now - self._offset_s) * 1e9)
+
+    def _seconds(self, chip_ns: int) -> float:
+        return chip_ns / 1e9 + self._offset_s
 
     def _on_power_cut(self) -> None:
         self._lost_power = True
-        self._chip.cpu.pause()
+        self._chip.pause()
 
     def _boot(self, now: float) -> None:
-        self._offset_s = now - self._chip.clock.now_ns / 1e9
+        self._offset_s = now - self._chip.now_ns / 1e9
         self._chip.power_on()
         self.power = Power.RUNNING
 
@@ -151,12 +168,10 @@ class EmulatedNaze(SimulatedBoard):
         self.power = Power.OFF
 
     def _hear(self, data: bytes, now: float) -> None:
-        self._chip.usart1.receive(data)
+        self._chip.receive(1, data)
 
     def _take_sent(self, now: float) -> bytes:
-        sent = bytes(self._chip.usart1.sent)
-        self._chip.usart1.sent.clear()
-        return sent
+        return self._chip.take_sent(1)
 
     def _move_sticks(self) -> None:
         faults = self.faults
@@ -164,4 +179,4 @@ class EmulatedNaze(SimulatedBoard):
         if self.power is Power.RUNNING and faults.armed != self.armed:
             throttle, yaw = _STICK_LOW_US, _STICK_HIGH_US if faults.armed else _STICK_LOW_US
         switches = (faults.aux1, faults.aux2, faults.aux3, faults.aux4)
-        self._chip.receiver.channels[:] = (faults.roll, faults.pitch, throttle, yaw, *switches)
+        self._chip.set_receiver([faults.roll, faults.pitch, throttle, yaw, *switches])

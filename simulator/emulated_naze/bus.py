@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The peripheral bus: which register block answers at which address (section 3.3, memory map)."""
+"""The register blocks that the firmware uses rarely; the others are in C (`native/bus.c`, section 3.3)."""
 
 import logging
+from collections.abc import Mapping
 from typing import Protocol
 
-from simulator.emulated_naze.pace import Pace
-
 BASE = 0x4000_0000
-SIZE = 0x2_4000
+_RCC, _FLASH_CONTROLLER = 0x4002_1000, 0x4002_2000
 _BLOCK_BITS = 10
 
 _log = logging.getLogger(__name__)
@@ -43,40 +42,32 @@ class Registers:
 
 
 class Bus:
-    """Passes accesses to the blocks, and reports each to `pace`."""
+    """Passes accesses to the blocks; `others` are those without behaviour, by address."""
 
-    def __init__(self, pace: Pace) -> None:
-        self._pace = pace
-        self._blocks: dict[int, Peripheral] = {}
+    def __init__(self, rcc: Peripheral, flash_controller: Peripheral, others: Mapping[int, Peripheral]) -> None:
+        blocks = {_RCC: rcc, _FLASH_CONTROLLER: flash_controller, **others}
+        self._blocks = {address - BASE >> _BLOCK_BITS: block for address, block in blocks.items()}
         self._reported: set[int] = set()
 
-    def attach(self, address: int, peripheral: Peripheral) -> None:
-        """Map a block of 1 KB at `address`."""
-        self._blocks[(address - BASE) >> _BLOCK_BITS] = peripheral
-
     def reset(self) -> None:
-        for peripheral in dict.fromkeys(self._blocks.values()):
+        for peripheral in self._blocks.values():
             peripheral.reset()
 
-    def read(self, offset: int, size: int) -> int:
-        self._pace.charge_access()
+    def read(self, offset: int, _: int) -> int:
+        """Read the word at an offset in the bus."""
         block = self._blocks.get(offset >> _BLOCK_BITS)
         if block is None:
             self._report(offset)
             return 0
-        value = block.read(offset & 0x3FC) >> 8 * (offset & 3) & (1 << 8 * size) - 1
-        self._pace.saw(offset, value)
-        return value
+        return block.read(offset & 0x3FC)
 
     def write(self, offset: int, _: int, value: int) -> None:
-        """Handle a store. The chip copies a short one to the rest of the word, which no register uses."""
-        self._pace.charge_access()
-        self._pace.saw(~offset, value)
+        """Write a word."""
         block = self._blocks.get(offset >> _BLOCK_BITS)
         if block is None:
             self._report(offset)
         else:
-            block.write(offset & 0x3FC, value << 8 * (offset & 3))
+            block.write(offset & 0x3FC, value)
 
     def _report(self, offset: int) -> None:
         block = offset >> _BLOCK_BITS

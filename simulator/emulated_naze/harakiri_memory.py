@@ -2,10 +2,10 @@
 """Harakiri's state that no protocol reports, read from its RAM by the image's symbols, and from its flash."""
 
 from enum import Enum
+from typing import Protocol
 
 from simulator.board.flash import NorFlash
 from simulator.board.options import Faults, SimOptions
-from simulator.emulated_naze.dma import Memory
 from simulator.emulated_naze.flash_controller import PAGE_SIZE
 from simulator.emulated_naze.image import Image
 from simulator.naze.mission_slots import MissionSlots, slot_pages
@@ -15,6 +15,13 @@ _FLAGS, _ARMED = "f", 1
 _PROTOCOL = "Currentprotocol"
 #: The patch's two slots (firmware/README.md, Flash map).
 _SLOTS = 0x1_DC00
+
+
+class Memory(Protocol):
+    """The chip's RAM and flash."""
+
+    def load(self, address: int, size: int) -> bytes:
+        """Bytes at an address."""
 
 
 class SpokenProtocol(Enum):
@@ -35,8 +42,11 @@ class HarakiriMemory:
         self._flash = flash
 
     @property
-    def armed(self) -> bool:
-        return self._flags is not None and self._ram.load(self._flags + _ARMED, 1) == b"\1"
+    def armed(self) -> bool | None:
+        """None for an image without symbols."""
+        if self._flags is None:
+            return None
+        return self._ram.load(self._flags + _ARMED, 1) == b"\1"
 
     @property
     def protocol(self) -> SpokenProtocol | None:

@@ -29,9 +29,13 @@ class Hmc5883l(RegisterChip):
         """Begin a transfer; all measurements of a read transfer are simultaneous."""
         super().begin(is_read)
         if is_read:
-            field = _BIAS.get(self._registers[_CONFIGURATION_A] & 0b11, _FIELD)
+            field = _BIAS.get(self._registers[_CONFIGURATION_A] & 0b11) or self._field()
             x, z, y = (value + self._noise.randint(-1, 1) for value in field)
             self._measured = (x, z, y)
+
+    def _field(self) -> tuple[int, int, int]:
+        """The field in the order of the registers."""
+        return _FIELD
 
     def get(self, number: int) -> int:
         """Read a measurement or a written value."""

@@ -10,7 +10,8 @@ _MEASUREMENTS, _POWER, _IDENTITY = 0x3B, 0x6B, 0x75
 _RESET, _ASLEEP = 0x80, 0x40
 #: Level and still, 1 g at the range of 8 g; the gyroscope's zero has an offset.
 _STILL = (0, 0, 4096)
-_TEMPERATURE = -2000
+#: 30.6 degrees C.
+TEMPERATURE = -2000
 _DRIFT = (3, -2, 1)
 
 
@@ -21,7 +22,7 @@ class Mpu6050(RegisterChip):
         super().__init__()
         self._noise = noise
         self._registers = bytearray(256)
-        self._measured = self._measure()
+        self._measured: tuple[int, ...] = (0,) * 7
         self._reset()
 
     def _reset(self) -> None:
@@ -52,4 +53,4 @@ class Mpu6050(RegisterChip):
         noise = self._noise.randint
         acceleration = (value + noise(-2, 2) for value in _STILL)
         rotation = (value + noise(-1, 1) for value in _DRIFT)
-        return (*acceleration, _TEMPERATURE, *rotation)
+        return (*acceleration, TEMPERATURE, *rotation)

@@ -36,9 +36,12 @@ class Ms5611:
         self._command = byte
         match byte & 0xF0:
             case 0x40:  # pressure
-                self._converted = _PRESSURE + self._noise.randint(-_PRESSURE_NOISE, _PRESSURE_NOISE)
+                self._converted = self._pressure()
             case 0x50:  # temperature
                 self._converted = _TEMPERATURE
+
+    def _pressure(self) -> int:
+        return _PRESSURE + self._noise.randint(-_PRESSURE_NOISE, _PRESSURE_NOISE)
 
     def read(self) -> int:
         byte, self._answer = self._answer[:1], self._answer[1:]
@@ -51,6 +54,15 @@ class Ms5611:
             at = self._command & 0x0E
             return self._prom[at : at + 2]
         return b""
+
+
+def converted_pressure(pressure_pa: float) -> int:
+    """The converter's value at a pressure and the example's temperature (the data sheet's formulas, solved for D1)."""
+    _, sensitivity, offset, sensitivity_slope, offset_slope, reference, _ = _PROM
+    difference = _TEMPERATURE - reference * 2**8
+    off = offset * 2**16 + offset_slope * difference / 2**7
+    sens = sensitivity * 2**15 + sensitivity_slope * difference / 2**8
+    return round((pressure_pa * 2**15 + off) * 2**21 / sens)
 
 
 def _checksum(words: tuple[int, ...]) -> int:

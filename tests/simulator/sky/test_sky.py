@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the sensors measure of a body at rest and in flight."""
+
+from statistics import fmean, stdev
+
+import pytest
+
+from simulator.sky.body import GRAVITY
+from simulator.sky.sky import Sky, Weather
+from simulator.sky.vectors import facing
+
+OFF = (1000,) * 4
+
+
+def still(seed: int = 0) -> Sky:
+    sky = Sky(Weather(seed=seed), lambda: OFF)
+    sky.advance(0.1)
+    return sky
+
+
+def test_at_rest_the_imu_measures_gravity_and_noise() -> None:
+    sky = still()
+    found = [sky.motion() for _ in range(2000)]
+    assert fmean(motion.acceleration[2] for motion in found) == pytest.approx(GRAVITY, abs=0.01)
+    assert fmean(motion.acceleration[0] for motion in found) == pytest.approx(0.0, abs=0.01)
+    assert 0.0 < stdev(motion.rates[1] for motion in found) < 0.01
+
+
+def test_propellers_shake_the_accelerometer() -> None:
+    sky = Sky(Weather(), lambda: (1500,) * 4)
+    found = []
+    for step in range(1, 400):
+        sky.advance(0.5 + step * 0.003)
+        found.append(sky.motion().acceleration[0])
+    assert stdev(found) > 2 * stdev(still().motion().acceleration[0] for _ in range(400))
+
+
+@pytest.mark.parametrize(("heading", "axis", "sign"), [(0.0, 0, 1), (90.0, 1, 1), (180.0, 0, -1), (270.0, 1, -1)])
+def test_the_compass_follows_the_nose(heading: float, axis: int, sign: int) -> None:
+    """With the nose to the east, north is left."""
+    sky = still()
+    sky.body.attitude = facing(heading)
+    field = [fmean(values) for values in zip(*(sky.magnetic_field() for _ in range(200)), strict=True)]
+    assert sign * field[axis] == pytest.approx(0.21, abs=0.01)
+    assert field[2] == pytest.approx(-0.43, abs=0.01)
+
+
+def test_pressure_falls_with_height() -> None:
+    sky = still()
+    low = fmean(sky.pressure() for _ in range(300))
+    sky.body.position = (0.0, 0.0, 10.0)
+    assert low - fmean(sky.pressure() for _ in range(300)) == pytest.approx(113, abs=5)
+
+
+def test_a_seed_repeats_a_flight() -> None:
+    def fly(seed: int) -> tuple[float, ...]:
+        sky = Sky(Weather(wind=5.0, seed=seed), lambda: (1550, 1551, 1549, 1550))
+        sky.advance(3.0)
+        return (*sky.body.position, sky.motion().acceleration[0])
+
+    assert fly(4) == fly(4) != fly(5)
+
+
+def test_a_craft_in_the_hand_turns_about_all_axes() -> None:
+    sky = still()
+    sky.is_held = True
+    felt = []
+    for step in range(600):
+        sky.advance(0.2 + step * 0.1)
+        felt.append(sky.body.felt)
+    for axis in range(3):
+        assert min(v[axis] for v in felt) < -0.8 * GRAVITY
+        assert max(v[axis] for v in felt) > 0.8 * GRAVITY
