@@ -96,7 +96,7 @@ class Sandbox:
         (folder / "gcs.key").chmod(0o600)
         # Only parsed.
         (folder / "firmware" / "build").mkdir(parents=True)
-        for name in ("X.elf", "pilot.json5", "firmware/build/libnaze_mission.so"):
+        for name in ("X.elf", "sticks.txt", "pilot.json5", "firmware/build/libnaze_mission.so"):
             (folder / name).touch()
 
     def redirected(self, command: Command) -> list[str]:
