@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 from socket import SOCK_STREAM
 
-from benchmarks.processes import ROOT, cpu_s, running, wait_for
+from benchmarks.processes import ROOT, cpu_s, resident_mb, running, wait_for
 from tests.support.programs import NAZE_BRIDGE, free_port
 from tests.support.zenoh_router import client, running_router
 
@@ -65,7 +65,7 @@ def main(counts: tuple[int, ...]) -> None:
             endpoint = f"tcp/127.0.0.1:{free_port(SOCK_STREAM)}"
             config = _config(Path(name), endpoint)
             router = stack.enter_context(running_router(Path(name), endpoint, config)).process.pid
-            before_mb = _resident_mb(router)
+            before_mb = resident_mb(router)
             log, began_at = Path(name) / "vehicles.log", time.monotonic()
             command = [sys.executable, "-c", _VEHICLES, endpoint, "0", str(count)]
             vehicles = stack.enter_context(running(command, log))
@@ -82,11 +82,11 @@ def main(counts: tuple[int, ...]) -> None:
                 time.sleep(_WATCHED_S)
                 cpu_percent = 100 * (cpu_s(router) - before_s) / _WATCHED_S
                 rate_hz = received[0] / _WATCHED_S
-            router_mb = _resident_mb(router)
+            router_mb = resident_mb(router)
             list_s = _listed_s(endpoint, count)
             print(
                 f"{count:8} {opened_s:12.1f} {before_mb:5.1f}->{router_mb:.1f} {cpu_percent:9.2f} {rate_hz:12.1f}"
-                f" {list_s:7.2f} {_resident_mb(vehicles.pid):10.1f}",
+                f" {list_s:7.2f} {resident_mb(vehicles.pid):10.1f}",
                 flush=True,
             )
 
@@ -117,11 +117,6 @@ def _listed_s(endpoint: str, count: int) -> float:
     if found != count:
         print(f"only {found} of {count} are listed", flush=True)
     return took_s
-
-
-def _resident_mb(pid: int) -> float:
-    pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
-    return pages * 4096 / 1e6
 
 
 if __name__ == "__main__":

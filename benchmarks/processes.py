@@ -149,3 +149,9 @@ def cpu_s(pid: int) -> float:
     The clock id is computed like clock_getcpuclockid(3) on Linux.
     """
     return time.clock_gettime(~pid << 3 | 2)
+
+
+def resident_mb(pid: int) -> float:
+    """Memory of a process."""
+    pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    return pages * 4096 / 1e6

@@ -137,7 +137,7 @@ class Bridge:
         #: The seal of the flight controller's settings.
         self._settings = SettingsSeal(session, missions, ground, emit, config.seals, lambda: self.transfer is not None)
         self._sharing.on_change = self._settings.changed_here
-        self._reporter = VehicleReporter(session, missions, ground, self._settings, own.also_want)
+        self._reporter = VehicleReporter(session, missions, ground, self._settings, own.also_want, own.progress)
         self._uploads = MissionUploads(missions, ground, emit, incidents, own.let_read)
         self._watch = MissionWatch(missions, ground, emit)
         downloads = MissionDownloads(missions, ground)

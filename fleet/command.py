@@ -28,7 +28,7 @@ from terminal.command_group import CommandGroup
 from terminal.mission_source import save_mission, shown_path
 from terminal.options import PATH
 from terminal.printing import print_json, print_table
-from terminal.sentences import fail
+from terminal.sentences import complain, fail
 
 _STANDARD_OUTPUT = Path("-")
 
@@ -50,21 +50,26 @@ for _command in (push_mission, verify_mission, enroll, expel):
 def list_vehicles(as_json: bool, limit: int | None, conditions: list[Condition], **where: Any) -> None:
     """Show which vehicles are alive, and their state.
 
-    Exit code 0, even if there are none; 1: the fleet cannot be reached, or the router does not answer.
+    Exit code 0, even if there are none; 1: a vehicle, or the router, does not answer, or cannot be reached.
     """
     with fleet_session(where) as (session, prefix):
         found = matching(everyone := roll_call(session, prefix), conditions)
-    shown = found[:limit]
+    shown, unanswered = found[:limit], sum(not vehicle.answers for vehicle in everyone)
     if as_json:
-        print_json({"vehicles": [asdict(vehicle) for vehicle in shown], "complaints": complaints(shown)})
+        counts = {"alive": len(everyone), "unanswered": unanswered}
+        print_json({"vehicles": [asdict(vehicle) for vehicle in shown], "complaints": complaints(everyone)} | counts)
     elif shown:
         print_table(fleet_table(shown))
         if len(shown) < len(found):
-            click.echo(f"and {len(found) - len(shown)} more")
+            click.echo(f"and {len(found) - len(shown):,} more")
     elif everyone:
-        click.echo(f"None of {len(everyone)} vehicles matches.")
+        click.echo(f"None of the {len(everyone) - unanswered:,} vehicles that answered matches.")
     else:
         click.echo(f"No vehicle is alive under {prefix!r}.")
+    for line in () if as_json else complaints(everyone):
+        complain(line)
+    if unanswered:
+        raise SystemExit(1)
 
 
 @fleet.command(short_help="Show which vehicles are alive, until Ctrl-C.")

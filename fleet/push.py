@@ -28,7 +28,7 @@ _TOO_LATE = f"no result after {_PUSH_TIMEOUT_S:.0f} s; {_LOOK}"
 
 @dataclass(slots=True)
 class PushState:
-    """The progress of one vehicle. `records` of `total` are written; `error`: why it failed."""
+    """The progress of one vehicle. `records` of `total` are written; `error`: why it failed, or was left out."""
 
     vehicle: str
     records: int = 0
@@ -36,6 +36,7 @@ class PushState:
     result: Json | None = None
     error: str | None = None
     is_begun: bool = False
+    is_left_out: bool = False
 
     @property
     def is_done(self) -> bool:
@@ -61,14 +62,20 @@ class FleetPush:
     @property
     def failed(self) -> list[PushState]:
         """The vehicles that are not known to hold the mission."""
-        return [progress for progress in self.vehicles.values() if progress.error is not None]
+        return [each for each in self.vehicles.values() if each.error is not None and not each.is_left_out]
+
+    @property
+    def left_out(self) -> list[PushState]:
+        """The vehicles that nothing was sent to, because another one had failed."""
+        return [each for each in self.vehicles.values() if each.is_left_out]
 
     def begin(self, names: Iterable[str], *, staged: bool) -> Iterator[str]:
         """Yield each vehicle whose push begins now; with `staged` no further one after a failure."""
         for name in names:
             if staged and (failed := self.failed):
                 for other in set(self.waiting) - set(self.running):
-                    self.vehicles[other].error = f"not started: {failed[0].vehicle} had failed"
+                    self.vehicles[other].is_left_out = True
+                    self.vehicles[other].error = f"{failed[0].vehicle} had failed"
             if not self.vehicles[name].is_done:
                 self.vehicles[name].is_begun = True
                 yield name

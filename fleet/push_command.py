@@ -22,6 +22,7 @@ from fleet.roll_call import alive, chosen, roll_call
 from fleet.session import FleetError
 from fleet.tables import (
     dry_run_table,
+    in_few_words,
     progress_bars,
     push_data,
     push_summary,
@@ -62,13 +63,13 @@ def push_mission(
     """Write a mission file to vehicles, each by its own rules, and verify it there.
 
     A vehicle that fails does not stop the others, unless --staged. Exit code 0: all hold it (--dry-run: all would
-    accept it), 1: one does not, 2: the file is unreadable.
+    accept it), 1: one does not, or did not answer, 2: the file is unreadable.
     """
     mission, item_count = _read(file, names, to_all)
     with fleet_session(where) as (session, prefix):
-        bridges, meant = _meant(session, prefix, names, conditions)
+        bridges, meant, unknown = _meant(session, prefix, names, conditions)
         if dry_run:
-            _show_trials(try_mission(session, prefix, meant, bridges, mission), as_json)
+            _show_trials(try_mission(session, prefix, meant, bridges, mission), unknown, as_json)
             return
         delivery, is_stopped = FleetPush(meant, bridges), False
         try:
@@ -84,8 +85,7 @@ def push_mission(
     if is_stopped:
         complain(_GOES_ON)
         raise SystemExit(INTERRUPTED)
-    if delivery.failed:
-        raise SystemExit(1)
+    _end(unknown, is_bad=bool(delivery.failed))
 
 
 @click.command("verify", short_help="Compare the missions on vehicles with a file.")
@@ -100,11 +100,11 @@ def verify_mission(
 ) -> None:
     """Compare the missions on vehicles with a file, by checksum, as stored under each vehicle's rules.
 
-    Exit code 0: all hold it, 1: one does not, 2: the file is unreadable.
+    Exit code 0: all hold it, 1: one does not, or did not answer, 2: the file is unreadable.
     """
     mission, _ = _read(file, names, to_all)
     with fleet_session(where) as (session, prefix):
-        bridges, meant = _meant(session, prefix, names, conditions)
+        bridges, meant, unknown = _meant(session, prefix, names, conditions)
         trials = try_mission(session, prefix, meant, bridges, mission)
     held = sum(trial.is_held is True for trial in trials)
     if as_json:
@@ -112,8 +112,7 @@ def verify_mission(
     else:
         print_table(verify_table(trials))
         click.echo(f"{held} of {len(trials)} vehicles hold the mission")
-    if held < len(trials):
-        raise SystemExit(1)
+    _end(unknown, is_bad=held < len(trials))
 
 
 def _read(file: Path, names: tuple[str, ...], to_all: bool) -> tuple[bytes, int]:
@@ -129,24 +128,33 @@ def _read(file: Path, names: tuple[str, ...], to_all: bool) -> tuple[bytes, int]
 
 def _meant(
     session: zenoh.Session, prefix: str, names: tuple[str, ...], conditions: list[Condition]
-) -> tuple[set[BridgeId], list[str]]:
-    """All bridges, and the names of the vehicles to serve."""
+) -> tuple[set[BridgeId], list[str], str]:
+    """All bridges, the names of the vehicles to serve, and the vehicles of which is unknown whether they match."""
     bridges = alive(session, prefix)
     found = chosen(bridges, names, prefix)
     if not conditions:
-        return bridges, found
-    like = {vehicle.name for vehicle in matching(roll_call(session, prefix), conditions)}
-    if not like & set(found):
-        raise FleetError(f"none of {len(found)} vehicles matches")
-    return bridges, [name for name in found if name in like]
+        return bridges, found, ""
+    listed = [vehicle for vehicle in roll_call(session, prefix) if vehicle.name in found]
+    like = {vehicle.name for vehicle in matching(listed, conditions)}
+    silent = [vehicle.name for vehicle in listed if not vehicle.answers and vehicle.name not in like]
+    unknown = f"{len(silent)} of {len(found)} vehicles did not answer: {in_few_words(silent)}" if silent else ""
+    if not like:
+        raise FleetError(f"none of the vehicles that answered matches; {unknown}".removesuffix("; "))
+    return bridges, [name for name in found if name in like], unknown
 
 
-def _show_trials(trials: list[Trial], as_json: bool) -> None:
+def _show_trials(trials: list[Trial], unknown: str, as_json: bool) -> None:
     failed = sum(trial.error is not None for trial in trials)
     if as_json:
         print_json({"vehicles": [asdict(each) for each in trials], "failed": failed})
     else:
         print_table(dry_run_table(trials))
         click.echo(f"{len(trials) - failed} of {len(trials)} vehicles would accept the mission; nothing was written")
-    if failed:
+    _end(unknown, is_bad=failed > 0)
+
+
+def _end(unknown: str, *, is_bad: bool) -> None:
+    if unknown:
+        complain(unknown)
+    if is_bad or unknown:
         raise SystemExit(1)

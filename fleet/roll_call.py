@@ -1,55 +1,69 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The vehicles that are alive, and their states: one query to the whole fleet."""
+"""The vehicles that are alive, and their overviews: one query to the whole fleet."""
 
 from collections.abc import Collection
-from queue import SimpleQueue
+from contextlib import suppress
+from queue import Empty, SimpleQueue
 
 import zenoh
 
 from fleet.payload import decode
 from fleet.session import FleetError, send_query
 from fleet.vehicle import BridgeId, FleetVehicle, as_fleet, bridge_of, in_order, replier, vehicle_of
-from payloads.keys import ALIVE, STATE, full
+from payloads.keys import ALIVE, OVERVIEW, full
 from payloads.mission_data import Json
+from payloads.overview import state_of
 
-#: After this a bridge without a reply is shown as not answering.
-_TIMEOUT_S = 2.0
+#: After a pause of this length the router does not answer.
+_TIMEOUT_S = 5.0
+#: When none of the missing replies has arrived for this long, their bridges are shown as not answering.
+_PAUSE_S = 2.0
+#: Replies of a large fleet may arrive for as long as this, times the pause.
+_PAUSES = 15
 
 
 def alive(session: zenoh.Session, prefix: str) -> set[BridgeId]:
-    """The bridges that have a liveliness token."""
-    replies = list(session.liveliness().get(full(prefix, "*", f"{ALIVE}/*"), timeout=_TIMEOUT_S))
-    if any(reply.err is not None for reply in replies):
-        # zenoh's own error, a timeout: an empty list would be wrong.
-        raise FleetError(
-            f"the router did not list the vehicles within {_TIMEOUT_S:.0f} s: it hangs, or the connection is bad"
-        )
-    samples = [reply.ok for reply in replies if reply.ok is not None]
-    return {bridge for sample in samples if (bridge := bridge_of(str(sample.key_expr), prefix)) is not None}
+    """The bridges that have a liveliness token; FleetError if the router does not list all."""
+    replies: SimpleQueue[zenoh.Reply | None] = SimpleQueue()
+    take = zenoh.handlers.Callback(replies.put, lambda: replies.put(None), indirect=False)
+    session.liveliness().get(full(prefix, "*", f"{ALIVE}/*"), take, timeout=_TIMEOUT_S * _PAUSES)
+    found = set()
+    with suppress(Empty):
+        while (reply := replies.get(timeout=_TIMEOUT_S)) is not None and reply.ok is not None:
+            found.add(bridge_of(str(reply.ok.key_expr), prefix))
+        if reply is None:
+            return {bridge for bridge in found if bridge is not None}
+    # zenoh's own error, or a pause: a shorter list would be wrong.
+    raise FleetError(
+        f"the router did not list the vehicles: nothing for {_TIMEOUT_S:.0f} s; it hangs, or the connection is bad"
+    )
 
 
 def roll_call(session: zenoh.Session, prefix: str) -> list[FleetVehicle]:
-    """The fleet by name. Takes as long as the slowest bridge, two seconds at most."""
+    """The fleet by name. Ends two seconds after the last reply, or when all have replied."""
     bridges = alive(session, prefix)
-    states = replies_of(session, full(prefix, "*", STATE.suffix), bridges, _TIMEOUT_S)
-    return as_fleet(vehicle_of(bridge, states.get(bridge)) for bridge in bridges)
+    found = replies_of(session, full(prefix, "*", OVERVIEW.suffix), bridges, _PAUSE_S)
+    overviews = ((bridge, found.get(bridge)) for bridge in bridges)
+    return as_fleet(vehicle_of(bridge, overview and state_of(overview)) for bridge, overview in overviews)
 
 
 def replies_of(
-    session: zenoh.Session, selector: str, bridges: Collection[BridgeId], timeout_s: float
+    session: zenoh.Session, selector: str, bridges: Collection[BridgeId], pause_s: float
 ) -> dict[BridgeId, Json | None]:
-    """These bridges' replies, None if unreadable. Ends when all have replied. Replies of storages are ignored."""
+    """These bridges' replies, None if unreadable. Replies of storages are ignored.
+
+    Ends when all have replied, or when no further reply has arrived for `pause_s`.
+    """
     found: dict[BridgeId, Json | None] = {}
     if not bridges:
         return found
     replies: SimpleQueue[zenoh.Reply | None] = SimpleQueue()
-    send_query(session, selector, replies.put, timeout_s)
-    for reply in iter(replies.get, None):
-        bridge = replier(reply)
-        if reply.ok is not None and bridge is not None and bridge in bridges:
-            found[bridge] = decode(reply.ok)
-            if len(found) == len(bridges):
-                break
+    send_query(session, selector, replies.put, pause_s * _PAUSES)
+    with suppress(Empty):
+        while len(found) < len(bridges) and (reply := replies.get(timeout=pause_s)) is not None:
+            bridge = replier(reply)
+            if reply.ok is not None and bridge is not None and bridge in bridges:
+                found[bridge] = decode(reply.ok)
     return found
 
 

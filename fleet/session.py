@@ -96,7 +96,8 @@ def send_query(
     """Send a query. `replied` is called on zenoh's threads: with each reply (vehicles may share a name), then None."""
     session.get(
         selector,
-        zenoh.handlers.Callback(replied, lambda: replied(None)),
+        # Direct: otherwise each query would have a thread.
+        zenoh.handlers.Callback(replied, lambda: replied(None), indirect=False),
         target=zenoh.QueryTarget.ALL,
         consolidation=zenoh.ConsolidationMode.NONE,
         payload=payload,

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The fleet, and the progress and result of a push to it, as tables for a terminal."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from rich import box
@@ -19,6 +19,8 @@ from fleet.vehicle import FleetVehicle
 from payloads.mission_data import Json
 
 _UNKNOWN = "-"
+#: Of many vehicles with the same problem, so many are named.
+_NAMED = 5
 _ANSWERS = {
     True: Text("yes", style="green"),
     False: Text("no", style="bold red"),
@@ -53,23 +55,30 @@ def watch_table(rows: Sequence[tuple[FleetVehicle, float | None, str]]) -> Table
 
 
 def fleet_table(fleet: Sequence[FleetVehicle]) -> Table:
-    caption = Text("".join(f"\n{line}" for line in complaints(fleet)), style="yellow")
     titles = ("Vehicle", "Speaks", "Armed", "Battery", "Latitude", "Longitude", "Height", "Mission")
-    table = _table(*titles, caption=caption)
+    table = _table(*titles)
     for vehicle in fleet:
         table.add_row(*_cells(vehicle))
     return table
 
 
-def complaints(fleet: Iterable[FleetVehicle]) -> list[str]:
+def complaints(fleet: Sequence[FleetVehicle]) -> list[str]:
     """The problems of the fleet, a line each."""
-    lines = []
-    for vehicle in fleet:
-        if vehicle.bridges > 1:
-            lines.append(f"{vehicle.name}: {vehicle.bridges} bridges use this name; give each its own (zenoh.vehicle)")
-        if not vehicle.answers:
-            lines.append(f"{vehicle.name}: alive, but sends no state")
+    lines = [
+        f"{vehicle.name}: {vehicle.bridges} bridges use this name; give each its own (zenoh.vehicle)"
+        for vehicle in fleet
+        if vehicle.bridges > 1
+    ]
+    silent = [vehicle.name for vehicle in fleet if not vehicle.answers]
+    if silent:
+        count = f"{len(silent):,} of {len(fleet):,} vehicles"
+        lines.append(f"{count} are alive, but did not answer: {in_few_words(silent)}")
     return list(dict.fromkeys(lines))
+
+
+def in_few_words(names: Sequence[str]) -> str:
+    """The first of these names."""
+    return ", ".join(names[:_NAMED]) + ", ..." * (len(names) > _NAMED)
 
 
 def _cells(vehicle: FleetVehicle) -> list[Text]:
@@ -126,6 +135,8 @@ def push_table(fleet: FleetPush) -> Table:
 
 
 def _result(progress: PushState) -> Text:
+    if progress.is_left_out:
+        return Text("not started", style="yellow")
     if progress.error is not None:
         return Text("failed", style="bold red")
     if progress.is_done:
@@ -174,13 +185,15 @@ def push_data(fleet: FleetPush) -> Json:
             for each in fleet.vehicles.values()
         ],
         "failed": len(fleet.failed),
+        "not_started": len(fleet.left_out),
     }
 
 
 def push_summary(fleet: FleetPush) -> str:
-    count, failed = len(fleet.vehicles), len(fleet.failed)
+    count, failed, left_out = len(fleet.vehicles), len(fleet.failed), len(fleet.left_out)
     held = sum(each.result is not None for each in fleet.vehicles.values())
-    return f"{held} of {count} vehicles hold the mission, verified" + (f"; {failed} failed" if failed else "")
+    more = (f"; {failed} failed" if failed else "") + (f"; {left_out} not started" if left_out else "")
+    return f"{held} of {count} vehicles hold the mission, verified{more}"
 
 
 def _words(progress: PushState) -> str:

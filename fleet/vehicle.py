@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A vehicle of the fleet, made from its `state`."""
+"""A vehicle of the fleet, made from its `overview` or its `state`."""
 
 import re
 from collections import Counter
@@ -26,7 +26,7 @@ class BridgeId:
 class FleetVehicle:
     """The known data of one vehicle; None: unknown.
 
-    `answers`: True if its bridge sent its state. `bridges`: how many use this name, normally 1.
+    `answers`: True if it was heard. `bridges`: how many use this name, normally 1.
     """
 
     name: str
@@ -34,15 +34,18 @@ class FleetVehicle:
     answers: bool = False
     bridges: int = 1
     protocol: str | None = None
-    flight_controller: str | None = None
     armed: bool | None = None
     mode: str | None = None
     battery_v: float | None = None
     lat_deg: float | None = None
     lon_deg: float | None = None
     height_m: float | None = None
+    heading_deg: float | None = None
+    speed_m_s: float | None = None
+    fix: str | None = None
     mission_count: int | None = None
     mission_checksum: str | None = None
+    mission_state: str | None = None
 
 
 def bridge_of(key: str, prefix: str) -> BridgeId | None:
@@ -65,7 +68,7 @@ def replier(reply: zenoh.Reply) -> BridgeId | None:
 
 
 def vehicle_of(bridge: BridgeId, state: Json | None) -> FleetVehicle:
-    """Make a vehicle from the payload of its `state`; None: it sent none."""
+    """Make a vehicle from the payload of its `state` (payloads.overview.state_of for an overview); None: not heard."""
     if state is None:
         return FleetVehicle(bridge.vehicle, bridge.session_id)
     return FleetVehicle(
@@ -73,15 +76,18 @@ def vehicle_of(bridge: BridgeId, state: Json | None) -> FleetVehicle:
         bridge.session_id,
         answers=True,
         protocol=text(state, "link", "state"),
-        flight_controller=text(state, "link", "flight_controller"),
         armed=flag(state, "status", "armed"),
         mode=text(state, "status", "mode"),
         battery_v=number(state, "battery", "voltage_v"),
         lat_deg=number(state, "position", "lat_deg"),
         lon_deg=number(state, "position", "lon_deg"),
         height_m=number(state, "position", "height_m"),
+        heading_deg=number(state, "attitude", "heading_deg"),
+        speed_m_s=number(state, "gps", "ground_speed_m_s"),
+        fix=text(state, "gps", "fix"),
         mission_count=whole(state, "mission", "count"),
         mission_checksum=text(state, "mission", "checksum"),
+        mission_state=text(state, "mission", "state"),
     )
 
 
@@ -89,7 +95,7 @@ def as_fleet(vehicles: Iterable[FleetVehicle]) -> list[FleetVehicle]:
     """Sort vehicles by name, and count the bridges per name."""
     found = list(vehicles)
     bridges = Counter(vehicle.name for vehicle in found)
-    counted = [replace(vehicle, bridges=bridges[vehicle.name]) for vehicle in found]
+    counted = [replace(each, bridges=bridges[each.name]) if bridges[each.name] > 1 else each for each in found]
     return sorted(counted, key=lambda vehicle: (in_order(vehicle.name), vehicle.session_id))
 
 

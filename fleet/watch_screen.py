@@ -7,9 +7,11 @@ import sys
 import termios
 import time
 import tty
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
+from enum import IntEnum
 
 import zenoh
 from rich.console import Console, Group
@@ -19,7 +21,7 @@ from rich.text import Text
 from fleet.conditions import Condition
 from fleet.session import is_connected
 from fleet.tables import watch_table
-from fleet.vehicle import FleetVehicle, in_order
+from fleet.vehicle import FleetVehicle
 from fleet.watch import Watch
 from terminal.printing import print_json
 
@@ -29,6 +31,7 @@ SILENT_S = 70.0
 #: Lines without a vehicle: counts, column titles and rule, the last line, and an empty one.
 _OTHER_LINES = 5
 _LINKED = ("MSP", "MAVLink")
+_UNHEARD = "not heard yet"
 #: Rows that a key scrolls; pages are scrolled by `page` rows.
 _ROWS = {b"j": 1, b"\x1b[B": 1, b"k": -1, b"\x1b[A": -1}
 _PAGES = {b" ": 1, b"\x1b[6~": 1, b"b": -1, b"\x1b[5~": -1}
@@ -42,12 +45,16 @@ class ScreenRow:
     age_s: float | None
 
     @property
+    def is_heard(self) -> bool:
+        return self.vehicle.answers
+
+    @property
     def problem(self) -> str:
-        """The reason why it needs attention; empty if it does not."""
+        """The reason why it needs attention; empty if it does not, or if nothing was heard of it."""
         if self.vehicle.bridges > 1:
             return f"{self.vehicle.bridges} bridges use this name"
-        if not self.vehicle.answers:
-            return "sends no state"
+        if not self.is_heard:
+            return ""
         if self.age_s is not None and self.age_s > SILENT_S:
             return "silent"
         return "" if self.vehicle.protocol in _LINKED else "no flight controller"
@@ -68,42 +75,60 @@ def show_screen(seen: Watch, session: zenoh.Session, conditions: Sequence[Condit
 
 
 def screen(rows: Sequence[ScreenRow], top: int, page: int, *, is_connected: bool) -> Group | Text:
-    """The screen: counts, then armed vehicles, then those with problems, then the others."""
+    """The screen: counts, then armed vehicles, those with problems, the others, and those not heard yet."""
     if not is_connected:
         return Text("The router is gone; waiting for it. Ctrl-C ends.", style="red")
     if not rows:
         return Text("No such vehicle is alive. Ctrl-C ends.")
-    armed = sum(row.vehicle.armed is True for row in rows)
-    ill = sum(bool(row.problem) for row in rows)
-    head = f"{len(rows)} vehicles, {armed} armed, {ill} with problems"
+    counts = Counter(map(_rank, rows))
+    heard = len(rows) - counts[_Rank.UNHEARD]
+    there = f"{len(rows):,} vehicles" if heard == len(rows) else f"Heard {heard:,} of {len(rows):,} vehicles"
+    ill = sum(bool(row.problem) for row in rows[: counts[_Rank.ARMED]]) + counts[_Rank.ILL]
+    head = f"{there}, {counts[_Rank.ARMED]:,} armed, {ill:,} with problems"
     shown = rows[top : top + page]
     last = "Ctrl-C ends."
     if len(shown) < len(rows):
-        last = f"{top + 1} to {top + len(shown)} of {len(rows)}; arrow keys and space scroll. {last}"
-    table = watch_table([(row.vehicle, row.age_s, row.problem) for row in shown])
+        last = f"{top + 1:,} to {top + len(shown):,} of {len(rows):,}; arrow keys and space scroll. {last}"
+    table = watch_table([(row.vehicle, row.age_s, row.problem or _UNHEARD * (not row.is_heard)) for row in shown])
     return Group(Text(head, style="bold"), table, Text(last, style="dim"))
 
 
 def print_changes(seen: Watch, conditions: Sequence[Condition]) -> None:
     """Print a line for each vehicle that appears, changes or disappears, until KeyboardInterrupt."""
-    seen.follow(["*"])
-    known: dict[str, FleetVehicle] = {}
+    known: dict[tuple[str, str], FleetVehicle] = {}
     while True:
-        now = {row.vehicle.session_id: row.vehicle for row in _rows(seen, conditions)}
-        for session_id, vehicle in now.items():
-            if known.get(session_id) != vehicle:
+        now = {(row.vehicle.name, row.vehicle.session_id): row.vehicle for row in _rows(seen, conditions)}
+        for bridge, vehicle in now.items():
+            if (before := known.get(bridge)) is not vehicle and before != vehicle:
                 print_json({"time_s": round(time.time(), 3), "alive": True, **asdict(vehicle)})
-        for session_id in known.keys() - now.keys():
-            print_json({"time_s": round(time.time(), 3), "alive": False, "name": known[session_id].name})
+        for name, session_id in known.keys() - now.keys():
+            print_json({"time_s": round(time.time(), 3), "alive": False, "name": name, "session_id": session_id})
         known = now
         time.sleep(_REFRESH_S)
 
 
 def _rows(seen: Watch, conditions: Sequence[Condition]) -> list[ScreenRow]:
-    fleet, ages_s = seen.look()
-    rows = [ScreenRow(vehicle, age_s) for vehicle, age_s in zip(fleet, ages_s, strict=True)]
-    rows = [row for row in rows if all(condition(row.vehicle) for condition in conditions)]
-    return sorted(rows, key=lambda row: (row.vehicle.armed is not True, not row.problem, in_order(row.vehicle.name)))
+    rows = [ScreenRow(vehicle, age_s) for vehicle, age_s in seen.look()]
+    if conditions:
+        rows = [row for row in rows if all(condition(row.vehicle) for condition in conditions)]
+    return sorted(rows, key=_rank)
+
+
+class _Rank(IntEnum):
+    """The order of the rows; those of one rank are ordered by name."""
+
+    ARMED = 0
+    ILL = 1
+    WELL = 2
+    UNHEARD = 3
+
+
+def _rank(row: ScreenRow) -> _Rank:
+    if row.vehicle.armed:
+        return _Rank.ARMED
+    if row.problem:
+        return _Rank.ILL
+    return _Rank.WELL if row.is_heard else _Rank.UNHEARD
 
 
 @contextmanager

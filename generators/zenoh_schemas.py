@@ -76,7 +76,7 @@ _SUMMARY_FIELDS = {
 }
 _WHAT = {
     "state": "The whole vehicle: the newest values of every group.",
-    "overview": "The state in 60 bytes, for programs that watch thousands of vehicles: always CBOR, all numbers whole. "
+    "overview": "The state in 80 bytes, for programs that watch thousands of vehicles: always CBOR, all numbers whole. "
     "null: not known, or stale.",
     "event": "An event, as in the daemon's log.",
     "history": "The reply to a query about a time range.",

@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A vehicle in 60 bytes, for programs that watch thousands: whole numbers only, always in CBOR."""
+"""A vehicle in 80 bytes, for programs that watch thousands: whole numbers only, always in CBOR."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
+from bridge.model.mission_progress import Progress
 from payloads.mission_data import Json
 
 _GREATEST = 0xFFFFFFFF
+_FIXES = {"none": 0, "2D": 2, "3D": 3}
+_PROGRESS = {progress.text: progress.value for progress in Progress}
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,17 +26,21 @@ class Overview:
     height_m: Annotated[int | None, "above the launch point"]
     mission_count: Annotated[int | None, "records, home included"]
     mission_checksum: Annotated[int | None, "CRC-32 over the records"]
+    heading_deg: Annotated[int | None, "0 up to 360, clockwise from north"]
+    speed_dm_s: Annotated[int | None, "over ground, m/s * 10"]
+    fix: Annotated[int | None, "of the GPS: 0 none, 2 or 3 dimensions"]
+    mission_state: Annotated[int | None, "MAVLink's MISSION_STATE: 2 not started, 3 active, 5 complete"]
 
     @property
     def marks(self) -> object:
         """The values whose change is sent at once."""
-        return self.link, self.armed, self.mode, self.mission_count, self.mission_checksum
+        return self.link, self.armed, self.mode, self.mission_count, self.mission_checksum, self.mission_state
 
 
 def overview_of(state: Json) -> Overview:
     status, battery, position = (state[group] for group in ("status", "battery", "position"))
     mission = state["mission"] or {}
-    checksum = mission.get("checksum")
+    checksum, progress, heading_deg = mission.get("checksum"), mission.get("state"), state["attitude"]["heading_deg"]
     return Overview(
         link=state["link"]["state"],
         armed=status.get("armed"),
@@ -43,6 +51,10 @@ def overview_of(state: Json) -> Overview:
         height_m=_whole(position.get("height_m"), 1),
         mission_count=mission.get("count"),
         mission_checksum=None if checksum is None else int(checksum, 16),
+        heading_deg=None if heading_deg is None else round(heading_deg) % 360,
+        speed_dm_s=_whole(state["gps"]["ground_speed_m_s"], 10),
+        fix=_FIXES.get(state["gps"]["fix"]),
+        mission_state=None if progress is None else _PROGRESS[progress],
     )
 
 
@@ -52,6 +64,9 @@ def state_of(overview: Json) -> Json:
     def scaled(name: str, scale: float) -> float | None:
         value = overview.get(name)
         return value / scale if isinstance(value, int) and abs(value) <= _GREATEST else None
+
+    def named(name: str, names: Mapping[str, int]) -> str | None:
+        return next((each for each, number in names.items() if number == overview.get(name)), None)
 
     checksum = overview.get("mission_checksum")
     return {
@@ -64,9 +79,12 @@ def state_of(overview: Json) -> Json:
             "lon_deg": scaled("lon_e7", 1e7),
             "height_m": scaled("height_m", 1),
         },
+        "attitude": {"heading_deg": scaled("heading_deg", 1)},
+        "gps": {"ground_speed_m_s": scaled("speed_dm_s", 10), "fix": named("fix", _FIXES)},
         "mission": {
             "count": overview.get("mission_count"),
             "checksum": f"{checksum:08x}" if isinstance(checksum, int) and 0 <= checksum <= _GREATEST else None,
+            "state": named("mission_state", _PROGRESS),
         },
     }
 

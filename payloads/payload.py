@@ -16,18 +16,24 @@ from payloads.mission_data import Json, to_json
 
 _write_json = json.JSONEncoder(separators=(",", ":"), allow_nan=False).encode
 _SCALARS = frozenset((float, int, str, bool, type(None)))
-_ENCODINGS = {
-    PayloadEncoding.JSON: zenoh.Encoding.APPLICATION_JSON,
-    PayloadEncoding.CBOR: zenoh.Encoding.APPLICATION_CBOR,
-}
 _SCHEMA = f"naze-bridge/v{VERSION}/"
 
 
 def encoding_of(key: ZenohKey, encoding: PayloadEncoding) -> zenoh.Encoding:
-    """The encoding of a sample, with its schema, as in "application/json;naze-bridge/v1/state"."""
+    """The encoding of a sample. CBOR names its schema, as in "application/cbor;naze-bridge/v1/state".
+
+    JSON does not: zenohd's REST plugin shows it as such only without a suffix. There the attachment names the schema.
+    """
     if key.schema is None:
         return zenoh.Encoding.APPLICATION_OCTET_STREAM
-    return _ENCODINGS[encoding].with_schema(_SCHEMA + key.schema)
+    if encoding is PayloadEncoding.JSON:
+        return zenoh.Encoding.APPLICATION_JSON
+    return zenoh.Encoding.APPLICATION_CBOR.with_schema(_SCHEMA + key.schema)
+
+
+def attachment_of(key: ZenohKey, encoding: PayloadEncoding) -> str | None:
+    """The attachment of a sample, as in "naze-bridge/v1/state"; None if it has none."""
+    return None if key.schema is None or encoding is PayloadEncoding.CBOR else _SCHEMA + key.schema
 
 
 def decoded(data: bytes, encoding: str) -> Any:
@@ -48,6 +54,9 @@ class Payloads:
 
     def encoding(self, key: ZenohKey) -> zenoh.Encoding:
         return encoding_of(key, key.encoding or self._encoding)
+
+    def attachment(self, key: ZenohKey) -> str | None:
+        return attachment_of(key, key.encoding or self._encoding)
 
     def encode(self, key: ZenohKey, body: Json) -> bytes:
         """Encode a payload. May be called on any thread."""

@@ -22,6 +22,10 @@ class Progress(Enum):
     ACTIVE = 3
     COMPLETE = 5
 
+    @property
+    def text(self) -> str:
+        return self.name.lower().replace("_", " ")
+
 
 @dataclass(frozen=True, slots=True)
 class FlownMission:

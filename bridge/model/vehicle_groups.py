@@ -124,6 +124,9 @@ class MissionIdentity:
 
     count: Annotated[int, "records, home included; 0: none"]
     checksum: Annotated[str, "CRC-32 over the records, 8 hexadecimal digits"]
+    state: Annotated[
+        str | None, "not started, active or complete; null: the flight controller (a Harakiri) does not report it"
+    ] = None
 
 
 @dataclass(frozen=True, slots=True)

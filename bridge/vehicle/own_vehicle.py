@@ -75,7 +75,7 @@ class OwnVehicle:
         self.due = self._second_ends = now
         #: The messages that any ground station wants, by the reading that triggers them.
         self._rows: dict[type[Reading] | None, list[Row]] = {}
-        self._progress = MissionProgress()
+        self.progress = MissionProgress()
         self._announced_home: Home | None = None
         self._also_wanted: Mapping[type[Reading], float] = {}
         self._newcomers_due = inf
@@ -279,7 +279,7 @@ class OwnVehicle:
         vehicle = self._session.vehicle
         if vehicle.last(MissionLeg) is not None and vehicle.fresh(MissionLeg, now) is None:
             return FlownMission(held.items)
-        return FlownMission(held.items, self._missions.seq_of(self._progress.number), self._progress.progress)
+        return FlownMission(held.items, self._missions.seq_of(self.progress.number), self.progress.progress)
 
     def _follow_state(self, now: float) -> None:
         """Send a heartbeat as soon as something in it has changed; report the failsafe."""
@@ -304,10 +304,10 @@ class OwnVehicle:
     def _follow_mission(self, now: float) -> None:
         """Report a reached waypoint and the next one at once."""
         leg = self._session.vehicle.last(MissionLeg)
-        before = self._progress.number, self._progress.progress
-        reached = None if leg is None else self._progress.take(leg.status)
+        before = self.progress.number, self.progress.progress
+        reached = None if leg is None else self.progress.take(leg.status)
         everyone = self._ground.everyone()
-        if before != (self._progress.number, self._progress.progress):
+        if before != (self.progress.number, self.progress.progress):
             self._send_current(everyone, now)
         seq = self._missions.seq_of(reached or 0)
         if seq:

@@ -11,6 +11,7 @@ from bridge.gcs.ground import Ground
 from bridge.missions.mission_service import MissionService
 from bridge.model.flight_mode import FlightMode
 from bridge.model.ground_track import bearing_deg, distance_m
+from bridge.model.mission_progress import MissionProgress
 from bridge.model.vehicle import (
     STALE_S,
     Charge,
@@ -20,6 +21,7 @@ from bridge.model.vehicle import (
     GpsFix,
     Health,
     Height,
+    MissionLeg,
     Mode,
     Orientation,
     Power,
@@ -77,12 +79,14 @@ class VehicleReporter:
         ground: Ground,
         settings: SettingsSeal,
         want: Callable[[Mapping[type[Reading], float]], None],
+        progress: MissionProgress,
     ) -> None:
         self._session = session
         self._missions = missions
         self._ground = ground
         self._settings = settings
         self._want = want
+        self._progress = progress
         #: Groups updated since the last `take_fresh`; some may no longer be watched.
         self.fresh: set[Group] = set()
         #: The groups in use: they are polled, and `take_fresh` returns the updated ones.
@@ -141,7 +145,10 @@ class VehicleReporter:
 
     def whole(self, now: float) -> VehicleReport:
         held = self._missions.held
-        mission = None if held is None else MissionIdentity(held.identity.count, f"{held.identity.checksum:08x}")
+        mission = None
+        if held is not None:
+            state = None if self._fresh(MissionLeg, now) is None else self._progress.progress.text
+            mission = MissionIdentity(held.identity.count, f"{held.identity.checksum:08x}", state)
         settings = None
         if (sealed := self._settings.state) is not None:
             settings = SettingsIdentity(str(sealed.seal), None if sealed.change is None else sealed.change.text())

@@ -84,7 +84,7 @@ class Publisher:
 
     def put_raw(self, key: ZenohKey, data: bytes) -> None:
         try:
-            self._publishers[key.suffix].put(data)
+            self._publishers[key.suffix].put(data, attachment=self._payloads.attachment(key))
         except zenoh.ZError:
             self.failed += 1
 

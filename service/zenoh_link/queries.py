@@ -69,9 +69,11 @@ class Question:
     def send(self, body: Json) -> None:
         """Send one reply; more may follow."""
         data, encoding = self._payloads.reply(self._key, body), self._payloads.encoding(self._key)
+        attachment = self._payloads.attachment(self._key)
 
         def reply() -> None:
-            self._query.reply(self.name, data, encoding=encoding, timestamp=self._thread.timestamp())
+            timestamp = self._thread.timestamp()
+            self._query.reply(self.name, data, encoding=encoding, timestamp=timestamp, attachment=attachment)
 
         self._thread.submit(reply, self._reply_kind)
 

@@ -59,7 +59,8 @@ def test_a_staged_push_begins_no_other_after_a_failure() -> None:
     assert next(begun) == "a"
     fleet.refused("a", {"error": "no"})
     assert list(begun) == []
-    assert [each.error for each in fleet.failed] == ["no", "not started: a had failed", "not started: a had failed"]
+    assert [each.error for each in fleet.failed] == ["no"]
+    assert [each.error for each in fleet.left_out] == ["a had failed"] * 2
 
 
 def test_any_result_but_accepted_is_a_failure() -> None:

@@ -68,7 +68,7 @@ def test_a_staged_push_stops_at_the_first_failure(fleet: Fleet, tmp_path: Path) 
     bad = plan_file(tmp_path, [HOME, PlanRow(Command.NAV_LAND), waypoint(1)])
     pushed = fleet.pushed(bad, "--all", "--staged", code=1)
     assert "LAND must be last" in pushed["kite"]["error"]
-    assert [pushed[name]["error"] for name in NAMES[1:]] == ["not started: kite had failed"] * 2
+    assert [pushed[name]["error"] for name in NAMES[1:]] == ["kite had failed"] * 2
     assert [fleet.daemons[name].pull()["records"] for name in NAMES] == before
     pushed = fleet.pushed(plan_file(tmp_path, plain_plan(5)), "--all", "--staged", code=0)
     assert [pushed[name]["ok"] for name in NAMES] == [True] * 3
@@ -85,7 +85,7 @@ def test_vehicles_are_selected_by_state(fleet: Fleet, tmp_path: Path) -> None:
     assert listed("--where", "name=*i*", "--where", "armed=no") == ["kite", "swift"]
     assert listed("--limit", "2") == ["kite", "owl"]
     assert fleet.ask("list", "--limit", "2").stdout.endswith("\nand 1 more\n")
-    assert "None of 3 vehicles" in fleet.ask("list", "--where", "armed=true").stdout
+    assert "None of the 3 vehicles that answered" in fleet.ask("list", "--where", "armed=true").stdout
     pushed = fleet.pushed(plan_file(tmp_path, plain_plan(9)), "--all", "--where", "mission_count=8", code=0)
     assert list(pushed) == ["owl"]
     wrong = fleet.ask("list", "--where", "colour=red")

@@ -67,7 +67,7 @@ def test_a_storage_does_not_answer_for_a_silent_vehicle(stored: tuple[Fleet, zen
     try:
         until(lambda: not fleet.listed()["kite"]["answers"], "its silence")
         with client(fleet.router.endpoint) as session, watching(session, "fleet") as seen:
-            until(lambda: seen.look()[0], "its token")
+            until(seen.look, "its token")
             assert not seen.look()[0][0].answers
     finally:
         kite.send_signal(signal.SIGCONT)

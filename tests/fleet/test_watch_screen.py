@@ -35,23 +35,32 @@ def test_a_large_fleet_fits_a_small_terminal() -> None:
     shown = lines(rows, 0)
     assert len(shown) == 23
     assert max(len(line) for line in shown) <= 80
-    assert shown[0] == "1000 vehicles, 0 armed, 0 with problems"
-    assert shown[-1].startswith("1 to 19 of 1000; arrow keys and space scroll.")
-    assert lines(rows, 981)[-1].startswith("982 to 1000 of 1000;")
+    assert shown[0] == "1,000 vehicles, 0 armed, 0 with problems"
+    assert shown[-1].startswith("1 to 19 of 1,000; arrow keys and space scroll.")
+    assert lines(rows, 981)[-1].startswith("982 to 1,000 of 1,000;")
 
 
 def test_vehicles_with_problems_are_marked() -> None:
     rows = [
         ScreenRow(vehicle(1, bridges=2), 0.1),
-        ScreenRow(vehicle(2, answers=False), None),
         ScreenRow(vehicle(3), 99.0),
         ScreenRow(vehicle(4, protocol="searching"), 0.1),
         ScreenRow(vehicle(5), 0.1),
     ]
-    assert [bool(row.problem) for row in rows] == [True] * 4 + [False]
+    assert [bool(row.problem) for row in rows] == [True] * 3 + [False]
     text = "\n".join(lines(rows, 0))
-    assert "5 vehicles, 0 armed, 4 with problems" in text
-    assert [part in text for part in ("2 bridges use", "sends no state", "silent", "no flight")] == [True] * 4
+    assert "4 vehicles, 0 armed, 3 with problems" in text
+    assert [part in text for part in ("2 bridges use", "silent", "no flight")] == [True] * 3
+
+
+def test_a_vehicle_that_was_not_heard_yet_is_counted_as_such() -> None:
+    """Its values are unknown: it is neither disarmed nor a problem."""
+    armed = [ScreenRow(vehicle(number, armed=True), 0.1) for number in range(3)]
+    unheard = [ScreenRow(FleetVehicle(f"owl-{number}", "1"), None) for number in range(2000)]
+    shown = lines([*armed, *unheard], 0)
+    assert shown[0] == "Heard 3 of 2,003 vehicles, 3 armed, 0 with problems"
+    row = next(line for line in shown if line.startswith("owl-0 "))
+    assert row.split(maxsplit=1)[1].split() == ["-"] * 5 + ["not", "heard", "yet"]
 
 
 class Sample:
@@ -77,7 +86,7 @@ def test_a_backlog_is_shown_with_its_true_age() -> None:
 
     def age_s(made_at: float) -> float | None:
         watch.sample(Sample("fleet/kite/v1/state", {"time_s": made_at}))  # type: ignore[arg-type]
-        return watch.look()[1][0]
+        return watch.look()[0][1]
 
     assert age_s(1400.0) == 0
     now = 5008.0
@@ -91,17 +100,17 @@ def test_only_vehicles_on_the_screen_send_their_states() -> None:
     config = zenoh.Config()
     config.insert_json5("scouting/multicast/enabled", "false")
     config.insert_json5("listen/endpoints", "[]")
-    overview = Overview("MSP", False, "AUTO", 1234, None, None, -3, 146, 0xABCD)
+    overview = Overview("MSP", False, "AUTO", 1234, None, None, -3, 146, 0xABCD, 90, 25, 3, 3)
     cbor = compact.dumps("overview", {"time_s": 7} | plain(overview))
     encoding = encoding_of(OVERVIEW, PayloadEncoding.CBOR)
-    fields = ("battery_v", "height_m", "mission_checksum", "flight_controller")
+    fields = ("battery_v", "height_m", "mission_checksum", "heading_deg", "speed_m_s", "fix", "mission_state")
     with zenoh.open(config) as session, watching(session, "fleet") as watch:
         states = [session.declare_publisher(f"fleet/{name}/v1/state") for name in ("kite", "owl")]
         tokens = [session.liveliness().declare_token(f"fleet/{name}/v1/alive/1") for name in ("kite", "owl")]
 
         def shows(owl: tuple[Any, ...], *followed: bool) -> None:
             def is_so() -> bool:
-                seen = [tuple(getattr(each, field) for field in fields) for each in watch.look()[0]]
+                seen = [tuple(getattr(each, field) for field in fields) for each, _ in watch.look()]
                 # zenoh 1.10 declares it as a bool.
                 readers = [each.matching_status.matching for each in states]  # type: ignore[attr-defined]
                 return readers == [*followed] and seen[1:] == [owl]
@@ -109,12 +118,13 @@ def test_only_vehicles_on_the_screen_send_their_states() -> None:
             until(is_so, f"{owl}, {followed}")
 
         session.put("fleet/owl/v1/overview", cbor, encoding=encoding)
-        shows((12.34, -3, "0000abcd", None), False, False)
+        shown = (12.34, -3, "0000abcd", 90, 2.5, "3D", "active")
+        shows(shown, False, False)
         watch.follow(["owl"])
-        state = {"link": {"state": "MSP", "flight_controller": "Harakiri"}, "battery": {"voltage_v": 11.5}}
+        state = {"link": {"state": "MSP"}, "battery": {"voltage_v": 11.5}}
         states[1].put(json.dumps(state), encoding="application/json")
-        shows((11.5, None, None, "Harakiri"), False, True)
+        shows((11.5, *[None] * 6), False, True)
         watch.follow(["kite"])
         session.put("fleet/owl/v1/overview", cbor, encoding=encoding)
-        shows((12.34, -3, "0000abcd", "Harakiri"), True, False)
+        shows(shown, True, False)
         del tokens

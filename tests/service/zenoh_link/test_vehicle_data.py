@@ -42,7 +42,9 @@ def check_all(reader: Reader, encoding: str) -> set[str]:
         suffix = str(sample.key_expr).removeprefix(key("@").removesuffix("@"))
         found.add(suffix)
         kind = "cbor" if suffix in COMPACT else encoding
-        assert str(sample.encoding) == f"application/{kind};naze-bridge/v{VERSION}/{SCHEMAS[suffix]}"
+        schema = f"naze-bridge/v{VERSION}/{SCHEMAS[suffix]}"
+        assert str(sample.encoding) == (f"application/cbor;{schema}" if kind == "cbor" else "application/json")
+        assert kind == "cbor" or str(sample.attachment and sample.attachment.to_string()) == schema
         check(suffix, body(sample))
     return found
 
