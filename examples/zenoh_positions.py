@@ -4,8 +4,8 @@
 Fields and units: docs/zenoh-payloads.md.
 """
 
+import argparse
 import json
-import sys
 import time
 
 import zenoh
@@ -45,4 +45,6 @@ def main(endpoint: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1] if len(sys.argv) > 1 else "tcp/localhost:7447")
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("endpoint", nargs="?", default="tcp/localhost:7447", help="the router, or one vehicle")
+    main(arguments.parse_args().endpoint)

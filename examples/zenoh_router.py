@@ -6,14 +6,19 @@ FILE is a zenoh configuration (zenoh-tls/router.json5); ENDPOINT is an address t
 """
 
 import json
+import os
 import signal
 import sys
+from pathlib import Path
 
 import zenoh
 
 arguments = sys.argv[1:]
 if arguments and arguments[0].endswith(".json5"):
-    config = zenoh.Config.from_file(arguments[0])
+    # The files that it names are beside it.
+    file = Path(arguments[0]).absolute()
+    os.chdir(file.parent)
+    config = zenoh.Config.from_file(file)
 else:
     config = zenoh.Config()
     config.insert_json5("listen/endpoints", json.dumps(arguments or ["tcp/0.0.0.0:7447"]))

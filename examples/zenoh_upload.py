@@ -4,6 +4,7 @@
 The vehicle must accept commands: `commands = true` in its [zenoh] table, docs/zenoh.md.
 """
 
+import argparse
 import json
 import sys
 from pathlib import Path
@@ -41,6 +42,9 @@ def main(vehicle: str, file: str, endpoint: str) -> int:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) < 3:
-        sys.exit(__doc__)
-    sys.exit(main(sys.argv[1], sys.argv[2], sys.argv[3] if len(sys.argv) > 3 else "tcp/localhost:7447"))
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("vehicle")
+    arguments.add_argument("file", help="QGC WPL 110 or a .plan")
+    arguments.add_argument("endpoint", nargs="?", default="tcp/localhost:7447", help="the router, or the vehicle")
+    given = arguments.parse_args()
+    sys.exit(main(given.vehicle, given.file, given.endpoint))

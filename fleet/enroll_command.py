@@ -47,12 +47,12 @@ def enroll(name: str, role: str, folder: Path, prefix: str, router: str) -> None
         raise click.UsageError(str(error)) from error
     except EnrolmentError as error:
         fail(str(error))
-    click.echo(f"Copy to {name}: {', '.join(str(file) for file in files)}")
+    click.echo(f"Copy into one folder of {name}: {', '.join(str(file) for file in files)}")
     if role == Role.VEHICLE.value:
         click.echo(f'In its configuration file:\n\n[zenoh]\nvehicle = "{name}"\nconfig_file = "{files[0].name}"')
     if way_in.is_tls:
         click.echo(f"\nCertificates: python make_certificates.py {folder} ROUTER_HOST {name} (examples/zenoh-tls)")
-    click.echo(f"\nThen restart the router with {fleet.path / 'router.json5'}.")
+    click.echo(f"\nThen restart the router in {fleet.path} with router.json5.")
 
 
 @click.command(short_help="Remove a vehicle or a person from a fleet.")
@@ -69,5 +69,5 @@ def expel(name: str, folder: Path) -> None:
         fleet.expel(name)
     except EnrolmentError as error:
         fail(str(error))
-    click.echo(f"{name} is expelled.\n\nNow restart the router with {fleet.path / 'router.json5'}.")
+    click.echo(f"{name} is expelled.\n\nNow restart the router in {fleet.path} with router.json5.")
     click.echo(f"Until then {name}'s sessions go on, and it can open new ones.")

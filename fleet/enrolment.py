@@ -2,7 +2,8 @@
 """The members of a fleet, and the router's access control made from them: `fleet enroll`, `fleet expel`.
 
 A folder holds `members.json` (names and roles), `passwords.txt` (the router's) or the certificates that
-examples/zenoh-tls/make_certificates.py makes, `router.json5`, and one `NAME.json5` for each member.
+examples/zenoh-tls/make_certificates.py makes, `router.json5`, and one `NAME.json5` for each member. These name other
+files without a folder: payloads/zenoh_file.py finds them beside the configuration, zenohd in its working directory.
 
 A certificate cannot be revoked: zenoh reads no revocation lists (1.10). The router admits every certificate of the
 fleet, but gives rights only to the names in its configuration, and an expelled name is never used again.
@@ -34,7 +35,7 @@ _VIEWED = ("*/v1/**", "*/v1/**/@adv/**")
 
 #: NAME.json5, NAME.pem and NAME.key are the router's, or those of the certificate authority.
 _RESERVED = ("router", "ca")
-_ROUTER, _MEMBERS, _PASSWORDS = "router.json5", "members.json", "passwords.txt"
+_ROUTER, _MEMBERS, _PASSWORDS, _CA = "router.json5", "members.json", "passwords.txt", "ca.pem"
 
 
 class Role(Enum):
@@ -91,7 +92,7 @@ class FleetFolder:
         own = self._write(f"{name}.json5", self._session(name, router), 0o600)
         self._write(_ROUTER, self._router_config(members, router), 0o644)
         self._write_members(members)
-        return [own] if not router.is_tls else [own, *(self.path / f"{name}.{kind}" for kind in ("pem", "key"))]
+        return [own, *(self.path / file for file in (_CA, f"{name}.pem", f"{name}.key") if router.is_tls)]
 
     def expel(self, name: str) -> None:
         """Remove a member's rights, password and login. May be repeated, for example after the disk was full."""
@@ -138,15 +139,15 @@ class FleetFolder:
             "transport": {
                 "unicast": {"max_sessions": _MAX_SESSIONS, "accept_pending": _ACCEPT_PENDING},
                 "link": {"tcp": {"so_sndbuf": _BUFFER_BYTES, "so_rcvbuf": _BUFFER_BYTES}, **tls},
-                "auth": {} if router.is_tls else {"usrpwd": {"dictionary_file": str(self.path / _PASSWORDS)}},
+                "auth": {} if router.is_tls else {"usrpwd": {"dictionary_file": _PASSWORDS}},
             },
             "access_control": access_control(router.prefix, members, by_certificate=router.is_tls),
         }
 
-    def _tls(self, files: Mapping[str, str]) -> Json:
-        files = {"root_ca_certificate": "ca.pem", **files}
-        paths = {setting: str(self.path / file) for setting, file in files.items()}
-        return {"protocols": ["tls"], "tls": {**paths, "enable_mtls": True, "close_link_on_expiration": True}}
+    @staticmethod
+    def _tls(files: Mapping[str, str]) -> Json:
+        more = {"enable_mtls": True, "close_link_on_expiration": True}
+        return {"protocols": ["tls"], "tls": {"root_ca_certificate": _CA, **files, **more}}
 
     def _session(self, name: str, router: FleetRouter) -> Json:
         session: Json = {

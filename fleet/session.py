@@ -16,6 +16,7 @@ import zenoh
 
 from payloads.endpoints import connect_endpoints, endpoint_trouble, in_short, tls_files
 from payloads.keys import full
+from payloads.zenoh_file import read_zenoh_file
 from storage.os_error import reason
 
 DEFAULT_ENDPOINT = "tcp/localhost:7447"
@@ -134,7 +135,7 @@ def _config(connect: Sequence[str], config_file: Path | None) -> zenoh.Config:
 def _from_file(path: Path) -> zenoh.Config:
     try:
         path.open("rb").close()  # zenoh's own message for a missing file is long
-        return zenoh.Config.from_file(str(path))
+        return read_zenoh_file(path)
     except OSError as error:
         raise FleetError(f"{path} cannot be read: {reason(error)}") from error
     except zenoh.ZError as error:

@@ -8,6 +8,7 @@ import zenoh
 
 from payloads.endpoints import all_endpoints, in_short
 from payloads.names import ZenohSettingsError
+from payloads.zenoh_file import read_zenoh_file
 from service.settings.zenoh import I_KNOW, ZenohProfile, ZenohSettings
 
 #: Commands up to 10 MB get a reply; larger ones are not assembled in a Pi's memory.
@@ -62,7 +63,7 @@ def make_config(settings: ZenohSettings) -> zenoh.Config:
 def _read(settings: ZenohSettings) -> zenoh.Config:
     assert settings.config_file is not None
     try:
-        return zenoh.Config.from_file(settings.config_file)
+        return read_zenoh_file(settings.config_file)
     except zenoh.ZError as error:
         raise ZenohSettingsError(
             f"zenoh.config_file {settings.config_file} cannot be used: {in_short(error)}"

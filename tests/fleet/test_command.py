@@ -162,6 +162,9 @@ def test_invalid_states_of_strangers_are_ignored(fleet: Fleet) -> None:
 
 def test_the_example_programs_work(fleet: Fleet, tmp_path: Path) -> None:
     file = plan_file(tmp_path, plain_plan(6, start=120))
+    for name in ("zenoh_positions.py", "zenoh_upload.py"):
+        told = subprocess.run([sys.executable, EXAMPLES / name, "--help"], capture_output=True, text=True, check=False)
+        assert (told.returncode, told.stderr, "usage: " in told.stdout) == (0, "", True), told
     upload = [sys.executable, str(EXAMPLES / "zenoh_upload.py")]
     uploaded = subprocess.run(
         [*upload, "kite", str(file), fleet.router.endpoint], capture_output=True, text=True, timeout=60, check=False

@@ -2,8 +2,11 @@
 """`fleet enroll`: the router allows each member only the actions of its role."""
 
 import json
+import shutil
 import socket
 import stat
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -13,7 +16,7 @@ import pytest
 import zenoh
 
 from tests.support.programs import free_port, run_naze_bridge, until
-from tests.support.zenoh_router import running_router
+from tests.support.zenoh_router import EXAMPLES, running_router
 
 
 class Enrolled:
@@ -97,6 +100,29 @@ def test_a_guest_may_only_read(enrolled: Enrolled) -> None:
     assert replies(pilot, "fleet/kite/v1/mission/current") == []
     assert not [each for each in pilot.liveliness().get("fleet/ghost/**") if each.ok]
     del inputs, queryables, looks, forged, token
+
+
+@pytest.mark.parametrize("scheme", ["tls", "tcp"])
+def test_the_printed_files_are_enough_on_other_machines(scheme: str, tmp_path: Path) -> None:
+    host = "localhost" if scheme == "tls" else "127.0.0.1"
+    made, endpoint = tmp_path / "made", f"{scheme}/{host}:{free_port(socket.SOCK_STREAM)}"
+    enrolled = run_naze_bridge("fleet", "enroll", "anna", "--role", "pilot", "--folder", made, "--router", endpoint)
+    if scheme == "tls":
+        script = EXAMPLES / "zenoh-tls" / "make_certificates.py"
+        subprocess.run([sys.executable, script, made, "localhost", "anna"], check=True)
+    (line,) = (line for line in enrolled.stdout.splitlines() if line.startswith("Copy into one folder of anna: "))
+    own = [Path(name) for name in line.partition(": ")[2].split(", ")]
+    routers = ["router.json5", *(["ca.pem", "router.pem", "router.key"] if scheme == "tls" else ["passwords.txt"])]
+    for folder, files in {"anna": own, "router": [made / name for name in routers]}.items():
+        (tmp_path / folder).mkdir()
+        for file in files:
+            shutil.copy(file, tmp_path / folder)
+    shutil.rmtree(made)
+    config = tmp_path / "router" / "router.json5"
+    config.write_text(config.read_text().replace("/0.0.0.0:", "/127.0.0.1:"))
+    with running_router(tmp_path, endpoint, config):
+        listed = run_naze_bridge("fleet", "list", "--zenoh-config", tmp_path / "anna" / "anna.json5")
+    assert (listed.returncode, "No vehicle is alive" in listed.stdout) == (0, True), listed
 
 
 def test_logins_are_secret_and_kept(enrolled: Enrolled) -> None:

@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 import zenoh
 
+from payloads.zenoh_file import read_zenoh_file
 from tests.support.programs import free_port, run_naze_bridge, until
 from tests.support.zenoh_router import EXAMPLES, Router, running_router
 
@@ -54,7 +55,9 @@ class Members:
         self.router.start_again()
 
     def open(self, config: str) -> zenoh.Session:
-        return self._stack.enter_context(zenoh.open(zenoh.Config.from_json5(config)))
+        path = self.folder / "opened.json5"
+        path.write_text(config)
+        return self._stack.enter_context(zenoh.open(read_zenoh_file(path)))
 
 
 @pytest.fixture(params=["tls", "tcp"])

@@ -34,7 +34,9 @@ class Router(Program):
             command = [ZENOHD, "--no-multicast-scouting", "-c" if where.endswith(".json5") else "-l", where]
         with self._output.open("ab") as file:
             self._starts = self._output.read_text().count(_UP)
-            return subprocess.Popen(command, stdout=file, stderr=file)
+            where = self._arguments[0]
+            folder = Path(where).parent if where.endswith(".json5") else None
+            return subprocess.Popen(command, stdout=file, stderr=file, cwd=folder)
 
     def wait(self) -> None:
         until(lambda: self.printed.count(_UP) > self._starts or not self.is_alive, "the router")
