@@ -104,6 +104,11 @@ void MissionPoll(void)
     }
 }
 
+nm_list_t MissionStored(void)
+{
+    return mission.stored;
+}
+
 bool MissionSpendWrite(void)
 {
     return nm_spend_write(&mission);

@@ -38,6 +38,9 @@ bool MissionUploaded(void);
  */
 void MissionPoll(void);
 
+/* The stored list. */
+nm_list_t MissionStored(void);
+
 /* Take a write of the configuration that a companion asks for from the core's budget. False if it is spent. */
 bool MissionSpendWrite(void);
 

@@ -1,0 +1,254 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * Experimental: flown in simulation only. First flights: propellers off, then on a tether, then with height.
+ *
+ * Mission flight: flies a stored mission list (naze_mission.h), as docs/mission-flight.md describes it. This header is the
+ * manual of the core; the firmware around it flies.
+ *
+ * The core decides, it does not steer. Once every control loop (50 Hz) the firmware passes position, height, heading, sticks
+ * and switches to nf_step() and gets back one of seven modes with its details: a place to fly to, a climb rate, a heading.
+ * No heap, no I/O, no globals: the caller owns all state, one nf_t. Its only time is a millisecond counter that may wrap.
+ * Floats are used for distances and bearings only (sqrtf, cosf, atan2f).
+ *
+ * SAFETY
+ *   One switch starts a flight: the pilot's, going from off to on while armed, with fix, home, compass and barometer. Switched off, the
+ *   next call commands nothing. Failsafe and return-to-launch end the flight too; it starts again only after the switch was
+ *   off. Nothing else starts, stops, skips or moves a flight.
+ *
+ *   The list is flown only if its CRC-32 is right and it is still the list that was there at arming; if all commands, places,
+ *   distances and heights are within their limits. That is checked record by record before the first of them is flown.
+ *   A flight that cannot go on holds its place; nf_t.reason says why.
+ *
+ *   Sticks: roll or pitch gives the craft to the pilot (position hold, in the same call) until the switch was off. Yaw turns
+ *   the nose, which then stays there until the next leg. The throttle works once it has been in its middle zone since the
+ *   flight started: leaving that zone ends a climb or descent; during take-off, climb and landing it ends the flight (hold).
+ *
+ * STATES
+ *   nf_states[] is the table: what each state commands, when it must be left, and what follows if it is not. docs/
+ *   mission-flight.md has the same table; a test compares them.
+ *
+ * WORK
+ *   One call reads at most NF_MAX_READS records, has no loop but that, and computes at most three distances. A list is
+ *   checked over the first calls of a flight: 146 records in 19 calls.
+ */
+#ifndef NAZE_FLIGHT_H
+#define NAZE_FLIGHT_H
+
+#include "naze_mission.h"
+
+#define NF_VERSION 1u
+#define NF_READS_PER_STEP 8u /* records checked, and regions of interest passed */
+#define NF_MAX_READS 20u
+#define NF_NO_RECORD 0xFFFFu
+#define NF_MAX_LEG_M 2000u  /* the longest leg that is flown */
+#define NF_MIN_HEIGHT_CM 100 /* a craft whose throttle was high may still stand on the ground below this */
+#define NF_SLOW_CM_S 50     /* a leg that closes in more slowly ... */
+#define NF_SLOW_MS 20000u   /* ... for so long is stalled */
+#define NF_LEAD_CD 4500     /* the heading asked for is at most this far from the present one, 1/100 degree */
+
+/* A place, degrees * 1e7. */
+typedef struct {
+    int32_t lat;
+    int32_t lon;
+} nf_place_t;
+
+/* What the firmware is to do until the next call. */
+typedef enum {
+    NF_PASS,     /* nothing is commanded: the pilot flies */
+    NF_GROUND,   /* standing on the ground, armed: motors idle, whatever the throttle stick says */
+    NF_TAKEOFF,  /* take off to `takeoff_cm` above the ground, holding the place `target` */
+    NF_GO,       /* fly to `target` and stay there: `brake`, `issue` */
+    NF_HOLD,     /* the firmware's own position hold, at the place where the craft comes to a stop */
+    NF_LEVEL,    /* no fix: level, height held; the sticks steer */
+    NF_LAND      /* land where the craft is, then disarm */
+} nf_mode_t;
+
+typedef enum {
+    NF_OFF,
+    NF_CHECK,
+    NF_NEXT,
+    NF_WAIT,
+    NF_LIFT,
+    NF_RISE,
+    NF_CLIMB,
+    NF_LEG,
+    NF_LOITER,
+    NF_TURN,
+    NF_STAY,
+    NF_SETTLE,
+    NF_DESCENT,
+    NF_SINK,
+    NF_DONE,
+    NF_HELD,
+    NF_NO_FIX,
+    NF_HANDS,
+    NF_STATES
+} nf_state_t;
+
+/* Why a flight did not start, stopped, or is slower than it should be. */
+typedef enum {
+    NF_OK = 0,
+    NF_DISABLED,      /* did not start: the setting mission_fly is 0 */
+    NF_NOT_ARMED,     /* ... the switch was on before arming */
+    NF_FIX_MISSING,   /* ... no fix, or fewer than 5 satellites */
+    NF_HOME_MISSING,  /* ... no home position */
+    NF_NOT_READY,     /* ... compass or barometer missing or not calibrated */
+    NF_LIST_EMPTY,    /* list refused: no record after the home point */
+    NF_LIST_DAMAGED,  /* ... its CRC is wrong, or a record cannot be read */
+    NF_LIST_CHANGED,  /* ... another one than at arming */
+    NF_BAD_ORDER,     /* ... a command that is unknown or must not be at this place of the list */
+    NF_BAD_PLACE,     /* ... a place without coordinates */
+    NF_FIRST_FAR,     /* ... the first place is too far away */
+    NF_LEG_LONG,      /* ... a leg is longer than NF_MAX_LEG_M */
+    NF_TOO_HIGH,      /* ... a height above the limit */
+    NF_ON_GROUND,     /* ... on the ground, and the first record is no TAKEOFF; or flying below NF_MIN_HEIGHT_CM */
+    NF_THROTTLE_LOW,  /* stopped: the throttle was not put into the middle in time */
+    NF_NO_LIFT,       /* ... the craft did not leave the ground */
+    NF_CLIMB_SLOW,    /* ... a climb took too long */
+    NF_STALLED,       /* ... a leg came no nearer: wind */
+    NF_TURN_SLOW,     /* ... the craft did not turn */
+    NF_LAND_SLOW,     /* landing takes too long; it goes on */
+    NF_STICKS,        /* stopped: roll or pitch stick */
+    NF_THROTTLE,      /* ... throttle stick during take-off, climb or landing */
+    NF_FIX_LOST,      /* ... */
+    NF_RTL,           /* ended: the pilot's return-to-launch */
+    NF_FAILSAFE,      /* ... */
+    NF_SWITCHED_OFF,  /* ... the pilot's switch */
+    NF_DISARMED,      /* ... */
+    NF_FLOWN,         /* the whole list was flown */
+    NF_REASONS
+} nf_reason_t;
+
+/* How the time that a state may take is computed: `base_ms`, and in addition ... */
+typedef enum {
+    NF_FOREVER,    /* no deadline */
+    NF_FIXED,      /* nothing */
+    NF_PER_CLIMB,  /* four times the height to go at the climb or landing rate */
+    NF_PER_METRE,  /* 2 s for each metre to go, which is NF_SLOW_CM_S */
+    NF_PER_TURN,   /* 72 s for each turn, which is 5 degrees a second */
+    NF_PER_RECORD  /* the record's seconds */
+} nf_allowance_t;
+
+typedef struct {
+    const char *name;
+    nf_mode_t mode;       /* commanded in this state */
+    nf_allowance_t rule;
+    uint32_t base_ms;
+    nf_state_t then;      /* at the deadline */
+    nf_reason_t reason;   /* ... told then */
+} nf_row_t;
+
+extern const nf_row_t nf_states[NF_STATES];
+
+/* The pilot's settings. Copied when the craft is armed. */
+typedef struct {
+    bool enabled;
+    uint16_t radius_cm;       /* smallest hit radius: gps_wp_radius */
+    uint16_t first_m;         /* farthest first place */
+    uint16_t height_m;        /* greatest height */
+    uint16_t climb_cm_s;      /* climb and descent between records */
+    uint16_t launch_cm_s;     /* climb of the firmware's take-off */
+    uint16_t landing_cm_s;
+    uint16_t speed_cm_s;      /* cruise speed: heights are changed over the estimated time of a leg */
+} nf_settings_t;
+
+/* The state of the craft at one call. */
+typedef struct {
+    uint32_t now_ms;
+    nf_place_t place;
+    nf_place_t home;          /* the launch place */
+    int32_t height_cm;        /* above the launch place */
+    int32_t climb_cm_s;
+    int32_t heading_cd;       /* 1/100 degree, clockwise from north, any range */
+    nm_list_t list;           /* the list that is stored now */
+    bool switch_on;
+    bool armed;
+    bool flying;              /* false: the craft stands on the ground. True once its throttle was high, on the ground too */
+    bool fix;                 /* good enough for position hold */
+    bool home_known;
+    bool instruments;         /* compass and barometer work and are calibrated */
+    bool failsafe;
+    bool rtl;                 /* the pilot's, or failsafe's */
+    bool stick;               /* roll or pitch beyond the deadband */
+    bool yaw_stick;
+    bool throttle_middle;     /* throttle stick in its middle zone */
+    bool settled;             /* NF_HOLD, NF_GO: the firmware holds a place, at rest */
+    bool arrived;             /* NF_GO: the firmware takes the target as reached */
+    bool battery_low;
+} nf_input_t;
+
+typedef struct {
+    nf_mode_t mode;
+    nf_place_t target;        /* NF_GO, NF_TAKEOFF */
+    bool issue;               /* NF_GO, NF_TAKEOFF: give the target to the navigation (again) */
+    bool brake;               /* NF_GO: slow down towards the target */
+    bool pilots_throttle;     /* NF_HOLD, NF_LEVEL: the stick climbs and descends; else climb_cm_s holds the height */
+    bool nose;                /* turn to heading_cd; else the yaw stick turns it, or the firmware holds the heading */
+    int16_t climb_cm_s;       /* 0: hold the height */
+    int32_t heading_cd;       /* 0..35999 */
+    int32_t takeoff_cm;       /* NF_TAKEOFF: height above the place of the start */
+} nf_output_t;
+
+/* Read one record of NM_RECORD_SIZE bytes. False if there is none. */
+typedef bool (*nf_read_t)(void *self, uint16_t number, uint8_t *record);
+
+/* A record, decoded. */
+typedef struct {
+    nf_place_t place;
+    int16_t height_m;
+    int8_t turns;
+    uint8_t seconds;          /* LOITER_TIME; WAYPOINT: 1 brake */
+    uint8_t radius_m;
+    uint8_t command;
+    bool roi;                 /* nose to the region of interest */
+} nf_record_t;
+
+/* All of the core's state. Fields in the first group are the progress; all are for reading only. */
+typedef struct {
+    nf_state_t state;
+    nf_reason_t reason;
+    uint16_t record;          /* in flight or left; NF_NO_RECORD: none */
+    uint16_t reached;         /* the record whose place was reached last; NF_NO_RECORD: none */
+    uint16_t count;           /* of records in the list */
+    uint32_t distance_cm;     /* to the target; 0 without one */
+    int32_t bearing_cd;       /* ... */
+    int32_t height_error_cm;  /* target height minus height; 0 without a target height */
+    bool battery_low;         /* told, nothing more */
+
+    nf_read_t read;
+    void *self;
+    nf_settings_t settings;
+    nm_list_t list;           /* at arming */
+    bool armed, switch_on;    /* at the last call */
+    bool begun;               /* `record` is where a flight was left */
+    bool grounded;            /* a take-off from the ground has not left it yet */
+    bool throttle_works;      /* the throttle was in its middle zone since the start */
+    bool nose_is_pilots;      /* turned by the yaw stick since the leg began */
+    bool roi_known;
+    bool adjusting;           /* climbing or descending */
+    bool issue;               /* of `target`, at the next call */
+    uint8_t slow;             /* windows without progress */
+    nf_record_t now;          /* the record in flight */
+    nf_place_t target, roi, last;
+    uint32_t entered_ms, allowed_ms, mark_ms, issued_ms;
+    uint32_t mark_cm;
+    int32_t ground_cm;        /* height at take-off */
+    int32_t height_cm;        /* target height */
+    int32_t nose_cd;
+    int32_t to_turn_cd;
+    int32_t heading_cd;       /* at the last call */
+    uint32_t checksum;        /* NF_CHECK: over the records so far */
+    uint16_t next;            /* NF_CHECK: the next record */
+    bool first;               /* NF_CHECK: no place was checked yet, and no flight was left */
+} nf_t;
+
+/* Prepare `f`. The list is read with `read`, which is passed `self`. */
+void nf_start(nf_t *f, nf_read_t read, void *self);
+
+/* One control loop. `settings` are taken over while disarmed. */
+void nf_step(nf_t *f, const nf_settings_t *settings, const nf_input_t *in, nf_output_t *out);
+
+/* Distance in cm and bearing in 1/100 degree (0..35999) between places that are a few kilometres apart. */
+uint32_t nf_distance(const nf_place_t *from, const nf_place_t *to, int32_t *bearing_cd);
+
+#endif

@@ -1,0 +1,683 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * The flight core flies random lists on a point-mass craft with wind, GPS lag and correlated noise, while the pilot's
+ * switches and sticks, the fix and failsafe change at random. Usage: test-flight [LISTS [SEED]]
+ *
+ * Each call is checked (check_step), and each flight (check_flight). A failure prints its seed.
+ */
+#include "naze_flight.h"
+#include "reference.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { STEP_MS = 20, MAX_RECORDS = 9, LAG_STEPS = 10, RADIUS_CM = 200, CRUISE_CM_S = 350, LIMIT_S = 900 };
+enum { WAYPOINT, LOITER_UNLIM, LOITER_TURNS, LOITER_TIME, RETURN_TO_LAUNCH, LAND, TAKEOFF, SETROI };
+
+#define DEGREE 1e7
+#define CM 1.113195 /* per 1e-7 degree of latitude */
+#define LAT0 450000000
+#define LON0 80000000
+
+static unsigned long checks, seed;
+static unsigned long seen_states[NF_STATES], seen_reasons[NF_REASONS];
+static unsigned reads;
+
+#define CHECK(condition) check((condition), #condition, __LINE__)
+
+static void check(bool condition, const char *what, int line)
+{
+    checks++;
+    if (condition)
+        return;
+    printf("test_flight.c:%d: seed %lu: failed: %s\n", line, seed, what);
+    exit(1);
+}
+
+/* ---- chance ----------------------------------------------------------------------------------------------------------- */
+
+static uint64_t chance_state;
+
+static uint32_t random32(void)
+{
+    chance_state ^= chance_state << 13;
+    chance_state ^= chance_state >> 7;
+    chance_state ^= chance_state << 17;
+    return (uint32_t)(chance_state * 0x2545F4914F6CDD1Du >> 32);
+}
+
+static int between(int low, int high)
+{
+    return low + (int)(random32() % (uint32_t)(high - low + 1));
+}
+
+static bool one_in(uint32_t n)
+{
+    return random32() % n == 0;
+}
+
+static double noise(void) /* about normal, deviation 1 */
+{
+    double sum = 0;
+    for (int i = 0; i < 6; i++)
+        sum += random32() / 4294967296.0 - 0.5;
+    return sum * sqrt(2.0);
+}
+
+/* ---- lists ------------------------------------------------------------------------------------------------------------ */
+
+typedef struct {
+    uint16_t count;
+    uint8_t bytes[MAX_RECORDS + 1][NM_RECORD_SIZE];
+    nf_record_t record[MAX_RECORDS + 1];
+} list_t;
+
+static list_t list;
+
+static nf_place_t place_at(double north_cm, double east_cm)
+{
+    nf_place_t place;
+    place.lat = LAT0 + (int32_t)lround(north_cm / CM);
+    place.lon = LON0 + (int32_t)lround(east_cm / CM / cos(LAT0 / DEGREE * acos(-1) / 180));
+    return place;
+}
+
+static void encode(uint8_t *bytes, const nf_record_t *record)
+{
+    ns_put32(bytes, (uint32_t)record->place.lat);
+    ns_put32(bytes + 4, (uint32_t)record->place.lon);
+    ns_put16(bytes + 8, (uint16_t)record->height_m);
+    ns_put16(bytes + 10, record->roi ? 1 : 0);
+    bytes[12] = record->seconds;
+    bytes[13] = record->radius_m;
+    bytes[14] = (uint8_t)record->turns;
+    bytes[15] = record->command;
+}
+
+static void add(const nf_record_t *record)
+{
+    list.record[list.count] = *record;
+    encode(list.bytes[list.count++], record);
+}
+
+static nm_list_t identity(void)
+{
+    nm_list_t identity;
+    identity.count = list.count;
+    identity.checksum = list.count ? bitwise_crc32(list.bytes[0], list.count * NM_RECORD_SIZE) : 0;
+    return identity;
+}
+
+static nf_record_t random_record(int command)
+{
+    nf_record_t record;
+    memset(&record, 0, sizeof record);
+    record.command = (uint8_t)command;
+    record.place = place_at(between(-5000, 5000), between(-5000, 5000));
+    record.height_m = (int16_t)between(2, 25);
+    record.radius_m = (uint8_t)between(2, 6);
+    record.roi = one_in(3);
+    if (command == WAYPOINT)
+        record.seconds = (uint8_t)between(0, 1);
+    if (command == LOITER_TIME)
+        record.seconds = (uint8_t)between(1, 12);
+    if (command == LOITER_TURNS)
+        record.turns = (int8_t)(one_in(2) ? between(1, 2) : -between(1, 2));
+    return record;
+}
+
+/* A legal list: home, perhaps TAKEOFF, records, perhaps one that can only be the last. */
+static void make_list(bool takes_off)
+{
+    static const int middle[] = {WAYPOINT, WAYPOINT, WAYPOINT, LOITER_TURNS, LOITER_TIME, RETURN_TO_LAUNCH, SETROI};
+    const int last[] = {WAYPOINT, LOITER_TIME, LOITER_TURNS, LOITER_UNLIM, LAND, LAND};
+    nf_record_t record = random_record(WAYPOINT);
+    const int more = between(1, MAX_RECORDS - 3);
+    list.count = 0;
+    add(&record);
+    if (takes_off) {
+        record = random_record(TAKEOFF);
+        record.height_m = (int16_t)between(2, 15);
+        add(&record);
+    }
+    for (int i = 0; i < more; i++) {
+        record = random_record(middle[between(0, 6)]);
+        add(&record);
+    }
+    record = random_record(last[between(0, 5)]);
+    add(&record);
+}
+
+static bool read_record(void *self, uint16_t number, uint8_t *record)
+{
+    (void)self;
+    reads++;
+    if (number >= list.count)
+        return false;
+    memcpy(record, list.bytes[number], NM_RECORD_SIZE);
+    return true;
+}
+
+/* ---- the craft -------------------------------------------------------------------------------------------------------- */
+
+typedef struct {
+    double north, east, height;     /* cm */
+    double v_north, v_east, climb;  /* cm/s over ground */
+    double heading;                 /* degrees, not wrapped */
+    double wind_n, wind_e, gust_n, gust_e;
+    double drift_n, drift_e;        /* of the GPS */
+    nf_place_t measured[LAG_STEPS];
+    nf_place_t hold;
+    bool holds;                     /* the navigation has arrived at its target */
+    bool aloft, flying, armed;
+    double lift_s, ground_s;
+} craft_t;
+
+static craft_t craft;
+
+static void reset_craft(bool aloft)
+{
+    memset(&craft, 0, sizeof craft);
+    craft.armed = true;
+    craft.aloft = craft.flying = aloft;
+    craft.height = aloft ? between(150, 2500) : 0;
+    craft.north = between(-1000, 1000);
+    craft.east = between(-1000, 1000);
+    craft.heading = between(0, 359);
+    const double wind = between(0, 800), from = between(0, 628) / 100.0;
+    craft.wind_n = wind * cos(from);
+    craft.wind_e = wind * sin(from);
+    for (int i = 0; i < LAG_STEPS; i++)
+        craft.measured[i] = place_at(craft.north, craft.east);
+}
+
+/* The velocity that the firmware's navigation asks for. */
+static void steer(const nf_output_t *out, double *north, double *east)
+{
+    int32_t bearing;
+    *north = *east = 0;
+    if (out->mode != NF_GO && out->mode != NF_TAKEOFF)
+        return;
+    const double distance = nf_distance(&craft.measured[0], &out->target, &bearing);
+    double speed = distance * 0.4;
+    if (!craft.holds) {
+        speed = out->brake ? distance / 3 : distance;
+        if (speed < 100)
+            speed = 100;
+    }
+    if (speed > CRUISE_CM_S)
+        speed = CRUISE_CM_S;
+    *north = speed * cos(bearing * acos(-1) / 18000);
+    *east = speed * sin(bearing * acos(-1) / 18000);
+}
+
+static void move_craft(const nf_output_t *out)
+{
+    const double dt = STEP_MS / 1000.0;
+    double north, east, climb = 0, step;
+    steer(out, &north, &east);
+    craft.gust_n += (noise() * 120 - craft.gust_n) * dt;
+    craft.gust_e += (noise() * 120 - craft.gust_e) * dt;
+    if (out->mode == NF_LEVEL || out->mode == NF_PASS) {
+        north = craft.wind_n * 0.5;
+        east = craft.wind_e * 0.5;
+    }
+    const double dn = north - craft.v_north, de = east - craft.v_east, change = sqrt(dn * dn + de * de);
+    step = change > 250 * dt ? 250 * dt / change : 1; /* acceleration */
+    craft.v_north += dn * step + craft.gust_n * dt;
+    craft.v_east += de * step + craft.gust_e * dt;
+    switch (out->mode) {
+    case NF_TAKEOFF:
+        craft.lift_s += dt;
+        if (craft.lift_s > 1)
+            craft.flying = true;
+        if (craft.lift_s > 3)
+            craft.aloft = true;
+        climb = craft.height < out->takeoff_cm ? 100 : 0;
+        break;
+    case NF_LAND:
+        climb = -80;
+        break;
+    case NF_GROUND:
+        CHECK(!craft.aloft || craft.height < 100);
+        craft.lift_s = 0;
+        climb = -100;
+        break;
+    default:
+        climb = out->climb_cm_s;
+        break;
+    }
+    if (!craft.aloft) {
+        craft.v_north = craft.v_east = craft.climb = 0;
+        return;
+    }
+    craft.climb += (climb - craft.climb) * dt / 0.4;
+    craft.height += craft.climb * dt;
+    if (craft.height <= 0) {
+        craft.height = 0;
+        craft.ground_s += dt;
+        craft.armed = out->mode != NF_LAND || craft.ground_s < 3;
+    }
+    craft.north += craft.v_north * dt;
+    craft.east += craft.v_east * dt;
+    if (out->nose) {
+        const double off = remainder(out->heading_cd / 100.0 - craft.heading, 360);
+        craft.heading += fmax(-30, fmin(30, off * 1.5)) * dt;
+    }
+}
+
+static void measure(const nf_output_t *out)
+{
+    craft.drift_n += -craft.drift_n / 60 * STEP_MS / 1000 + noise() * 100 * sqrt(2.0 / 60 * STEP_MS / 1000);
+    craft.drift_e += -craft.drift_e / 60 * STEP_MS / 1000 + noise() * 100 * sqrt(2.0 / 60 * STEP_MS / 1000);
+    memmove(craft.measured, craft.measured + 1, sizeof craft.measured - sizeof *craft.measured);
+    craft.measured[LAG_STEPS - 1] = place_at(craft.north + craft.drift_n, craft.east + craft.drift_e);
+    if (out->issue)
+        craft.holds = false;
+    else if (out->mode == NF_GO && (nf_distance(&craft.measured[0], &out->target, NULL) <= RADIUS_CM || (out->brake && one_in(2000))))
+        craft.holds = out->brake; /* by chance too early, as the firmware does on bearing alone */
+}
+
+/* ---- a flight --------------------------------------------------------------------------------------------------------- */
+
+static const nf_settings_t settings = {true, RADIUS_CM, 250, 100, 100, 100, 50, CRUISE_CM_S};
+
+typedef struct {
+    nf_t core;
+    nf_input_t in;
+    nf_output_t out;
+    /* As the checks see it. */
+    nf_state_t state;
+    uint32_t entered_ms;
+    double turned, heading_before, low, high;
+    uint16_t record;
+    bool touched; /* since the state was entered */
+    bool toggled;
+} flight_t;
+
+static double bearing_to(const nf_place_t *to)
+{
+    int32_t bearing;
+    (void)nf_distance(&craft.measured[0], to, &bearing);
+    return bearing / 100.0;
+}
+
+static const nf_place_t *roi_before(uint16_t number)
+{
+    while (number-- > 0)
+        if (list.record[number].command == SETROI)
+            return &list.record[number].place;
+    return NULL;
+}
+
+static bool is_known_place(const nf_place_t *place, const nf_input_t *in)
+{
+    for (uint16_t i = 0; i < list.count; i++)
+        if (!memcmp(place, &list.record[i].place, sizeof *place))
+            return true;
+    return !memcmp(place, &in->home, sizeof *place);
+}
+
+static void check_leave(flight_t *flight, const nf_record_t *record, uint32_t now)
+{
+    const nf_t *core = &flight->core;
+    const uint32_t took = now - flight->entered_ms;
+    const bool went_on = core->state == NF_NEXT || core->state == NF_LEG || core->state == NF_SETTLE || core->state == NF_DONE;
+    if (flight->state == NF_LOITER && went_on)
+        CHECK(labs((long)took - record->seconds * 1000) <= 1000);
+    if (flight->state == NF_TURN && went_on && !flight->touched)
+        CHECK(fabs(flight->turned - record->turns * 360.0) <= 15);
+    if (flight->state == NF_LEG && (went_on || core->state == NF_LOITER || core->state == NF_TURN || core->state == NF_STAY)) {
+        const nf_place_t *place = record->command == RETURN_TO_LAUNCH ? &flight->in.home
+                                  : record->command == TAKEOFF        ? &list.record[0].place
+                                                                      : &record->place;
+        const unsigned radius = record->command <= LOITER_TIME && record->radius_m * 100 > RADIUS_CM ? record->radius_m * 100u : RADIUS_CM;
+        CHECK(nf_distance(&flight->in.place, place, NULL) <= radius + 1);
+        CHECK(core->reached == flight->record || core->state == NF_DONE || list.record[core->reached].command == SETROI);
+    }
+}
+
+static void check_step(flight_t *flight)
+{
+    const nf_t *core = &flight->core;
+    const nf_input_t *in = &flight->in;
+    const nf_output_t *out = &flight->out;
+    const nf_state_t before = flight->state;
+    const uint16_t number = flight->record;
+
+    seen_states[core->state]++;
+    seen_reasons[core->reason]++;
+    CHECK(core->state < NF_STATES && core->reason < NF_REASONS && out->mode <= NF_LAND);
+    CHECK(reads <= NF_MAX_READS);
+    CHECK(!out->nose || (out->heading_cd >= 0 && out->heading_cd < 36000));
+    CHECK(labs(out->climb_cm_s) <= settings.climb_cm_s);
+    CHECK(out->mode == NF_PASS || (in->armed && in->switch_on && !in->rtl && !in->failsafe));
+    CHECK(out->mode != NF_LAND || list.record[list.count - 1].command == LAND);
+    CHECK(out->mode != NF_TAKEOFF || list.record[1].command == TAKEOFF);
+    if (out->mode == NF_GO && core->record > 0 && core->state == NF_LEG)
+        CHECK(is_known_place(&out->target, in));
+    if (in->stick && before != NF_OFF)
+        CHECK(core->state == NF_OFF || core->state == NF_HELD || core->state == NF_NO_FIX || core->state == NF_HANDS);
+    if (!in->fix)
+        CHECK(out->mode == NF_PASS || out->mode == NF_LEVEL || out->mode == NF_GROUND);
+    if (before == NF_OFF && core->state != NF_OFF)
+        CHECK(flight->toggled);
+    if (before == NF_HELD && core->state != NF_OFF)
+        CHECK(core->state == NF_HELD || core->state == NF_NO_FIX || flight->toggled);
+    if (nf_states[core->state].rule != NF_FOREVER && core->state == before)
+        CHECK(in->now_ms - core->entered_ms <= core->allowed_ms);
+    if (core->state == NF_LEG && before == NF_LEG && number == core->record && !flight->toggled) {
+        const double target = core->now.command == TAKEOFF ? flight->high : core->now.height_m * 100.0;
+        CHECK(craft.height >= fmin(flight->low, target) - 300 && craft.height <= fmax(flight->high, target) + 300);
+        const nf_record_t *record = &list.record[number];
+        CHECK(out->brake == !(record->command == WAYPOINT && record->seconds == 0));
+        const nf_place_t *roi = record->roi && record->command <= LOITER_TIME ? roi_before(number) : NULL;
+        if (!flight->touched && in->now_ms - flight->entered_ms > 15000) {
+            const nf_place_t *to = roi ? roi : &out->target;
+            if (nf_distance(&craft.measured[0], to, NULL) > 2500)
+                CHECK(fabs(remainder(bearing_to(to) - craft.heading, 360)) <= 15);
+        }
+    }
+    if (core->state != before || core->record != number || flight->toggled) {
+        if (core->state == NF_LEG || core->state == NF_NEXT)
+            CHECK(core->record >= number || flight->toggled || number == NF_NO_RECORD);
+        if (before != NF_OFF && number != NF_NO_RECORD && number < list.count && !flight->toggled)
+            check_leave(flight, &list.record[number], in->now_ms);
+        flight->state = core->state;
+        flight->record = core->record;
+        flight->entered_ms = in->now_ms;
+        flight->turned = 0;
+        flight->touched = false;
+        flight->low = flight->high = craft.height;
+    } else if (core->state == NF_TURN)
+        flight->turned += craft.heading - flight->heading_before;
+    flight->heading_before = craft.heading;
+}
+
+/* Things that happen in the sky and in the pilot's hands; `rate`: the mean number of steps between them. */
+static void happen(flight_t *flight, uint32_t rate)
+{
+    nf_input_t *in = &flight->in;
+    const bool was_on = in->switch_on;
+    in->yaw_stick = in->yaw_stick ? !one_in(50) : one_in(rate);
+    in->stick = in->stick ? !one_in(50) : one_in(rate * 2);
+    in->fix = in->fix ? !one_in(rate * 2) : one_in(300);
+    in->failsafe = in->failsafe ? !one_in(100) : one_in(rate * 5);
+    in->rtl = in->rtl ? !one_in(100) : one_in(rate * 5);
+    in->throttle_middle = in->throttle_middle ? !one_in(rate * 2) : one_in(50);
+    in->switch_on = in->switch_on ? !one_in(rate) : one_in(100);
+    if (one_in(rate * 20))
+        in->list.checksum++;
+    flight->toggled = in->switch_on && !was_on;
+    if (in->stick || in->yaw_stick || !in->throttle_middle || !in->fix || flight->toggled)
+        flight->touched = true;
+}
+
+static void sense(flight_t *flight)
+{
+    nf_input_t *in = &flight->in;
+    in->now_ms += STEP_MS;
+    in->place = craft.measured[0];
+    in->height_cm = (int32_t)lround(craft.height + noise() * 5);
+    in->climb_cm_s = (int32_t)lround(craft.climb + noise() * 5);
+    in->heading_cd = (int32_t)lround(remainder(craft.heading, 360) * 100);
+    in->flying = craft.flying;
+    in->armed = craft.armed;
+    in->settled = fabs(craft.v_north) + fabs(craft.v_east) < 30;
+    in->arrived = craft.holds;
+}
+
+static void step(flight_t *flight)
+{
+    sense(flight);
+    reads = 0;
+    nf_step(&flight->core, &settings, &flight->in, &flight->out);
+    check_step(flight);
+    move_craft(&flight->out);
+    measure(&flight->out);
+}
+
+static void prepare(flight_t *flight, bool aloft)
+{
+    memset(flight, 0, sizeof *flight);
+    nf_start(&flight->core, read_record, NULL);
+    flight->record = NF_NO_RECORD;
+    flight->in.now_ms = 0u - (uint32_t)between(0, 100000); /* wraps during the flight */
+    flight->in.home = place_at(0, 0);
+    flight->in.list = identity();
+    flight->in.fix = flight->in.home_known = flight->in.instruments = flight->in.throttle_middle = true;
+    reset_craft(aloft);
+    craft.armed = false;
+    step(flight);
+    craft.armed = true;
+    step(flight);
+}
+
+static bool is_over(const flight_t *flight)
+{
+    switch (flight->core.state) {
+    case NF_OFF:
+    case NF_STAY:
+    case NF_DONE:
+    case NF_HELD:
+    case NF_HANDS:
+        return true;
+    default:
+        return false;
+    }
+}
+
+/* One list in an undisturbed sky must be flown to its end. */
+static void fly_undisturbed(void)
+{
+    flight_t flight;
+    const bool takes_off = one_in(2);
+    make_list(takes_off);
+    prepare(&flight, !takes_off);
+    flight.in.switch_on = flight.toggled = true;
+    step(&flight);
+    flight.toggled = false;
+    for (int i = 0; i < LIMIT_S * 1000 / STEP_MS && !is_over(&flight) && craft.armed; i++)
+        step(&flight);
+    const uint8_t last = list.record[list.count - 1].command;
+    if (flight.core.state == NF_HELD)
+        CHECK(flight.core.reason == NF_ON_GROUND ? !takes_off : flight.core.reason == NF_BAD_ORDER && list.count == 2);
+    else if (last == LAND)
+        CHECK(!craft.armed);
+    else
+        CHECK(flight.core.state == (last == LOITER_UNLIM ? NF_STAY : NF_DONE));
+    flight.in.switch_on = false;
+    step(&flight);
+    CHECK(flight.out.mode == NF_PASS);
+}
+
+static void fly_disturbed(void)
+{
+    flight_t flight;
+    const uint32_t rate = (uint32_t)between(200, 6000);
+    const bool takes_off = one_in(2);
+    make_list(takes_off);
+    prepare(&flight, !takes_off || one_in(3));
+    for (int i = 0; i < 240 * 1000 / STEP_MS && craft.armed; i++) {
+        happen(&flight, rate);
+        step(&flight);
+    }
+}
+
+/* ---- refusals, one by one --------------------------------------------------------------------------------------------- */
+
+static nf_reason_t refusal(void (*spoil)(flight_t *flight))
+{
+    flight_t flight;
+    nf_record_t record;
+    list.count = 0;
+    record = random_record(WAYPOINT);
+    add(&record);
+    record.place = place_at(3000, 0);
+    add(&record);
+    add(&record);
+    prepare(&flight, true);
+    craft.height = 1000;
+    craft.north = craft.east = 0;
+    spoil(&flight);
+    flight.in.switch_on = flight.toggled = true;
+    for (int i = 0; i < 30; i++) {
+        step(&flight);
+        flight.toggled = false;
+        CHECK(flight.core.state == NF_OFF || flight.core.state == NF_CHECK || flight.core.state == NF_HELD || flight.core.reason == NF_OK);
+    }
+    return flight.core.reason;
+}
+
+static void rearm(flight_t *flight)
+{
+    flight->in.list = identity();
+    craft.armed = false;
+    step(flight);
+    craft.armed = true;
+    step(flight);
+}
+
+static void nothing(flight_t *flight) { (void)flight; }
+static void no_fix(flight_t *flight) { flight->in.fix = false; }
+static void no_home(flight_t *flight) { flight->in.home_known = false; }
+static void no_compass(flight_t *flight) { flight->in.instruments = false; }
+static void changed(flight_t *flight) { flight->in.list.checksum++; }
+static void damaged(flight_t *flight) { (void)flight; list.bytes[2][8] ^= 1; }
+static void empty(flight_t *flight) { list.count = 1; rearm(flight); }
+static void low(flight_t *flight) { (void)flight; craft.height = 50; }
+static void far(flight_t *flight) { list.record[1].place = place_at(26000, 0); encode(list.bytes[1], &list.record[1]); rearm(flight); }
+static void long_leg(flight_t *flight) { list.record[2].place = place_at(-198000, 0); encode(list.bytes[2], &list.record[2]); rearm(flight); }
+static void high(flight_t *flight) { list.record[2].height_m = 101; encode(list.bytes[2], &list.record[2]); rearm(flight); }
+static void placeless(flight_t *flight) { list.record[2].place.lat = 0; encode(list.bytes[2], &list.record[2]); rearm(flight); }
+static void unknown(flight_t *flight) { list.record[2].command = 8; encode(list.bytes[2], &list.record[2]); rearm(flight); }
+static void landing_first(flight_t *flight) { list.record[1].command = LAND; encode(list.bytes[1], &list.record[1]); rearm(flight); }
+static void late_takeoff(flight_t *flight) { list.record[2].command = TAKEOFF; encode(list.bytes[2], &list.record[2]); rearm(flight); }
+static void roi_last(flight_t *flight) { list.record[2].command = SETROI; encode(list.bytes[2], &list.record[2]); rearm(flight); }
+
+static void test_refusals(void)
+{
+    CHECK(refusal(nothing) == NF_OK);
+    CHECK(refusal(no_fix) == NF_FIX_MISSING);
+    CHECK(refusal(no_home) == NF_HOME_MISSING);
+    CHECK(refusal(no_compass) == NF_NOT_READY);
+    CHECK(refusal(changed) == NF_LIST_CHANGED);
+    CHECK(refusal(damaged) == NF_LIST_DAMAGED);
+    CHECK(refusal(empty) == NF_LIST_EMPTY);
+    CHECK(refusal(low) == NF_ON_GROUND);
+    CHECK(refusal(far) == NF_FIRST_FAR);
+    CHECK(refusal(long_leg) == NF_LEG_LONG);
+    CHECK(refusal(high) == NF_TOO_HIGH);
+    CHECK(refusal(placeless) == NF_BAD_PLACE);
+    CHECK(refusal(unknown) == NF_BAD_ORDER);
+    CHECK(refusal(landing_first) == NF_BAD_ORDER);
+    CHECK(refusal(late_takeoff) == NF_BAD_ORDER);
+    CHECK(refusal(roi_last) == NF_BAD_ORDER);
+}
+
+/* Only an edge of the switch while armed starts a flight; a flight that was left goes on at its record. */
+static void test_switch(void)
+{
+    flight_t flight;
+    nf_record_t record;
+    list.count = 0;
+    for (int i = 0; i < 5; i++) {
+        record = random_record(WAYPOINT);
+        record.place = place_at(i % 2 ? 3000 : -3000, 1000);
+        record.height_m = 10;
+        add(&record);
+    }
+    prepare(&flight, true);
+    craft.armed = false;
+    flight.in.switch_on = flight.toggled = true;
+    step(&flight);
+    craft.armed = true;
+    craft.height = 1000;
+    flight.toggled = false;
+    for (int i = 0; i < 100; i++)
+        step(&flight);
+    CHECK(flight.out.mode == NF_PASS && flight.core.reason == NF_NOT_ARMED);
+    flight.in.switch_on = false;
+    step(&flight);
+    flight.in.switch_on = flight.toggled = true;
+    step(&flight);
+    flight.toggled = false;
+    while (flight.core.record < 3)
+        step(&flight);
+    flight.in.switch_on = false;
+    step(&flight);
+    CHECK(flight.core.reason == NF_SWITCHED_OFF);
+    flight.in.switch_on = flight.toggled = true;
+    step(&flight);
+    flight.toggled = false;
+    step(&flight);
+    CHECK(flight.core.record == 3 && flight.core.state == NF_LEG);
+    while (flight.core.state == NF_LEG)
+        step(&flight);
+    CHECK(flight.core.state == NF_DONE && flight.core.reason == NF_FLOWN);
+    craft.armed = false;
+    step(&flight);
+    CHECK(flight.out.mode == NF_PASS && flight.core.reason == NF_DISARMED);
+}
+
+/* A wind that the craft cannot fly against ends the leg, in a hold. */
+static void test_stall(void)
+{
+    flight_t flight;
+    nf_record_t record = random_record(WAYPOINT);
+    list.count = 0;
+    add(&record);
+    record.place = place_at(8000, 0);
+    add(&record);
+    prepare(&flight, true);
+    craft.height = 1000;
+    flight.in.switch_on = flight.toggled = true;
+    step(&flight);
+    flight.toggled = false;
+    for (int i = 0; i < 60 * 1000 / STEP_MS; i++) {
+        const double north = craft.north;
+        step(&flight);
+        craft.north = north - 0.5; /* blown back */
+    }
+    CHECK(flight.core.state == NF_HELD && flight.core.reason == NF_STALLED && flight.out.mode == NF_HOLD);
+}
+
+/* Print the table of states, for the test that compares the manual. */
+static void print_states(void)
+{
+    static const char *const modes[] = {"pass", "ground", "takeoff", "go", "hold", "level", "land"};
+    static const char *const rules[] = {"none", "fixed", "climb", "metre", "turn", "record"};
+    for (int i = 0; i < NF_STATES; i++)
+        printf("%s|%s|%s|%lu|%s|%d\n", nf_states[i].name, modes[nf_states[i].mode], rules[nf_states[i].rule],
+               (unsigned long)nf_states[i].base_ms / 1000, nf_states[nf_states[i].then].name, (int)nf_states[i].reason);
+}
+
+int main(int argc, char **argv)
+{
+    if (argc > 1 && !strcmp(argv[1], "--states")) {
+        print_states();
+        return 0;
+    }
+    const unsigned long lists = argc > 1 ? strtoul(argv[1], NULL, 10) : 2000;
+    const unsigned long first = argc > 2 ? strtoul(argv[2], NULL, 10) : 1;
+    chance_state = 88172645463325252u;
+    test_refusals();
+    test_switch();
+    test_stall();
+    for (seed = first; seed < first + lists; seed++) {
+        chance_state = seed * 0x9E3779B97F4A7C15u + 1;
+        if (seed % 4)
+            fly_disturbed();
+        else
+            fly_undisturbed();
+    }
+    if (lists >= 1000) {
+        for (int i = 0; i < NF_STATES; i++)
+            if (i != NF_SINK && i != NF_NEXT)
+                CHECK(seen_states[i]);
+    }
+    printf("%lu lists flown, %lu checks passed\n", lists, checks);
+    return 0;
+}
