@@ -389,7 +389,7 @@ static void check_step(flight_t *flight)
         flight->record = core->record;
         flight->entered_ms = in->now_ms;
         flight->turned = 0;
-        flight->touched = false;
+        flight->touched = in->yaw_stick;
         flight->low = flight->high = craft.height;
     } else if (core->state == NF_TURN)
         flight->turned += craft.heading - flight->heading_before;

@@ -249,8 +249,9 @@ def test_mission_flight_keeps_changes_of_the_trees_own(clone: Workshop) -> None:
     clone.add_flight()
     clone.git("add", "-A")
     clone.git("commit", "-qm", "other.c")
+    commit = f"commit {clone.git('rev-parse', 'HEAD').strip()}"
     for patch in (clone.firmware / "patches").glob("*.patch"):
-        patch.write_text(re.sub(r"commit [0-9a-f]+", f"commit {clone.git('rev-parse', 'HEAD').strip()}", patch.read_text()))
+        patch.write_text(re.sub(r"commit [0-9a-f]+", commit, patch.read_text()))
     main = clone.tree / "src" / "main.c"
     main.write_bytes(main.read_bytes().replace(b"line(30)", b"line(31)"))
     mine = clone.files()
