@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from protocols.msp.mission_flight import FlightReason
+
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 
 
@@ -42,6 +44,35 @@ def test_core_passes_its_tests_on_an_emulated_cortex_m3() -> None:
 
 def test_thousands_of_random_missions_are_flown_as_the_manual_says() -> None:
     assert "3000 lists flown" in make("flights", "FLIGHTS=3000")
+
+
+_RULES = {
+    "none": "",
+    "fixed": "{} s",
+    "climb": "{} s + 4 times the climb",
+    "metre": "{} s + 2 s for each metre",
+    "turn": "{} s + 72 s for each turn",
+    "record": "its seconds",
+}
+
+
+def test_the_manuals_table_of_flight_states_is_the_cores(tmp_path: Path) -> None:
+    sources = [FIRMWARE / name for name in ("naze_flight.c", "naze_slots.c", "tests/test_flight.c")]
+    command = ["gcc", "-std=c99", f"-I{FIRMWARE}", *map(str, sources), "-lm", "-o", str(tmp_path / "states")]
+    subprocess.run(command, check=True)
+    printed = subprocess.run([tmp_path / "states", "--states"], check=True, capture_output=True, text=True).stdout
+    rows = [line.split("|") for line in printed.splitlines()]
+    expected = []
+    for name, mode, rule, seconds, then, reason in rows:
+        lasting = rule == "none"
+        words = FlightReason(int(reason)).name.lower().replace("_", " ") if int(reason) else ""
+        cells = [name, mode, _RULES[rule].format(seconds), "" if lasting else then, words]
+        expected.append("| " + " | ".join(cells) + " |")
+    page = (FIRMWARE.parent / "docs" / "mission-flight.md").read_text()
+    table = page.partition("## States")[2].partition("## ")[0]
+    assert [re.sub(" +", " ", row) for row in expected] == [
+        re.sub(" +", " ", line) for line in table.splitlines() if line.startswith("| ")
+    ][1:]
 
 
 def test_core_stays_small() -> None:

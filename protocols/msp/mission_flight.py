@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Progress of a mission that the board flies: the command FLIGHT of Harakiri's mission extension (docs/msp-mission.md)."""
+
+import struct
+from dataclasses import dataclass
+from enum import IntEnum
+
+from protocols.msp.frame import request
+
+FLIGHT = 179
+FLIGHT_REQUEST = request(FLIGHT)
+_VERSION = 1
+_NO_RECORD = 0xFFFF
+_REPLY = struct.Struct("<6B3HIHhI")
+_IN_COMMAND, _BATTERY_LOW, _SWITCH_ON, _ENABLED = 4, 8, 2, 1
+
+
+class FlightState(IntEnum):
+    """The states of firmware/naze_flight.h, in order."""
+
+    OFF = 0
+    CHECK = 1
+    NEXT = 2
+    WAIT = 3
+    LIFT = 4
+    RISE = 5
+    CLIMB = 6
+    LEG = 7
+    LOITER = 8
+    TURN = 9
+    STAY = 10
+    SETTLE = 11
+    DESCENT = 12
+    SINK = 13
+    DONE = 14
+    HELD = 15
+    NO_FIX = 16
+    HANDS = 17
+
+
+class FlightReason(IntEnum):
+    """Why a flight did not start, stopped, or is slow."""
+
+    NONE = 0
+    DISABLED = 1
+    NOT_ARMED = 2
+    FIX_MISSING = 3
+    HOME_MISSING = 4
+    NOT_READY = 5
+    LIST_EMPTY = 6
+    LIST_DAMAGED = 7
+    LIST_CHANGED = 8
+    BAD_ORDER = 9
+    BAD_PLACE = 10
+    FIRST_FAR = 11
+    LEG_LONG = 12
+    TOO_HIGH = 13
+    ON_GROUND = 14
+    THROTTLE_LOW = 15
+    NO_LIFT = 16
+    CLIMB_SLOW = 17
+    STALLED = 18
+    TURN_SLOW = 19
+    LAND_SLOW = 20
+    STICKS = 21
+    THROTTLE = 22
+    FIX_LOST = 23
+    RTL = 24
+    FAILSAFE = 25
+    SWITCHED_OFF = 26
+    DISARMED = 27
+    FLOWN = 28
+
+
+@dataclass(frozen=True, slots=True)
+class FlightProgress:
+    """Reply to FLIGHT. `record` is in flight, or was left or refused; metres and degrees; `height_error` is up."""
+
+    state: FlightState
+    reason: FlightReason
+    is_enabled: bool
+    switch_on: bool
+    in_command: bool
+    battery_low: bool
+    record: int | None
+    reached: int | None
+    count: int
+    distance: float
+    bearing: float
+    height_error: float
+    state_s: float
+
+
+def decode_flight(payload: bytes) -> FlightProgress | None:
+    """Read a reply; None if it is cut, an error, or of another version."""
+    if len(payload) < _REPLY.size:
+        return None
+    status, version, flags, state, reason, _, record, reached, count, distance, bearing, height_error, state_ms = (
+        _REPLY.unpack_from(payload)
+    )
+    if status or version != _VERSION or state > max(FlightState) or reason > max(FlightReason):
+        return None
+    return FlightProgress(
+        state=FlightState(state),
+        reason=FlightReason(reason),
+        is_enabled=bool(flags & _ENABLED),
+        switch_on=bool(flags & _SWITCH_ON),
+        in_command=bool(flags & _IN_COMMAND),
+        battery_low=bool(flags & _BATTERY_LOW),
+        record=None if record == _NO_RECORD else record,
+        reached=None if reached == _NO_RECORD else reached,
+        count=count,
+        distance=distance / 100,
+        bearing=bearing / 100,
+        height_error=height_error / 100,
+        state_s=state_ms / 1000,
+    )

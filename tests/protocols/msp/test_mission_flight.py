@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The progress of a mission flight, as firmware/naze_flight.h numbers it."""
+
+import re
+import struct
+from enum import IntEnum
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from protocols.msp.mission_flight import FLIGHT_REQUEST, FlightReason, FlightState, decode_flight
+from tests.support.programs import REPOSITORY
+
+_HEADER = (REPOSITORY / "firmware" / "naze_flight.h").read_text()
+REPLY = struct.pack("<6B3HIHhI", 0, 1, 0b1111, 7, 18, 3, 4, 3, 9, 1250, 27000, -150, 61500)
+
+
+def test_a_reply_is_read() -> None:
+    progress = decode_flight(REPLY)
+    assert progress is not None
+    assert (progress.state, progress.reason) == (FlightState.LEG, FlightReason.STALLED)
+    assert progress.is_enabled and progress.switch_on and progress.in_command and progress.battery_low
+    assert (progress.record, progress.reached, progress.count) == (4, 3, 9)
+    assert (progress.distance, progress.bearing, progress.height_error, progress.state_s) == (12.5, 270, -1.5, 61.5)
+
+
+def test_no_record_is_none() -> None:
+    progress = decode_flight(REPLY[:6] + b"\xff\xff\xff\xff" + REPLY[10:])
+    assert progress is not None
+    assert progress.record is progress.reached is None
+
+
+@pytest.mark.parametrize("at", [0, 1, 3, 4])
+def test_another_status_version_state_or_reason_is_no_progress(at: int) -> None:
+    assert decode_flight(REPLY[:at] + b"\x63" + REPLY[at + 1 :]) is None
+
+
+@given(st.binary(max_size=40))
+def test_any_bytes_are_read_or_refused(payload: bytes) -> None:
+    progress = decode_flight(payload)
+    assert progress is None or len(payload) >= len(REPLY)
+
+
+def test_the_request_is_that_of_the_specification() -> None:
+    assert FLIGHT_REQUEST == bytes.fromhex("244d3c00b3b3")
+
+
+@pytest.mark.parametrize(
+    ("values", "last", "others"), [(FlightState, "NF_STATES", {}), (FlightReason, "NF_REASONS", {"NONE": "OK"})]
+)
+def test_the_numbers_are_the_firmwares(values: type[IntEnum], last: str, others: dict[str, str]) -> None:
+    block = next(body for body in re.findall(r"typedef enum \{(.*?)\}", _HEADER, re.DOTALL) if f"{last}\n" in body)
+    names = re.findall(r"^    NF_(\w+)", block, re.MULTILINE)[:-1]
+    assert names == [others.get(value.name, value.name) for value in values]
