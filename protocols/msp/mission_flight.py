@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Progress of a mission that the board flies: the command FLIGHT of Harakiri's mission extension (docs/msp-mission.md)."""
+"""Progress of a mission that the board flies: FLIGHT of Harakiri's mission extension (docs/msp-mission.md)."""
 
 import struct
 from dataclasses import dataclass

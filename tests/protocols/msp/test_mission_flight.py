@@ -20,7 +20,10 @@ def test_a_reply_is_read() -> None:
     progress = decode_flight(REPLY)
     assert progress is not None
     assert (progress.state, progress.reason) == (FlightState.LEG, FlightReason.STALLED)
-    assert progress.is_enabled and progress.switch_on and progress.in_command and progress.battery_low
+    assert progress.is_enabled
+    assert progress.switch_on
+    assert progress.in_command
+    assert progress.battery_low
     assert (progress.record, progress.reached, progress.count) == (4, 3, 9)
     assert (progress.distance, progress.bearing, progress.height_error, progress.state_s) == (12.5, 270, -1.5, 61.5)
 
@@ -43,7 +46,7 @@ def test_any_bytes_are_read_or_refused(payload: bytes) -> None:
 
 
 def test_the_request_is_that_of_the_specification() -> None:
-    assert FLIGHT_REQUEST == bytes.fromhex("244d3c00b3b3")
+    assert bytes.fromhex("244d3c00b3b3") == FLIGHT_REQUEST
 
 
 @pytest.mark.parametrize(
