@@ -23,7 +23,7 @@ extern uint16_t batteryWarningVoltage;
 
 static nf_t flight;
 static nf_output_t out;
-static bool failsafe, launched, grounded, nosed;
+static bool failsafe, launched, grounded, nosed, own_gains;
 static uint16_t announced = NF_NO_RECORD;
 
 static bool read_record(void *self, uint16_t number, uint8_t *record)
@@ -118,6 +118,7 @@ static void go(void)
         if (fast)
             waypoint_speed_gov = speed;
         GPS_set_nav_gains(cfg.mission_nav_p, cfg.mission_nav_i);
+        own_gains = true;
     }
     WP_Fastcorner = !out.brake; /* which GPS_reset_nav() clears */
 }
@@ -136,9 +137,10 @@ static void climb(int16_t rate_cm_s)
 
 static void leave(void)
 {
-    if (f.GPS_AUTO_MODE) {
-        f.GPS_AUTO_MODE = 0;
-        GPS_set_pids(); /* the pilot's navigation gains */
+    f.GPS_AUTO_MODE = 0; /* which a lost fix has cleared before */
+    if (own_gains) {
+        GPS_set_pids();
+        own_gains = false;
     }
 }
 
