@@ -15,7 +15,7 @@ _REPLY = struct.Struct("<6B3HIHhI")
 _IN_COMMAND, _BATTERY_LOW, _SWITCH_ON, _ENABLED = 4, 8, 2, 1
 
 
-class FlightState(IntEnum):
+class FlightPhase(IntEnum):
     """The states of firmware/naze_flight.h, in order."""
 
     OFF = 0
@@ -76,7 +76,7 @@ class FlightReason(IntEnum):
 class FlightProgress:
     """Reply to FLIGHT. `record` is in flight, or was left or refused; metres and degrees; `height_error` is up."""
 
-    state: FlightState
+    state: FlightPhase
     reason: FlightReason
     is_enabled: bool
     switch_on: bool
@@ -98,10 +98,10 @@ def decode_flight(payload: bytes) -> FlightProgress | None:
     status, version, flags, state, reason, _, record, reached, count, distance, bearing, height_error, state_ms = (
         _REPLY.unpack_from(payload)
     )
-    if status or version != _VERSION or state > max(FlightState) or reason > max(FlightReason):
+    if status or version != _VERSION or state > max(FlightPhase) or reason > max(FlightReason):
         return None
     return FlightProgress(
-        state=FlightState(state),
+        state=FlightPhase(state),
         reason=FlightReason(reason),
         is_enabled=bool(flags & _ENABLED),
         switch_on=bool(flags & _SWITCH_ON),

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocols.msp.mission_flight import FLIGHT_REQUEST, FlightReason, FlightState, decode_flight
+from protocols.msp.mission_flight import FLIGHT_REQUEST, FlightReason, FlightPhase, decode_flight
 from tests.support.programs import REPOSITORY
 
 _HEADER = (REPOSITORY / "firmware" / "naze_flight.h").read_text()
@@ -19,7 +19,7 @@ REPLY = struct.pack("<6B3HIHhI", 0, 1, 0b1111, 7, 18, 3, 4, 3, 9, 1250, 27000, -
 def test_a_reply_is_read() -> None:
     progress = decode_flight(REPLY)
     assert progress is not None
-    assert (progress.state, progress.reason) == (FlightState.LEG, FlightReason.STALLED)
+    assert (progress.state, progress.reason) == (FlightPhase.LEG, FlightReason.STALLED)
     assert progress.is_enabled
     assert progress.switch_on
     assert progress.in_command
@@ -50,7 +50,7 @@ def test_the_request_is_that_of_the_specification() -> None:
 
 
 @pytest.mark.parametrize(
-    ("values", "last", "others"), [(FlightState, "NF_STATES", {}), (FlightReason, "NF_REASONS", {"NONE": "OK"})]
+    ("values", "last", "others"), [(FlightPhase, "NF_STATES", {}), (FlightReason, "NF_REASONS", {"NONE": "OK"})]
 )
 def test_the_numbers_are_the_firmwares(values: type[IntEnum], last: str, others: dict[str, str]) -> None:
     block = next(body for body in re.findall(r"typedef enum \{(.*?)\}", _HEADER, re.DOTALL) if f"{last}\n" in body)
