@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocols.msp.mission_flight import FLIGHT_REQUEST, FlightReason, FlightPhase, decode_flight
+from protocols.msp.mission_flight import FLIGHT_REQUEST, FlightPhase, FlightReason, decode_flight
 from tests.support.programs import REPOSITORY
 
 _HEADER = (REPOSITORY / "firmware" / "naze_flight.h").read_text()
