@@ -66,7 +66,7 @@ class FcOutput(NamedTuple):
 
 
 class TimedPart(Protocol):
-    """A part with a timer: `tick` is called at `due` or later, and sets the next `due`; infinity: nothing is due."""
+    """A part with a timer. `tick` is called at `due` or later and sets the next `due`; infinity means no timer."""
 
     @property
     def due(self) -> float:
@@ -77,9 +77,12 @@ class TimedPart(Protocol):
 
 
 class Bridge:
-    """Wires the parts and routes events between them; service/ uses only what is public here.
+    """The whole bridge. Its public methods are all that service/ uses; the parts behind them are private.
 
-    After each input, take the output: `take_datagrams`, `take_fc_output`, `store_effects`; then call `tick` at `due`.
+    After each input, take the output (`take_datagrams`, `take_fc_output`, `store_effects`), and call `tick` at `due`:
+
+    >>> bridge.gcs_received(peer, data, now, datagram=True)
+    >>> for peer, datagram in bridge.take_datagrams(): sock.sendto(datagram, peer.key)
     """
 
     def __init__(
@@ -210,7 +213,7 @@ class Bridge:
 
     @property
     def fc_trouble(self) -> str:
-        """Why the board cannot be used and what the pilot must do; empty if nothing."""
+        """The reason why the board cannot be used, and the remedy; empty if it can be."""
         return self._session.state.trouble
 
     @property

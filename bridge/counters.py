@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the bridge counts, for metrics and the status."""
+"""The bridge's counters, for metrics and the status."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

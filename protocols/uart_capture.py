@@ -56,7 +56,7 @@ class UartEvent:
 
 
 def capture_header(started: str) -> bytes:
-    """Return the first line of a recording. `started`: time in UTC, for people."""
+    """The first line of a recording. `started`: time in UTC, for people."""
     return f'{{"{_MARK}":{_VERSION},"started":{json.dumps(started)}}}\n'.encode()
 
 

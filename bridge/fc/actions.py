@@ -29,7 +29,7 @@ _MAX_TILT = 0.05
 
 @dataclass(frozen=True, slots=True)
 class FcAction:
-    """`needs` must be on board. A Harakiri does nothing else until it is done, and then restarts.
+    """A calibration. `needs`: the sensor. A Harakiri does nothing else until it is done, and then restarts.
 
     instruction: for the pilot.
     """

@@ -43,7 +43,7 @@ class TokenBucket:
 
     @property
     def used(self) -> float:
-        """The uses that were not regained when it was last asked."""
+        """The uses not yet regained at the last call of `has`."""
         return self._used
 
 
@@ -99,13 +99,13 @@ class HostBudget(Budget):
         return True
 
     def has_seat(self, *, is_own: bool) -> None:
-        """It was given a seat, or has lost it."""
+        """The host was given a seat, or has lost it."""
         self.is_own = is_own
         for cost, bucket in self._buckets.items():
             bucket.rate = LIMITS[cost].each
 
     def join(self, *, may_sit: bool) -> None:
-        """A station that has proven nothing has connected; it takes a seat if one is free."""
+        """A station without proven rights has connected. The host takes a seat if one is free."""
         self.stations += 1
         self._hosts.without_seat += self.stations == 1
         if may_sit and self.seat is None and self._hosts.free_seats:
@@ -118,7 +118,7 @@ class HostBudget(Budget):
             self._hosts.give_seat(self)
 
     def leave(self) -> None:
-        """Such a station has left, or has proven its rights."""
+        """A station without proven rights has left, or has proven them."""
         self.stations -= 1
         if not self.stations:
             self._hosts.take_seat(self)
@@ -127,7 +127,7 @@ class HostBudget(Budget):
 
 
 class HostBudgets:
-    """All hosts."""
+    """The budgets of all hosts, and their seats."""
 
     def __init__(self) -> None:
         #: A seat's writes outlive its host: a new address gains nothing.

@@ -15,7 +15,7 @@ TOO_MANY_WRITES = "Flash wear limit: try again in 10 minutes"
 
 
 class FlashBudget:
-    """Everyone on an open link may write until the shared limit is used up; then each seat still has its reserve.
+    """All hosts on an open link may write until the shared limit is used up; then each seat still has its reserve.
 
     A station with the key or a listed address has 400 writes at once and 12 an hour for its host alone.
     """

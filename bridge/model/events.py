@@ -1,15 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What happened: the log prints these events, and other parts act on some of them. docs/events.md is for users."""
+"""The events of the bridge: the log prints them, and other parts act on some. docs/events.md is for users."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, dataclass_transform
 
 Level = Literal["debug", "info", "warning", "error"]
 
 
-@dataclass(frozen=True, kw_only=True)
-class BridgeEvent:
+@dataclass_transform(frozen_default=True, kw_only_default=True)
+class _Event:
+    """Makes each kind of event below a dataclass."""
+
+    def __init_subclass__(cls) -> None:
+        dataclass(frozen=True, kw_only=True)(cls)
+
+
+class BridgeEvent(_Event):
     """Its log line has its name, its level, and its fields as facts, with the unit in the key.
 
     >>> FcLost(why="no answer for 3 s", speed_baud=115200, incident="link-3").facts()
@@ -31,7 +38,6 @@ class BridgeEvent:
 Emit = Callable[[BridgeEvent], None]
 
 
-@dataclass(frozen=True, kw_only=True)
 class PortLost(BridgeEvent):
     """The flight controller's port is gone; not if the bridge closed it itself."""
 
@@ -41,7 +47,6 @@ class PortLost(BridgeEvent):
     incident: str
 
 
-@dataclass(frozen=True, kw_only=True)
 class FcSensed(BridgeEvent):
     """A protocol was recognised."""
 
@@ -53,7 +58,6 @@ class FcSensed(BridgeEvent):
     incident: str
 
 
-@dataclass(frozen=True, kw_only=True)
 class FcFound(BridgeEvent):
     """The flight controller is identified."""
 
@@ -66,7 +70,6 @@ class FcFound(BridgeEvent):
     incident: str
 
 
-@dataclass(frozen=True, kw_only=True)
 class FcInCommandLine(BridgeEvent):
     """It cannot be used until the pilot types `exit` there."""
 
@@ -76,7 +79,6 @@ class FcInCommandLine(BridgeEvent):
     incident: str
 
 
-@dataclass(frozen=True, kw_only=True)
 class FcLost(BridgeEvent):
     """It no longer replies, or speaks another protocol."""
 
@@ -87,21 +89,18 @@ class FcLost(BridgeEvent):
     incident: str
 
 
-@dataclass(frozen=True, kw_only=True)
 class Armed(BridgeEvent):
     """The flight controller reports it."""
 
     name_in_log = "vehicle.armed"
 
 
-@dataclass(frozen=True, kw_only=True)
 class Disarmed(BridgeEvent):
     """The flight controller reports it."""
 
     name_in_log = "vehicle.disarmed"
 
 
-@dataclass(frozen=True, kw_only=True)
 class GcsFound(BridgeEvent):
     """A ground station was heard for the first time."""
 
@@ -109,7 +108,6 @@ class GcsFound(BridgeEvent):
     station: str
 
 
-@dataclass(frozen=True, kw_only=True)
 class GcsSilent(BridgeEvent):
     """A ground station was forgotten after a silence."""
 
@@ -117,7 +115,6 @@ class GcsSilent(BridgeEvent):
     peer: str
 
 
-@dataclass(frozen=True, kw_only=True)
 class GcsRefused(BridgeEvent):
     """A peer may not do this; the first time for this reason."""
 
@@ -128,7 +125,6 @@ class GcsRefused(BridgeEvent):
     why: str
 
 
-@dataclass(frozen=True, kw_only=True)
 class GcsText(BridgeEvent):
     """A text for ground stations."""
 
@@ -137,7 +133,6 @@ class GcsText(BridgeEvent):
     text: str
 
 
-@dataclass(frozen=True, kw_only=True)
 class ShareRefused(BridgeEvent):
     """A program's change was refused. At debug level if it repeats, as the next."""
 
@@ -148,7 +143,6 @@ class ShareRefused(BridgeEvent):
     why: str
 
 
-@dataclass(frozen=True, kw_only=True)
 class ShareUnanswered(BridgeEvent):
     """A program's request got no answer in time."""
 
@@ -159,7 +153,6 @@ class ShareUnanswered(BridgeEvent):
     why: str
 
 
-@dataclass(frozen=True, kw_only=True)
 class UploadStarted(BridgeEvent):
     """A ground station's first item is requested."""
 
@@ -169,7 +162,6 @@ class UploadStarted(BridgeEvent):
     incident: str
 
 
-@dataclass(frozen=True, kw_only=True)
 class UploadEnded(BridgeEvent):
     """The final ack of a complete list is sent; `mission` is its number in the store."""
 
@@ -181,7 +173,6 @@ class UploadEnded(BridgeEvent):
     incident: str
 
 
-@dataclass(frozen=True, kw_only=True)
 class UploadRefused(BridgeEvent):
     """An upload was refused or abandoned."""
 
@@ -193,7 +184,6 @@ class UploadRefused(BridgeEvent):
     incident: str
 
 
-@dataclass(frozen=True, kw_only=True)
 class StationMoved(BridgeEvent):
     """An upload continues from another address."""
 
@@ -203,7 +193,6 @@ class StationMoved(BridgeEvent):
     incident: str
 
 
-@dataclass(frozen=True, kw_only=True)
 class PushStarted(BridgeEvent):
     """A list from the command line, the page or zenoh is to be written."""
 
@@ -213,7 +202,6 @@ class PushStarted(BridgeEvent):
     incident: str
 
 
-@dataclass(frozen=True, kw_only=True)
 class PushEnded(BridgeEvent):
     """That list was written, or was not; `mission` is its number in the store."""
 
@@ -225,7 +213,6 @@ class PushEnded(BridgeEvent):
     incident: str
 
 
-@dataclass(frozen=True, kw_only=True)
 class MissionChangedOnBoard(BridgeEvent):
     """The flight controller's list changed, but not through the bridge."""
 
@@ -233,7 +220,6 @@ class MissionChangedOnBoard(BridgeEvent):
     detail: str
 
 
-@dataclass(frozen=True, kw_only=True)
 class SettingsChangedOnBoard(BridgeEvent):
     """PIDs, modes, rates or MISC changed, but not through the bridge."""
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a bridge that restarts in flight must know about the craft, because an armed flight controller may not tell it.
+"""The facts that a bridge restarted in flight needs, because an armed flight controller may not report them.
 
 A Harakiri that speaks MAVLink or FrSky reports neither home nor the switch ranges that make its flight mode.
 """

@@ -36,7 +36,7 @@ class ArrivedMission:
 
 @dataclass(frozen=True, slots=True)
 class RecalledMission:
-    """What the store knows about a list that was verified before.
+    """The store's facts about a list that was verified before.
 
     `sent_as`: the commands that ambiguous records were sent with, by record number. `sent_seqs`: the item numbers of
     each ground station that sent it and has not read it back since, by Station.identity.

@@ -270,7 +270,7 @@ class Vehicle:
         self._is_resumed = False
 
     def memory(self, family: str, now: float) -> FlightMemory | None:
-        """What a restarted bridge must know about the craft; None unless it is armed."""
+        """The facts about an armed craft that a restarted bridge needs; None unless it is armed."""
         switches = self.last(Switches)
         if self.last(FlightState) is None or self.armed_at is None:
             return None
@@ -387,7 +387,7 @@ class Vehicle:
     def _place_home(self, *, has_armed: bool) -> None:
         """Home is where the craft was armed. It never moves in flight, even if the link is lost.
 
-        Before the first arming it is where the craft stands. The flight controller's own home overrides both.
+        Before the first arming it is the place of the craft. The flight controller's own home overrides both.
         """
         position, height = self.last(GlobalPosition), self.last(Height)
         if position is None:

@@ -139,7 +139,7 @@ class SettingsIdentity:
 
 @dataclass(frozen=True, slots=True)
 class LastHeard:
-    """What matters once the craft is silent: the last known values, however old."""
+    """The values to find a silent craft by: the last known ones, however old."""
 
     armed: bool | None = None
     armed_age_s: Annotated[float | None, "seconds since it was heard"] = None

@@ -100,7 +100,7 @@ class MspSharing:
         self._stopped = True
 
     def tick(self, now: float) -> None:
-        """Answer what can be answered, disconnect who waited too long, and forward the next request."""
+        """Answer what can be answered, disconnect programs that waited too long, and forward the next request."""
         waiting = [program for program in self._programs if program.waiting]
         for program in waiting:
             self._answer(program, now)

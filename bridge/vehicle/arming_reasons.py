@@ -20,7 +20,7 @@ _PREFIX = "PreArm: "
 
 
 class ArmingReasons:
-    """Knows the reasons, and tells them when they change, and every 30 s while they hold."""
+    """Reports the reasons when they change, and every 30 s while they remain."""
 
     def __init__(self, session: FcSession, announcer: LinkAnnouncer, ground: Ground) -> None:
         self._session = session
@@ -31,7 +31,7 @@ class ArmingReasons:
         self._told_at = -inf
 
     def follow(self, now: float) -> None:
-        """Find the present reasons, before SYS_STATUS is made of them, and tell them if they are news."""
+        """Update the reasons, before SYS_STATUS is made of them, and report them if they have changed."""
         self.current = self._find(now)
         # A text would be too early during the first search.
         is_searching = self._announcer.why_unknown and not self._announcer.is_lost
@@ -46,7 +46,7 @@ class ArmingReasons:
             self._ground.say(Severity.WARNING, line)
 
     def tell(self, station: Station) -> None:
-        """Tell them to a newcomer, or in answer to MAV_CMD_RUN_PREARM_CHECKS."""
+        """Report the reasons to a newcomer, or in answer to MAV_CMD_RUN_PREARM_CHECKS."""
         for line in self._told:
             self._ground.say(Severity.WARNING, line, station)
 

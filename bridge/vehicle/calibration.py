@@ -34,7 +34,7 @@ _UNKNOWN = math.nan
 
 
 class Calibration:
-    """At most one at a time."""
+    """The calibration in progress, at most one at a time."""
 
     def __init__(self, ground: Ground, runner: Runner, announcer: LinkAnnouncer) -> None:
         self._ground = ground
@@ -55,7 +55,7 @@ class Calibration:
         self.tick(now)
 
     def tick(self, now: float) -> None:
-        """Show that it is running, and end it when its time has passed."""
+        """Report a running calibration, and end it when its time has passed."""
         lasts_s = _LONGEST_S if self._restarts else self._usual_s
         if now >= self._began_at + lasts_s:
             self._conclude(now)
@@ -74,7 +74,7 @@ class Calibration:
 
     @property
     def is_endless(self) -> bool:
-        """True if nothing but its own end, or a power cut, ends it."""
+        """True if the calibration cannot be cancelled: only its own end, or a power cut, ends it."""
         return self.action is not None and self._restarts
 
     @property

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames from ground stations: guarded, then answered by the message router, or passed on to an autopilot. Sans-IO."""
+"""Frames from ground stations: checked, then answered by the message router, or passed on to an autopilot. Sans-IO."""
 
 from collections.abc import Callable
 from functools import partial
@@ -22,7 +22,7 @@ from protocols.rights.mavlink import effect_of
 
 
 class Incoming:
-    """Guards, counts, and answers or passes on every frame from a ground station.
+    """Checks, counts, and answers or passes on every frame from a ground station.
 
     `routes` is set while an autopilot that represents itself is on the line; frames then go to it unchanged.
     """

@@ -50,7 +50,7 @@ class LinkAnnouncer:
 
     @property
     def why_unknown(self) -> str:
-        """Why nothing is known about the flight controller, while it is lost or was never found; else empty."""
+        """The reason for missing values while the flight controller is lost or was never found; else empty."""
         if not self._was_found:
             return "no flight controller: check power, wiring" if self.is_lost else "looking for the flight controller"
         return "flight controller lost" if self.is_lost else ""
@@ -61,7 +61,7 @@ class LinkAnnouncer:
         self.due = max(min(self.due, self._silent_since + _LOST_S), self._quiet_until)
 
     def expect_silence(self, until: float) -> None:
-        """The flight controller will be silent, and restart, because the pilot asked for that."""
+        """Expect silence and a restart of the flight controller, which the pilot has caused."""
         self._quiet_until = until
         if self._silent_since is not None and not self.is_lost:
             self.due = max(self._silent_since + _LOST_S, until)

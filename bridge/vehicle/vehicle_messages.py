@@ -101,7 +101,7 @@ T = TypeVar("T")
 
 
 class Unknown(Exception):
-    """A message cannot be made: a value for which it has no "unknown" is unknown or stale."""
+    """A value is unknown or stale, and the message has no code for that, so it cannot be made."""
 
 
 def known(value: T | None) -> T:

@@ -100,7 +100,7 @@ class VehicleReporter:
         }
 
     def heard(self, news: Collection[type[Reading]], now: float) -> None:
-        """The vehicle has new readings. To be called while groups are watched."""
+        """Note new readings. To be called while groups are watched."""
         for reading in news:
             group, pause_s = _NEWS_OF.get(reading, (Group.LINK, inf))
             if now >= self._published_at.get(group, -inf) + pause_s:

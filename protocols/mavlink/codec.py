@@ -85,7 +85,7 @@ class FrameWriter:
         self._seq = 0
 
     def frame(self, packed: Packed, version: int) -> bytes:
-        """Return a frame of MAVLink 1 or 2; always 2 if MAVLink 1 has no such message."""
+        """A frame of MAVLink 1 or 2; always 2 if MAVLink 1 has no such message."""
         seq, self._seq = self._seq, (self._seq + 1) & 0xFF
         msgid = packed.msgid
         if version == 1 and not packed.is_v2_only:

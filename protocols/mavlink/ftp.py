@@ -17,7 +17,7 @@ _ERRORS = dict.fromkeys((_LIST_DIRECTORY, _OPEN_FILE_RO, _CALC_FILE_CRC32), _FIL
 
 
 def refuse(payload: Sequence[int]) -> list[int] | None:
-    """Return the payload of the NAK to a request's payload; None if it is not a request."""
+    """The payload of the NAK to a request's payload; None if it is not a request."""
     request = bytes(payload)
     if len(request) < _HEADER.size:
         return None

@@ -28,7 +28,7 @@ Stream = tuple[int, int, int]
 
 
 def key_from_passphrase(passphrase: str) -> bytes:
-    """Return the 32-byte key that Mission Planner and MAVProxy derive from a passphrase."""
+    """The 32-byte key that Mission Planner and MAVProxy derive from a passphrase."""
     return sha256(passphrase.encode()).digest()
 
 
@@ -48,11 +48,11 @@ class Timestamps:
         self.last = min(at_least, _MAX_TIMESTAMP)
 
     def now(self) -> int:
-        """Return the current timestamp without consuming it."""
+        """The current timestamp, without consuming it."""
         return max(self.last, ticks(self._clock()))
 
     def take(self) -> int:
-        """Return the timestamp for the next frame."""
+        """The timestamp for the next frame."""
         self.last = min(max(self.last + 1, ticks(self._clock())), _MAX_TIMESTAMP)
         return self.last
 
@@ -87,7 +87,7 @@ class Signing:
         self.streams: dict[Stream, int] = {}
 
     def signature(self, frame: bytes, link_id: int) -> bytes:
-        """Return the 13 signature bytes of a MAVLink 2 frame whose flags mark it as signed."""
+        """The 13 signature bytes of a MAVLink 2 frame whose flags mark it as signed."""
         timestamp = self._timestamps.take()
         # Sent back by a stranger, the frame must not prove the key.
         self.streams[frame[5], frame[6], link_id] = timestamp

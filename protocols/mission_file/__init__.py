@@ -12,7 +12,7 @@ __all__ = ["MissionFileError", "read_mission_file", "write_mission_file", "write
 
 
 def write_mission_file(items: Sequence[MissionItem], name: str) -> str:
-    """Return the items as a file's text: a QGroundControl plan if `name` ends with .plan, else QGC WPL 110."""
+    """The items as a file's text: a QGroundControl plan if `name` ends with .plan, else QGC WPL 110."""
     return write_qgc_plan(items) if _is_plan(name) else write_qgc_wpl(items)
 
 

@@ -27,7 +27,7 @@ _SAVE_AGAIN = "save it again from QGroundControl"
 
 
 def read_qgc_plan(text: str, name: str, note: Note = no_note) -> list[MissionItem]:
-    """Return the items, home first; MissionFileError names the file and the entry of mission.items, from 1."""
+    """Read the items, home first; MissionFileError names the file and the entry of mission.items, from 1."""
     plan = _parse(text, name)
     if not isinstance(plan, dict) or plan.get("fileType") not in ("Plan", None):
         what = 'this is not a QGroundControl plan, its fileType is not "Plan"'
@@ -73,7 +73,7 @@ def _other_parts(plan: dict[str, Any]) -> str:
 
 
 def write_qgc_plan(items: Sequence[MissionItem]) -> str:
-    """Return the items as a file's text, the first one as the planned home; `read_qgc_plan` reads the same again."""
+    """The items as a file's text, the first one as the planned home; `read_qgc_plan` reads the same again."""
     home = [_degrees(items[0].lat_e7), _degrees(items[0].lon_e7), items[0].alt_m] if items else [0, 0, 0]
     mission = {
         "version": 2,

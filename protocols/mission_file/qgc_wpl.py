@@ -29,7 +29,7 @@ _SAVE_AGAIN = "save the file again from the ground station"
 
 
 def read_qgc_wpl(text: str, name: str, note: Note = no_note) -> list[MissionItem]:
-    """Return the items, home first; MissionFileError names the file and the line.
+    """Read the items, home first; MissionFileError names the file and the line.
 
     A file without items is an error: it is more likely truncated than meant to erase a mission.
     """
@@ -90,7 +90,7 @@ def _numbered(items: list[MissionItem], note: Note) -> list[MissionItem]:
 
 
 def write_qgc_wpl(items: Sequence[MissionItem]) -> str:
-    """Return the items as a file's text; `read_qgc_wpl` reads the same items again."""
+    """The items as a file's text; `read_qgc_wpl` reads the same items again."""
     return "".join(f"{line}\n" for line in ["QGC WPL 110", *map(_line, items)])
 
 

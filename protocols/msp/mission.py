@@ -104,7 +104,7 @@ class WpRecord(NamedTuple):
     command: int
 
     def pack(self) -> bytes:
-        """Return the 16 bytes; struct.error if a field does not fit, which is a bug in the caller."""
+        """The 16 bytes; struct.error if a field does not fit, which is a bug in the caller."""
         return _RECORD.pack(*self)
 
 

@@ -78,7 +78,7 @@ class NavRecord:
     flag: int = 0
 
     def pack(self) -> bytes:
-        """Return the 20 bytes behind the number; struct.error if a field does not fit, which is a bug in the caller."""
+        """The 20 bytes behind the number; struct.error if a field does not fit, which is a bug in the caller."""
         return _BODY.pack(self.action, self.lat_e7, self.lon_e7, self.alt_cm, self.p1, self.p2, self.p3, self.flag)
 
 

@@ -11,7 +11,6 @@ from payloads.names import ZenohSettingsError
 from service.settings.addresses import AddressError, GcsAddress, SerialFc, parse_gcs, split_gcs
 from service.settings.config_files import Given, nearest, read_files
 from service.settings.key import ENVIRONMENT_PREFIX, Problem, SettingsError, Unfit
-from service.settings.ports import port_conflicts
 from service.settings.settings import DEFAULT_GCS, Settings
 from service.settings.table import KEYS
 from service.settings.web import WebSettings
@@ -64,9 +63,6 @@ def load_settings(
     if isinstance(fc, SerialFc) and str(record_to) == fc.path:
         text = f"record_uart {record_to} is the flight controller's port: name a file"
         problems.append(Problem(given["record_uart"].where, text))
-    links_are_from = "--gcs" if gcs else given["gcs"].where if "gcs" in given else ""
-    conflicts = port_conflicts(fc, addresses, values.get("share", ()), zenoh, web)
-    problems += [Problem(links_are_from, text) for text in conflicts]
     if zenoh is not None:
         problems += _zenoh_problems(zenoh, given)
     key = _key(values.get("key_file"), given, problems)
@@ -76,7 +72,7 @@ def load_settings(
     own_access = {str(address): access for address, access in links}
     access = {link: own_access.get(link, WriteAccess()).with_key(key) for link in map(str, addresses)}
     composed = {
-        "gcs": addresses,
+        "gcs": [*dict.fromkeys(addresses)],  # one listed twice is one link
         "access": {link: rules for link, rules in access.items() if not rules.is_open},
         "sources": {name: found.where for name, found in given.items()},
         "state_dir": values.get("state_dir") or default_state_dir(),

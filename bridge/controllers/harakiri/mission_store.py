@@ -62,7 +62,7 @@ _PUSH_S = 3.8
 #: How long to ask for the outcome of a COMMIT without a reply.
 _LOOK_S = 0.6
 #: Losses in a row without progress before a push is given up.
-_MAX_VAIN = 20
+_MAX_WASTED = 20
 #: Unanswered requests in a row after which a list cannot be read.
 _MAX_SILENCE = 5
 
@@ -239,7 +239,7 @@ class HarakiriMissions(HarakiriStore):
         stale = 0  # chunks sent after a lost one, which will still be answered
         committing = False
         most = self.info.chunk_records
-        vain = 0
+        wasted = 0
         while True:
             while sent < total and len(in_flight) + stale < self.info.chunk_window:
                 chunk = ext.encode_chunk(packed, sent, most)
@@ -261,7 +261,7 @@ class HarakiriMissions(HarakiriStore):
                 confirmed = _confirmed(packed, answer)
                 if confirmed > acked:
                     acked = confirmed
-                    stale = vain = 0
+                    stale = wasted = 0
                     progress(acked)
                 if answer.status is ReplyStatus.OK:
                     in_flight = in_flight[1:]
@@ -277,8 +277,8 @@ class HarakiriMissions(HarakiriStore):
                     raise PushFailed(PushFailure.FLASH, is_final=False)
                 return
             # A frame was lost. A bad line loses long frames most.
-            vain += 1
-            if vain > _MAX_VAIN:
+            wasted += 1
+            if wasted > _MAX_WASTED:
                 raise PushFailed(PushFailure.NO_ANSWER)
             in_flight, stale = [], behind
             sent = acked
@@ -307,7 +307,7 @@ class HarakiriMissions(HarakiriStore):
         total = info.stored.count
         missing = range(0, total, step)
         parts: dict[int, Sequence[WpRecord]] = {}
-        vain = 0
+        wasted = 0
         in_flight = 0
         waiting: list[int] = list(missing)
         while len(parts) < len(missing):
@@ -319,8 +319,8 @@ class HarakiriMissions(HarakiriStore):
             reply: MspFrame | None = yield Receive(_READ_REPLIES)
             answer = None if reply is None else ext.decode_records(reply.payload)
             if answer is None:
-                vain += 1
-                if vain > _MAX_SILENCE:
+                wasted += 1
+                if wasted > _MAX_SILENCE:
                     return None
                 in_flight = 0
                 waiting = [first for first in missing if first not in parts]
@@ -330,7 +330,7 @@ class HarakiriMissions(HarakiriStore):
                 return None
             # Damage that the XOR missed may look like another place.
             if answer.first in missing and len(answer.records) == min(step, total - answer.first):
-                vain = 0 if answer.first not in parts else vain
+                wasted = 0 if answer.first not in parts else wasted
                 parts[answer.first] = answer.records
         return tuple(record for first in missing for record in parts[first])
 

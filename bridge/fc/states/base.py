@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The states of the line to a flight controller, their events, and what outlives them. Sans-IO.
+"""The states of the line to a flight controller, their events, and the data that outlives them. Sans-IO.
 
 Every state takes bytes and time, reports an event when it ends, and has a deadline: no state can wait forever.
 `bridge.fc.session` has the table of which event leads where.
@@ -129,7 +129,7 @@ class State(ABC):
     name: ClassVar[str]
     #: True while the flight controller is being searched for.
     is_searching: ClassVar[bool] = False
-    #: Why the board cannot be used and what the pilot must do; empty if nothing.
+    #: The reason why the board cannot be used, and the remedy; empty if it can be.
     trouble: ClassVar[str] = ""
     #: The flight controller on the line; None until it is identified.
     controller: FlightController | None = None

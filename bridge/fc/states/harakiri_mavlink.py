@@ -26,7 +26,7 @@ _RUNS = tuple(bytes((hazard,)) * RUN_LENGTH for hazard in sorted(HAZARDS))
 
 
 class HarakiriMavlink(MavlinkLine):
-    """The bridge represents it, and sends it probes for MSP and the messages of a mission transfer."""
+    """A Harakiri that speaks MAVLink. The bridge represents it, and sends only probes for MSP and mission transfers."""
 
     def __init__(self, port: Port, event: Found, now: float) -> None:
         super().__init__(port, event, now)
@@ -71,7 +71,7 @@ class HarakiriMavlink(MavlinkLine):
 
     @property
     def timeout_s(self) -> float:
-        """Shorter while armed."""
+        """The silence after which it is lost, s: shorter while armed."""
         if not self.port.vehicle.armed:
             return super().timeout_s
         return _ARMED_SILENCE_S + _BYTES_BEFORE_LOSS * byte_time_s(self.speed)
@@ -98,7 +98,7 @@ class _HarakiriSender:
         self._tail = b""
 
     def frame(self, packed: Packed) -> bytes | None:
-        """Return a frame that is safe to send now; None if there is none."""
+        """A frame that is safe to send now; None if there is none."""
         for _ in range(256):
             frame = self._writer.frame(packed, 1)
             on_wire = self._tail + frame

@@ -61,7 +61,7 @@ class MavlinkLine(State):
 
     @property
     def timeout_s(self) -> float:
-        """Without a frame for this long it is gone, s."""
+        """The silence after which the flight controller is lost, s."""
         return _SILENCE_S
 
     @abstractmethod

@@ -31,7 +31,7 @@ _LAST_CHECK_S = 64.0
 
 
 class MspLine(State):
-    """A line with MSP replies: common to identifying and to the time after it."""
+    """A line with MSP replies: the base of `Identifying` and `Polling`."""
 
     link: MspLink
 

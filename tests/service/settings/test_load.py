@@ -181,3 +181,15 @@ def test_check_config_warns_of_a_weak_key_and_does_not_quote_it(folder: Path) ->
     assert "setup --new-key" in warning
     key.write_text(f"{new_passphrase()}\n")
     assert run_naze_bridge("run", "--check-config", "--config", config).stderr == ""
+
+
+def test_a_link_that_is_listed_twice_is_one_link(folder: Path) -> None:
+    settings = load(folder, 'gcs = ["udpout:10.0.0.1:9", "tcpin:[::]:5", "udpout:10.0.0.1:9"]')
+    assert [str(address) for address in settings.gcs] == ["udpout:10.0.0.1:9", "tcpin:[::]:5"]
+
+
+def test_the_flight_controllers_port_is_not_recorded_into(folder: Path) -> None:
+    config = folder / "naze.toml"
+    config.write_text('fc = "/dev/ttyUSB0,57600"\nrecord_uart = "/dev/ttyUSB0"')
+    with pytest.raises(SettingsError, match="is the flight controller's port: name a file"):
+        load_settings(config, None, (), folder)

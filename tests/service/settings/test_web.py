@@ -39,10 +39,6 @@ def test_the_environment_variable_is_enough(tmp_path: Path, monkeypatch: pytest.
         ("[web]\nlisten = '0.0.0.0:99999'", ["99999", "not a port number"]),
         ("[web]\nhosts = ['naze.example:8080']", ["web.hosts holds 'naze.example:8080'", "not a host name"]),
         ("[web]\ntoken_file = ''", ["web.token_file is ''", "text in quotes"]),
-        (
-            "gcs = ['tcpin:127.0.0.1:8080']\n[web]",
-            ["gcs tcpin:127.0.0.1:8080 and web.listen 127.0.0.1:8080", "TCP port 8080"],
-        ),
     ],
 )
 def test_an_invalid_table_is_one_sentence(tmp_path: Path, text: str, reason: list[str]) -> None:
