@@ -2,7 +2,6 @@
 """Liveliness: the bridge's own token, other bridges that use its name by mistake, and connected sessions."""
 
 import asyncio
-from dataclasses import dataclass
 
 import zenoh
 
@@ -13,7 +12,6 @@ from service.machine.threads import post
 RENAME = "give one of the two another zenoh.vehicle"
 
 
-@dataclass(frozen=True, kw_only=True)
 class NameTaken(BridgeEvent):
     """Another bridge has the same vehicle name."""
 
@@ -24,7 +22,6 @@ class NameTaken(BridgeEvent):
     what: str = RENAME
 
 
-@dataclass(frozen=True, kw_only=True)
 class NameFree(BridgeEvent):
     """No other bridge has the vehicle name any longer."""
 
@@ -33,7 +30,6 @@ class NameFree(BridgeEvent):
     was: str
 
 
-@dataclass(frozen=True, kw_only=True)
 class SessionJoined(BridgeEvent):
     """Another session is connected."""
 
@@ -42,7 +38,6 @@ class SessionJoined(BridgeEvent):
     kind: str
 
 
-@dataclass(frozen=True, kw_only=True)
 class SessionLeft(BridgeEvent):
     """Its connection ended."""
 
