@@ -8,7 +8,7 @@ from math import inf
 from bridge.gcs.budget import HostBudgets
 from bridge.gcs.cost import Cost
 from bridge.gcs.flash_budget import FlashBudget
-from bridge.gcs.ground_station import GroundStation
+from bridge.gcs.ground_station import GroundStation, Speaker
 from bridge.gcs.places import MAX_LISTENERS, MAX_PEERS, Places
 from bridge.gcs.rights import LinkAccess, Standing
 from bridge.gcs.station import RECORDER, Peer, Severity, Station
@@ -103,6 +103,11 @@ class Ground:
     def station(self, peer: Peer) -> GroundStation | None:
         return self._heard.get(peer) or self._unheard.get(peer)
 
+    def speaker(self, station: Station) -> Speaker:
+        """The frames of a station. Beyond the remembered senders of an address, none is known."""
+        there = self._heard.get(station.peer)
+        return (there and there.speakers.get((station.sysid, station.compid))) or Speaker()
+
     def peers(self) -> list[Peer]:
         """The peers that were heard, in order of arrival."""
         return list(self._heard)
@@ -134,11 +139,11 @@ class Ground:
         """Forget silent stations."""
         latest: dict[tuple[str, tuple[int, int]], float] = {}
         for peer, station in self._heard.items():
-            for ids, heard_at in station.speakers.items():
-                latest[peer.link, ids] = max(heard_at, latest.get((peer.link, ids), -inf))
+            for ids, speaker in station.speakers.items():
+                latest[peer.link, ids] = max(speaker.heard_at, latest.get((peer.link, ids), -inf))
         for peer, station in [*self._heard.items()]:
             # Heard later at another address: the station has moved there.
-            moved = all(latest[peer.link, ids] > at for ids, at in station.speakers.items())
+            moved = all(latest[peer.link, ids] > each.heard_at for ids, each in station.speakers.items())
             if now >= station.heard_at + (MOVED_S if moved else EXPIRY_S):
                 self._leaves(station)
         self.due = now + _EXPIRY_INTERVAL_S if self._heard else inf

@@ -12,7 +12,7 @@ from bridge.gcs.recent_texts import RecentTexts
 from bridge.gcs.rights import FrameRefusal, LinkAccess, Standing
 from bridge.gcs.station import RECORDER, Peer, Station
 from protocols.mavlink.codec import FrameWriter
-from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame, MavlinkSplitter
 from protocols.mavlink.signing import Check
 from protocols.rights.effect import Effect
 
@@ -32,6 +32,40 @@ _ADDRESS = "this address may only read"
 _NOT_OVER_OPEN_LINK = "open link; see pass_through in settings"
 #: Ground stations and radios repeat these.
 _ROUTINE = Effect.RATE, Effect.SILENCE
+#: A frame with a number this little behind the newest one was delayed by the network.
+_MOST_LATE = 32
+#: After such a silence a sender may have been restarted, and numbers its frames from 0 again.
+_RESTARTED_S = 1.0
+
+
+class Speaker:
+    """A sysid and compid at one address.
+
+    Senders number their frames from 0 to 255 again and again: a gap shows that a frame was lost, an older number that a
+    frame was delayed. A sender without numbers seems to lose a frame each time.
+    """
+
+    __slots__ = ("_newest", "_number", "heard_at", "is_copy", "is_late", "losses")
+
+    def __init__(self) -> None:
+        self.heard_at = -inf
+        self._newest, self._number = b"", 0
+        #: How often frames were lost.
+        self.losses = 0
+        #: The last frame was sent before one that arrived earlier. It was the same frame again, doubled by the network.
+        self.is_late = self.is_copy = False
+
+    def heard(self, frame: MavlinkFrame, now: float) -> None:
+        raw = frame.raw
+        number = raw[4] if raw[0] == MAGIC_V2 else raw[2]  # frame.seq, for each frame
+        ahead = (number - self._number) & 0xFF
+        self.is_copy = raw == self._newest
+        self.is_late = ahead >= 256 - _MOST_LATE and now < self.heard_at + _RESTARTED_S
+        if self.is_copy or self.is_late:
+            return
+        if ahead != 1:
+            self.losses += 1
+        self._newest, self._number, self.heard_at = raw, number, now
 
 
 class GroundStation:
@@ -63,8 +97,8 @@ class GroundStation:
         self.came_at = self.heard_at = -inf
         self._beats = 0
         self._beat_at = -inf
-        #: When each (sysid, compid) was last heard from there.
-        self.speakers: dict[tuple[int, int], float] = {}
+        #: The senders there, by sysid and compid.
+        self.speakers: dict[tuple[int, int], Speaker] = {}
         #: It has sent REQUEST_DATA_STREAM; a command.
         self.uses_streams = False
         self.uses_commands = False
@@ -155,8 +189,11 @@ class GroundStation:
         if self.version != 2:
             self.version = frame.version
             self.frame_version = 2 if self.access.signing is not None else self.version
-        if sender in self.speakers or len(self.speakers) < _MAX_SPEAKERS:
-            self.speakers[sender] = now
+        speaker = self.speakers.get(sender)
+        if speaker is None and len(self.speakers) < _MAX_SPEAKERS:
+            speaker = self.speakers[sender] = Speaker()
+        if speaker is not None:
+            speaker.heard(frame, now)
         if self._beats < _STEADY_BEATS and now >= self._beat_at + _BEAT_S:
             self._beats, self._beat_at = self._beats + 1, now
         host = self.host if self.standing is Standing.OPEN and self._beats >= _STEADY_BEATS else None

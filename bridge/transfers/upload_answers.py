@@ -174,9 +174,9 @@ class UploadAnswers:
         else:
             self._ground.refuse(station, _NOT_WHOLE)
 
-    def forget(self, station: Station) -> bool:
-        """The ground station has begun a new upload. True if the answer to its former one was remembered."""
-        return self._answers.pop(station, None) is not None
+    def forget(self, station: Station) -> None:
+        """The ground station has begun a new upload."""
+        self._answers.pop(station, None)
 
     def was_said_to(self, station: Station, now: float) -> bool:
         """True if the station was answered at this address."""

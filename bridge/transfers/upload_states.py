@@ -13,8 +13,6 @@ from bridge.model.refusal import Refusal
 from bridge.transfers.arriving_list import ArrivingList, WholeList
 from protocols.mission_item import MissionItem, MissionResult
 
-#: After a station's next MISSION_COUNT, items of its former list may still arrive for this long.
-_FORMER_ITEMS_S = 2.0
 #: QGroundControl reports a failed write 1.5 s after its last item, unless that is requested again; MAVSDK after 2.5 s.
 #: Writing 120 records to an INAV takes 2.4 s. Twice in that time, in case one request is lost.
 _NO_ANSWER_S = 0.6
@@ -129,7 +127,7 @@ class Receiving(UploadState):
 
     def __init__(self, upload: "Upload", event: Ready, now: float) -> None:
         super().__init__(upload, event, now)
-        self.list = ArrivingList(upload.count, event.check, upload.former_until, now)
+        self.list = ArrivingList(upload.count, event.check, now)
 
     @property
     def received(self) -> tuple[MissionItem, ...]:
@@ -158,7 +156,8 @@ class Closing(Receiving):
         UploadState.__init__(self, upload, event, now)
         assert isinstance(upload.state, Receiving)
         self.list, missing = upload.state.list, upload.state.list.missing
-        text = f"Mission NOT written: {missing} of {upload.count} missing, use Write"
+        lost = f"{missing} of {upload.count} missing" if missing else "messages lost"
+        text = f"Mission NOT written: {lost}, use Write"
         self.timeout = Refusal(MissionResult.OPERATION_CANCELLED, text)
 
 
@@ -221,20 +220,16 @@ class DeliveringUnanswered(Delivering):
 class Upload:
     """One ground station's upload of `count` items; a clear has 0.
 
-    `mission_type`: MAV_MISSION_TYPE of the final MISSION_ACK. `follows`: the station has sent another list just before.
+    `mission_type`: MAV_MISSION_TYPE of the final MISSION_ACK.
     """
 
-    def __init__(
-        self, station: Station, count: int, incident: str, mission_type: int, now: float, *, follows: bool = False
-    ) -> None:
+    def __init__(self, station: Station, count: int, incident: str, mission_type: int, now: float) -> None:
         self.station = station
         self.count = count
         self.incident = incident
         self.mission_type = mission_type
         #: When its ground station last sent a message of this upload.
         self.heard_at = now
-        #: Items of the station's former list may arrive until then.
-        self.former_until = now + _FORMER_ITEMS_S if follows else now
         self.state: UploadState = Waiting(self, Event(), now)
 
 

@@ -99,6 +99,8 @@ class MissionUploads:
 
     def count(self, station: Station, count: int, now: float) -> None:
         """MISSION_COUNT: an upload is announced, or cancelled with a count of 0."""
+        if self._ground.speaker(station).is_late:
+            return
         upload = self._find(station, now)
         if upload is None:
             if count or not self.answers.repeat_cancelled(station, now):
@@ -109,12 +111,12 @@ class MissionUploads:
             # A clear may be repeated.
             if upload.count:
                 self._handle(upload, Cancelled(), now)
-        elif count != upload.count or isinstance(state, Complete | Delivering):
+        elif count != upload.count or state.received or isinstance(state, Delivering):
+            # Perhaps the same list: its sender has begun it again, too.
             self._handle(upload, _AGAIN, now)
-            self._begin(station, count, now, follows=True)
+            self._begin(station, count, now)
         elif isinstance(state, Receiving):
-            state.list.doubt()
-            self._request(upload, now, state.list.wanted)
+            self._request(upload, now, 0)
 
     def clear_all(self, station: Station, mission_type: int, now: float) -> None:
         """MISSION_CLEAR_ALL. `mission_type`: of the answer, MISSION or ALL."""
@@ -126,7 +128,10 @@ class MissionUploads:
         self._begin(station, 0, now, mission_type)
 
     def item(self, station: Station, item: MissionItem, now: float) -> None:
-        """MISSION_ITEM or MISSION_ITEM_INT."""
+        """MISSION_ITEM or MISSION_ITEM_INT. One that the network delayed may belong to the former list."""
+        speaker = self._ground.speaker(station)
+        if speaker.is_late:
+            return
         upload = self._find(station, now)
         if upload is None:
             self.answers.late_item(station, item.seq, now, is_lost=not self._queue.uploads)
@@ -139,12 +144,12 @@ class MissionUploads:
             text = f"WP {item.seq} is beyond the {upload.count} items announced"
             self._ground.refuse(station, Refusal(MissionResult.INVALID_SEQUENCE, text))
         else:
-            taken = state.list.take(item, now)
-            if taken is Reply.REQUEST:
-                self._request(upload, now, state.list.wanted)
+            taken = state.list.take(item, speaker, now)
+            if isinstance(taken, int):
+                self._request(upload, now, taken)
             elif taken is Reply.START_AGAIN:
                 self._handle(upload, _AGAIN, now)
-                self._begin(station, upload.count, now, follows=True)
+                self._begin(station, upload.count, now)
             elif isinstance(taken, WholeList):
                 self._handle(upload, Arrived(taken), now)
             else:
@@ -206,16 +211,14 @@ class MissionUploads:
 
     # State changes of an upload.
 
-    def _begin(
-        self, station: Station, count: int, now: float, mission_type: int = _MISSION, *, follows: bool = False
-    ) -> None:
-        follows |= self.answers.forget(station)
+    def _begin(self, station: Station, count: int, now: float, mission_type: int = _MISSION) -> None:
+        self.answers.forget(station)
         if not self._ground.allows(station, Cost.UPLOAD):
             # A flood must cost less than the lists that it announces: no incident, no log entry.
             self._ground.say(Severity.ERROR, _TOO_MANY_UPLOADS.text, station)
             self.answers.end(station, _TOO_MANY_UPLOADS.ack, 0, now, mission_type)
             return
-        upload = Upload(station, count, f"upload-{next(self._incidents)}", mission_type, now, follows=follows)
+        upload = Upload(station, count, f"upload-{next(self._incidents)}", mission_type, now)
         self._queue.uploads.append(upload)
         self.due = 0.0
         armed = self._missions.armed_refusal()
@@ -360,6 +363,8 @@ class MissionUploads:
                     before, after = str(upload.station), str(station)
                     self._emit(StationMoved(before=before, after=after, incident=upload.incident))
                     upload.station, found = station, upload
+                    if isinstance(upload.state, Receiving):
+                        upload.state.list.moved()
         return found
 
     def _elsewhere(self, upload: Upload, now: float) -> list[Station]:

@@ -6,7 +6,7 @@ from functools import partial
 
 import pytest
 
-from bridge.transfers.upload_states import Receiving
+from bridge.transfers.upload_states import Delivering
 from protocols.mavlink.dialect import Message
 from protocols.mission_item import MissionItem
 from tests.bridge.transfers.test_uploads import A, acks, holding, receiving, requested, state
@@ -51,11 +51,12 @@ def test_two_lists_are_never_mixed_if_items_of_the_former_are_late(count: int) -
     world, station = holding()
     former, items = waypoints(16, 1), [*waypoints(1, 1), *waypoints(count, 2)[1:]]
     receiving(world, station, former, 2)
+    late = [station.pack(item_message(2, former[2])) for _ in range(2)]
     station.radio = Radio(delay_s=0.02)
     upload = Upload(station, items)
     world.wait_until(lambda _: bool(upload.requested), 1)
-    for _ in range(2):
-        world.at(world.now, partial(world.receive_from, station, station.pack(item_message(2, former[2]))))
+    for data in late:
+        world.at(world.now, partial(world.receive_from, station, data))
     assert upload.run() is A.ACCEPTED
     assert world.stored == records_of(items)
 
@@ -70,7 +71,7 @@ def test_two_lists_are_never_mixed_if_a_request_and_its_repeat_are_on_their_way(
     for _ in range(2):
         station.send(item_message(4, items[4]))
         world.run(0.01)
-        assert state(world) is Receiving
+        assert state(world) is not Delivering
     answers_requests(world, station, items)
     world.wait_until(lambda _: bool(acks(station)), 20)
     assert acks(station) == [A.ACCEPTED]
@@ -112,28 +113,50 @@ def test_two_lists_are_never_mixed_if_the_first_was_stuck_and_the_second_count_i
     latter = [replace(item, alt_m=item.alt_m + 5) if item.seq in changed else item for item in former]
     receiving(world, station, former, 6)
     world.run(3.0)
+    station.pack(count_message(12))
     answers_requests(world, station, latter)
     world.wait_until(lambda _: bool(acks(station)), 20)
     assert acks(station) == [A.ACCEPTED]
     assert world.stored == records_of(latter)
 
 
-def test_an_item_that_was_once_doubtful_is_doubted_again() -> None:
-    """The network duplicates a MISSION_COUNT; later the ground station begins a second list of the same length."""
+def test_a_list_is_requested_twice_if_a_frame_was_lost() -> None:
     world, station = holding()
-    first, second = waypoints(12, 1), waypoints(12, 2)
-    receiving(world, station, first, 6)
-    for _ in range(2):
-        station.send(count_message(12))
-        station.send(item_message(6, second[6]))
-        world.run(0.001)
-        assert requested(station)[-1] == 0
-        # An item that is known resolves the doubt.
-        station.send(item_message(3, first[3]))
-        world.run(0.2)
-    answers_requests(world, station, first)
-    world.wait_until(lambda _: bool(acks(station)), 20)
-    assert world.stored == records_of(first)
+    items = waypoints(6)
+    station.on_message.append(
+        lambda message: (
+            station.pack(count_message(6)) if message.get_type() == "MISSION_REQUEST" and message.seq == 3 else None
+        )
+    )
+    assert Upload(station, items).run() is A.ACCEPTED
+    assert requested(station) == [0, 1, 2, 3, 4, 0, 1, 2, 3, 4, 5]
+    assert world.stored == records_of(items)
+
+
+def test_a_list_whose_last_item_follows_a_lost_frame_is_requested_again() -> None:
+    """MAVProxy does not answer after its last item: its list is not accepted."""
+    world, station = holding()
+    first, second = waypoints(6, 1), [*waypoints(1, 1), *waypoints(6, 2)[1:]]
+    receiving(world, station, first, 5)
+    station.pack(count_message(6))
+    station.send(item_message(5, second[5]))
+    world.wait_until(lambda _: bool(acks(station)), 10)
+    assert set(requested(station)) == {0}
+    assert acks(station) == [A.OPERATION_CANCELLED]
+    assert world.stored == records_of(waypoints(20, seed=77))
+
+
+def test_a_delayed_message_count_does_not_begin_the_list_again() -> None:
+    world, station = holding()
+    items = waypoints(6)
+    late = station.pack(count_message(6))
+    receiving(world, station, items, 3)
+    world.receive_from(station, late)
+    for seq in range(3, 6):
+        station.send(item_message(seq, items[seq]))
+    world.run(1)
+    assert acks(station) == [A.ACCEPTED]
+    assert world.stored == records_of(items)
 
 
 def test_two_lists_are_never_mixed_if_the_only_count_is_lost() -> None:
