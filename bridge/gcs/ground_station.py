@@ -45,11 +45,13 @@ class Speaker:
     frame was delayed. A sender without numbers seems to lose a frame each time.
     """
 
-    __slots__ = ("_newest", "_number", "heard_at", "is_copy", "is_late", "losses")
+    __slots__ = ("_newest", "heard_at", "is_copy", "is_late", "losses", "number")
 
     def __init__(self) -> None:
         self.heard_at = -inf
-        self._newest, self._number = b"", 0
+        #: The number of the last frame, and of the newest one with its bytes.
+        self.number = 0
+        self._newest = 0, b""
         #: How often frames were lost.
         self.losses = 0
         #: The last frame was sent before one that arrived earlier. It was the same frame again, doubled by the network.
@@ -57,15 +59,20 @@ class Speaker:
 
     def heard(self, frame: MavlinkFrame, now: float) -> None:
         raw = frame.raw
-        number = raw[4] if raw[0] == MAGIC_V2 else raw[2]  # frame.seq, for each frame
-        ahead = (number - self._number) & 0xFF
-        self.is_copy = raw == self._newest
+        self.number = number = raw[4] if raw[0] == MAGIC_V2 else raw[2]  # frame.seq, for each frame
+        newest, known = self._newest
+        ahead = (number - newest) & 0xFF
+        self.is_copy = raw == known
         self.is_late = ahead >= 256 - _MOST_LATE and now < self.heard_at + _RESTARTED_S
         if self.is_copy or self.is_late:
             return
         if ahead != 1:
             self.losses += 1
-        self._newest, self._number, self.heard_at = raw, number, now
+        self._newest, self.heard_at = (number, raw), now
+
+    def is_older(self, number: int) -> bool:
+        """True if the last frame is late, and was sent before the one with this number."""
+        return self.is_late and 0 < (number - self.number) & 0xFF <= _MOST_LATE
 
 
 class GroundStation:

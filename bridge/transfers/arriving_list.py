@@ -43,7 +43,7 @@ class ItemRequest:
     """The pending item request. Its timeout follows the ground station's round trip time."""
 
     due: float = 0.0
-    #: The item was requested more than once.
+    #: The item was requested more than once, and perhaps answered late.
     is_repeated: bool = False
     seq: int | None = None
     _first_at: float = 0.0
@@ -56,12 +56,13 @@ class ItemRequest:
     _unanswered: Counter[int] = field(default_factory=Counter)
 
     def asked(self, seq: int, now: float) -> None:
-        self.is_repeated = seq == self.seq
-        if not self.is_repeated:
+        unanswered = self._unanswered.get(seq, 0)
+        self.is_repeated = seq == self.seq or unanswered > 0
+        if seq != self.seq:
             self.seq, self._first_at = seq, now
             self._timeout_s = min(max(1.5 * (self._round_trip_s or 0.0), _FIRST_TIMEOUT_S), _MAX_TIMEOUT_S)
         self._asked_at = now
-        self._unanswered[seq] = self._unanswered.get(seq, 0) + 1
+        self._unanswered[seq] = unanswered + 1
         self.due = now + self._timeout_s
 
     def lost(self, now: float) -> None:
@@ -71,10 +72,6 @@ class ItemRequest:
         else:
             often_s = max(self._round_trip_s / 2, _FIRST_TIMEOUT_S)
             self._timeout_s = often_s if now < self._first_at + _OFTEN_S else _SELDOM_S
-
-    def awaits(self, seq: int) -> bool:
-        """True if an item was requested more often than it has arrived."""
-        return self._unanswered[seq] > 0
 
     def explains_repeat(self, seq: int) -> bool:
         """True if a repeated item was requested as often."""
@@ -132,16 +129,18 @@ class ArrivingList:
     def missing(self) -> int:
         return self._count - len(self.items)
 
-    @property
-    def wanted(self) -> int:
-        """The item to request after a timeout.
+    def ask_again(self, now: float) -> int:
+        """The number of the item that is requested after a timeout.
 
         Not item 1: Mission Planner takes that request as the answer to the MISSION_COUNT of another list, and its
         repeat as that to its item 0, which may be lost.
         """
-        if self._compared is not None:
-            return self._compared
-        return 0 if self._judged == 1 and not self.request.awaits(0) else self._judged
+        wanted = self._judged if self._compared is None else self._compared
+        if self._judged == 1:
+            wanted = 0
+        self.request.lost(now)
+        self.request.asked(wanted, now)
+        return wanted
 
     def moved(self) -> None:
         """The sender's address has changed: frames may have been lost."""
@@ -149,7 +148,7 @@ class ArrivingList:
             self._losses = -1
 
     def take(self, item: MissionItem, sender: Speaker, now: float) -> WholeList | Reply | int:
-        """Keep an item of this list; the number of the next item to request.
+        """Keep an item of this list; the number of the item that is requested next.
 
         An item that contradicts the list shows that its station has started again.
         """
@@ -176,11 +175,11 @@ class ArrivingList:
             self._compared += 1
         if self._judged >= self._count - 1 and self._losses not in (sender.losses, None):
             self._compare(sender)
-        if self._compared is not None:
-            return self._compared
-        if self._judged == self._count:
-            return WholeList(self.received, self._check.finish())
-        return self._judged
+        wanted = self._judged if self._compared is None else self._compared
+        if wanted == self._count:
+            return WholeList(tuple(map(self.items.__getitem__, range(wanted))), self._check.finish())
+        self.request.asked(wanted, now)
+        return wanted
 
     def _compare(self, sender: Speaker) -> None:
         """Begin or end the second reading."""

@@ -128,6 +128,7 @@ class Receiving(UploadState):
     def __init__(self, upload: "Upload", event: Ready, now: float) -> None:
         super().__init__(upload, event, now)
         self.list = ArrivingList(upload.count, event.check, now)
+        self.list.request.asked(0, now)
 
     @property
     def received(self) -> tuple[MissionItem, ...]:
@@ -142,8 +143,7 @@ class Receiving(UploadState):
         return min(self.deadline, self.list.request.due)
 
     def repeats(self, now: float) -> tuple[int, ...]:
-        self.list.request.lost(now)
-        return (self.list.wanted,)
+        return (self.list.ask_again(now),)
 
 
 class Closing(Receiving):
@@ -164,11 +164,12 @@ class Closing(Receiving):
 class _Whole(UploadState):
     """The whole list is here. Its last two items are requested again while the station waits for the final ack."""
 
+    is_awaited = True
+
     def __init__(self, upload: "Upload", event: Event, now: float) -> None:
         super().__init__(upload, event, now)
-        self._count = upload.count
-        self._reminder_at = inf
-        self.item_repeated(now)
+        self._count = upload.count if self.is_awaited else 0
+        self._reminder_at = now + _NO_ANSWER_S if self._count else inf
 
     @property
     def due(self) -> float:
@@ -213,21 +214,23 @@ class DeliveringDespiteCancel(Delivering):
 class DeliveringUnanswered(Delivering):
     """The station has begun another transfer meanwhile, to which it would attribute this one's ack."""
 
-    def item_repeated(self, now: float) -> None:
-        """No reminder."""
+    is_awaited = False
 
 
 class Upload:
     """One ground station's upload of `count` items; a clear has 0.
 
-    `mission_type`: MAV_MISSION_TYPE of the final MISSION_ACK.
+    `mission_type`: MAV_MISSION_TYPE of the final MISSION_ACK. `number`: of the frame that began it.
     """
 
-    def __init__(self, station: Station, count: int, incident: str, mission_type: int, now: float) -> None:
+    def __init__(
+        self, station: Station, count: int, incident: str, mission_type: int, now: float, number: int = 0
+    ) -> None:
         self.station = station
         self.count = count
         self.incident = incident
         self.mission_type = mission_type
+        self.number = number
         #: When its ground station last sent a message of this upload.
         self.heard_at = now
         self.state: UploadState = Waiting(self, Event(), now)

@@ -14,6 +14,7 @@ from typing import Any
 from bridge.gcs.cost import Cost
 from bridge.gcs.flash_budget import TOO_MANY_WRITES
 from bridge.gcs.ground import Ground
+from bridge.gcs.ground_station import Speaker
 from bridge.gcs.places import MAX_PEERS
 from bridge.gcs.station import Peer, Severity, Station
 from bridge.line.conversation import Conversation
@@ -116,7 +117,7 @@ class MissionUploads:
             self._handle(upload, _AGAIN, now)
             self._begin(station, count, now)
         elif isinstance(state, Receiving):
-            self._request(upload, now, 0)
+            self._request(upload, now, *state.repeats(now))
 
     def clear_all(self, station: Station, mission_type: int, now: float) -> None:
         """MISSION_CLEAR_ALL. `mission_type`: of the answer, MISSION or ALL."""
@@ -127,14 +128,14 @@ class MissionUploads:
             self._handle(upload, _AGAIN, now)
         self._begin(station, 0, now, mission_type)
 
-    def item(self, station: Station, item: MissionItem, now: float) -> None:
-        """MISSION_ITEM or MISSION_ITEM_INT. One that the network delayed may belong to the former list."""
-        speaker = self._ground.speaker(station)
-        if speaker.is_late:
-            return
+    def item(self, station: Station, item: MissionItem, speaker: Speaker, now: float) -> None:
+        """MISSION_ITEM or MISSION_ITEM_INT."""
         upload = self._find(station, now)
         if upload is None:
             self.answers.late_item(station, item.seq, now, is_lost=not self._queue.uploads)
+            return
+        if speaker.is_late and speaker.is_older(upload.number):
+            # Delayed by the network: an item of the former list.
             return
         upload.heard_at, state = now, upload.state
         if not isinstance(state, Receiving):
@@ -218,7 +219,8 @@ class MissionUploads:
             self._ground.say(Severity.ERROR, _TOO_MANY_UPLOADS.text, station)
             self.answers.end(station, _TOO_MANY_UPLOADS.ack, 0, now, mission_type)
             return
-        upload = Upload(station, count, f"upload-{next(self._incidents)}", mission_type, now)
+        number = self._ground.speaker(station).number
+        upload = Upload(station, count, f"upload-{next(self._incidents)}", mission_type, now, number)
         self._queue.uploads.append(upload)
         self.due = 0.0
         armed = self._missions.armed_refusal()
@@ -293,7 +295,6 @@ class MissionUploads:
         state, stations = upload.state, [upload.station]
         if isinstance(state, Receiving):
             request = state.list.request
-            request.asked(seqs[0], now)
             self.due = min(self.due, request.due)
             # Without items, a station at another address may have started again: it would take this request for its own
             # list's, whose MISSION_COUNT it repeats until it has one.

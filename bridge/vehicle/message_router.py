@@ -136,7 +136,7 @@ class MessageRouter:
             self._commands.refuse(station, m.MAV_CMD_NAV_WAYPOINT)
             self._ground.mission_ack(station, MissionResult.DENIED)
         else:
-            self._uploads.item(station, convert(message), now)
+            self._uploads.item(station, convert(message), self._ground.speaker(station), now)
 
     def _set_current(self, station: Station, _message: Message, now: float) -> None:
         self._commands.refuse(station, m.MAV_CMD_DO_SET_MISSION_CURRENT)

@@ -123,11 +123,12 @@ def test_two_lists_are_never_mixed_if_the_first_was_stuck_and_the_second_count_i
 def test_a_list_is_requested_twice_if_a_frame_was_lost() -> None:
     world, station = holding()
     items = waypoints(6)
-    station.on_message.append(
-        lambda message: (
-            station.pack(count_message(6)) if message.get_type() == "MISSION_REQUEST" and message.seq == 3 else None
-        )
-    )
+
+    def lose(message: Message) -> None:
+        if message.get_type() == "MISSION_REQUEST" and message.seq == 3:
+            station.pack(count_message(6))
+
+    station.on_message.append(lose)
     assert Upload(station, items).run() is A.ACCEPTED
     assert requested(station) == [0, 1, 2, 3, 4, 0, 1, 2, 3, 4, 5]
     assert world.stored == records_of(items)

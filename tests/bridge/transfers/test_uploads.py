@@ -685,10 +685,10 @@ def test_the_timeout_adapts_to_the_round_trip(round_trip_s: float, copies: int) 
     upload = Upload(station, waypoints(30), repeat_s=10)
     assert upload.run(120) is A.ACCEPTED
     counts = [requested(station).count(seq) for seq in range(30)]
-    # Once more if item 1 takes longer than expected.
-    assert counts[0] - copies in (0, 1)
-    # The second answer to the first request arrives after the second request.
-    assert max(counts[2:]) == {1.0: 2, 2.0: 3}.get(round_trip_s, 1)
+    # Again while item 1 takes longer than expected.
+    assert counts[0] >= copies
+    # The round trip is known after some items.
+    assert max(counts[4:]) == {1.0: 2, 2.0: 3}.get(round_trip_s, 1)
 
 
 def test_four_copies_of_a_lost_request_arrive_before_mavsdk_gives_up() -> None:
