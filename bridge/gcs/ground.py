@@ -104,7 +104,7 @@ class Ground:
         return self._heard.get(peer) or self._unheard.get(peer)
 
     def speaker(self, station: Station) -> Speaker:
-        """The frames of a station. Beyond the remembered senders of an address, none is known."""
+        """What is known of a station. Beyond the remembered senders of an address: nothing."""
         there = self._heard.get(station.peer)
         return (there and there.speakers.get((station.sysid, station.compid))) or Speaker()
 
@@ -281,8 +281,13 @@ class Ground:
         old = self._heard.get(station.peer)
         if old is None or now < old.heard_at + _STILL_S:
             return []
-        elsewhere = (Station(peer, station.sysid, station.compid) for peer in self._heard)
-        return [where for where in elsewhere if self.has_moved(station, where, now)]
+        return [where for where in self.elsewhere(station) if self.has_moved(station, where, now)]
+
+    def elsewhere(self, station: Station) -> list[Station]:
+        """Other addresses where these ids were heard."""
+        ids = station.sysid, station.compid
+        others = (peer for peer, there in self._heard.items() if ids in there.speakers and peer != station.peer)
+        return [Station(peer, *ids) for peer in others]
 
     def has_moved(self, station: Station, to: Station, now: float) -> bool:
         """True if `to` is the new address of a station that fell silent at its old one.

@@ -11,6 +11,7 @@ from bridge.gcs.message_rates import MessageRates
 from bridge.gcs.recent_texts import RecentTexts
 from bridge.gcs.rights import FrameRefusal, LinkAccess, Standing
 from bridge.gcs.station import RECORDER, Peer, Station
+from bridge.model.transfer_memory import Download, FinalAck
 from protocols.mavlink.codec import FrameWriter
 from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame, MavlinkSplitter
 from protocols.mavlink.signing import Check
@@ -39,13 +40,13 @@ _RESTARTED_S = 1.0
 
 
 class Speaker:
-    """A sysid and compid at one address.
+    """A sysid and compid at one address: the order of its frames, and its mission transfers.
 
     Senders number their frames from 0 to 255 again and again: a gap shows that a frame was lost, an older number that a
     frame was delayed. A sender without numbers seems to lose a frame each time.
     """
 
-    __slots__ = ("_newest", "heard_at", "is_copy", "is_late", "losses", "number")
+    __slots__ = ("_newest", "download", "final_ack", "heard_at", "is_copy", "is_late", "losses", "number")
 
     def __init__(self) -> None:
         self.heard_at = -inf
@@ -56,6 +57,9 @@ class Speaker:
         self.losses = 0
         #: The last frame was sent before one that arrived earlier. It was the same frame again, doubled by the network.
         self.is_late = self.is_copy = False
+        self.download: Download | None = None
+        #: Of its last upload.
+        self.final_ack: FinalAck | None = None
 
     def heard(self, frame: MavlinkFrame, now: float) -> None:
         raw = frame.raw

@@ -9,12 +9,11 @@ from bridge.gcs.station import Station
 from bridge.missions.mission_service import HeldMission, MissionService
 from bridge.model.flight_memory import Home
 from bridge.model.refusal import Refusal
+from bridge.model.transfer_memory import Download
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.mission_messages import item_message
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
 
-#: Downloads that are remembered; the oldest is forgotten first.
-_MAX_READERS = 16
 #: A download has ended after this long without a request, even if its MISSION_ACK was lost. Mission Planner repeats
 #: the request for an item for 15 s.
 _READING_S = 20.0
@@ -33,15 +32,6 @@ class _Question:
     as_int: bool
 
 
-@dataclass(slots=True)
-class _Snapshot:
-    """The list as of the start of a download."""
-
-    items: tuple[MissionItem, ...]
-    until: float
-    fc_store: object
-
-
 class MissionDownloads:
     """Every ground station reads its own snapshot, so an upload in between cannot mix two lists."""
 
@@ -49,7 +39,6 @@ class MissionDownloads:
         self._missions = missions
         self._ground = ground
         self._vehicle = missions.vehicle
-        self._snapshots: dict[Station, _Snapshot] = {}
         self._questions: dict[_Question, None] = {}
         #: While home is unknown: the mission store of the flight controller, and when item 0 was first requested.
         self._homeless: tuple[object, float] = None, 0.0
@@ -61,10 +50,10 @@ class MissionDownloads:
     def request(self, station: Station, seq: int, now: float, *, as_int: bool) -> None:
         """MISSION_REQUEST or MISSION_REQUEST_INT; item 0 is served at any time (Mission Planner asks on arming)."""
         question = _Question(station, seq, as_int)
-        snapshot = self._snapshots.get(station)
-        if snapshot is not None and now < snapshot.until and snapshot.fc_store is self._missions.fc_store:
-            snapshot.until = now + _READING_S
-            self._answer(question, snapshot.items, now)
+        download = self._ground.speaker(station).download
+        if download is not None and now < download.until and download.fc_store is self._missions.fc_store:
+            download.until = now + _READING_S
+            self._answer(question, download.items, now)
         elif self._vehicle.armed and seq == 0:
             self._send_home(question, now)
         else:
@@ -72,7 +61,7 @@ class MissionDownloads:
 
     def forget(self, station: Station) -> None:
         """The ground station has read the list, or writes a new one."""
-        self._snapshots.pop(station, None)
+        self._ground.speaker(station).download = None
 
     def _ask(self, question: _Question, now: float) -> None:
         """Read the list once for all waiting requests, so that a flood of them cannot fill the queue."""
@@ -99,10 +88,8 @@ class MissionDownloads:
                     self._ground.refuse(question.station, held)
                 # Otherwise the craft may be armed: Mission Planner repeats the request until that is known.
                 continue
-            self._snapshots.pop(question.station, None)
-            self._snapshots[question.station] = _Snapshot(held.items, now + _READING_S, self._missions.fc_store)
-            if len(self._snapshots) > _MAX_READERS:
-                del self._snapshots[next(iter(self._snapshots))]
+            download = Download(held.items, now + _READING_S, self._missions.fc_store)
+            self._ground.speaker(question.station).download = download
             self._answer(question, held.items, now)
 
     def _answer(self, question: _Question, items: tuple[MissionItem, ...], now: float) -> None:
