@@ -11,7 +11,7 @@ An autopilot that speaks MAVLink itself is not represented but passed through, b
     FcSession <-> Routes <-> Ground
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import count
 from math import inf
@@ -35,12 +35,21 @@ from bridge.model.events import Armed, Disarmed, Emit
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.vehicle import FlightState, Health, MissionLeg, Readiness
 from bridge.model.vehicle_groups import Group
+from bridge.settings.board_setting import SettingTable, Value
 from bridge.sharing.msp_sharing import MspSharing
 from bridge.sharing.program import Program
 from bridge.transfers.downloads import MissionDownloads
 from bridge.transfers.local_missions import LocalMissions
 from bridge.transfers.mission_watch import MissionWatch
 from bridge.transfers.uploads import FC_LOST, STOPPED, MissionUploads
+from bridge.vehicle.board_settings import (
+    READ_WITHIN_S,
+    BoardSettings,
+    OnChanged,
+    OnSaved,
+    OnTable,
+    TableListener,
+)
 from bridge.vehicle.calibration import Calibration
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.incoming import Incoming
@@ -139,7 +148,12 @@ class Bridge:
         own = self._own_vehicle = OwnVehicle(session, missions, ground, self._announcer, config.unix_time_s, now)
         #: The seal of the flight controller's settings.
         self._settings = SettingsSeal(session, missions, ground, emit, config.seals, lambda: self.transfer is not None)
-        self._sharing.on_change = self._settings.changed_here
+        self._board_settings = BoardSettings(
+            session, missions, emit, lambda: self.transfer is not None, lambda: self._sharing.due < inf
+        )
+        self._board_settings.on_change = self._settings.changed_here
+        self._settings.on_found_change = self._board_settings.may_have_changed
+        self._sharing.on_change = self._program_changed_settings
         self._reporter = VehicleReporter(session, missions, ground, self._settings, own.also_want, own.progress)
         self._uploads = MissionUploads(missions, ground, emit, incidents, own.let_read)
         self._watch = MissionWatch(missions, ground, emit)
@@ -165,6 +179,7 @@ class Bridge:
             self._uploads,
             self._watch,
             self._settings,
+            self._board_settings,
             ground,
             self._announcer,
             self._calibration,
@@ -264,6 +279,38 @@ class Bridge:
         self._sharing.stop()
         self._uploads.end(STOPPED, now)
 
+    # The board's settings.
+
+    @property
+    def board_settings(self) -> SettingTable | None:
+        """As last read, also of a board that is armed or lost since; None: never."""
+        return self._board_settings.table
+
+    @property
+    def unsaved_settings(self) -> Mapping[str, Value]:
+        """Those that the bridge has changed in the board's RAM, and not saved."""
+        return self._board_settings.unsaved
+
+    def follow_board_settings(self, on_table: TableListener, on_saved: TableListener) -> None:
+        """Call these when the table was read with other values, and when it was saved."""
+        self._board_settings.on_table.append(on_table)
+        self._board_settings.on_saved.append(on_saved)
+
+    def read_board_settings(self, on_done: OnTable, now: float, within_s: float = READ_WITHIN_S) -> None:
+        """The table, checked against the board if that is possible now, else as last read."""
+        self._has_line_changed = True
+        self._board_settings.current(on_done, now, within_s)
+
+    def change_board_setting(self, name: str, value: Value, on_done: OnChanged, now: float, client: str) -> None:
+        """Change a setting in the board's RAM; `on_done` gets it as read back, maybe before this returns."""
+        self._has_line_changed = True
+        self._board_settings.change(name, value, on_done, now, client)
+
+    def save_board_settings(self, on_done: OnSaved, now: float) -> None:
+        """Write the settings to the board's flash."""
+        self._has_line_changed = True
+        self._board_settings.save(on_done, now)
+
     # For metrics, the status and other followers.
 
     def watch(self, groups: Iterable[Group]) -> None:
@@ -335,6 +382,10 @@ class Bridge:
         """A program's request was refused. In flight a warning would cover what concerns the craft."""
         self._ground.say(Severity.NOTICE if self.vehicle.armed else Severity.WARNING, text)
 
+    def _program_changed_settings(self, now: float) -> None:
+        self._settings.changed_here(now)
+        self._board_settings.may_have_changed(now)
+
     def _newcomer(self, station: GroundStation, now: float) -> None:
         if not self.is_passing_through:
             self._own_vehicle.newcomer(station, now)
@@ -345,6 +396,7 @@ class Bridge:
         # A passed-through autopilot represents itself.
         self._own_vehicle.due = inf if self.is_passing_through else min(self._own_vehicle.due, now)
         self._settings.found(controller, now)
+        self._board_settings.found(controller, now)
         if controller is None:
             trouble = self._session.state.trouble
             self._missions.use(Refusal(MissionResult.DENIED, trouble) if trouble else NO_LINK, now, is_same_board=True)

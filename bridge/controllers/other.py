@@ -3,6 +3,7 @@
 
 from dataclasses import replace
 
+from bridge.controllers.msp_settings import part_settings
 from bridge.controllers.multiwii.profile import CURRENTS_PER_A
 from bridge.fc.interview import Interview
 from bridge.fc.profile import SILENCE_WITH_H7_S, FlightController, Profile, Spoken
@@ -46,11 +47,20 @@ def _recognise(board: Interview) -> Conversation[FlightController | None]:
     else:
         boxes = yield from board.box_names()
     firmware = _FIRMWARE.get(name, Firmware.UNKNOWN)
-    return FlightController(OTHER_MSP, name, boxes=boxes, version=version, firmware=firmware)
+    profile = CLEANFLIGHT if firmware in (Firmware.BETAFLIGHT, Firmware.CLEANFLIGHT) else OTHER_MSP
+    return FlightController(profile, name, boxes=boxes, version=version, firmware=firmware)
 
 
-OTHER_MSP = Profile("another MSP flight controller", "other", recognise=_recognise, silence_s=SILENCE_WITH_H7_S)
-OLD_MULTIWII = replace(OTHER_MSP, currents_per_a=CURRENTS_PER_A)
+OTHER_MSP = Profile(
+    "another MSP flight controller",
+    "other",
+    recognise=_recognise,
+    silence_s=SILENCE_WITH_H7_S,
+    settings=part_settings,
+)
+#: The parsers of these act on no byte inside a frame.
+CLEANFLIGHT = replace(OTHER_MSP, accepts_any_byte=True)
+OLD_MULTIWII = replace(CLEANFLIGHT, currents_per_a=CURRENTS_PER_A)
 #: Ground stations write missions to such an autopilot directly; only the command line can ask the bridge to.
 OTHER_MAVLINK = Profile(
     "another MAVLink autopilot",

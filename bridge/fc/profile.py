@@ -18,6 +18,7 @@ from bridge.model.airframe import Airframe
 from bridge.model.flight_mode import ARM_BOX
 from bridge.model.refusal import Refusal
 from bridge.model.vehicle import Vehicle
+from bridge.settings.fc_settings import FcSettings
 from protocols.mission_item import MissionResult
 from protocols.msp.mission import Info
 from protocols.rights.msp import Firmware
@@ -56,6 +57,9 @@ class RuleSettings:
 #: Opens the mission store of a board.
 OpenStore = Callable[["FlightController", Vehicle, RuleSettings], AnyFcMissionStore]
 
+#: Opens the settings of a board.
+OpenSettings = Callable[["FlightController"], FcSettings]
+
 
 def _none_known(_vehicle: Vehicle, _now: float) -> tuple[str, ...]:
     """The reasons that prevent arming, on firmware that does not report them."""
@@ -76,6 +80,7 @@ class Profile:
     accepts_any_byte: its parser acts on no byte runs inside a frame. turn_s: it serves one request in this time.
     silence_s: after this long without a reply it is gone: unplugged, reset, or switched to another protocol.
     missions: how they are written to it, or the reply to any attempt.
+    settings: how its own settings are read and changed; None: not over this protocol.
     check_kind, rules: how `naze-bridge check --kind` calls it, and the rules it applies.
     mavlink_sender: MAVLink version, sysid and compid it sends with; None matches any.
     restarts_after_calibration: it reboots by itself when a calibration is done. calibrates_six_positions: its
@@ -98,6 +103,7 @@ class Profile:
     turn_s: float = 0.0
     silence_s: float = MSP_SILENCE_S
     missions: OpenStore | Refusal = NO_MISSIONS
+    settings: OpenSettings | None = None
     check_kind: str | None = None
     rules: Callable[[RuleSettings], MissionRules] | None = None
     mavlink_sender: tuple[int, int, int] | None = None

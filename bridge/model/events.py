@@ -220,6 +220,30 @@ class MissionChangedOnBoard(BridgeEvent):
     detail: str
 
 
+class SettingsRead(BridgeEvent):
+    """All settings of the flight controller were read, for the first time or with other values."""
+
+    name_in_log = "settings.read"
+    settings: int
+
+
+class SettingChanged(BridgeEvent):
+    """A setting was changed in the flight controller's RAM. `by`: the client."""
+
+    name_in_log = "settings.changed"
+    setting: str
+    before: str
+    after: str
+    by: str
+
+
+class SettingsSaved(BridgeEvent):
+    """The settings were written to the flight controller's flash. `changed`: those that the bridge had changed."""
+
+    name_in_log = "settings.saved"
+    changed: str
+
+
 class SettingsChangedOnBoard(BridgeEvent):
     """PIDs, modes, rates or MISC changed, but not through the bridge."""
 

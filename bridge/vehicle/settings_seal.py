@@ -67,6 +67,8 @@ class SettingsSeal:
         self._is_reading = False
         #: The text for ground stations that connect later.
         self._told = ""
+        #: Called when settings have changed without the bridge.
+        self.on_found_change: Callable[[float], None] = lambda _now: None
         #: None until the settings of a board were read; those of a lost board stay.
         self.state: SettingsState | None = None
         #: The time of the next `tick`, monotonic s.
@@ -110,6 +112,7 @@ class SettingsSeal:
         self.due = now + _INTERVAL_S
         if not changed or self.state is None:
             return
+        self.on_found_change(now)
         change = SettingsChange(changed, now)
         self.state = replace(self.state, change=change)
         self._ground.say(Severity.WARNING, change.text(_MOST_TEXT))

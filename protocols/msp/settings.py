@@ -8,6 +8,7 @@ INAV's fc_msp.c.
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 from protocols.msp.commands import Msp
 from protocols.rights.msp import Firmware
@@ -30,11 +31,13 @@ Layout = Sequence[tuple[str | None, int]]
 class SettingsRequest:
     """A request for a part. `pid_size`: bytes for each PID; `layout`: of rates and MISC.
 
+    setter: the command that takes the same payload, but of mode ranges one at a time, behind its number.
     instead: a command that takes its place if the first byte of its reply is set.
     """
 
     part: Part
     command: int
+    setter: int
     layout: Layout = ()
     pid_size: int = 3
     instead: int | None = None
@@ -47,6 +50,21 @@ class SettingsRequest:
                 kept[at : at + size] = bytes(len(kept[at : at + size]))
             at += size
         return bytes(kept)
+
+
+class Field(NamedTuple):
+    """One setting in a part's payload: an unsigned number of `size` bytes from `at` on."""
+
+    name: str
+    at: int
+    size: int
+
+    def value(self, payload: bytes) -> int:
+        return int.from_bytes(payload[self.at : self.at + self.size], "little")
+
+    def put(self, payload: bytes, value: int) -> bytes:
+        """The payload with another value. OverflowError for one that does not fit."""
+        return payload[: self.at] + value.to_bytes(self.size, "little") + payload[self.at + self.size :]
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +83,8 @@ _OLD_RATES: Layout = (
 _NEW_RATES: Layout = (
     ("RC rate", 1), ("RC expo", 1), ("roll rate", 1), ("pitch rate", 1), ("yaw rate", 1), ("throttle PID", 1),
     ("throttle mid", 1), ("throttle expo", 1), ("TPA breakpoint", 2), ("yaw expo", 1), ("yaw RC rate", 1),
-    ("pitch RC rate", 1), ("pitch RC expo", 1),
+    ("pitch RC rate", 1), ("pitch RC expo", 1), ("throttle limit type", 1), ("throttle limit", 1), ("roll limit", 2),
+    ("pitch limit", 2), ("yaw limit", 2), ("rates type", 1), ("throttle hover", 1),
 )  # fmt: skip
 _INAV_RATES: Layout = (
     ("throttle mid", 1), ("throttle expo", 1), ("throttle PID", 1), ("TPA breakpoint", 2), ("RC expo", 1),
@@ -89,31 +108,61 @@ _INAV_MISC: Layout = (
     ("cell max", 2), ("cell warning", 2), ("capacity", 4), ("capacity warning", 4), ("capacity critical", 4),
     ("capacity unit", 1),
 )  # fmt: skip
-_PIDS = SettingsRequest(Part.PIDS, Msp.PID)
+_PIDS = SettingsRequest(Part.PIDS, Msp.PID, 202)
 #: In newer firmware 113 has the active boxes, which change in flight.
-_BOXES, _RANGES = SettingsRequest(Part.MODES, Msp.BOX), SettingsRequest(Part.MODES, Msp.MODE_RANGES)
-_RATES_7, _RATES = (SettingsRequest(Part.RATES, Msp.RC_TUNING, layout) for layout in (_OLD_RATES, _NEW_RATES))
-_MISC = SettingsRequest(Part.MISC, Msp.MISC)
-_MISC_22 = SettingsRequest(Part.MISC, Msp.MISC, _NEW_MISC)
-_NEW = (_PIDS, _RANGES, _RATES, _MISC_22)
+BOXES, RANGES = SettingsRequest(Part.MODES, Msp.BOX, 203), SettingsRequest(Part.MODES, Msp.MODE_RANGES, 35)
+_RATES_7, _RATES = (SettingsRequest(Part.RATES, Msp.RC_TUNING, 204, layout) for layout in (_OLD_RATES, _NEW_RATES))
+_MISC = SettingsRequest(Part.MISC, Msp.MISC, 207)
+_MISC_22 = SettingsRequest(Part.MISC, Msp.MISC, 207, _NEW_MISC)
+_NEW = (_PIDS, RANGES, _RATES, _MISC_22)
 SETTINGS: Mapping[Firmware, tuple[SettingsRequest, ...]] = {
-    Firmware.HARAKIRI: (_PIDS, _BOXES, _RATES_7, _MISC),
-    Firmware.HARAKIRI_MISSIONS: (_PIDS, _BOXES, _RATES_7, _MISC),
-    Firmware.BASEFLIGHT: (_PIDS, _BOXES, _RATES_7, _MISC_22),
-    Firmware.MULTIWII: (_PIDS, _BOXES, _RATES_7, SettingsRequest(Part.MISC, Msp.MISC, _MULTIWII_MISC)),
+    Firmware.HARAKIRI: (_PIDS, BOXES, _RATES_7, _MISC),
+    Firmware.HARAKIRI_MISSIONS: (_PIDS, BOXES, _RATES_7, _MISC),
+    Firmware.BASEFLIGHT: (_PIDS, BOXES, _RATES_7, _MISC_22),
+    Firmware.MULTIWII: (_PIDS, BOXES, _RATES_7, SettingsRequest(Part.MISC, Msp.MISC, 207, _MULTIWII_MISC)),
     Firmware.CLEANFLIGHT: _NEW,
     Firmware.BETAFLIGHT: _NEW,
     Firmware.INAV: (
         # With EZ Tune on, each reading of the PIDs lets INAV compute them from EZ Tune's own values again.
-        SettingsRequest(Part.PIDS, Msp.PID_V2, pid_size=4, instead=Msp.INAV_EZ_TUNE),
-        _RANGES,
-        SettingsRequest(Part.RATES, Msp.INAV_RATE_PROFILE, _INAV_RATES),
-        SettingsRequest(Part.MISC, Msp.INAV_MISC, _INAV_MISC),
+        SettingsRequest(Part.PIDS, Msp.PID_V2, 0x2031, pid_size=4, instead=Msp.INAV_EZ_TUNE),
+        RANGES,
+        SettingsRequest(Part.RATES, Msp.INAV_RATE_PROFILE, 0x2008, _INAV_RATES),
+        SettingsRequest(Part.MISC, Msp.INAV_MISC, 0x2004, _INAV_MISC),
     ),
     # Its MISC may have counters, and its rates any layout.
-    Firmware.UNKNOWN: (_PIDS, _RANGES, SettingsRequest(Part.RATES, Msp.RC_TUNING)),
+    Firmware.UNKNOWN: (_PIDS, RANGES, SettingsRequest(Part.RATES, Msp.RC_TUNING, 204)),
 }
-_RANGE_SIZE = 4
+RANGE_SIZE = 4
+
+
+def fields(request: SettingsRequest, payload: bytes, names: SettingNames) -> tuple[Field, ...]:
+    """The settings in a reply, each with a name of its own; bytes without a name are left out."""
+    match request.part:
+        case Part.PIDS:
+            size, letters = request.pid_size, "PIDF"
+            found = [
+                Field(f"{name} {letters[at]}", number * size + at, 1)
+                for number, name in enumerate(names.pids[: len(payload) // size])
+                for at in range(size)
+            ]
+        case Part.MODES if request.command == Msp.MODE_RANGES:
+            parts = ("ID", "AUX", "LOW", "HIGH")
+            found = [
+                Field(f"MODE{at // RANGE_SIZE + 1} {parts[at % RANGE_SIZE]}", at, 1)
+                for at in range(len(payload) // RANGE_SIZE * RANGE_SIZE)
+            ]
+        case Part.MODES:
+            size = len(payload) // len(names.boxes) if names.boxes else 0
+            found = [
+                Field(f"BOX {name}", at * size, size) for at, name in enumerate(names.boxes if size else ()) if name
+            ]
+        case Part.RATES | Part.MISC:
+            found, at = [], 0
+            for label, size in request.layout:
+                if label and at + size <= len(payload):
+                    found.append(Field(label, at, size))
+                at += size
+    return tuple(found)
 
 
 def changed_names(request: SettingsRequest, before: bytes, after: bytes, names: SettingNames) -> tuple[str, ...]:
@@ -158,8 +207,8 @@ def _changed_ranges(before: bytes, after: bytes, names: Mapping[int, str]) -> It
 
 def _ranges(payload: bytes) -> Mapping[int, list[bytes]]:
     found: dict[int, list[bytes]] = {}
-    for at in range(0, len(payload) - _RANGE_SIZE + 1, _RANGE_SIZE):
-        number, channel, first, last = payload[at : at + _RANGE_SIZE]
+    for at in range(0, len(payload) - RANGE_SIZE + 1, RANGE_SIZE):
+        number, channel, first, last = payload[at : at + RANGE_SIZE]
         if first < last:  # else it is unused
             found.setdefault(number, []).append(bytes((channel, first, last)))
     return {number: sorted(ranges) for number, ranges in found.items()}

@@ -14,7 +14,7 @@ from simulator.board.msp_sensors import DRAWN_MAH, RSSI, MspCommand, SensorRepli
 from simulator.board.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
 from simulator.board.waypoint_craft import WaypointCraft
 from simulator.inav.boxes import ANGLE, ARM, BOXES, NAMES, NAV_ALTHOLD, NAV_RTH, NAV_WP, PLANE_BOXES
-from simulator.inav.mission import CAPACITY, FAKE, InavMission
+from simulator.inav.mission import CAPACITY, EEPROM_SIZE, FAKE, InavMission
 from simulator.inav.navigation import InavNavigation
 from simulator.inav.settings import InavSettings
 
@@ -29,7 +29,7 @@ _CELLS, _BATTERY_PERCENT = 3, 88
 _API_VERSION = bytes((0, 2, 5))
 _HDOP_E2 = 130
 _LONGEST_NAME = 16
-_MISSION_SETTING = b"nav_wp_multi_mission_index\0"
+_SELECTED = "nav_wp_multi_mission_index"
 _FIELD_ALTITUDE_CM = round(FIELD_ALTITUDE_M * 100)
 #: The sticks that load the saved missions have to be held for 20 ticks, each of the first receiver frame after 20 ms:
 #: 0.4 s to 0.8 s (rc_controls.c). This is SBUS, at 14 ms.
@@ -56,6 +56,8 @@ class InavCommand(IntEnum):
     GPSSTATISTICS = 166
     RTC = 246
     SETTING = 0x1003
+    SET_SETTING = 0x1004
+    SETTING_INFO = 0x1007
     INAV_STATUS = 0x2000
     INAV_ANALOG = 0x2002
     INAV_AIR_SPEED = 0x2009
@@ -105,7 +107,7 @@ class InavFirmware(MspFirmware):
         self._mission = InavMission(boot.eeprom)
         self._craft = WaypointCraft()
         self._navigation = InavNavigation(self._mission, self._craft)
-        self._settings = InavSettings(has_ez_tune=self._version >= (7, 0, 0))
+        self._settings = InavSettings(boot.eeprom[EEPROM_SIZE:], has_ez_tune=self._version >= (7, 0, 0))
         self._booted_at = boot.now
         self._name = b"INAV"
         self._stick_loads = boot.faults.stick_loads
@@ -182,9 +184,11 @@ class InavFirmware(MspFirmware):
                 # Any length up to the longest, also an empty one.
                 self._name = payload if len(payload) <= _LONGEST_NAME else self._name
                 return reply(command) if payload == self._name else error(command)
-            case InavCommand.SETTING:
-                is_known = payload == _MISSION_SETTING
-                return reply(command, bytes((self._mission.selected,))) if is_known else error(command)
+            case InavCommand.SETTING | InavCommand.SET_SETTING | InavCommand.SETTING_INFO:
+                self._settings[_SELECTED] = self._mission.selected
+                found = self._settings.answer(command, payload)
+                self._mission.selected = int(self._settings[_SELECTED])
+                return error(command) if found is None else reply(command, found)
             case InavCommand.WP_GETINFO:
                 known = self._mission.known(self.armed)
                 return reply(command, bytes((0, CAPACITY, self._mission.is_valid, known)))
@@ -195,7 +199,9 @@ class InavFirmware(MspFirmware):
             case MspCommand.ACC_CALIBRATION | MspCommand.MAG_CALIBRATION:
                 return self._when_disarmed(command, True)
             case MspCommand.EEPROM_WRITE:
-                self._busy += 0.0 if self.armed else self._options.eeprom_write_ms / 1000
+                if not self.armed:
+                    self._settings.save()
+                    self._busy += self._options.eeprom_write_ms / 1000
                 return self._when_disarmed(command, True)
         if not self.armed and self._settings.write(command, payload):
             return reply(command)

@@ -1,7 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""INAV's PIDs, modes, rates and MISC, from one boot to the next (fc_msp.c)."""
+"""INAV's settings by name or index, and its PIDs, modes, rates and MISC, from one boot to the next (fc_msp.c)."""
 
 import struct
+
+from protocols.msp.inav_settings import (
+    COMMON_SET_SETTING,
+    COMMON_SETTING,
+    COMMON_SETTING_INFO,
+    InavSetting,
+    InavType,
+    decode_value,
+    pack_value,
+)
+from simulator.inav.setting_table import PIDS, SETTINGS
 
 _PIDS = 11
 _RANGES, _RANGE_SIZE = 40, 4
@@ -12,13 +23,22 @@ _ARM, _ANGLE, _NAV_WP = 0, 1, 28
 
 MODE_RANGES, SET_MODE_RANGE, PIDNAMES, UID = 34, 35, 117, 160
 INAV_MISC, RATE_PROFILE, SET_RATE_PROFILE, PID_V2, SET_PID_V2, EZ_TUNE = 0x2003, 0x2007, 0x2008, 0x2030, 0x2031, 0x2070
+#: Bytes of each value in the EEPROM, behind one that is set once they were saved.
+_STORED_SIZE = 16
+SETTINGS_SIZE = 1 + _STORED_SIZE * len(SETTINGS)
+_CHECKED_BELOW = (InavType.INT8, InavType.INT16, InavType.FLOAT)
 _SETTERS = {SET_PID_V2: PID_V2, SET_RATE_PROFILE: RATE_PROFILE}
 
 
 class InavSettings:
-    """`has_ez_tune`: from version 7 on. It is off."""
+    """`has_ez_tune`: from version 7 on. It is off. `stored`: SETTINGS_SIZE bytes of the EEPROM."""
 
-    def __init__(self, *, has_ez_tune: bool) -> None:
+    def __init__(self, stored: memoryview, *, has_ez_tune: bool) -> None:
+        self._stored = stored
+        self._settings = {
+            setting.name: setting._replace(value=self._saved_value(setting) if stored[0] else setting.value)
+            for setting in SETTINGS
+        }
         ranges = b"".join(bytes((box, aux, *_HIGH)) for box, aux in ((_ARM, _AUX1), (_ANGLE, _AUX2), (_NAV_WP, _AUX2)))
         throttles = struct.pack("<5H", 1500, 0, 1850, 1000, 1000)
         battery = struct.pack("<HBBHHHHIIIB", 1100, 0, 0, 425, 330, 420, 350, 2200, 400, 200, 0)
@@ -35,7 +55,65 @@ class InavSettings:
 
     def read(self, command: int) -> bytes | None:
         """The payload of a reply; None for other commands."""
-        return self._replies.get(command)
+        reply = self._replies.get(command)
+        if command == PID_V2 and reply is not None:
+            return bytes(int(self._settings[name].value) for name in PIDS) + reply[len(PIDS) :]
+        return reply
+
+    def __getitem__(self, name: str) -> float | str:
+        return self._settings[name].value
+
+    def __setitem__(self, name: str, value: float | str) -> None:
+        self._settings[name] = self._settings[name]._replace(value=value)
+
+    def answer(self, command: int, payload: bytes) -> bytes | None:
+        """The payload of the reply to a request about one setting; None: an error."""
+        setting, data = self._find(payload)
+        if setting is None:
+            return None
+        match command:
+            case _ if command == COMMON_SETTING:
+                return pack_value(setting.type, setting.value)
+            case _ if command == COMMON_SETTING_INFO:
+                return setting.encode()
+            case _ if command == COMMON_SET_SETTING:
+                return b"" if self._set(setting, data) else None
+        return None
+
+    def save(self) -> None:
+        """EEPROM_WRITE."""
+        self._stored[0] = 1
+        for setting in self._settings.values():
+            at = 1 + setting.index * _STORED_SIZE
+            packed = pack_value(setting.type, setting.value).ljust(_STORED_SIZE, b"\0")
+            self._stored[at : at + _STORED_SIZE] = packed
+
+    def _saved_value(self, setting: InavSetting) -> float | str:
+        at = 1 + setting.index * _STORED_SIZE
+        value = decode_value(setting.type, bytes(self._stored[at : at + _STORED_SIZE]))
+        assert value is not None
+        return value
+
+    def _find(self, payload: bytes) -> tuple[InavSetting | None, bytes]:
+        """The setting that a request names, by a text or behind a zero by its index, and what follows."""
+        name, end, data = payload.partition(b"\0")
+        if name or len(data) < 2:
+            return self._settings.get(name.decode("ascii", "replace")) if end else None, data
+        index = int.from_bytes(data[:2], "little")
+        settings = [*self._settings.values()]
+        return settings[index] if index < len(settings) else None, data[2:]
+
+    def _set(self, setting: InavSetting, data: bytes) -> bool:
+        """An unsigned value below the minimum is taken; bytes behind the value are not looked at."""
+        value = decode_value(setting.type, data)
+        if value is None:
+            return False
+        if isinstance(value, str):
+            value = data.decode("ascii", "replace")[: setting.maximum]
+        elif value > setting.maximum or (value < setting.minimum and setting.type in _CHECKED_BELOW):
+            return False
+        self[setting.name] = value
+        return True
 
     def write(self, command: int, payload: bytes) -> bool:
         """Carry out a setter; False if it is another command, or its payload has another length."""
@@ -48,4 +126,7 @@ class InavSettings:
         if setting is None or len(payload) != len(self._replies[setting]):
             return False
         self._replies[setting] = payload
+        if command == SET_PID_V2:
+            for name, value in zip(PIDS, payload, strict=False):
+                self[name] = value
         return True

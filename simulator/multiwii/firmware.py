@@ -10,9 +10,10 @@ from simulator.board.msp_port import error, reply
 from simulator.board.msp_sensors import MspCommand, SensorReplies
 from simulator.board.nav_status import Error, Mode, State
 from simulator.board.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
+from simulator.board.part_settings import PartSettings
 from simulator.board.transmitter import switch_positions
 from simulator.board.waypoint_craft import WaypointCraft
-from simulator.multiwii.mission import MultiWiiMission
+from simulator.multiwii.mission import SETTINGS_SIZE, MultiWiiMission
 from simulator.multiwii.navigation import HIGHEST_M, SAFE_DISTANCE_M, WP_RADIUS_M, MultiWiiNavigation
 
 _VERSION, _QUADX, _MSP_VERSION = 241, 3, 0
@@ -26,15 +27,9 @@ _BOXES = tuple(_BOX_NAMES)
 _ARM, _RETURN, _MISSION = _BOXES.index(0), _BOXES.index(10), _BOXES.index(20)
 _FLAG_CRC_ERROR, _FLAG_HOME, _FLAG_HOLD, _FLAG_IN_PROGRESS = 0xFE, 0x01, 0x02, 0xFF
 _HOME, _HOLD = 0, 255
-_ACKNOWLEDGED = frozenset((MspCommand.ACC_CALIBRATION, MspCommand.MAG_CALIBRATION, MspCommand.EEPROM_WRITE))
-_SETTERS = {
-    MspCommand.SET_PID: MspCommand.PID,
-    MspCommand.SET_BOX: MspCommand.BOX,
-    MspCommand.SET_RC_TUNING: MspCommand.RC_TUNING,
-    MspCommand.SET_MISC: MspCommand.MISC,
-}
+_ACKNOWLEDGED = frozenset((MspCommand.ACC_CALIBRATION, MspCommand.MAG_CALIBRATION))
 #: ARM is on aux 1 high.
-_SETTINGS = {
+_SETTINGS: dict[int, bytes] = {
     MspCommand.PID: bytes((33, 30, 23)) * 10,
     MspCommand.BOX: b"\x04" + bytes(2 * len(_BOXES) - 1),
     MspCommand.RC_TUNING: bytes((90, 65, 0, 0, 0, 50, 0)),
@@ -53,7 +48,7 @@ class MultiWiiFirmware(MspFirmware):
         self._mission = MultiWiiMission(boot.eeprom, boot.options.capacity)
         self._craft = WaypointCraft()
         self._navigation = MultiWiiNavigation(self._mission, self._craft)
-        self._settings = dict(_SETTINGS)
+        self._settings = PartSettings(_SETTINGS, boot.eeprom[-SETTINGS_SIZE:])
 
     @property
     def stored(self) -> list[bytes]:
@@ -72,7 +67,8 @@ class MultiWiiFirmware(MspFirmware):
 
     def _is_arm_on(self) -> bool:
         """The switches other than ARM only select modes here, which `faults.boxes` has."""
-        return bool(self._settings[MspCommand.BOX][0] & switch_positions(self._faults.armed, 0))
+        boxes = self._settings.read(MspCommand.BOX)
+        return bool(boxes and boxes[0] & switch_positions(self._faults.armed, 0))
 
     def _state(self) -> FlightState:
         return self._craft.state()
@@ -94,10 +90,10 @@ class MultiWiiFirmware(MspFirmware):
                 return self._set_waypoint(payload[:WAYPOINT_SIZE])
             case MspCommand.WP:
                 return reply(command, self._waypoint(payload[0]))
-        if command in _SETTERS:
-            setting = _SETTERS[MspCommand(command)]
-            self._settings[setting] = payload[: len(self._settings[setting])]
-        if command in _SETTERS or command in _ACKNOWLEDGED:
+            case MspCommand.EEPROM_WRITE:
+                self._settings.save()
+                return reply(command)
+        if self._settings.write(command, payload) or command in _ACKNOWLEDGED:
             return reply(command)
         answer = self._read(command)
         return error(command) if answer is None else reply(command, answer)
@@ -141,8 +137,6 @@ class MultiWiiFirmware(MspFirmware):
                 speeds = (100 * WP_RADIUS_M, SAFE_DISTANCE_M, HIGHEST_M, 400, 100)
                 limits = (40, 3000, 20, 100, 600)
                 return struct.pack("<BB5HBHHBHBB", 0x83, 3, *speeds, *limits, self._options.capacity, 0)
-            case MspCommand.PID | MspCommand.BOX | MspCommand.RC_TUNING | MspCommand.MISC:
-                return self._settings[MspCommand(command)]
             case MspCommand.PIDNAMES:
                 return b"ROLL;PITCH;YAW;ALT;Pos;PosR;NavR;LEVEL;MAG;VEL;"
-        return _SENSORS.payload(command, self.craft_at(self._clock))
+        return self._settings.read(command) or _SENSORS.payload(command, self.craft_at(self._clock))

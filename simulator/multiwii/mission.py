@@ -6,12 +6,14 @@ import struct
 from simulator.board.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
 
 SLOT_SIZE = WAYPOINT_SIZE + 1
+#: At the end of the EEPROM.
+SETTINGS_SIZE = 128
 _ERASED = b"\xff" * SLOT_SIZE
 
 
 def blank_eeprom(capacity: int) -> bytearray:
     """A factory-new EEPROM: no waypoint's checksum is valid."""
-    return bytearray(_ERASED * (capacity + 1))
+    return bytearray(_ERASED * (capacity + 1) + bytes(SETTINGS_SIZE))
 
 
 class MultiWiiMission:

@@ -89,7 +89,7 @@ def test_a_walk_does_not_get_longer(name: str, monkeypatch: pytest.MonkeyPatch) 
 
     async def story(daemon: TracedDaemon) -> None:
         await daemon.until(lambda wake_up: "ATTITUDE" in wake_up.types)
-        await asyncio.sleep(5.0)  # the first heartbeats and texts
+        await asyncio.sleep(6.0)  # the first heartbeats and texts, and the settings
         daemon.wake_ups.clear()
         walks.append(await _WALKS[name](daemon))
 

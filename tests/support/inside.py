@@ -17,6 +17,7 @@ class Inside:
         self.uploads = bridge._uploads
         self.sharing = bridge._sharing
         self.settings = bridge._settings
+        self.board_settings = bridge._board_settings
         self.parameters = bridge._parameters
 
 

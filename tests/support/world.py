@@ -49,11 +49,13 @@ from simulator.board.line import garble
 from simulator.board.options import Faults, SimOptions
 from simulator.naze.board import SimulatedNaze
 from simulator.naze.mission_slots import MissionSlots, flash_size, slot_pages
-from tests.support.inside import Inside
+from tests.support.inside import Inside, inside
 
 #: Limit on waiting conversations: a flood of requests must not fill the bridge's memory.
 MAX_QUEUED = 12
 _MAX_TICKS_AT_ONCE = 8
+#: Their parsers act on no byte inside a frame.
+_TAKES_ANY_BYTE = (inav.PROFILE, multiwii.PROFILE, other.CLEANFLIGHT, other.OLD_MULTIWII)
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,7 +241,7 @@ class World:
 
     def wait_ready(self, seconds: float = 20.0) -> float:
         """Wait until the flight controller is found and its list is read."""
-        return self.wait_until(lambda world: world.is_found and not world.bridge.is_busy, seconds)
+        return self.wait_until(lambda world: world.is_found and not inside(world.bridge).runner.needs_line, seconds)
 
     def receive_from_fc(self, data: bytes) -> None:
         """Let the bridge read bytes that are not from the simulated board."""
@@ -354,7 +356,7 @@ class World:
             assert b"".join(frame.encode() for frame in frames) == data.rstrip(rubbed_out), (
                 f"not whole frames: {data.hex()}"
             )
-            assert is_clean(data) or self.kind in (inav.PROFILE, multiwii.PROFILE), data.hex()
+            assert is_clean(data) or self.kind in _TAKES_ANY_BYTE, data.hex()
             for frame in frames:
                 self._assert_has_right(frame)
         speed = self.inside.session.state.speed

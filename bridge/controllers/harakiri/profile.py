@@ -10,6 +10,8 @@ from bridge.controllers.harakiri.arming import arming_blockers
 from bridge.controllers.harakiri.check import harakiri_rules
 from bridge.controllers.harakiri.mavlink_missions import HarakiriMavlinkMissions
 from bridge.controllers.harakiri.mission_store import HarakiriMissions
+from bridge.controllers.harakiri.settings import HarakiriFcSettings
+from bridge.controllers.msp_settings import part_settings
 from bridge.fc.interview import Interview
 from bridge.fc.profile import FlightController, Profile, Spoken
 from bridge.line.conversation import Conversation
@@ -59,6 +61,7 @@ PATCHED = Profile(
     _FAMILY,
     recognise=_recognise_patched,
     missions=HarakiriMissions,
+    settings=HarakiriFcSettings,
     polls=(*POLLS, BOX_POLL),
     acc_axes=_ACC_AXES,
     check_kind="harakiri",
@@ -73,6 +76,7 @@ UNPATCHED = Profile(
     polls=(*POLLS, BOX_POLL),
     acc_axes=_ACC_AXES,
     missions=Refusal(MissionResult.UNSUPPORTED, "This Harakiri lacks the mission patch"),
+    settings=part_settings,
     restarts_after_calibration=True,
     arming_blockers=arming_blockers,
 )

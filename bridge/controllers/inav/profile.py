@@ -4,6 +4,7 @@
 from dataclasses import replace
 
 from bridge.controllers.inav.mission_store import InavMissions
+from bridge.controllers.inav.settings import InavFcSettings
 from bridge.controllers.inav.telemetry import INAV_DECODERS, INAV_POLLS, arming_blockers
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import INAV_CAPACITY, inav_profile
@@ -67,6 +68,7 @@ PROFILE = Profile(
     turn_s=0.01,
     silence_s=SILENCE_WITH_H7_S,
     missions=lambda board, vehicle, _: InavMissions(inav_profile(board.capacity), board, vehicle),
+    settings=InavFcSettings,
     check_kind="inav",
     rules=lambda settings: NavRules(inav_profile(settings.capacity or INAV_CAPACITY)),
 )

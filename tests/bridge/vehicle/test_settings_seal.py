@@ -2,7 +2,8 @@
 """Settings that change on the board without the bridge are reported once, by name; changes through it are not."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import pytest
 
@@ -13,6 +14,8 @@ from protocols.mission_item import MissionResult
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from protocols.msp.mission import MissionCommand
 from protocols.msp.settings import Part
+from simulator.board.msp_board import MspBoard
+from simulator.board.telemetry_only import BETAFLIGHT, TelemetryFirmware
 from simulator.commands.fc_kinds import make_board
 from simulator.naze.board import SimulatedNaze
 from tests.support.conversations import Upload, waypoints
@@ -216,11 +219,12 @@ def test_a_few_requests_a_minute() -> None:
 
 
 def test_a_board_without_the_commands_is_left_alone() -> None:
-    """Betaflight's simulator answers none of them."""
-    world = World(speeds=(115200,), peer=make_board("betaflight"))
+    """They are asked twice as settings, and twice for the seal."""
+    firmware = partial(TelemetryFirmware, replace(BETAFLIGHT, settings={}))
+    world = World(speeds=(115200,), peer=MspBoard(firmware, memoryview(bytearray(1))))
     world.run(300)
     asked = requests(world, 0.0)
-    assert all(asked.count(command) <= 2 for command in (RC_TUNING, PID, MISC, 34))
+    assert all(asked.count(command) <= 4 for command in (RC_TUNING, PID, MISC, 34))
     assert world.bridge.report(world.now).settings is None
     assert not [event for event in world.log_event if event.level == "warning"]
 

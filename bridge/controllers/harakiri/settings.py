@@ -1,0 +1,208 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""All settings of a Harakiri with the mission extension: its commands SETTING and SET_SETTING, and the modes of BOX."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from bridge.controllers.msp_settings import part_settings, some_parts
+from bridge.fc.profile import FlightController
+from bridge.line.conversation import Conversation, Pause, ask, ask_surely
+from bridge.settings.board_setting import BoardSetting, SettingTable, Value, ValueKind, table_of
+from bridge.settings.fc_settings import (
+    ARMED,
+    BUSY,
+    NO_ANSWER,
+    NOT_SAVED,
+    NOT_TAKEN,
+    WRITES_SPENT,
+    FcSettings,
+    SettingRefusal,
+    TableReading,
+    fixed,
+)
+from protocols.msp import mission as ext
+from protocols.msp.frame import FRAME_OVERHEAD, Direction
+from protocols.msp.mission import InfoFlag, MissionCommand, ReplyStatus
+from protocols.msp.setting_table import (
+    TABLE_REQUEST,
+    HeldSetting,
+    Setting,
+    SettingCommand,
+    SettingsReply,
+    SettingType,
+    TableReply,
+    decode_settings,
+    decode_table,
+    encode_read_settings,
+    encode_save,
+    encode_set_setting,
+    table_checksum,
+)
+from protocols.msp.settings import BOXES
+
+#: Settings a request: the reply leaves room for a poll in the board's send ring. With names of 32 characters.
+_EACH = 4
+_ENTRY_SIZE, _HEADER_SIZE, _TABLE_SIZE = 46, 3, 9
+#: The table may change while it is read.
+_READINGS = 3
+#: For a configuration write that is scheduled.
+_BUSY_TRIES, _BUSY_INTERVAL_S = 12, 0.1
+#: Writing and reading back take a quarter of a second.
+_SAVED_AFTER_S = 0.3
+_SAVES = 2
+_CRASHES = "a running Harakiri can crash with another one; set it on its command line"
+_FIXED = dict.fromkeys(
+    ("gbl_flg", *(f"align_{sensor}_{axis}" for sensor in ("gyro", "acc", "mag") for axis in "xyz")), _CRASHES
+)
+_LOWERED_ONLY = {"esc_moff": "it can only be lowered, a disarmed board sends it to the motors"}
+_UNITS = {
+    "looptime": "us", "mag_dec": "0.01 deg", "gps_wp_radius": "cm", "serial_baudrate": "baud", "gps_baudrate": "baud",
+    "rc_minchk": "us", "rc_mid": "us", "rc_maxchk": "us", "esc_min": "us", "esc_max": "us", "esc_nfly": "us",
+    "esc_moff": "us", "esc_pwm": "Hz", "srv_pwm": "Hz", "fs_rcthr": "us", "fs_delay": "0.1 s", "fs_ofdel": "0.1 s",
+    "vbatmaxcellvoltage": "0.1 V", "vbatmincellvoltage": "0.1 V", "nav_speed_min": "cm/s", "nav_speed_max": "cm/s",
+    "gps_maxangle": "deg", "acc_lpfhz": "Hz", "acc_altlpfhz": "Hz", "acc_gpslpfhz": "Hz", "gy_lpf": "Hz",
+    "maincuthz": "Hz", "gpscuthz": "Hz", "gps_lag": "ms", "tri_ymid": "us", "tri_ymin": "us", "tri_ymax": "us",
+    "rtl_mnh": "m", "rtl_mnd": "m", "snr_min": "cm", "snr_max": "cm",
+}  # fmt: skip
+
+
+class HarakiriFcSettings(FcSettings):
+    """The settings of one patched Harakiri; a setting's handle is its description there."""
+
+    def __init__(self, board: FlightController) -> None:
+        self._modes = some_parts(board, BOXES)
+        #: For a build with an earlier mission extension.
+        self._parts = part_settings(board)
+        self._lists_all: bool | None = None
+
+    def read(self, former: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
+        """The values of the former table if their checksum is still the board's: then that is three requests."""
+        if self._lists_all is None:
+            reply = yield from ask_surely(TABLE_REQUEST, SettingCommand.SETTING, _TABLE_SIZE)
+            if reply is None:
+                return None
+            self._lists_all = reply.direction is Direction.REPLY
+        if not self._lists_all:
+            return (yield from self._parts.read(former, reading))
+        listed = None if former is None else _listed(former)
+        for _ in range(_READINGS):
+            whole = yield from _whole()
+            if whole is None:
+                return None
+            if listed is not None and _is(listed, whole):
+                modes = yield from self._modes.read(None, reading)
+                return None if modes is None else table_of(*listed, *modes)
+            listed = yield from _read(whole.total, reading)
+            if listed is None:
+                return None
+        return None
+
+    def change(
+        self, table: SettingTable, setting: BoardSetting, value: Value
+    ) -> Conversation[SettingTable | SettingRefusal]:
+        if not isinstance(setting.handle, Setting):
+            return (yield from self._modes.change(table, setting, value))
+        index = list(table.settings).index(setting.name)
+        frame = encode_set_setting(index, setting.handle, float(value))
+        reply = None
+        for _ in range(_BUSY_TRIES):
+            reply = yield from _ask(frame, SettingCommand.SET_SETTING, 1)
+            if reply is None or reply.status is not ReplyStatus.BUSY:
+                break
+            yield Pause(_BUSY_INTERVAL_S)
+        if reply is None:
+            return NO_ANSWER
+        if reply.status is ReplyStatus.RANGE and setting.name in _LOWERED_ONLY:
+            return fixed(replace(setting, fixed=_LOWERED_ONLY[setting.name]))
+        if reply.status not in (ReplyStatus.OK, ReplyStatus.RANGE):
+            return {ReplyStatus.ARMED: ARMED, ReplyStatus.BUSY: BUSY}.get(reply.status, NOT_TAKEN)
+        held = yield from _ask(encode_read_settings(index, 1), SettingCommand.SETTING, 1)
+        whole = yield from _whole()
+        if held is None or whole is None or (held.first, len(held.settings)) != (index, 1):
+            return NO_ANSWER
+        changed = table.updated(_shown(held.settings[0]))
+        if _is(_listed(changed), whole):
+            return changed
+        # The change had an effect on others: another sensor loses its calibration.
+        read = yield from self.read(None, TableReading())
+        return NO_ANSWER if read is None else read
+
+    def save(self) -> Conversation[SettingRefusal | None]:
+        if not self._lists_all:
+            return (yield from self._parts.save())
+        for _ in range(_SAVES):
+            whole = yield from _whole()
+            if whole is None:
+                return NO_ANSWER
+            frame = encode_save(whole.checksum)
+            reply = yield from ask(frame, SettingCommand.SET_SETTING, _TABLE_SIZE, tries=1, exclusive=True)
+            answer = None if reply is None else decode_settings(reply.payload[:_HEADER_SIZE])
+            if answer is not None and answer.status is ReplyStatus.BUSY:
+                info = yield from ask_surely(ext.INFO_REQUEST, MissionCommand.INFO, ext.INFO_SIZE)
+                decoded = None if info is None else ext.decode_info(info.payload)
+                return WRITES_SPENT if decoded is not None and InfoFlag.WRITES_SPENT in decoded.flags else BUSY
+            if answer is not None and answer.status is ReplyStatus.ARMED:
+                return ARMED
+            yield Pause(_SAVED_AFTER_S)
+            if answer is not None and answer.status is ReplyStatus.OK:
+                after = yield from _whole()
+                if after is None:
+                    return NO_ANSWER
+                return None if after.checksum == whole.checksum else NOT_SAVED
+            # The reply is lost, or a value has changed in between.
+        return NO_ANSWER
+
+
+def _whole() -> Conversation[TableReply | None]:
+    """Number and checksum of all settings; None if it does not answer, or is armed."""
+    reply = yield from ask(TABLE_REQUEST, SettingCommand.SETTING, _TABLE_SIZE)
+    whole = None if reply is None else decode_table(reply.payload)
+    return whole if whole is not None and whole.status is ReplyStatus.OK else None
+
+
+def _ask(frame: bytes, command: int, count: int) -> Conversation[SettingsReply | None]:
+    reply = yield from ask(frame, command, _HEADER_SIZE + count * _ENTRY_SIZE)
+    return None if reply is None else decode_settings(reply.payload)
+
+
+def _read(total: int, reading: TableReading) -> Conversation[list[BoardSetting] | None]:
+    found: list[BoardSetting] = []
+    damaged = 0
+    while len(found) < total:
+        frame = encode_read_settings(len(found), _EACH)
+        reply = yield from _ask(frame, SettingCommand.SETTING, _EACH)
+        if reply is None or reply.status is not ReplyStatus.OK or reply.first != len(found) or not reply.settings:
+            # Damage that the XOR missed, or the board has armed.
+            damaged += 1
+            if reply is None or damaged > _READINGS:
+                return None
+            continue
+        found += map(_shown, reply.settings)
+        reading.progress(len(found))
+        yield Pause(reading.pace(len(frame) + FRAME_OVERHEAD + len(reply.encode())))
+    return found
+
+
+def _listed(table: SettingTable) -> list[BoardSetting]:
+    """The settings of a table that the board lists by SETTING, in its order."""
+    return [setting for setting in table if isinstance(setting.handle, Setting)]
+
+
+def _is(listed: Sequence[BoardSetting], whole: TableReply) -> bool:
+    held = [HeldSetting(setting.handle, float(setting.value)) for setting in listed]
+    return (len(held), table_checksum(held)) == (whole.total, whole.checksum)
+
+
+def _shown(held: HeldSetting) -> BoardSetting:
+    described, value = held
+    kind = ValueKind.FLOAT if described.type is SettingType.FLOAT else ValueKind.INTEGER
+    return BoardSetting(
+        described.name,
+        kind,
+        described.minimum,
+        described.maximum,
+        value,
+        _UNITS.get(described.name, ""),
+        fixed=_FIXED.get(described.name, ""),
+        handle=described,
+    )

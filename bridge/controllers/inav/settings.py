@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""All settings of an INAV, one request each, by their place in its table; and its modes."""
+
+from dataclasses import replace
+
+from bridge.controllers.msp_settings import some_parts
+from bridge.fc.profile import FlightController
+from bridge.line.conversation import Conversation, Pause, ask
+from bridge.settings.board_setting import BoardSetting, SettingTable, Value, ValueKind, table_of
+from bridge.settings.eeprom_write import write_eeprom
+from bridge.settings.fc_settings import (
+    NO_ANSWER,
+    NOT_TAKEN,
+    FcSettings,
+    SettingRefusal,
+    TableReading,
+    fixed,
+)
+from protocols.msp.frame import Direction, MspFrame, frame_size, request
+from protocols.msp.inav_settings import (
+    COMMON_SET_SETTING,
+    COMMON_SETTING_INFO,
+    InavSetting,
+    InavType,
+    decode_setting_info,
+    encode_about_index,
+    encode_about_name,
+    pack_value,
+)
+from protocols.msp.settings import RANGES
+
+#: The usual size; its ring also holds the few replies with many names of values.
+_REPLY_SIZE = 160
+#: INAV has about 650; a board that never ends its table must not be asked for ever.
+_MOST = 2000
+_TRIES = 3
+_KINDS = {InavType.FLOAT: ValueKind.FLOAT, InavType.STRING: ValueKind.TEXT}
+#: Disarmed motors get these pulses.
+_LOWERED_ONLY = "min_command"
+_FIXED = {"3d_neutral": "disarmed motors get this pulse: set it with INAV Configurator"}
+
+
+class InavFcSettings(FcSettings):
+    """The settings of one INAV; a setting's handle is its type there. Those of profiles are the active one's."""
+
+    def __init__(self, board: FlightController) -> None:
+        self._modes = some_parts(board, RANGES)
+        self._is_read = False
+
+    def read(self, former: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
+        """The former table if it was read from this board and nothing can have changed since: INAV has no checksum."""
+        if self._is_read and not reading.is_doubtful:
+            return former
+        found: list[BoardSetting] = []
+        skipped = 0
+        for index in range(_MOST):
+            payload = encode_about_index(index)
+            is_past_end = False
+            for _ in range(_TRIES):
+                reply = yield from _ask(payload)
+                if reply is None:
+                    return None
+                is_past_end = reply.direction is Direction.ERROR
+                yield Pause(reading.pace(frame_size(COMMON_SETTING_INFO, len(payload)) + len(reply.encode())))
+                info = None if is_past_end else decode_setting_info(reply.payload)
+                if info is not None and info.index == index:
+                    found.append(_shown(info))
+                    reading.progress(len(found))
+                    break
+            else:
+                if is_past_end:  # one error frame alone may be noise
+                    break
+                skipped += 1
+        modes = yield from self._modes.read(None, reading)
+        self._is_read = True
+        return table_of(*found, *modes or (), is_complete=modes is not None and not skipped) if found else None
+
+    def change(
+        self, table: SettingTable, setting: BoardSetting, value: Value
+    ) -> Conversation[SettingTable | SettingRefusal]:
+        if not isinstance(setting.handle, InavType):
+            return (yield from self._modes.change(table, setting, value))
+        if setting.name == _LOWERED_ONLY and float(value) > float(setting.value):
+            return fixed(replace(setting, fixed="it can only be lowered, disarmed motors get this pulse"))
+        payload = encode_about_name(setting.name) + pack_value(setting.handle, value)
+        reply = yield from ask(request(COMMON_SET_SETTING, payload), COMMON_SET_SETTING, 0)
+        after = yield from _ask(encode_about_name(setting.name))
+        info = None if after is None else decode_setting_info(after.payload)
+        if reply is None or info is None or info.name != setting.name:
+            return NO_ANSWER
+        return NOT_TAKEN if reply.direction is Direction.ERROR else table.updated(_shown(info))
+
+    def save(self) -> Conversation[SettingRefusal | None]:
+        return (yield from write_eeprom())
+
+
+def _ask(payload: bytes) -> Conversation[MspFrame | None]:
+    return (yield from ask(request(COMMON_SETTING_INFO, payload), COMMON_SETTING_INFO, _REPLY_SIZE))
+
+
+def _shown(info: InavSetting) -> BoardSetting:
+    kind = _KINDS.get(info.type, ValueKind.INTEGER)
+    return BoardSetting(
+        info.name,
+        kind,
+        info.minimum,
+        info.maximum,
+        info.value,
+        choices=info.choices,
+        fixed=_FIXED.get(info.name, ""),
+        handle=info.type,
+    )

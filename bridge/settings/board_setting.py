@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A setting of the flight controller, and the table of all of them."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from typing import Any
+
+#: A text only where the setting is one.
+Value = float | str
+
+
+class ValueKind(Enum):
+    """The values that a setting may have."""
+
+    INTEGER = "integer"
+    #: Single precision.
+    FLOAT = "float"
+    TEXT = "text"
+
+
+@dataclass(frozen=True, slots=True)
+class BoardSetting:
+    """A setting with the value that the board holds in RAM.
+
+    name: as in the board's command line, or made from its MSP layout if it has no such name. minimum, maximum: of a
+    number; of a text its lengths. choices: names of the values from `minimum` on. fixed: the reason why it cannot be
+    set over the air; empty if it can. handle: what its FcSettings needs to change it.
+    """
+
+    name: str
+    kind: ValueKind
+    minimum: float
+    maximum: float
+    value: Value
+    unit: str = ""
+    choices: tuple[str, ...] = ()
+    fixed: str = ""
+    handle: Any = field(default=None, compare=False, repr=False)
+
+    @property
+    def range_text(self) -> str:
+        """The accepted values, for a refusal."""
+        if self.kind is ValueKind.TEXT:
+            return f"{shown(self.minimum)} to {shown(self.maximum)} characters"
+        unit = f" {self.unit}" if self.unit else ""
+        return f"{shown(self.minimum)}..{shown(self.maximum)}{unit}"
+
+    def accepts(self, value: Value) -> bool:
+        """True if the value is of this kind and in range."""
+        if isinstance(value, str):
+            is_text = self.kind is ValueKind.TEXT and value.isascii() and value.isprintable()
+            return is_text and self.minimum <= len(value) <= self.maximum
+        is_number = self.kind is not ValueKind.TEXT and math.isfinite(value) and self.minimum <= value <= self.maximum
+        return is_number and (self.kind is ValueKind.FLOAT or value == int(value))
+
+
+@dataclass(frozen=True, slots=True)
+class SettingTable:
+    """All settings of a board, in its own order.
+
+    is_complete: False if some could not be read; their names are missing.
+    """
+
+    settings: Mapping[str, BoardSetting] = field(default_factory=dict)
+    is_complete: bool = True
+
+    def __iter__(self) -> Iterator[BoardSetting]:
+        return iter(self.settings.values())
+
+    def __len__(self) -> int:
+        return len(self.settings)
+
+    def find(self, name: str) -> BoardSetting | None:
+        """The setting of this name; letters of the other case are accepted if they leave no doubt."""
+        found = self.settings.get(name)
+        if found is None:
+            alike = [setting for setting in self if setting.name.lower() == name.lower()]
+            found = alike[0] if len(alike) == 1 else None
+        return found
+
+    def updated(self, *settings: BoardSetting) -> "SettingTable":
+        """The table with other values."""
+        return replace(self, settings={**self.settings, **{setting.name: setting for setting in settings}})
+
+    def differences(self, later: "SettingTable") -> tuple[str, ...]:
+        """The names of settings with another value, or only in one of the tables."""
+        names = dict.fromkeys((*self.settings, *later.settings))
+        return tuple(name for name in names if _value(self, name) != _value(later, name))
+
+
+def table_of(*settings: BoardSetting, is_complete: bool = True) -> SettingTable:
+    """A table of settings in this order."""
+    return SettingTable({setting.name: setting for setting in settings}, is_complete)
+
+
+def shown(value: Value) -> str:
+    """A value as the board's command line would take it; floats with the digits that single precision has."""
+    if isinstance(value, str):
+        return value
+    return str(int(value)) if value == int(value) and abs(value) < 1e15 else f"{value:.7g}"
+
+
+def _value(table: SettingTable, name: str) -> Value | None:
+    setting = table.settings.get(name)
+    return None if setting is None else setting.value

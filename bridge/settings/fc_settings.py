@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The interface between the settings and the flight controllers that have them.
+
+Each kind of flight controller has its own way to read, change and save them: `bridge.controllers.harakiri.settings`,
+`bridge.controllers.inav.settings`, and `bridge.settings.msp_parts` for all others.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+
+from bridge.line.conversation import Conversation
+from bridge.settings.board_setting import BoardSetting, SettingTable, Value, ValueKind, shown
+
+
+class Cause(Enum):
+    """The kind of reason for a setting that was not set, or settings that were not read or saved."""
+
+    UNKNOWN_NAME = "unknown name"
+    OUT_OF_RANGE = "out of range"
+    FIXED = "cannot be set over the air"
+    ARMED = "armed"
+    OCCUPIED = "the line is needed for a mission"
+    NO_LINK = "no flight controller"
+    NO_ANSWER = "no answer"
+    LIMIT = "too many writes"
+    REFUSED = "refused by the flight controller"
+
+
+@dataclass(frozen=True, slots=True)
+class SettingRefusal:
+    """The reason for a person, in one sentence. After NO_ANSWER it is not known what the board has done."""
+
+    cause: Cause
+    text: str
+
+
+ARMED = SettingRefusal(Cause.ARMED, "Armed: disarm to change settings")
+NO_ANSWER = SettingRefusal(Cause.NO_ANSWER, "The flight controller does not answer: read the settings again")
+WRITES_SPENT = SettingRefusal(
+    Cause.LIMIT, "The flight controller limits flash wear: one save in 5 minutes now, no limit after a restart"
+)
+BUSY = SettingRefusal(Cause.OCCUPIED, "The flight controller is busy writing its configuration: try again")
+NOT_SAVED = SettingRefusal(Cause.REFUSED, "The flight controller could not save: read the settings again")
+NOT_TAKEN = SettingRefusal(Cause.REFUSED, "The flight controller did not take the value")
+
+
+def out_of_range(setting: BoardSetting, value: Value) -> SettingRefusal:
+    is_part = setting.kind is ValueKind.INTEGER and not isinstance(value, str) and value % 1
+    accepted = f"a whole number, {setting.range_text}" if is_part else setting.range_text
+    return SettingRefusal(Cause.OUT_OF_RANGE, f"{setting.name} stays {shown(setting.value)}: {accepted}")
+
+
+def fixed(setting: BoardSetting) -> SettingRefusal:
+    return SettingRefusal(Cause.FIXED, f"{setting.name} stays {shown(setting.value)}: {setting.fixed}")
+
+
+@dataclass(frozen=True, slots=True)
+class TableReading:
+    """How to read a table.
+
+    pace: the pause in s after this many bytes, which leaves telemetry its share of the line. progress: called with the
+    number of settings read so far. is_doubtful: True if settings may have changed without the bridge since the last
+    reading.
+    """
+
+    pace: Callable[[int], float] = lambda _size: 0.0
+    progress: Callable[[int], None] = lambda _count: None
+    is_doubtful: bool = True
+
+
+class FcSettings(ABC):
+    """The settings of one flight controller. Its conversations run while it is disarmed."""
+
+    @abstractmethod
+    def read(self, former: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
+        """All settings; None if the board does not answer. Other work may use the line at each Pause.
+
+        former: as last read, maybe from another board.
+        """
+
+    @abstractmethod
+    def change(
+        self, table: SettingTable, setting: BoardSetting, value: Value
+    ) -> Conversation[SettingTable | SettingRefusal]:
+        """Change one setting in RAM; the table after reading back what the board holds then.
+
+        A value that the board does not take is no refusal here: the table has the old one.
+        """
+
+    @abstractmethod
+    def save(self) -> Conversation[SettingRefusal | None]:
+        """Write the settings in RAM to the board's flash; None if they are stored."""

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""INAV's settings by name or index, both directions (src/main/fc/fc_msp.c, src/main/fc/settings.h)."""
+
+import struct
+from enum import IntEnum
+from typing import NamedTuple
+
+#: MSP command numbers.
+COMMON_SETTING, COMMON_SET_SETTING, COMMON_SETTING_INFO = 0x1003, 0x1004, 0x1007
+
+_DETAILS = struct.Struct("<HBBBiIHBB")
+_INDEX = struct.Struct("<BH")
+_LOOKUP = 1 << 6
+
+
+class InavType(IntEnum):
+    """setting_type_e."""
+
+    UINT8 = 0
+    INT8 = 1
+    UINT16 = 2
+    INT16 = 3
+    UINT32 = 4
+    FLOAT = 5
+    STRING = 6
+
+
+_VALUES = {
+    InavType.UINT8: struct.Struct("<B"),
+    InavType.INT8: struct.Struct("<b"),
+    InavType.UINT16: struct.Struct("<H"),
+    InavType.INT16: struct.Struct("<h"),
+    InavType.UINT32: struct.Struct("<I"),
+    InavType.FLOAT: struct.Struct("<f"),
+}
+
+
+class InavSetting(NamedTuple):
+    """A reply to COMMON_SETTING_INFO. section: 0 is for all profiles. choices: names of the values from minimum on."""
+
+    name: str
+    group: int
+    type: InavType
+    section: int
+    minimum: int
+    maximum: int
+    index: int
+    choices: tuple[str, ...]
+    value: float | str
+
+    def encode(self) -> bytes:
+        mode = _LOOKUP if self.choices else 0
+        details = _DETAILS.pack(
+            self.group, self.type, self.section, mode, self.minimum, self.maximum, self.index, 0, bool(self.section)
+        )
+        texts = b"".join(_text(choice) for choice in self.choices)
+        return _text(self.name) + details + texts + pack_value(self.type, self.value)
+
+
+def encode_about_index(index: int) -> bytes:
+    """The payload that names a setting by its place in the table."""
+    return _INDEX.pack(0, index)
+
+
+def encode_about_name(name: str) -> bytes:
+    """The payload that names a setting; a new value may follow."""
+    return _text(name)
+
+
+def pack_value(kind: InavType, value: float | str) -> bytes:
+    """A value as COMMON_SET_SETTING takes it; struct.error for one that the type cannot hold."""
+    if isinstance(value, str):
+        return value.encode("ascii", "replace")
+    return _VALUES[kind].pack(value if kind is InavType.FLOAT else int(value))
+
+
+def decode_setting_info(payload: bytes) -> InavSetting | None:
+    """Read a reply to COMMON_SETTING_INFO; None if it is cut, or has an unknown type."""
+    name, rest = _take_text(payload)
+    if not name or rest is None or len(rest) < _DETAILS.size:
+        return None
+    group, kind, section, mode, minimum, maximum, index, _, _ = _DETAILS.unpack_from(rest)
+    if kind > max(InavType):
+        return None
+    rest = rest[_DETAILS.size :]
+    choices: list[str] = []
+    count = maximum - minimum + 1 if mode == _LOOKUP else 0
+    if not 0 <= count <= len(rest):
+        return None
+    for _ in range(count):
+        choice, after = _take_text(rest)
+        if after is None:
+            return None
+        choices.append(choice)
+        rest = after
+    value = decode_value(InavType(kind), rest)
+    if value is None:
+        return None
+    if kind in (InavType.INT8, InavType.INT16, InavType.FLOAT):
+        # Sent as an unsigned number; the largest values of these types may be negative.
+        maximum = struct.unpack("<i", struct.pack("<I", maximum))[0]
+    return InavSetting(name, group, InavType(kind), section, minimum, maximum, index, tuple(choices), value)
+
+
+def decode_value(kind: InavType, data: bytes) -> float | str | None:
+    """The value in a reply; None if it is cut."""
+    if kind is InavType.STRING:
+        return data.partition(b"\0")[0].decode("ascii", "replace")
+    if len(data) < _VALUES[kind].size:
+        return None
+    value: float = _VALUES[kind].unpack_from(data)[0]
+    return value
+
+
+def _text(text: str) -> bytes:
+    return text.encode("ascii", "replace") + b"\0"
+
+
+def _take_text(data: bytes) -> tuple[str, bytes | None]:
+    """A text and the bytes behind it; None if its end is missing."""
+    text, end, rest = data.partition(b"\0")
+    return text.decode("ascii", "replace"), rest if end else None

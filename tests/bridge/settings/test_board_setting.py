@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+
+from math import inf, nan
+
+import pytest
+
+from bridge.settings.board_setting import BoardSetting, Value, ValueKind, shown, table_of
+from bridge.settings.fc_settings import out_of_range
+
+P_ROLL = BoardSetting("p_roll", ValueKind.INTEGER, 1, 200, 35)
+LAG = BoardSetting("bar_lag", ValueKind.FLOAT, 0, 10, 0.30000001192092896, "s")
+NAME = BoardSetting("name", ValueKind.TEXT, 0, 16, "INAV")
+
+
+@pytest.mark.parametrize(
+    ("setting", "value", "is_accepted"),
+    [
+        (P_ROLL, 1, True), (P_ROLL, 200, True), (P_ROLL, 200.0, True), (P_ROLL, 0, False), (P_ROLL, 201, False),
+        (P_ROLL, 1.5, False), (P_ROLL, nan, False), (P_ROLL, inf, False), (P_ROLL, "40", False),
+        (LAG, 1.5, True), (LAG, -0.1, False), (LAG, nan, False),
+        (NAME, "", True), (NAME, "x" * 16, True), (NAME, "x" * 17, False), (NAME, "a\nb", False), (NAME, "é", False),
+        (NAME, 5, False),
+    ],
+)  # fmt: skip
+def test_only_values_of_its_kind_and_range_are_accepted(setting: BoardSetting, value: Value, is_accepted: bool) -> None:
+    assert setting.accepts(value) is is_accepted
+
+
+@pytest.mark.parametrize(
+    ("setting", "value", "sentence"),
+    [
+        (P_ROLL, 300, "p_roll stays 35: 1..200"),
+        (P_ROLL, 1.5, "p_roll stays 35: a whole number, 1..200"),
+        (LAG, 11, "bar_lag stays 0.3: 0..10 s"),
+        (NAME, "x" * 20, "name stays INAV: 0 to 16 characters"),
+    ],
+)
+def test_a_refusal_names_the_range(setting: BoardSetting, value: Value, sentence: str) -> None:
+    assert out_of_range(setting, value).text == sentence
+
+
+def test_a_table_finds_names_in_any_case_unless_two_differ_only_in_it() -> None:
+    table = table_of(P_ROLL, LAG, BoardSetting("P_ROLL", ValueKind.INTEGER, 0, 1, 0))
+    assert table.find("P_ROLL") is table.settings["P_ROLL"]
+    assert table.find("BAR_LAG") is LAG
+    assert table.find("P_Roll") is None
+
+
+def test_tables_differ_in_values_and_in_missing_settings() -> None:
+    before = table_of(P_ROLL, LAG)
+    assert before.differences(before) == ()
+    after = before.updated(BoardSetting("p_roll", ValueKind.INTEGER, 1, 200, 36))
+    assert before.differences(after) == ("p_roll",)
+    assert before.differences(table_of(P_ROLL, NAME)) == ("bar_lag", "name")
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(35, "35"), (35.0, "35"), (0.30000001192092896, "0.3"), (2147483647, "2147483647"), ("x", "x")]
+)
+def test_values_are_shown_as_typed(value: Value, text: str) -> None:
+    assert shown(value) == text

@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+from bridge.settings.fc_settings import Cause
+from protocols.msp.frame import Direction
+from tests.support.settings_client import BOARDS, cause_of, ready, value_of
+from tests.support.share_program import ShareProgram
+
+SET_PID = 202
+
+
+def test_a_part_whose_bytes_are_hazards_is_not_written_to_an_unpatched_harakiri() -> None:
+    _, client = ready(BOARDS["Harakiri"])
+    for value in (13, 35, 82):
+        assert cause_of(client.change("YAW_P", value)) is Cause.FIXED
+    assert value_of(client.change("YAW_P", 36)) == 36
+
+
+def test_a_change_by_another_program_is_read_again() -> None:
+    world, client = ready(BOARDS["Betaflight"])
+    pids = bytes((99, 80, 30, 47, 84, 34, 45, 80, 0, 50, 75, 75, 40, 0, 0))
+    reply = ShareProgram(world, may_write=True).outcome(SET_PID, pids)
+    assert reply is not None
+    assert reply.direction is Direction.REPLY
+    world.run(10)
+    assert client.value("ROLL_P") == 99
