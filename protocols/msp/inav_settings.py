@@ -36,7 +36,7 @@ _VALUES = {
 
 
 class InavSetting(NamedTuple):
-    """A reply to COMMON_SETTING_INFO. section: 0 is for all profiles. choices: names of the values from minimum on."""
+    """A reply to COMMON_SETTING_INFO. section: 0 is for all profiles. place: in its table. choices: names of the values from minimum on."""
 
     name: str
     group: int
@@ -44,14 +44,14 @@ class InavSetting(NamedTuple):
     section: int
     minimum: int
     maximum: int
-    index: int
+    place: int
     choices: tuple[str, ...]
     value: float | str
 
     def encode(self) -> bytes:
         mode = _LOOKUP if self.choices else 0
         details = _DETAILS.pack(
-            self.group, self.type, self.section, mode, self.minimum, self.maximum, self.index, 0, bool(self.section)
+            self.group, self.type, self.section, mode, self.minimum, self.maximum, self.place, 0, bool(self.section)
         )
         texts = b"".join(_text(choice) for choice in self.choices)
         return _text(self.name) + details + texts + pack_value(self.type, self.value)

@@ -84,12 +84,12 @@ class InavSettings:
         """EEPROM_WRITE."""
         self._stored[0] = 1
         for setting in self._settings.values():
-            at = 1 + setting.index * _STORED_SIZE
+            at = 1 + setting.place * _STORED_SIZE
             packed = pack_value(setting.type, setting.value).ljust(_STORED_SIZE, b"\0")
             self._stored[at : at + _STORED_SIZE] = packed
 
     def _saved_value(self, setting: InavSetting) -> float | str:
-        at = 1 + setting.index * _STORED_SIZE
+        at = 1 + setting.place * _STORED_SIZE
         value = decode_value(setting.type, bytes(self._stored[at : at + _STORED_SIZE]))
         assert value is not None
         return value

@@ -63,7 +63,7 @@ class InavFcSettings(FcSettings):
                 is_past_end = reply.direction is Direction.ERROR
                 yield Pause(reading.pace(frame_size(COMMON_SETTING_INFO, len(payload)) + len(reply.encode())))
                 info = None if is_past_end else decode_setting_info(reply.payload)
-                if info is not None and info.index == index:
+                if info is not None and info.place == index:
                     found.append(_shown(info))
                     reading.progress(len(found))
                     break

@@ -32,7 +32,7 @@ def test_inavs_own_bytes_are_read() -> None:
     sent = b"mc_iterm_relax\0" + bytes.fromhex("0200 00 08 40 00000000 01000000 0500 00 03") + b"OFF\0ON\0\1"
     found = decode_setting_info(sent)
     assert found is not None
-    assert (found.name, found.index, found.choices, found.value) == ("mc_iterm_relax", 5, ("OFF", "ON"), 1)
+    assert (found.name, found.place, found.choices, found.value) == ("mc_iterm_relax", 5, ("OFF", "ON"), 1)
 
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=lambda setting: setting.name)
