@@ -36,7 +36,10 @@ _VALUES = {
 
 
 class InavSetting(NamedTuple):
-    """A reply to COMMON_SETTING_INFO. section: 0 is for all profiles. place: in its table. choices: names of the values from minimum on."""
+    """A reply to COMMON_SETTING_INFO.
+
+    section: 0 is for all profiles. place: in INAV's table. choices: names of the values from minimum on.
+    """
 
     name: str
     group: int
