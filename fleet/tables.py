@@ -11,7 +11,6 @@ from rich.progress import Progress as Bars
 from rich.table import Table
 from rich.text import Text
 
-from bridge.model.finding import without_defaults
 from fleet.payload import text
 from fleet.push import FleetPush, PushState
 from fleet.trial import Trial
@@ -146,11 +145,7 @@ def _result(progress: PushState) -> Text:
 
 def dry_run_table(trials: Sequence[Trial]) -> Table:
     """One row per vehicle, and below them the corrections, once for all vehicles that would hold the same records."""
-    corrections = {
-        trial.checksum: [finding.text() for finding in without_defaults(trial.findings)]
-        for trial in trials
-        if trial.is_taken
-    }
+    corrections = {trial.checksum: trial.corrections for trial in trials if trial.is_taken}
     lines = [line for checksum, said in corrections.items() if said for line in ("", f"Stored as {checksum}:", *said)]
     return _trial_table(trials, "Accepts it", lambda trial: (trial.is_taken, ""), "\n".join(lines))
 

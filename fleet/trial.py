@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import zenoh
 
-from bridge.model.finding import Finding, News
-from fleet.payload import decode, number, part, text, whole
+from fleet.payload import decode, part, text, whole
 from fleet.pull import pull
 from fleet.session import NO_COMMANDS, ask_each
 from fleet.vehicle import BridgeId
 from payloads.keys import CHECK
+from payloads.mission_data import correction_texts, mission_findings
 
 _TIMEOUT_S = 15.0
 
@@ -29,7 +29,8 @@ class Trial:
     checksum: str | None = None
     held_count: int | None = None
     held: str | None = None
-    findings: tuple[Finding, ...] = ()
+    #: The corrections, one line each.
+    corrections: tuple[str, ...] = ()
 
     @property
     def is_held(self) -> bool | None:
@@ -65,8 +66,8 @@ def _take(trial: Trial, reply: zenoh.Reply) -> None:
     if reply.ok is None or not isinstance(result, dict):
         trial.error = text(data, "error") or "it gives no reason"
         return
-    findings = part(result, "findings")
-    trial.findings = tuple(map(_finding, findings)) if isinstance(findings, list) else ()
+    findings = mission_findings(part(result, "findings"))
+    trial.corrections = tuple(correction_texts(findings))
     trial.count, trial.checksum = whole(result, "count"), text(result, "checksum")
     match text(result, "result"):
         case "ACCEPTED":
@@ -74,13 +75,4 @@ def _take(trial: Trial, reply: zenoh.Reply) -> None:
         case "CLEARED":
             trial.error = "no item of it can be stored"
         case _:
-            trial.error = trial.findings[-1].text() if trial.findings else "it gives no reason"
-
-
-def _finding(data: object) -> Finding:
-    """Read a finding, which may have more fields if the vehicle's version is newer."""
-    found = data if isinstance(data, dict) else {}
-    was, becomes = (text(found, name) or number(found, name) for name in ("was", "becomes"))
-    news = next((each for each in News if each == part(found, "news")), News.NOTICE)
-    field, why = (text(found, name) or "" for name in ("field", "why"))
-    return Finding(whole(found, "seq"), field, was, becomes, why, whole(found, "command"), news)
+            trial.error = findings[-1].text() if findings else "it gives no reason"

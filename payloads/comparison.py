@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import zip_longest
 
 from bridge.model.finding import DROPPED, REJECTED, Finding, value_label, without_defaults
-from payloads.mission_data import Json, mission_findings, mission_items
+from payloads.mission_data import Json, correction_texts, mission_findings, mission_items
 from protocols.mavlink.command import command_name
 from protocols.mission_item import MissionItem
 
@@ -48,7 +48,7 @@ def stored_mission(mission: Json) -> Json:
         "outcome": mission["outcome"],
         "detail": mission["detail"],
         "checksum": received["checksum"],
-        "findings": [finding.text() for finding in without_defaults(findings)[:MAX_ROWS]],
+        "findings": correction_texts(findings)[:MAX_ROWS],
         "rows": [row.to_json() for row in sent_and_stored(sent[:MAX_ROWS], stored, findings, received["sent_seqs"])],
         "rows_left_out": max(len(sent) - MAX_ROWS, 0),
         "items": [shown(item) for item in (stored or sent)[:MAX_ROWS]],
@@ -61,7 +61,7 @@ def checked_mission(items: Sequence[MissionItem], verdict: Json) -> Json:
     stored = mission_items(verdict["items"])
     return {
         "verdict": verdict["result"],
-        "findings": [finding.text() for finding in without_defaults(findings)],
+        "findings": correction_texts(findings),
         "rows": [row.to_json() for row in sent_and_stored(items, stored, findings, verdict["sent_seqs"])],
         "rows_left_out": 0,
         "items": [shown(item) for item in (stored or items)],

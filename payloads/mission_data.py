@@ -3,10 +3,11 @@
 
 import json
 import math
+from collections.abc import Iterable
 from dataclasses import asdict
 from typing import Any, TypeGuard
 
-from bridge.model.finding import Finding, News
+from bridge.model.finding import Finding, News, without_defaults
 from bridge.model.verdict import Verdict
 from protocols.mission_item import MissionItem
 from protocols.mission_record import identify
@@ -55,9 +56,28 @@ def mission_items(data: object) -> list[MissionItem]:
     return [_item(entry) for entry in data]
 
 
-def mission_findings(data: list[Json]) -> list[Finding]:
-    """The findings in a verdict or a stored mission; older missions lack `news`."""
-    return [Finding(**finding | {"news": News(finding.get("news", News.NOTICE))}) for finding in data]
+def mission_findings(data: object) -> list[Finding]:
+    """The findings in a verdict or a stored mission, from any release: older ones lack `news`.
+
+    Fields of another type count as missing, and the texts are safe to print.
+    """
+    return [_finding(entry) for entry in data if isinstance(entry, dict)] if isinstance(data, list) else []
+
+
+def _finding(data: Json) -> Finding:
+    def given(name: str, *types: type) -> Any:
+        value = strict(data.get(name))
+        return printable(value) if isinstance(value, types) and not isinstance(value, bool) else None
+
+    was, becomes = given("was", str, int, float), given("becomes", str, int, float)
+    news = next((each for each in News if each == data.get("news")), News.NOTICE)
+    why = given("why", str) or ""
+    return Finding(given("seq", int), given("field", str) or "", was, becomes, why, given("command", int), news)
+
+
+def correction_texts(findings: Iterable[Finding]) -> list[str]:
+    """The findings as lines for the pilot, without filled-in defaults."""
+    return [finding.text() for finding in without_defaults(findings)]
 
 
 def verdict_data(verdict: Verdict[Any]) -> Json:

@@ -8,8 +8,9 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from bridge.model.finding import Finding, without_defaults
+from bridge.model.finding import Finding
 from payloads.comparison import ItemRow, sent_and_stored
+from payloads.mission_data import correction_texts
 from protocols.mavlink.command import command_name
 from protocols.mission_item import MissionItem
 
@@ -33,7 +34,7 @@ def mission_table(
     `stored` is the list as it reads back, empty for a rejected or cleared one; `findings` name the items missing in it,
     and are printed below the table with their reasons, except filled-in defaults. `sent_seqs`: see Verdict.
     """
-    reasons = "".join(f"\n{finding.text()}" for finding in without_defaults(findings))
+    reasons = "".join(f"\n{text}" for text in correction_texts(findings))
     return rows_table(sent_and_stored(sent, stored, findings, sent_seqs), reasons)
 
 

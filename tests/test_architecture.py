@@ -44,7 +44,7 @@ PACKAGES = {
     "bridge": {"protocols"},
     "payloads": {"bridge.model", "protocols", "storage"},
     "terminal": {"payloads", "bridge.model", "protocols", "storage"},
-    "fleet": {"payloads", "terminal", "bridge.model", "protocols", "storage"},
+    "fleet": {"payloads", "terminal", "protocols", "storage"},
     "service": {"payloads", "terminal", "fleet", "bridge", "protocols", "simulator", "storage"},
 }
 SERVICE = {

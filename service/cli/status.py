@@ -16,6 +16,7 @@ from terminal.printing import print_json
 from terminal.sentences import say
 
 _MINUTE_S, _HOUR_S, _DAY_S = 60, 3600, 86400
+_OLD_S = 5.0
 
 
 @click.command()
@@ -38,9 +39,10 @@ def status_lines(facts: Json, addresses: list[str]) -> Iterator[tuple[str, str]]
     yield "Flight controller", _flight_controller(facts)
     if facts["flight_controller"] is not None:
         armed = {True: "ARMED", False: "disarmed", None: "arming state unknown"}[facts["armed"]]
-        yield "Vehicle", ", ".join(filter(None, (armed, facts["mode"])))
-        yield "GPS", _gps(facts)
-        yield "Battery", "unknown" if facts["battery_v"] is None else f"{facts['battery_v']:.1f} V"
+        yield "Vehicle", ", ".join(filter(None, (armed, facts["mode"]))) + _age(facts["status_age_s"])
+        yield "GPS", _gps(facts) + _age(facts["gps_age_s"])
+        battery = "unknown" if facts["battery_v"] is None else f"{facts['battery_v']:.1f} V"
+        yield "Battery", battery + _age(facts["battery_age_s"])
         yield "Mission", _mission(facts)
         yield "Settings", _settings(facts)
         if facts["round_trip_ms"] is not None:
@@ -72,6 +74,11 @@ def duration(seconds: float) -> str:
     if whole < _DAY_S:
         return f"{whole // _HOUR_S} h {whole % _HOUR_S // _MINUTE_S} min"
     return f"{whole // _DAY_S} d {whole % _DAY_S // _HOUR_S} h"
+
+
+def _age(seconds: float | None) -> str:
+    """Said of values that are no longer polled, or not answered: the others arrive at least every 2 s."""
+    return "" if seconds is None or seconds < _OLD_S else f", {duration(seconds)} ago"
 
 
 def _flight_controller(facts: Json) -> str:

@@ -108,8 +108,11 @@ class DaemonApi:
             "state": link.state,
             "speed_baud": link.speed_baud,
             "armed": report.status.armed,
+            "status_age_s": report.status.age_s,
             "battery_v": report.battery.voltage_v,
+            "battery_age_s": report.battery.age_s,
             "satellites": report.gps.satellites,
+            "gps_age_s": report.gps.age_s,
             "ground_stations": list(link.ground_stations),
             "refused": [
                 *(f"{count} x {why} ({link})" for (link, why), count in counters.refused.items()),

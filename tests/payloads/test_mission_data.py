@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from payloads.mission_data import mission_items, to_json
+from bridge.model.finding import Finding, News
+from payloads.mission_data import correction_texts, mission_findings, mission_items, to_json
 from protocols.mission_item import MissionItem
 
 _NUMBER = st.floats(width=32, allow_infinity=False)
@@ -39,3 +40,24 @@ def test_infinity_is_json_too() -> None:
 def test_a_bad_item_is_refused_by_the_name_of_its_field(entry: Any, named: str) -> None:
     with pytest.raises(ValueError, match=named):
         mission_items([entry])
+
+
+_JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=9),
+    lambda each: st.lists(each, max_size=3) | st.dictionaries(st.text(max_size=5), each, max_size=3),
+)
+_FIELDS = ("seq", "field", "was", "becomes", "why", "command", "news", "from_a_newer_release")
+
+
+@given(data=_JSON | st.lists(st.dictionaries(st.sampled_from(_FIELDS), _JSON | st.sampled_from(["p1", "command"]))))
+def test_findings_of_any_release_can_be_printed(data: object) -> None:
+    """They come from other vehicles, too."""
+    assert all(text.isprintable() for text in correction_texts(mission_findings(data)))
+
+
+def test_findings_survive_json() -> None:
+    found = [
+        Finding(3, "p1", 3.5, 3, "whole numbers only", 16, News.WARNING),
+        Finding(None, "list", 9, "rejected", "no"),
+    ]
+    assert mission_findings(json.loads(to_json([asdict(each) for each in found]))) == found
