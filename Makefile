@@ -83,7 +83,7 @@ pictures: $(VENV)/.test-ready
 
 real-board: $(VENV)/.test-ready
 	@test -n '$(IMAGE)' || { echo 'Say which image: make real-board IMAGE=path/to/X.elf' >&2; exit 1; }
-	NAZE_IMAGE='$(IMAGE)' NAZE_CUTS=$(or $(CUTS),200) NAZE_FLY='$(FLY)' $(BIN)/python -m pytest tests/real_board --timeout 0 $(ARGS)
+	NAZE_IMAGE='$(IMAGE)' NAZE_CUTS=$(or $(CUTS),200) NAZE_FLY='$(FLY)' NAZE_MISSIONS='$(MISSIONS)' $(BIN)/python -m pytest tests/real_board --timeout 0 $(ARGS)
 
 soak: $(VENV)/.test-ready
 	STORE_KILLS=200 STORE_DAMAGES=300 $(BIN)/python -m pytest --timeout 0 \

@@ -3,7 +3,7 @@
 
 from collections.abc import Callable
 
-from protocols.msp.frame import MspParser, request
+from protocols.msp.frame import Direction, MspParser, request
 from simulator.board.simulated_board import SimulatedBoard
 
 _STEP_S = 0.02
@@ -37,14 +37,18 @@ class Console:
         self.board.receive(data, self.now)
 
     def ask(self, command: int, payload: bytes = b"", timeout_s: float = 1.0) -> bytes | None:
-        """The reply's payload to an MSP request; None without one."""
+        """The reply's payload to an MSP request; None without one, or if it is refused."""
+        return self.exchange(request(command, payload), command, timeout_s)
+
+    def exchange(self, frame: bytes, command: int, timeout_s: float = 1.0) -> bytes | None:
+        """The same for a request that is already encoded."""
         parser = MspParser()
-        self.send(request(command, payload))
+        self.send(frame)
         end = self.now + timeout_s
         while self.now < end:
-            for frame in parser.feed(self.run(_STEP_S)):
-                if frame.command == command:
-                    return frame.payload
+            for reply in parser.feed(self.run(_STEP_S)):
+                if reply.command == command:
+                    return reply.payload if reply.direction is Direction.REPLY else None
         return None
 
     def wait_for_boot(self, timeout_s: float) -> None:

@@ -14,6 +14,7 @@ from simulator.emulated_naze.image import Image
 from simulator.emulated_naze.sky_sensors import SkyBarometer, SkyCompass, SkyImu
 from simulator.emulated_naze.switches import EmulatedFaults
 from simulator.sky.body import Airframe
+from simulator.sky.earth import Place
 from simulator.sky.gps_module import GpsModule
 from simulator.sky.sky import Sky, Weather
 from simulator.sky.vectors import heading_of, to_body
@@ -42,7 +43,7 @@ class FlyingSwitches(EmulatedFaults):
 
 
 class FlyingNaze(EmulatedNaze):
-    """`heading`: of the nose at the launch place, degrees."""
+    """`heading`: of the nose at the launch place `place`, degrees."""
 
     faults: FlyingSwitches
 
@@ -54,13 +55,15 @@ class FlyingNaze(EmulatedNaze):
         weather: Weather | None = None,
         frame: Airframe | None = None,
         heading: float = 0.0,
+        place: Place | None = None,
         longest_step_s: float = inf,
     ) -> None:
         self._weather = weather or Weather()
-        self.sky = Sky(self._weather, lambda: self._chip.motors_us(), frame, heading)
+        self.sky = Sky(self._weather, lambda: self._chip.motors_us(), frame, heading, place)
         self.gps = GpsModule(self.sky.place, self._weather.seed)
         super().__init__(image, FlyingSwitches(), flash, seed=self._weather.seed, longest_step_s=longest_step_s)
         self._boot_s = FLYING_BOOT_S
+        self._requested = self._is_pending = False
 
     def truth(self, now: float) -> Craft | None:
         """Where it truly is; without the firmware's `boxes` and `home`."""
@@ -120,6 +123,13 @@ class FlyingNaze(EmulatedNaze):
             chip.receive(_GPS_USART, sent)
 
     def _move_sticks(self) -> None:
+        """A request to arm moves the sticks once: a craft that has landed by itself must not be armed again."""
+        request = self.faults.armed
+        if request != self._requested:
+            self._requested, self._is_pending = request, True
+        self._is_pending = self._is_pending and request != self.armed
+        self.faults.armed = request if self._is_pending else self.armed
         super()._move_sticks()
+        self.faults.armed = request
         if not self.faults.radio:
             self._chip.set_receiver([0] * 8)

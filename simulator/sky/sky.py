@@ -49,10 +49,11 @@ class Sky:
         pulses: Callable[[], tuple[int, ...]],
         frame: Airframe | None = None,
         heading: float = 0.0,
+        place: Place | None = None,
     ) -> None:
         self.body = Body(frame, heading)
         self.wind = Wind(weather.wind, weather.wind_from, weather.seed, gusts=weather.gusts)
-        self.place = Place()
+        self.place = place or Place()
         self.battery = Battery()
         #: Set to turn the craft about slowly in a pilot's hands, to calibrate its compass.
         self.is_held = False

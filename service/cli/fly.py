@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`naze-bridge fly`: a mission file flown by a real firmware image in the simulated sky, and judged."""
+
+from dataclasses import asdict
+from enum import IntEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
+
+import click
+from rich.table import Table
+
+from bridge.controllers.table import PROFILES
+from bridge.fc.profile import RuleSettings
+from bridge.missions.list_check import check_list
+from bridge.model.verdict import Result
+from protocols.mission_file import MissionFileError
+from protocols.msp.mission import WpRecord
+from service.settings import SettingsError, takeoff_limit_m
+from simulator.commands.image import read_image
+from simulator.emulated_naze.image import Image
+from simulator.sky.earth import Place
+from simulator.sky.sky import Weather
+from terminal.mission_source import load_mission, shown_path
+from terminal.options import PATH
+from terminal.printing import print_json, print_table
+from terminal.sentences import complain, say
+
+if TYPE_CHECKING:
+    from simulator.flights.judgement import ItemResult
+    from simulator.flights.mission_run import MissionRun
+
+#: The only firmware that flies such a list.
+_KIND = "harakiri"
+_SETTINGS = ("set mission_fly=1",)
+
+
+class FlyStatus(IntEnum):
+    """The exit status."""
+
+    FLOWN = 0
+    NOT_FLOWN = 1
+    UNUSABLE = 2
+
+
+@click.command()
+@click.argument("file", type=PATH)
+@click.option(
+    "--image", required=True, type=click.Path(exists=True, dir_okay=False, path_type=Path), help="The firmware."
+)
+@click.option(
+    "--flash",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="The board's flash (sim --flash) with your settings, which is not changed. Default: a prepared board.",
+)
+@click.option("--wind", type=click.FloatRange(0, 20), default=0.0, help="Wind with gusts, m/s.")
+@click.option("--wind-from", type=click.FloatRange(0, 360), default=270.0, show_default=True, help="Its direction.")
+@click.option("--seed", type=int, default=0, help="Seed of gusts and noise.")
+@click.option("--svg", type=PATH, help="Draw the track into this file.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
+@click.pass_context
+def fly(
+    ctx: click.Context,
+    file: Path,
+    image: Path,
+    flash: Path | None,
+    wind: float,
+    wind_from: float,
+    seed: int,
+    svg: Path | None,
+    as_json: bool,
+) -> None:
+    """Fly a mission file in a simulated sky, with your own firmware.
+
+    Needs a TestCode3 with mission flight (docs/howto/try-a-mission.md). Nothing is sent to a real craft.
+
+    Exit code 0: the list was flown as it says, 1: it was not, 2: the file or the image cannot be used.
+    """
+    records = _records(file)
+    firmware = read_image(image)
+    weather = Weather(wind=wind, wind_from=wind_from, seed=seed)
+    place = Place(lat=records[0].lat_e7 / 1e7, lon=records[0].lon_e7 / 1e7)
+    try:
+        run, results = _fly(firmware, image.name, flash, records, weather, place, quiet=as_json)
+    except _unfit() as error:
+        _refuse(str(error))
+    from simulator.flights.judgement import is_flown
+
+    if svg:
+        from simulator.flights.track_picture import track_svg
+
+        title = f"{shown_path(file)}, wind {wind:g} m/s, seed {seed}"
+        svg.write_text(track_svg(run.track, records, place, title))
+    flown = is_flown(results)
+    if as_json:
+        items = [asdict(result) for result in results]
+        ending = run.reason.name.lower()
+        print_json(
+            {"file": shown_path(file), "flown": flown, "reason": ending, "seconds": _seconds(run), "items": items}
+        )
+    else:
+        print_table(_table(results))
+        say(f"{'Flown' if flown else 'Not flown'} in {_seconds(run):.0f} s.")
+    ctx.exit(FlyStatus.FLOWN if flown else FlyStatus.NOT_FLOWN)
+
+
+def _refuse(text: str) -> NoReturn:
+    complain(text)
+    raise SystemExit(FlyStatus.UNUSABLE)
+
+
+def _unfit() -> tuple[type[Exception], ...]:
+    from simulator.emulated_naze.console import ConsoleError
+    from simulator.flights.mission_upload import UnfitImageError
+    from simulator.flights.pilot import PilotError
+
+    return ConsoleError, UnfitImageError, PilotError
+
+
+def _records(file: Path) -> tuple[WpRecord, ...]:
+    """The list as the board would store it."""
+    try:
+        settings = RuleSettings(takeoff_limit_m())
+        rules = next(profile.rules for profile in PROFILES if profile.check_kind == _KIND and profile.rules)
+        verdict = check_list(load_mission(file), rules(settings), None)
+    except (MissionFileError, SettingsError) as error:
+        _refuse(str(error))
+    if verdict.result is not Result.ACCEPTED:
+        _refuse(
+            f"{shown_path(file)} is no mission to fly: {verdict.findings[-1].text() if verdict.findings else 'empty'}"
+        )
+    return verdict.records
+
+
+def _fly(
+    firmware: Image,
+    name: str,
+    flash_file: Path | None,
+    records: tuple[WpRecord, ...],
+    weather: Weather,
+    place: Place,
+    *,
+    quiet: bool,
+) -> "tuple[MissionRun, list[ItemResult]]":
+    from simulator.emulated_naze.flying_naze import FlyingNaze
+    from simulator.emulated_naze.prepared_flash import prepared_flash
+    from simulator.flights.judgement import judge
+    from simulator.flights.mission_run import fly_mission
+    from simulator.flights.mission_upload import require_mission_flight, upload
+    from simulator.flights.pilot import Pilot
+
+    def tell(text: str) -> None:
+        if not quiet:
+            say(text)
+
+    contents = bytearray(flash_file.read_bytes() if flash_file else prepared_flash(firmware, tell, _SETTINGS))
+    naze = FlyingNaze(firmware, memoryview(contents), weather=weather, place=place)
+    pilot = Pilot(naze)
+    tell(f"{name} boots.")
+    pilot.power_on()
+    require_mission_flight(pilot.console, name)
+    upload(pilot.console, records)
+    tell(f"{len(records) - 1} commands are on the board. It flies, in wind of {weather.wind:g} m/s.")
+    run = fly_mission(pilot, records)
+    return run, judge(run, place)
+
+
+def _seconds(run: "MissionRun") -> float:
+    return round(run.track.last.at_s - run.begun_s, 1)
+
+
+def _table(results: "list[ItemResult]") -> Table:
+    table = Table(box=None, pad_edge=False)
+    for title in ("WP", "command", "reached s", "near m", "high m", "held s", "turned", "problems"):
+        table.add_column(title, justify="left" if title in ("command", "problems") else "right")
+    for result in results:
+        high = "" if result.height_m is None else f"{result.height_m:.1f}"
+        planned = "" if result.planned_height_m is None else f" of {result.planned_height_m:.0f}"
+        table.add_row(
+            str(result.number),
+            result.command,
+            _number(result.reached_s, 0),
+            _number(result.distance_m, 1),
+            f"{high}{planned}" if high else "",
+            _number(result.held_s, 1),
+            _number(result.turned_deg, 0),
+            "; ".join(result.problems) or "-",
+        )
+    return table
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "" if value is None else f"{value:.{digits}f}"
