@@ -37,7 +37,7 @@ class MissionRun:
     begun_s: float
     track: Track
     reports: list[Report] = field(default_factory=list)
-    #: False if the flight was still going on when the patience ended.
+    #: False if the flight was still going on at the deadline.
     has_ended: bool = False
     has_landed: bool = False
 
