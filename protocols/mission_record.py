@@ -11,7 +11,7 @@ class MissionRecord(Protocol):
     """One record as a flight controller stores it; its number is its position in the list."""
 
     def pack(self) -> bytes:
-        """Return the bytes; struct.error if a field does not fit, which is a bug in the caller."""
+        """The bytes; struct.error if a field does not fit, which is a bug in the caller."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,5 +30,5 @@ def pack_records(records: Iterable[MissionRecord]) -> bytes:
 
 
 def identify(records: Sequence[MissionRecord]) -> ListIdentity:
-    """Return the identity of a list; a Harakiri with the mission extension computes the same."""
+    """The identity of a list; a Harakiri with the mission extension computes the same."""
     return ListIdentity(len(records), zlib.crc32(pack_records(records)))

@@ -38,7 +38,7 @@ class TlogRecord:
 
 
 def tlog_record(frame: bytes, at_us: int) -> bytes:
-    """Return the record of a complete, valid frame of the dialect; empty for one that must not be logged."""
+    """The record of a complete, valid frame of the dialect; empty for one that must not be logged."""
     # MAVLink 1 has neither signatures nor SETUP_SIGNING.
     if frame[0] == MAGIC_V2:
         if frame[_MSGID] == _SETUP_SIGNING:
@@ -69,7 +69,7 @@ def read_tlog(data: bytes, msgids: Container[int] | None = None) -> Iterator[Tlo
 
 
 def heartbeat_type(frame: bytes) -> int | None:
-    """Return the MAV_TYPE in a HEARTBEAT frame; None for other messages."""
+    """The MAV_TYPE in a HEARTBEAT frame; None for other messages."""
     found = MavlinkFrame(frame)
     if found.msgid != messages.MAVLINK_MSG_ID_HEARTBEAT:
         return None
@@ -78,7 +78,7 @@ def heartbeat_type(frame: bytes) -> int | None:
 
 
 def first_stamp_us(records: bytes) -> int:
-    """Return the time of the first record, in microseconds since the Unix epoch."""
+    """The time of the first record, in microseconds since the Unix epoch."""
     return int.from_bytes(records[:STAMP_SIZE], "big")
 
 

@@ -258,7 +258,7 @@ class Ground:
         self.flash.not_written(self._heard.get(station.peer))
 
     def wrote_at(self, station: Station) -> float:
-        """When the station's host last wrote: the host that has waited longest writes first."""
+        """The time of the last write by the station's host: the one that has waited longest writes first."""
         sender = self._heard.get(station.peer)
         return inf if sender is None or sender.host is None else sender.host.wrote_at
 

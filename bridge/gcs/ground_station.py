@@ -164,7 +164,7 @@ class GroundStation:
 
     @property
     def has_own_budget(self) -> bool:
-        """True if strangers cannot use up its limits."""
+        """True if strangers cannot use up the station's limits."""
         return self._own_budget is not None or (self.is_heard and self.host is not None and self.host.is_own)
 
     def allows(self, cost: Cost, now: float | None = None) -> bool:
@@ -176,18 +176,18 @@ class GroundStation:
 
     @property
     def is_steady(self) -> bool:
-        """True if it has been heard for a while."""
+        """True if the station has been heard for a while."""
         return self._beats >= _STEADY_BEATS
 
     def joins(self) -> None:
-        """It has a place on its link, or has gained other rights there."""
+        """The station has taken a place on its link, or gained other rights there."""
         if self.standing is Standing.PROVEN:
             self._own_budget = Budget()
         elif self.host is not None:
             self.host.join(may_sit=self.standing is Standing.OPEN)
 
     def leaves(self) -> None:
-        """It loses its place on its link, or has gained other rights."""
+        """The station loses its place on its link, or is about to gain other rights."""
         if self._own_budget is None and self.host is not None:
             self.host.leave()
 

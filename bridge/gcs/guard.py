@@ -30,7 +30,7 @@ class Guard:
         self.refused[station.peer.link, refused.why] += 1
 
     def report(self, refused: FrameRefusal, station: GroundStation, frame: MavlinkFrame) -> bool:
-        """Log a refusal of a connected station, if it is the first for this reason; True if so."""
+        """Log a connected station's refusal once for each reason; True if it is the first."""
         if refused.is_routine or refused.why in station.reported:
             return False
         station.reported.add(refused.why)

@@ -57,7 +57,7 @@ class Routes:
         return frame.sender in self._aboard
 
     def from_station(self, station: GroundStation, frame: MavlinkFrame, *, to_stations: bool) -> bool:
-        """Send a frame that the guard accepted on to other stations; True if it is for the autopilot, too.
+        """Send an accepted frame on to other stations; True if it is for the autopilot, too.
 
         `to_stations` False: it reaches no other station.
         """

@@ -37,7 +37,7 @@ class Station(NamedTuple):
 
     @property
     def identity(self) -> str:
-        """The same after a restart of either side, and after a TCP reconnection, which changes the port."""
+        """A name that survives a restart of either side, and a TCP reconnection, which changes the port."""
         return f"{self.peer.host} sysid {self.sysid} compid {self.compid}"
 
     def __str__(self) -> str:

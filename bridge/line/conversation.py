@@ -4,6 +4,11 @@
 A conversation is a generator. It yields one effect at a time and is sent the effect's answer;
 `bridge.line.runner.Runner` carries the effects out. At the `yield`, LinkLost is raised when the line goes down, and its
 subclasses Stopped when the bridge is stopping and OutOfTime when the conversation's time limit has passed.
+
+>>> def is_disarmed(arm_mask: int) -> Conversation[bool]:
+...     status = yield from ask_status()
+...     return status is not None and not status.box_flags & arm_mask
+>>> runner.start(is_disarmed(1), on_done, now)
 """
 
 from collections.abc import Generator, Sequence

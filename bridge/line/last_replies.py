@@ -34,6 +34,6 @@ class LastReplies:
         return reply if now <= heard_at + max_age_s else None
 
     def forget(self) -> None:
-        """The board was changed."""
+        """Forget all replies, because the board was changed."""
         self._replies.clear()
         self._confirmed.clear()

@@ -17,7 +17,7 @@ class _Event:
 
 
 class BridgeEvent(_Event):
-    """Its log line has its name, its level, and its fields as facts, with the unit in the key.
+    """An event. Its log line has its name, its level, and its fields as facts, with the unit in the key.
 
     >>> FcLost(why="no answer for 3 s", speed_baud=115200, incident="link-3").facts()
     {'why': 'no answer for 3 s', 'speed_baud': 115200, 'incident': 'link-3'}
@@ -71,7 +71,7 @@ class FcFound(BridgeEvent):
 
 
 class FcInCommandLine(BridgeEvent):
-    """It cannot be used until the pilot types `exit` there."""
+    """The flight controller is in its command line, and unusable until the pilot types `exit` there."""
 
     name_in_log = "fc.in_command_line"
     level: Level = "warning"
@@ -80,7 +80,7 @@ class FcInCommandLine(BridgeEvent):
 
 
 class FcLost(BridgeEvent):
-    """It no longer replies, or speaks another protocol."""
+    """The flight controller no longer replies, or speaks another protocol."""
 
     name_in_log = "fc.lost"
     level: Level = "warning"
@@ -90,13 +90,13 @@ class FcLost(BridgeEvent):
 
 
 class Armed(BridgeEvent):
-    """The flight controller reports it."""
+    """The flight controller reports that it is armed."""
 
     name_in_log = "vehicle.armed"
 
 
 class Disarmed(BridgeEvent):
-    """The flight controller reports it."""
+    """The flight controller reports that it is disarmed."""
 
     name_in_log = "vehicle.disarmed"
 
@@ -116,7 +116,7 @@ class GcsSilent(BridgeEvent):
 
 
 class GcsRefused(BridgeEvent):
-    """A peer may not do this; the first time for this reason."""
+    """A ground station's frame was refused; reported once for each reason."""
 
     name_in_log = "gcs.refused"
     level: Level = "warning"
@@ -134,7 +134,7 @@ class GcsText(BridgeEvent):
 
 
 class ShareRefused(BridgeEvent):
-    """A program's change was refused. At debug level if it repeats, as the next."""
+    """A program's change was refused. At debug level if it repeats."""
 
     name_in_log = "share.refused"
     level: Level = "warning"
@@ -144,7 +144,7 @@ class ShareRefused(BridgeEvent):
 
 
 class ShareUnanswered(BridgeEvent):
-    """A program's request got no answer in time."""
+    """A program's request got no answer in time. At debug level if it repeats."""
 
     name_in_log = "share.unanswered"
     level: Level = "warning"
@@ -203,7 +203,7 @@ class PushStarted(BridgeEvent):
 
 
 class PushEnded(BridgeEvent):
-    """That list was written, or was not; `mission` is its number in the store."""
+    """The end of such a push, with or without success; `mission` is the list's number in the store."""
 
     name_in_log = "mission.push_ended"
     source: str

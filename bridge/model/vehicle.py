@@ -186,7 +186,7 @@ class Readiness(Reading):
 
 @dataclass(slots=True)
 class Airspeed(Reading):
-    """From flight controllers with a pitot tube."""
+    """The airspeed, from flight controllers with a pitot tube."""
 
     airspeed_m_s: float
 
@@ -306,7 +306,7 @@ class Vehicle:
 
     @property
     def flight_mode(self) -> FlightMode | None:
-        """As last heard, however long ago; None for another autopilot's."""
+        """The flight mode as last heard, however long ago; None for another autopilot's."""
         last = self.last(Mode)
         return last.mode if last is not None and isinstance(last.mode, FlightMode) else None
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which requests of other programs may reach the flight controller."""
+"""The requests of other programs that may reach the flight controller."""
 
 from bridge.fc.profile import FlightController
 from bridge.line.msp_link import MspLink

@@ -18,6 +18,6 @@ class CommandResult(IntEnum):
 
 
 def command_name(command: int) -> str:
-    """Return a MAV_CMD's name as Mission Planner lists it, or its number."""
+    """A MAV_CMD's name as Mission Planner lists it, or its number."""
     entry = messages.enums["MAV_CMD"].get(command)
     return str(entry.name).removeprefix("MAV_CMD_").removeprefix("NAV_") if entry else str(command)

@@ -144,6 +144,9 @@ def whole_frame(raw: bytes) -> MavlinkFrame | None:
 class MavlinkSplitter:
     """Finds frames in a byte stream. Never raises: other bytes are counted and skipped.
 
+    >>> for frame in splitter.feed(port.read(512)):
+    ...     print(frame.sender, frame.msgid, frame.target)
+
     After a CRC failure the search resumes ONE byte later, so a frame behind a false or truncated header is not lost.
     A header is rejected at once if its message is unknown (the CRC could not be checked), if a MAVLink 1 size does
     not fit the message, or if it has an unknown incompatibility flag, as the protocol requires.

@@ -9,7 +9,7 @@ from protocols.mission_item import degrees_to_e7
 
 
 def file_degrees_to_e7(degrees: float, field: str, name: str, where: str) -> int | None:
-    """Return degrees * 1e7, None for NaN (not given); MissionFileError if out of range.
+    """Degrees * 1e7, None for NaN (not given); MissionFileError if out of range.
 
     The rules treat an infinite coordinate as missing, because a ground station may send it; in a file it is damage.
     """

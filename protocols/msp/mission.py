@@ -31,7 +31,7 @@ class MissionCommand(IntEnum):
 
 
 class ReplyStatus(IntEnum):
-    """First byte of every reply."""
+    """The result of a request: the first byte of every reply."""
 
     OK = 0
     SAME = 1

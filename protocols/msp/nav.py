@@ -127,7 +127,7 @@ class NavStatus:
 
 
 def encode_set_wp(number: int, record: NavRecord) -> bytes:
-    """Return the request that stores record `number`; UnsafeRecord if it must not reach a flight controller.
+    """The request that stores record `number`; UnsafeRecord if it must not reach a flight controller.
 
     INAV crashes on a JUMP whose target is below 1, on the ground and in the air.
     """

@@ -5,7 +5,7 @@ from enum import StrEnum
 
 
 class Effect(StrEnum):
-    """The first four are of MSP and MAVLink, the others of MAVLink only.
+    """An effect. The first four apply to MSP and MAVLink, the others to MAVLink only.
 
     A mission's upload is a CHANGE; its start is a MOVE.
     """
