@@ -48,8 +48,8 @@ void FlightDefaults(void)
     set_default(&cfg.mission_first, 10, 250, 200);
     set_default(&cfg.mission_height, 5, 250, 100);
     set_default(&cfg.mission_climb, 20, 250, 100);
-    set_default(&cfg.mission_nav_p, 5, 200, 60);
-    set_default(&cfg.mission_nav_i, 1, 200, 40);
+    set_default(&cfg.mission_nav_p, 5, 200, 70);
+    set_default(&cfg.mission_nav_i, 1, 200, 60);
 }
 
 void FlightFailsafe(void)
