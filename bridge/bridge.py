@@ -11,7 +11,7 @@ An autopilot that speaks MAVLink itself is not represented but passed through, b
     FcSession <-> Routes <-> Ground
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import count
 from math import inf
@@ -57,6 +57,8 @@ from bridge.vehicle.link_announcer import LinkAnnouncer
 from bridge.vehicle.message_router import MessageRouter
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.parameters import Parameters
+from bridge.vehicle.settings_backups import BackupTaker, OnBackup
+from bridge.vehicle.settings_restore import OnPlan, OnRestored, SettingsRestores
 from bridge.vehicle.settings_seal import SettingsSeal
 from bridge.vehicle.vehicle_report import VehicleReporter
 from protocols.mavlink.frame import MavlinkFrame
@@ -101,6 +103,7 @@ class Bridge:
         now: float,
         on_frames: FrameListener | None = None,
         on_ending: EndingListener = lambda _mission, _delivery: None,
+        on_backup: OnBackup = lambda _backup: None,
     ) -> None:
         self._config, owner = config, config.settings
         self._emit = emit
@@ -154,6 +157,11 @@ class Bridge:
         self._board_settings.on_change = self._settings.changed_here
         self._settings.on_found_change = self._board_settings.may_have_changed
         self._sharing.on_change = self._program_changed_settings
+        self._backups = BackupTaker(on_backup)
+        self._settings.on_identified = self._backups.identified
+        self._board_settings.on_read = lambda table: self._backups.read(table, self._board_settings.unsaved)
+        self._board_settings.on_saved.append(lambda _table, _now: self._backups.saved())
+        self._restores = SettingsRestores(self._board_settings, lambda: self.kind)
         self._reporter = VehicleReporter(session, missions, ground, self._settings, own.also_want, own.progress)
         self._uploads = MissionUploads(missions, ground, emit, incidents, own.let_read)
         self._watch = MissionWatch(missions, ground, emit)
@@ -282,6 +290,17 @@ class Bridge:
     # The board's settings.
 
     @property
+    def kind(self) -> str | None:
+        """The board's firmware and its version; None without a board."""
+        controller = self._session.state.controller
+        return None if controller is None else controller.kind
+
+    @property
+    def are_settings_checked(self) -> bool:
+        """True if `board_settings` was read from this board since anything else may have changed it."""
+        return self._board_settings.is_checked
+
+    @property
     def board_settings(self) -> SettingTable | None:
         """As last read, also of a board that is armed or lost since; None: never."""
         return self._board_settings.table
@@ -310,6 +329,26 @@ class Bridge:
         """Write the settings to the board's flash."""
         self._has_line_changed = True
         self._board_settings.save(on_done, now)
+
+    def plan_restore(
+        self, wanted: Mapping[str, Value], source: str, on_done: OnPlan, now: float, *, is_checked: bool = True
+    ) -> None:
+        """What a restore would change; see SettingsRestores.plan."""
+        self._has_line_changed = True
+        self._restores.plan(wanted, source, on_done, now, is_checked=is_checked)
+
+    def restore_settings(
+        self,
+        wanted: Mapping[str, Value],
+        source: str,
+        client: str,
+        progress: Callable[[int], None],
+        on_done: OnRestored,
+        now: float,
+    ) -> None:
+        """Set, save and verify settings; see SettingsRestores.restore."""
+        self._has_line_changed = True
+        self._restores.restore(wanted, source, client, progress, on_done, now)
 
     # For metrics, the status and other followers.
 
@@ -395,6 +434,7 @@ class Bridge:
         self._incoming.routes = Routes(self._ground) if self.is_passing_through else None
         # A passed-through autopilot represents itself.
         self._own_vehicle.due = inf if self.is_passing_through else min(self._own_vehicle.due, now)
+        self._backups.found()
         self._settings.found(controller, now)
         self._board_settings.found(controller, now)
         if controller is None:

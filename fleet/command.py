@@ -19,13 +19,14 @@ from fleet.options import (
 from fleet.pull import Held, pull
 from fleet.push_command import push_mission, verify_mission
 from fleet.roll_call import alive, chosen, roll_call
+from fleet.settings_command import fleet_settings
 from fleet.tables import complaints, fleet_table
 from fleet.watch import watching
 from fleet.watch_screen import print_changes, show_screen
 from protocols.mission_file import MissionFileError, write_qgc_wpl
 from storage.os_error import reason
 from terminal.command_group import CommandGroup
-from terminal.mission_source import save_mission, shown_path
+from terminal.files import shown_path, write_file
 from terminal.options import PATH
 from terminal.printing import print_json, print_table
 from terminal.sentences import complain, fail
@@ -38,7 +39,7 @@ def fleet() -> None:
     """Monitor and manage many vehicles at once, over Eclipse zenoh (docs/fleet.md)."""
 
 
-for _command in (push_mission, verify_mission, enroll, expel):
+for _command in (push_mission, verify_mission, fleet_settings, enroll, expel):
     fleet.add_command(_command)
 
 
@@ -123,7 +124,8 @@ def _save(held: Held, path: Path, *, is_file: bool) -> None:
     try:
         if not is_file:
             path.mkdir(parents=True, exist_ok=True)
-        save_mission(path if is_file else path / f"{held.vehicle}.waypoints", write_qgc_wpl(held.items))
+        target = path if is_file else path / f"{held.vehicle}.waypoints"
+        write_file(target, write_qgc_wpl(held.items), MissionFileError)
     except MissionFileError as error:
         fail(str(error))
     except OSError as error:

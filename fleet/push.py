@@ -14,7 +14,7 @@ from fleet.payload import decode, part, text, whole
 from fleet.roll_call import replies_of
 from fleet.session import NO_COMMANDS, ask_each
 from fleet.vehicle import BridgeId
-from payloads.keys import STATE, UPLOAD, full
+from payloads.keys import STATE, UPLOAD, ZenohKey, full
 from payloads.mission_data import ACCEPTED, Json
 
 #: 146 records take 2 s at 115200 baud and half a minute at 9600; a bad line may double that.
@@ -22,7 +22,7 @@ _PUSH_TIMEOUT_S = 120.0
 _STATE_TIMEOUT_S = 2.0
 _LOOK = "`naze-bridge fleet list` shows what it holds"
 _LOST = f"it or the router disconnected before the result was known; {_LOOK} when it is back"
-_TWO = "several bridges use this name, and the mission is for one: give each its own name (zenoh.vehicle)"
+_TWO = "several bridges use this name, and the file is for one: give each its own name (zenoh.vehicle)"
 _TOO_LATE = f"no result after {_PUSH_TIMEOUT_S:.0f} s; {_LOOK}"
 
 
@@ -113,19 +113,20 @@ def push(
     prefix: str,
     fleet: FleetPush,
     bridges: Collection[BridgeId],
-    mission: bytes,
+    file: bytes,
     show: Callable[[FleetPush], None],
     *,
     staged: bool = False,
+    key: ZenohKey = UPLOAD,
 ) -> None:
-    """Send the mission to all and wait until each is done; `show` is called after every change.
+    """Send the file to all and wait until each is done; `show` is called after every change.
 
     `staged`: a tenth of the vehicles first, then the others; after a failure no other one is started.
     """
     show(fleet)
     for stage in _stages(fleet.waiting, staged=staged):
         begun = fleet.begin(stage, staged=staged)
-        for name, reply in ask_each(session, prefix, begun, UPLOAD.suffix, _PUSH_TIMEOUT_S, mission):
+        for name, reply in ask_each(session, prefix, begun, key.suffix, _PUSH_TIMEOUT_S, file):
             if reply is None:
                 if not fleet.vehicles[name].is_done:
                     # Neither its token nor a storage's reply proves that it is alive.

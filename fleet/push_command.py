@@ -32,7 +32,7 @@ from fleet.tables import (
 from fleet.trial import Trial, try_mission
 from fleet.vehicle import BridgeId
 from protocols.mission_file import MissionFileError, read_mission_file
-from terminal.mission_source import mission_bytes, shown_path
+from terminal.files import read_file, shown_path
 from terminal.options import PATH
 from terminal.printing import print_json, print_table
 from terminal.sentences import INTERRUPTED, complain
@@ -67,7 +67,7 @@ def push_mission(
     """
     mission, item_count = _read(file, names, to_all)
     with fleet_session(where) as (session, prefix):
-        bridges, meant, unknown = _meant(session, prefix, names, conditions)
+        bridges, meant, unknown = vehicles_meant(session, prefix, names, conditions)
         if dry_run:
             _show_trials(try_mission(session, prefix, meant, bridges, mission), unknown, as_json)
             return
@@ -85,7 +85,7 @@ def push_mission(
     if is_stopped:
         complain(_GOES_ON)
         raise SystemExit(INTERRUPTED)
-    _end(unknown, is_bad=bool(delivery.failed))
+    end(unknown, is_bad=bool(delivery.failed))
 
 
 @click.command("verify", short_help="Compare the missions on vehicles with a file.")
@@ -104,7 +104,7 @@ def verify_mission(
     """
     mission, _ = _read(file, names, to_all)
     with fleet_session(where) as (session, prefix):
-        bridges, meant, unknown = _meant(session, prefix, names, conditions)
+        bridges, meant, unknown = vehicles_meant(session, prefix, names, conditions)
         trials = try_mission(session, prefix, meant, bridges, mission)
     held = sum(trial.is_held is True for trial in trials)
     if as_json:
@@ -112,21 +112,21 @@ def verify_mission(
     else:
         print_table(verify_table(trials))
         click.echo(f"{held} of {len(trials)} vehicles hold the mission")
-    _end(unknown, is_bad=held < len(trials))
+    end(unknown, is_bad=held < len(trials))
 
 
 def _read(file: Path, names: tuple[str, ...], to_all: bool) -> tuple[bytes, int]:
     if bool(names) == to_all:
         raise click.UsageError("specify the vehicles: --vehicle NAME, or --all")
     try:
-        mission = mission_bytes(file)
+        mission = read_file(file, MissionFileError)
         return mission, len(read_mission_file(mission, shown_path(file)))
     except MissionFileError as error:
         complain(error)
         raise SystemExit(_UNREADABLE) from error
 
 
-def _meant(
+def vehicles_meant(
     session: zenoh.Session, prefix: str, names: tuple[str, ...], conditions: list[Condition]
 ) -> tuple[set[BridgeId], list[str], str]:
     """All bridges, the names of the vehicles to serve, and the vehicles of which is unknown whether they match."""
@@ -150,10 +150,11 @@ def _show_trials(trials: list[Trial], unknown: str, as_json: bool) -> None:
     else:
         print_table(dry_run_table(trials))
         click.echo(f"{len(trials) - failed} of {len(trials)} vehicles would accept the mission; nothing was written")
-    _end(unknown, is_bad=failed > 0)
+    end(unknown, is_bad=failed > 0)
 
 
-def _end(unknown: str, *, is_bad: bool) -> None:
+def end(unknown: str, *, is_bad: bool) -> None:
+    """Exit code 1 if something failed, or if it is not known which vehicles were meant."""
     if unknown:
         complain(unknown)
     if is_bad or unknown:

@@ -126,8 +126,8 @@ def progress_bars(item_count: int) -> Iterator[Callable[[FleetPush], None]]:
         yield show
 
 
-def push_table(fleet: FleetPush) -> Table:
-    table = _table("Vehicle", "Push", "Details")
+def push_table(fleet: FleetPush, what: str = "Push") -> Table:
+    table = _table("Vehicle", what, "Details")
     for progress in fleet.vehicles.values():
         table.add_row(Text(progress.vehicle), _result(progress), Text(_words(progress)))
     return table

@@ -89,7 +89,10 @@ CHECK = _command("mission/check")
 CLEAR = _command("mission/clear")
 RESTORE = _command("mission/restore")
 STATUS = _command("status")
-COMMAND_KEYS = (UPLOAD, CHECK, CLEAR, RESTORE, STATUS)
+SETTINGS_LIST = _command("settings/list")
+SETTINGS_PLAN = _command("settings/plan")
+SETTINGS_RESTORE = _command("settings/restore")
+COMMAND_KEYS = (UPLOAD, CHECK, CLEAR, RESTORE, STATUS, SETTINGS_LIST, SETTINGS_PLAN, SETTINGS_RESTORE)
 
 KEYS = (
     *TELEMETRY.values(),

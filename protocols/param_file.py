@@ -87,7 +87,7 @@ def shown_value(value: float | str) -> str:
     """The shortest text of the value; of a fraction, the shortest that is equal in single precision."""
     if isinstance(value, str):
         return plain_text(value)
-    if value.is_integer() and abs(value) <= _MOST_WHOLE:
+    if _is_whole(value):
         return f"{value:.0f}"
     texts = (f"{value:.{digits}g}" for digits in range(1, _MOST_DIGITS))
     return next((text for text in texts if is_single(value, float(text))), f"{value:.{_MOST_DIGITS}g}")
@@ -97,8 +97,11 @@ def is_equal(value: float | str, other: float | str) -> bool:
     """True if both are the same number in single precision, which ground stations keep; whole numbers: exactly."""
     if isinstance(value, str) or isinstance(other, str) or value == other:
         return value == other
-    is_whole = value.is_integer() and other.is_integer() and abs(value) <= _MOST_WHOLE
-    return not is_whole and is_single(value, other)
+    return not (_is_whole(value) and _is_whole(other)) and is_single(value, other)
+
+
+def _is_whole(value: float) -> bool:
+    return abs(value) <= _MOST_WHOLE and value == int(value)
 
 
 def _setting(fields: list[str], line: str, name: str, where: str) -> tuple[str, float | str]:

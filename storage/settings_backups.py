@@ -101,6 +101,12 @@ class SettingsBackups:
             raise StoreError(f"the settings' backup {number} in {self._path} was damaged on the disk")
         return SettingsBackup(BackupLine(*line), json.loads(contents))
 
+    def newest(self) -> int | None:
+        """The number of the last backup of any board; None if there is none."""
+        with explained(f"cannot list the settings' backups in {self._path}"):
+            number: int | None = self._connection.execute("SELECT max(number) FROM settings_backups").fetchone()[0]
+        return number
+
     def before(self, backup: BackupLine) -> int | None:
         """The number of the same board's backup before this one; None if there is none."""
         with explained(f"cannot list the settings' backups in {self._path}"):

@@ -1,23 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Mission files on disk."""
 
-import errno
-import os
 from pathlib import Path
 
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
-from protocols.plain_text import plain_text
-from storage.bounded_file import read_bounded
-from storage.os_error import reason
+from terminal.files import read_file, shown_path
 from terminal.sentences import complain
-
-MAX_BYTES = 8 * 2**20  # 65,535 items, the most that MAVLink can count, are about 5 MB of text
-
-
-def shown_path(path: Path) -> str:
-    """The path in messages: any program may have made the file's name."""
-    return plain_text(str(path))
 
 
 def load_mission(path: Path) -> list[MissionItem]:
@@ -27,41 +16,4 @@ def load_mission(path: Path) -> list[MissionItem]:
     def note(text: str) -> None:
         complain(f"{name}, {text}")
 
-    return read_mission_file(mission_bytes(path), name, note)
-
-
-def mission_bytes(path: Path) -> bytes:
-    """MissionFileError if the file cannot be read."""
-    try:
-        return read_bounded(path, MAX_BYTES)
-    except (OSError, ValueError) as error:
-        raise _failed(path, error) from None
-
-
-def save_mission(path: Path, text: str) -> None:
-    """Write a file in one step: a full disk must not destroy the old one. MissionFileError if that fails.
-
-    A link stays a link, and only regular files are replaced: as root, renaming over a device would destroy it.
-    """
-    try:
-        target = Path(os.path.realpath(path))  # still a link if it leads to itself
-        if target.is_symlink() or (target.exists() and not target.is_file()):
-            name = shown_path(path)
-            raise MissionFileError(name, "", "it is not a regular file", "name a file for the mission")
-        draft = target.with_name(f".naze-bridge-{os.getpid()}")
-        with draft.open("x", encoding="utf-8") as file:  # "x": an existing file, above all a link, is not ours
-            try:
-                file.write(text)
-                file.flush()
-                draft.replace(target)
-            except OSError:
-                draft.unlink(missing_ok=True)
-                raise
-    except (OSError, ValueError) as error:
-        raise _failed(path, error) from None
-
-
-def _failed(path: Path, error: OSError | ValueError) -> MissionFileError:
-    is_full = isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
-    remedy = "delete other files there" if is_full else "check the path and its permissions"
-    return MissionFileError(shown_path(path), "", reason(error), remedy)
+    return read_mission_file(read_file(path, MissionFileError), name, note)

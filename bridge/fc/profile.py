@@ -131,6 +131,12 @@ class FlightController:
     firmware: Firmware = Firmware.UNKNOWN
 
     @property
+    def kind(self) -> str:
+        """The firmware and its version."""
+        version = "" if self.version is None else " " + ".".join(map(str, self.version))
+        return self.name + version
+
+    @property
     def arm_bit(self) -> int | None:
         """The place of the ARM box in the status flags."""
         return self.boxes.index(ARM_BOX) if ARM_BOX in self.boxes else None

@@ -26,7 +26,8 @@ class BoardSetting:
 
     name: as in the board's command line, or made from its MSP layout if it has no such name. minimum, maximum: of a
     number; of a text its lengths. choices: names of the values from `minimum` on. fixed: the reason why it cannot be
-    set over the air; empty if it can. handle: what its FcSettings needs to change it.
+    set over the air; empty if it can. raised: the same for a higher value. handle: what its FcSettings needs to change
+    it.
     """
 
     name: str
@@ -37,6 +38,7 @@ class BoardSetting:
     unit: str = ""
     choices: tuple[str, ...] = ()
     fixed: str = ""
+    raised: str = ""
     handle: Any = field(default=None, compare=False, repr=False)
 
     @property

@@ -99,7 +99,9 @@ class BoardSettings:
         self.read_so_far: int | None = None
         #: The settings that were changed here, and not saved since.
         self.unsaved: dict[str, Value] = {}
-        #: Called when the table has changed; after a save; after a change here that others must not take for foreign.
+        #: Called after each reading of the whole table; when the table has changed; after a save; after a change here
+        #: that others must not take for foreign.
+        self.on_read: Callable[[SettingTable], None] = lambda _table: None
         self.on_table: list[TableListener] = []
         self.on_saved: list[TableListener] = []
         self.on_change: Callable[[float], None] = lambda _now: None
@@ -137,6 +139,12 @@ class BoardSettings:
         if self._missions.occupied() is not None or self._is_transferring():
             return _OCCUPIED
         return None if armed is False else _UNREAD
+
+    @property
+    def is_checked(self) -> bool:
+        """True if the table was read from this board since anything else may have changed it."""
+        is_read = self._read_from is not None and self._read_from is self._fc_settings
+        return is_read and not self._is_doubtful and self._session.vehicle.armed is False
 
     # The door.
 
@@ -230,6 +238,7 @@ class BoardSettings:
                 self._is_doubtful, self._retry_s = False, _RETRY_S
                 self._read_from = fc_settings
                 self._take(result, at)
+                self.on_read(result)
                 self._answer_askers(at)
             else:
                 self._retry_s = min(2 * self._retry_s, _MOST_RETRY_S)

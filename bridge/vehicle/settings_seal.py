@@ -67,6 +67,8 @@ class SettingsSeal:
         self._is_reading = False
         #: The text for ground stations that connect later.
         self._told = ""
+        #: Called when it is known which board was found.
+        self.on_identified: Callable[[BoardId], None] = lambda _board: None
         #: Called when settings have changed without the bridge.
         self.on_found_change: Callable[[float], None] = lambda _now: None
         #: None until the settings of a board were read; those of a lost board stay.
@@ -131,6 +133,7 @@ class SettingsSeal:
         """Read the settings; returns the parts that changed without the bridge, None if it was interrupted."""
         if self._board is None:
             self._board = yield from self._identify(controller)
+            self.on_identified(self._board)
         is_ours, self._is_ours = self._is_ours, False
         former = None if is_ours else self._memory.recall(self._board)
         parts = {} if former is None else dict(former.parts)
@@ -157,10 +160,9 @@ class SettingsSeal:
         return changed
 
     def _identify(self, controller: FlightController) -> Conversation[BoardId]:
-        version = "" if controller.version is None else " " + ".".join(map(str, controller.version))
         uid = yield from self._ask(Msp.UID, controller.firmware, surely=True)
         is_one = len(uid or b"") == _UID_SIZE and len(set(uid or b"")) > 1
-        return BoardId(controller.name + version, uid.hex() if uid is not None and is_one else "")
+        return BoardId(controller.kind, uid.hex() if uid is not None and is_one else "")
 
     def _part(self, wanted: SettingsRequest, firmware: Firmware, before: bytes | None) -> Conversation[bytes | None]:
         """A part's settings; None if the board does not have it, or did not reply."""

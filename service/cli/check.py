@@ -20,7 +20,8 @@ from protocols.mission_file import MissionFileError
 from protocols.mission_item import MissionItem, MissionResult, degrees_to_e7, is_on_earth
 from protocols.mission_record import identify
 from service.settings import SettingsError, takeoff_limit_m
-from terminal.mission_source import load_mission, shown_path
+from terminal.files import shown_path
+from terminal.mission_source import load_mission
 from terminal.mission_table import mission_table
 from terminal.options import PATH
 from terminal.printing import print_json, print_table

@@ -19,9 +19,9 @@ from storage.store_error import StoreError
 from terminal.options import PATH
 from terminal.sentences import INTERRUPTED, complain, fail
 
-_GOES_ON = "the daemon continues with the mission, and the result follows; to exit now, press Ctrl-C again"
-_LEFT = "interrupted; the daemon continues with the mission: see `naze-bridge missions list`"
-_WRITES = ("push", "restore")
+_GOES_ON = "the daemon continues, and the result follows; to exit now, press Ctrl-C again"
+_LEFT = "interrupted; the daemon continues: see `naze-bridge missions list`, or `settings history`"
+_WRITES = ("push", "restore", "restore-settings")
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -96,7 +96,7 @@ def _first_interrupt(say: Callable[[], None]) -> Iterator[None]:
 
 
 def ask_store(state_dir: Path | None, request: Json) -> Json:
-    """Ask the daemon for stored missions; if none runs, read its store. A refusal ends the program with status 1."""
+    """Ask the daemon for what it has stored; if none runs, read its store. A refusal ends the program with status 1."""
     try:
         try:
             return ask_daemon(state_dir, request)
@@ -110,6 +110,7 @@ def ask_store(state_dir: Path | None, request: Json) -> Json:
 
 def _read_store(state_dir: Path | None, request: Json) -> Json:
     from service.daemon.api import listed, shown
+    from service.daemon.settings_api import backup_shown, backups_listed
     from service.daemon.store_worker import DATABASE_NAME
     from storage.mission_store import read_store
 
@@ -119,8 +120,14 @@ def _read_store(state_dir: Path | None, request: Json) -> Json:
     except PermissionError as error:
         raise ControlError(f"{SERVICE_STATE} cannot be read: use sudo") from error
     if path is None:
-        raise ControlError(f"no missions are stored in {' or '.join(map(str, folders))}: use --state-dir")
+        raise ControlError(f"no missions or settings are stored in {' or '.join(map(str, folders))}: use --state-dir")
     with read_store(path) as store:
-        is_list = request["do"] == "missions"
-        answer: Json = printable(listed(store, request["limit"]) if is_list else shown(store, request["number"]))
+        limit, number = request.get("limit", 0), request.get("number", 0)
+        answers: dict[str, Callable[[], Json]] = {
+            "missions": lambda: listed(store, limit),
+            "mission": lambda: shown(store, number),
+            "backups": lambda: backups_listed(store, limit),
+            "backup": lambda: backup_shown(store, number),
+        }
+        answer: Json = printable(answers[request["do"]]())
         return answer

@@ -20,7 +20,8 @@ from simulator.commands.image import read_image
 from simulator.emulated_naze.image import Image
 from simulator.sky.earth import Place
 from simulator.sky.sky import Weather
-from terminal.mission_source import load_mission, shown_path
+from terminal.files import shown_path
+from terminal.mission_source import load_mission
 from terminal.options import PATH
 from terminal.printing import print_json, print_table
 from terminal.sentences import complain, say

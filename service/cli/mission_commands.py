@@ -10,7 +10,8 @@ import click
 from payloads.mission_data import ACCEPTED, Json, mission_findings, mission_items
 from protocols.mission_file import MissionFileError, write_mission_file, write_qgc_wpl
 from service.cli.daemon_client import ask, ask_with_progress, bridge_options
-from terminal.mission_source import load_mission, save_mission, shown_path
+from terminal.files import shown_path, write_file
+from terminal.mission_source import load_mission
 from terminal.mission_table import mission_table
 from terminal.options import PATH
 from terminal.printing import print_json, print_table
@@ -88,7 +89,7 @@ def _show_held(held: Json, file: Path | None, *, is_quiet: bool) -> str:
         click.echo(write_qgc_wpl(items), nl=False)
     elif file is not None:
         try:
-            save_mission(file, write_mission_file(items, file.name))
+            write_file(file, write_mission_file(items, file.name), MissionFileError)
         except MissionFileError as error:
             fail(str(error))
         summary += f", written to {shown_path(file)}"

@@ -14,6 +14,7 @@ from protocols.mission_item import MissionItem
 from protocols.mission_record import pack_records
 from service.daemon.client import ControlError
 from service.daemon.daemon import Daemon
+from service.daemon.settings_api import SETTINGS_REQUESTS, SettingsApi
 from service.daemon.store_worker import as_dicts
 from service.machine.package import version
 from storage.mission_store import MissionStore, MissionSummary, ReceivedMission, StoredMission
@@ -31,6 +32,7 @@ class DaemonApi:
     def __init__(self, daemon: Daemon) -> None:
         self._daemon = daemon
         self._loop = asyncio.get_running_loop()
+        self.settings = SettingsApi(daemon)
 
     async def do(self, request: Json, progress: Callable[[Json], None]) -> Json:
         """Handle a request; `progress` is called with each step. ControlError, StoreError or ValueError on failure."""
@@ -49,6 +51,8 @@ class DaemonApi:
                 return await self.show_mission(whole_number(request, "number", 0, MOST))
             case "restore":
                 return await self.restore(whole_number(request, "number", 0, MOST), progress)
+            case str(name) if name in SETTINGS_REQUESTS:
+                return await self.settings.do(request, progress)
             case other:
                 raise ControlError(f"{other!r} is not a request")
 

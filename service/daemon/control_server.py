@@ -32,6 +32,8 @@ _ANSWER_TIMEOUT_S = 10.0
 #: For finished replies, when the daemon ends.
 _LAST_ANSWERS_S = 0.05
 
+_LOOK = "`pull` and `settings list` show what the flight controller holds"
+
 _log = structlog.get_logger()
 
 
@@ -114,7 +116,7 @@ class ControlServer:
         except ConnectionError:
             pass
         except asyncio.CancelledError:  # by close(); asyncio's streams would log it as an error
-            send({"error": "the daemon stopped before it could reply; `pull` shows what the flight controller holds"})
+            send({"error": f"the daemon stopped before it could reply; {_LOOK}"})
 
 
 def _is_live(path: Path) -> bool:

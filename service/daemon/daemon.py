@@ -98,6 +98,7 @@ class Daemon:
             self._loop.time(),
             None if self._tlog is None else self._tlog.on_frames,
             self._mission_ended,
+            lambda backup: self.store.back_up(backup.board.uid or self.fc.where, backup),
         )
         #: Per link; the flight controller's port is named "fc".
         self.traffic: defaultdict[str, Traffic] = defaultdict(Traffic)

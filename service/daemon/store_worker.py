@@ -14,6 +14,7 @@ import structlog
 
 from bridge.line.conversation import Conclude, FindPending, NoteReader, Recall, Save, StoreEffect
 from bridge.model.mission_log import ArrivedMission, PendingMission, RecalledMission
+from bridge.vehicle.settings_backups import Occasion, TakenBackup
 from protocols.mission_record import ListIdentity, identify, pack_records
 from service.machine.threads import BackgroundThread, post
 from storage.mission_store import MissionStore, ReceivedMission, open_store, store_in_memory
@@ -39,6 +40,8 @@ class StoreWorker:
         self._thread = BackgroundThread("store", _TIMEOUT_S)
         self._loop = asyncio.get_running_loop()
         self._store: MissionStore | None = None
+        #: The occasions of backups that could not be stored; the next reading of such a board is stored instead.
+        self._missed: dict[str, Occasion] = {}
         #: The file; None while missions are kept in memory.
         self._path: Path | None = None
         if directory is not None:
@@ -49,6 +52,21 @@ class StoreWorker:
 
         def work() -> None:
             post(self._loop, answer, self._do(effect))
+
+        self._thread.submit(work)
+
+    def back_up(self, board: str, backup: TakenBackup) -> None:
+        """Store a table of settings, if it has changed."""
+
+        def work() -> None:
+            if self._store is None:
+                return
+            occasion = self._missed.pop(board, backup.occasion)
+            try:
+                self._store.backups.add(board, backup.board.kind, backup.values, time.time(), occasion.value)
+            except StoreError as error:
+                self._missed[board] = occasion
+                _log.error("store.failed", why=str(error))
 
         self._thread.submit(work)
 

@@ -14,6 +14,7 @@ POST /api/check?name=NAME                the body is a mission file: the mission
 POST /api/write?name=NAME                the body is a mission file: write it (token)
 GET  /api/logs                           the telemetry logs (token)
 GET  /api/logs/NAME?start=N              one piece of a log (token)
+GET  /api/settings...                    see service.web.settings_history
 GET  /metrics                            for Prometheus
 """
 
@@ -32,10 +33,9 @@ from starlette.routing import Route
 from bridge.missions.mission_service import HeldMission
 from bridge.model.mission_log import Outcome
 from payloads.comparison import difference, shown, stored_mission
-from payloads.mission_data import MOST, Json, mission_items, to_json
+from payloads.mission_data import Json, mission_items, to_json
 from protocols.mission_item import MissionItem
 from service.daemon.api import DaemonApi
-from service.daemon.client import ControlError
 from service.daemon.daemon import Daemon
 from service.machine.host import Host
 from service.machine.package import version
@@ -46,7 +46,9 @@ from service.web.connect_help import connect_help, page_urls, qr_code
 from service.web.link_history import LinkHistory
 from service.web.metrics import CONTENT_TYPE, Metrics
 from service.web.mission_files import MissionFiles, MissionWriter
+from service.web.replies import answered, begun, json_reply, path_number, text_reply, whole
 from service.web.response_cache import ResponseCache
+from service.web.settings_history import SettingsHistory
 from service.web.telemetry_logs import TelemetryLogs
 from service.web.token import Token, TokenError
 from storage.os_error import reason
@@ -69,6 +71,7 @@ class Api:
         self._held_text: tuple[HeldMission, str] | None = None
         self._writer = MissionWriter()
         self._files = MissionFiles(self._api, self._writer)
+        self._settings = SettingsHistory(self._api.settings, self._writer, self._cache, token)
         self._history = LinkHistory(daemon)
         state_dir = daemon.settings.state_dir
         self._logs = TelemetryLogs(None if state_dir is None else state_dir / TLOG_FOLDER)
@@ -100,6 +103,7 @@ class Api:
         return [
             *(Route(path, guarded(handler), methods=["GET"]) for path, handler in get.items()),
             Route("/api/missions/{number}/restore", guarded(self._restore), methods=["POST"]),
+            *self._settings.routes(),
             Route("/api/check", guarded(self._check_file, MAX_FILE), methods=["POST"]),
             Route("/api/write", guarded(self._write_file, MAX_FILE), methods=["POST"]),
         ]
@@ -111,10 +115,11 @@ class Api:
         try:
             listed = (await self._api.list_missions(1))["missions"]
             newest = {key: listed[0][key] for key in ("number", "outcome")} if listed else None
+            newest_backup = await self._api.settings.newest_backup()
             store = daemon.store_trouble
         except StoreError as error:
-            newest, store = None, str(error)
-        return _json(
+            newest, newest_backup, store = None, None, str(error)
+        return json_reply(
             {
                 "version": version(),
                 **asdict(daemon.report()),
@@ -123,6 +128,7 @@ class Api:
                 "refused": [f"{count} x {why} ({link})" for (link, why), count in refused.items()],
                 "recording": daemon.recording,
                 "newest_mission": newest,
+                "newest_backup": newest_backup,
                 "store_trouble": store,
                 "lost_s": None if daemon.fc.lost_at is None else round(now - daemon.fc.lost_at, 1),
                 "transfer": None if transfer is None else asdict(transfer) | {"step": transfer.step.value},
@@ -134,16 +140,16 @@ class Api:
         """The mission as last read: an unauthenticated request must not use the flight controller's line."""
         held = self._daemon.bridge.held
         if held is None:
-            return _json({"count": None, "checksum": None, "items": []})
+            return json_reply({"count": None, "checksum": None, "items": []})
         if self._held_text is None or self._held_text[0] is not held:
             self._held_text = held, _held_text(held)
-        return _text(self._held_text[1])
+        return text_reply(self._held_text[1])
 
     async def _link(self, _request: Request) -> Response:
-        return _json(self._history.to_json())
+        return json_reply(self._history.to_json())
 
     async def _connect(self, _request: Request) -> Response:
-        return _json(connect_help(self._listen, self._daemon.settings.gcs, self._host.ipv4_addresses()))
+        return json_reply(connect_help(self._listen, self._daemon.settings.gcs, self._host.ipv4_addresses()))
 
     async def _connect_code(self, _request: Request) -> Response:
         urls = page_urls(self._listen, self._host.ipv4_addresses())
@@ -154,20 +160,20 @@ class Api:
         return Response(qr_code(urls[0]), media_type="image/svg+xml")
 
     async def _missions(self, _request: Request) -> Response:
-        return _json(await _answered(self._api.list_missions(_LISTED)))
+        return json_reply(await answered(self._api.list_missions(_LISTED)))
 
     async def _mission(self, request: Request) -> Response:
-        number = _number(request, "number")
+        number = path_number(request, "number")
 
         async def make() -> tuple[str, bool]:
             mission = await self._find(number)
             text = await asyncio.to_thread(lambda: to_json(stored_mission(mission)))
             return text, mission["outcome"] != Outcome.PENDING.value
 
-        return _text(await self._cache.get(str(number), make))
+        return text_reply(await self._cache.get(str(number), make))
 
     async def _difference(self, request: Request) -> Response:
-        number, other = _number(request, "number"), _number(request, "other")
+        number, other = path_number(request, "number"), path_number(request, "other")
 
         async def make() -> tuple[str, bool]:
             first, second = await self._find(number), await self._find(other)
@@ -177,50 +183,36 @@ class Api:
 
             return await asyncio.to_thread(compare), True
 
-        return _text(await self._cache.get(f"{number} {other}", make))
+        return text_reply(await self._cache.get(f"{number} {other}", make))
 
     async def _restore(self, request: Request) -> Response:
         check_token(request, self._token)
-        number = _number(request, "number")
-        return _begun(self._writer.begin(f"mission {number}", partial(self._api.restore, number)))
+        number = path_number(request, "number")
+        return begun(self._writer.begin(f"mission {number}", partial(self._api.restore, number)))
 
     async def _check_file(self, request: Request) -> Response:
         answer = await self._files.check(request)
-        return _text(await asyncio.to_thread(to_json, answer))
+        return text_reply(await asyncio.to_thread(to_json, answer))
 
     async def _write_file(self, request: Request) -> Response:
         check_token(request, self._token)
-        return _begun(await self._files.write(request))
+        return begun(await self._files.write(request))
 
     async def _list_logs(self, request: Request) -> Response:
         check_token(request, self._token)
-        return _json(await _from_disk(self._logs.list()))
+        return json_reply(await _from_disk(self._logs.list()))
 
     async def _read_log(self, request: Request) -> Response:
         check_token(request, self._token)
         start = request.query_params.get("start", "0")
-        piece = await _from_disk(self._logs.read(request.path_params["name"], _whole(start)))
+        piece = await _from_disk(self._logs.read(request.path_params["name"], whole(start)))
         return Response(piece, media_type="application/octet-stream")
 
     async def _render_metrics(self, _request: Request) -> Response:
         return Response(self._metrics.render(), media_type=CONTENT_TYPE)
 
     async def _find(self, number: int) -> Json:
-        return await _answered(self._api.show_mission(number))
-
-
-def _number(request: Request, name: str) -> int:
-    return _whole(request.path_params[name])
-
-
-def _whole(text: str) -> int:
-    if not text.isascii() or not text.isdecimal() or len(text) > len(str(MOST)) or int(text) > MOST:
-        raise HTTPException(HTTPStatus.NOT_FOUND, f"{text[:20]!r} is not a valid number.")
-    return int(text)
-
-
-def _begun(write_id: str) -> Response:
-    return _json({"id": write_id}, HTTPStatus.ACCEPTED)
+        return await answered(self._api.show_mission(number))
 
 
 def _sent(mission: Json) -> list[MissionItem]:
@@ -237,24 +229,6 @@ async def _from_disk(asked: Awaitable[T]) -> T:
         raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, f"The logs cannot be read: {reason(error)}.") from error
 
 
-async def _answered(asked: Awaitable[Json]) -> Json:
-    """Wait for the store; its errors become refusals."""
-    try:
-        return await asked
-    except ControlError as error:
-        raise HTTPException(HTTPStatus.NOT_FOUND, str(error)) from error
-    except StoreError as error:
-        raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, str(error)) from error
-
-
 def _held_text(held: HeldMission) -> str:
     identity, items = held.identity, [shown(item) for item in held.items]
     return to_json({"count": identity.count, "checksum": f"{identity.checksum:08x}", "items": items})
-
-
-def _json(value: Json, status: HTTPStatus = HTTPStatus.OK) -> Response:
-    return _text(to_json(value), status)
-
-
-def _text(json: str, status: HTTPStatus = HTTPStatus.OK) -> Response:
-    return Response(json, status, media_type="application/json")

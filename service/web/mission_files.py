@@ -39,11 +39,15 @@ class MissionWriter:
         self._task: asyncio.Task[None] | None = None
         self.state: Json | None = None
 
-    def begin(self, what: str, write: Callable[[Progress], Awaitable[Json]]) -> str:
-        """Start writing; returns the write's id: the page finds its own result by it. Refused while one runs."""
+    def begin(self, what: str, write: Callable[[Progress], Awaitable[Json]], unit: str = "records") -> str:
+        """Start writing; returns the write's id: the page finds its own result by it. Refused while one runs.
+
+        unit: what `write` counts as its progress.
+        """
         if self._task is not None and not self._task.done():
-            raise HTTPException(HTTPStatus.CONFLICT, "Another mission is being written: wait until it has finished.")
-        state: Json = {"id": secrets.token_hex(8), "what": what, "records": 0, "done": False, "ok": False, "text": ""}
+            raise HTTPException(HTTPStatus.CONFLICT, "Something else is being written: wait until it has finished.")
+        state: Json = {"id": secrets.token_hex(8), "what": what, "records": 0, "unit": unit}
+        state |= {"done": False, "ok": False, "text": ""}
         self.state = state
         self._task = asyncio.get_running_loop().create_task(self._run(write, state))
         return str(state["id"])

@@ -11,6 +11,7 @@ from protocols.mission_item import MissionItem
 from service.daemon.api import DaemonApi
 from service.zenoh_link.liveliness import RENAME
 from service.zenoh_link.queries import Answerer, QueryRefused, Question
+from service.zenoh_link.settings_commands import SettingsQueries
 
 _PAYLOAD = "the query's payload"
 #: Larger files are read by the command line only, not alongside a running link: a mission that fits has about 20 KB.
@@ -36,6 +37,7 @@ class CommandQueries:
             keys.RESTORE: self._alone(self._restore),
             keys.STATUS: self._status,
         }
+        self.answerers |= SettingsQueries(api.settings, self._alone).answerers
 
     def _alone(self, answerer: Answerer) -> Answerer:
         async def answer(question: Question) -> Json:

@@ -21,7 +21,8 @@ def test_the_table_has_every_key_and_its_version() -> None:
 
 
 def test_every_command_is_described() -> None:
-    described = re.findall(r"^\| `(@cmd/[^`]*)` \|", SECTIONS["Push a mission"], re.MULTILINE)
+    text = SECTIONS["Push a mission"] + SECTIONS["Settings"]
+    described = re.findall(r"^\| `(@cmd/[^`]*)` \|", text, re.MULTILINE)
     assert described == [key.suffix for key in KEYS if key.schema == "command_reply"]
 
 

@@ -36,6 +36,7 @@ from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission, Re
 from bridge.model.settings import SealMemory, SealsOfThisRun
 from bridge.model.verdict import SentSeqs
 from bridge.sharing.program import Program
+from bridge.vehicle.settings_backups import TakenBackup
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MAGIC_V1, MavlinkSplitter
 from protocols.mission_record import ListIdentity, identify
@@ -176,7 +177,8 @@ class World:
             seals=seals or SealsOfThisRun(),
         )
         self._on_frames = on_frames
-        self.bridge = Bridge(self._config, self._note, self.now, on_frames)
+        self.backups: list[TakenBackup] = []
+        self.bridge = Bridge(self._config, self._note, self.now, on_frames, on_backup=self.backups.append)
         if powered:
             self.naze.power_on_booted(self.now)
         if plugged:
@@ -199,7 +201,7 @@ class World:
         """Kill the bridge, and start another one after `away_s`, with the flight that the former one left."""
         left = self.bridge.flight if flight else None
         self._plugged = False
-        self.bridge = Bridge(self._config, self._note, self.now, self._on_frames)
+        self.bridge = Bridge(self._config, self._note, self.now, self._on_frames, on_backup=self.backups.append)
         self._is_away = True
         self.run(away_s)
         self._is_away = False

@@ -112,8 +112,8 @@ class HarakiriFcSettings(FcSettings):
             yield Pause(_BUSY_INTERVAL_S)
         if reply is None:
             return NO_ANSWER
-        if reply.status is ReplyStatus.RANGE and setting.name in _LOWERED_ONLY:
-            return fixed(replace(setting, fixed=_LOWERED_ONLY[setting.name]))
+        if reply.status is ReplyStatus.RANGE and setting.raised:
+            return fixed(replace(setting, fixed=setting.raised))
         if reply.status not in (ReplyStatus.OK, ReplyStatus.RANGE):
             return {ReplyStatus.ARMED: ARMED, ReplyStatus.BUSY: BUSY}.get(reply.status, NOT_TAKEN)
         held = yield from _ask(encode_read_settings(index, 1), SettingCommand.SETTING, 1)
@@ -204,5 +204,6 @@ def _shown(held: HeldSetting) -> BoardSetting:
         value,
         _UNITS.get(described.name, ""),
         fixed=_FIXED.get(described.name, ""),
+        raised=_LOWERED_ONLY.get(described.name, ""),
         handle=described,
     )

@@ -36,7 +36,7 @@ _MOST = 2000
 _TRIES = 3
 _KINDS = {InavType.FLOAT: ValueKind.FLOAT, InavType.STRING: ValueKind.TEXT}
 #: Disarmed motors get these pulses.
-_LOWERED_ONLY = "min_command"
+_LOWERED_ONLY = {"min_command": "it can only be lowered, disarmed motors get this pulse"}
 _FIXED = {"3d_neutral": "disarmed motors get this pulse: set it with INAV Configurator"}
 
 
@@ -80,8 +80,8 @@ class InavFcSettings(FcSettings):
     ) -> Conversation[SettingTable | SettingRefusal]:
         if not isinstance(setting.handle, InavType):
             return (yield from self._modes.change(table, setting, value))
-        if setting.name == _LOWERED_ONLY and float(value) > float(setting.value):
-            return fixed(replace(setting, fixed="it can only be lowered, disarmed motors get this pulse"))
+        if setting.raised and float(value) > float(setting.value):
+            return fixed(replace(setting, fixed=setting.raised))
         payload = encode_about_name(setting.name) + pack_value(setting.handle, value)
         reply = yield from ask(request(COMMON_SET_SETTING, payload), COMMON_SET_SETTING, 0)
         after = yield from _ask(encode_about_name(setting.name))
@@ -108,5 +108,6 @@ def _shown(info: InavSetting) -> BoardSetting:
         info.value,
         choices=info.choices,
         fixed=_FIXED.get(info.name, ""),
+        raised=_LOWERED_ONLY.get(info.name, ""),
         handle=info.type,
     )

@@ -10,13 +10,14 @@ import { followFile } from "./mission_file.js";
 import { showMissions } from "./missions.js";
 import { showOverview } from "./overview.js";
 import { showProfile } from "./profile.js";
+import { showSettings } from "./settings.js";
 import { showStateBar } from "./state_bar.js";
 import { listTable } from "./tables.js";
 import { followWrites } from "./write_form.js";
 
 const INTERVAL_MS = 1000, TRANSFER_INTERVAL_MS = 250, TRAIL_LENGTH = 600;
 const map = new MapView(byId("map"));
-const shown = { mission: undefined, newest: undefined };
+const shown = { mission: undefined, newest: undefined, backup: undefined };
 const trail = [];
 let held = { count: null, items: [] };
 let last = null, lastAt = performance.now();
@@ -34,6 +35,7 @@ async function look() {
     followFile(state);
     await showHeld(state);
     await showNewest(state);
+    await showBackups(state);
     await showLinkPlot();
     await showConnect();
     showTrouble(state.store_trouble);
@@ -74,6 +76,12 @@ async function showNewest(state) {
   if (newest === shown.newest || state.store_trouble) return;
   await showMissions(state.newest_mission);
   shown.newest = newest;
+}
+
+async function showBackups(state) {
+  if (state.newest_backup === shown.backup || state.store_trouble) return;
+  await showSettings();
+  shown.backup = state.newest_backup;
 }
 
 function follow(position) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The form that writes a mission: token, button, and next to it the result of this press, never of another write.
+// The form that writes a mission or settings: token, button, and next to it the result of this press, never of another write.
 import { make, setClass, setText } from "./dom.js";
 import { currentToken, tokenField } from "./token.js";
 
@@ -49,19 +49,19 @@ function follow(form, { write, transfer }) {
   const isOurs = write?.id === form.id;
   if (isOurs && !write.done) {
     if (transfer) Object.assign(form.bar, { hidden: false, max: transfer.total, value: write.records });
-    say(form, "", `${write.records} records written …`);
+    say(form, "", `${write.records} ${write.unit} written …`);
     return;
   }
   form.id = null;
   form.bar.hidden = true;
   if (isOurs) say(form, write.ok ? "good" : "bad", write.text);
-  else say(form, "bad", "The result of this write is no longer known here. Stored missions lists it.");
+  else say(form, "bad", "The result of this write is no longer known here. The stored missions and settings show it.");
   block(form);
 }
 
 function block(form) {
   form.button.disabled = armed === true;
-  setText(form.hint, armed === true ? "Armed: disarm to change the mission." : "");
+  setText(form.hint, armed === true ? "Armed: disarm to write." : "");
 }
 
 function say(form, kind, text) {

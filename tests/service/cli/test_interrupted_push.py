@@ -90,7 +90,7 @@ def interrupted_push(start: Starter) -> tuple[Board, Terminal]:
 
 def test_a_daemon_continues_and_its_result_is_shown(start: Starter) -> None:
     board, terminal = interrupted_push(start)
-    terminal.wait_for("naze-bridge: the daemon continues with the mission")
+    terminal.wait_for("naze-bridge: the daemon continues")
     assert terminal.end() == 0
     assert "ACCEPTED" in terminal.printed
     assert len(board.records()) == 146

@@ -15,7 +15,7 @@ import pytest
 
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import Command
-from terminal.mission_source import save_mission
+from terminal.files import write_file
 from tests.support.plan import HOME, PlanRow, judge, plain_plan, plan_text, records_of, waypoint
 from tests.support.programs import Daemon, run_naze_bridge
 
@@ -157,7 +157,7 @@ def test_a_full_disk_is_named_with_its_remedy(tmp_path: Path, monkeypatch: pytes
 
     monkeypatch.setattr(Path, "replace", full)
     with pytest.raises(MissionFileError, match="No space left on device; delete other files there"):
-        save_mission(tmp_path / "held.waypoints", "text")
+        write_file(tmp_path / "held.waypoints", "text", MissionFileError)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -39,7 +39,9 @@ def test_stored_missions_are_read_without_a_daemon(start_in: Starter, tmp_path: 
     assert "no daemon answers" in ask(daemon, "missions", "restore", "1").stderr
     restored = ask(daemon, "missions", "restore", "1", "--fc", "sim")
     assert restored.stdout.endswith("ACCEPTED: Mission verified: 5 records\n"), restored
-    assert_one_sentence(run_naze_bridge("missions", "list", "--state-dir", tmp_path), 1, "no missions are stored")
+    assert_one_sentence(
+        run_naze_bridge("missions", "list", "--state-dir", tmp_path), 1, "no missions or settings are stored"
+    )
 
 
 def test_a_file_name_cannot_act_on_the_terminal(daemon: Daemon, tmp_path: Path) -> None:

@@ -103,7 +103,7 @@ def test_only_one_restore_runs_at_a_time(web: WebBench) -> None:
     second = web.ask(*begin, **headers)
     assert (second.status, second.data["error"]) == (
         409,
-        "Another mission is being written: wait until it has finished.",
+        "Something else is being written: wait until it has finished.",
     )
     web.board.set("hang 0")
     until(lambda: web.state()["write"]["done"], "the end of the first restore")

@@ -52,7 +52,7 @@ def test_axe_finds_no_violation_in_any_state(
         assert violations(page) == []
         web.board.set("armed 1")
         until(lambda: page.text("#badges") == "ARMED", "the armed craft")
-        page.wait_text("#checked form", "disarm to change the mission")
+        page.wait_text("#checked form", "disarm to write")
         assert violations(page) == []
         web.board.set("unplug")
         page.wait_text("#badges", "LOST")

@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`fleet settings`: the flight controllers' settings of many vehicles, compared and restored."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.table import Column, Table
+from rich.text import Text
+
+from fleet.conditions import Condition
+from fleet.options import address_options, all_option, fleet_session, json_option, vehicle_option, where_option
+from fleet.push import FleetPush, push
+from fleet.push_command import end, vehicles_meant
+from fleet.roll_call import alive, chosen
+from fleet.settings import SettingsTrial, read_settings, try_settings, variants
+from fleet.tables import in_few_words, progress_bars, push_data, push_table
+from payloads.keys import SETTINGS_RESTORE
+from protocols.param_file import ParamFileError, read_param_file, shown_value
+from terminal.command_group import CommandGroup
+from terminal.files import read_file, shown_path
+from terminal.options import PATH
+from terminal.printing import print_json, print_table
+from terminal.sentences import INTERRUPTED, complain
+
+_UNREADABLE = 2
+_GOES_ON = "stopped; restores in progress continue: `naze-bridge fleet settings diff` shows the settings later"
+
+
+@click.group("settings", cls=CommandGroup)
+def fleet_settings() -> None:
+    """Compare and restore the flight controllers' settings of many vehicles."""
+
+
+@fleet_settings.command("diff")
+@vehicle_option
+@address_options
+@json_option
+def diff_settings(names: tuple[str, ...], as_json: bool, **where: Any) -> None:
+    """Show the settings in which vehicles differ: all that are alive, or those named.
+
+    Exit code 0: no difference, 1: they differ, or the settings of one are not known.
+    """
+    with fleet_session(where) as (session, prefix):
+        held = read_settings(session, prefix, chosen(alive(session, prefix), names, prefix))
+    read = [each for each in held if each.error is None]
+    failed = [each for each in held if each.error is not None]
+    found = variants(read)
+    if as_json:
+        settings = {name: [asdict(variant) for variant in each] for name, each in found.items()}
+        print_json({"settings": settings, "errors": {each.vehicle: each.error for each in failed}})
+    else:
+        if found:
+            table = Table("Setting", Column("Value", justify="right"), "Vehicles", box=None, pad_edge=False)
+            for name, each in found.items():
+                for place, variant in enumerate(each):
+                    value = "-" if variant.value is None else shown_value(variant.value)
+                    table.add_row(name if place == 0 else "", Text(value), Text(in_few_words(variant.vehicles)))
+            print_table(table)
+        click.echo(f"{len(found)} settings differ between {len(read)} vehicles")
+        for vehicle in failed:
+            click.echo(f"{vehicle.vehicle}: {vehicle.error}", err=True)
+    if found or failed:
+        raise SystemExit(1)
+
+
+@fleet_settings.command("restore")
+@click.argument("file", type=PATH)
+@vehicle_option
+@all_option
+@where_option
+@click.option("--staged", is_flag=True, help="A tenth of the vehicles first, then the rest; stop at the first failure.")
+@click.option("--dry-run", is_flag=True, help="Show what each vehicle would change; write nothing.")
+@address_options
+@json_option
+def restore_settings(
+    file: Path,
+    names: tuple[str, ...],
+    to_all: bool,
+    conditions: list[Condition],
+    staged: bool,
+    dry_run: bool,
+    as_json: bool,
+    **where: Any,
+) -> None:
+    """Write the settings of a .param file to vehicles, save them, and verify them there.
+
+    A vehicle that fails does not stop the others, unless --staged. Exit code 0: all have them (--dry-run: all could
+    take them), 1: one does not, 2: the file is unreadable.
+    """
+    if bool(names) == to_all:
+        raise click.UsageError("specify the vehicles: --vehicle NAME, or --all")
+    data, count = _read(file)
+    with fleet_session(where) as (session, prefix):
+        bridges, found, unknown = vehicles_meant(session, prefix, names, conditions)
+        if dry_run:
+            _show_trials(try_settings(session, prefix, found, data), unknown, as_json)
+            return
+        delivery, is_stopped = FleetPush(found, bridges), False
+        try:
+            with progress_bars(count) as show:
+                push(session, prefix, delivery, bridges, data, show, staged=staged, key=SETTINGS_RESTORE)
+        except KeyboardInterrupt:
+            is_stopped = True
+    if as_json:
+        print_json(push_data(delivery))
+    else:
+        print_table(push_table(delivery, "Restore"))
+        held = sum(each.result is not None for each in delivery.vehicles.values())
+        click.echo(f"{held} of {len(delivery.vehicles)} vehicles have saved these settings, verified")
+    if is_stopped:
+        complain(_GOES_ON)
+        raise SystemExit(INTERRUPTED)
+    end(unknown, is_bad=bool(delivery.failed))
+
+
+def _read(file: Path) -> tuple[bytes, int]:
+    try:
+        data = read_file(file, ParamFileError)
+        return data, len(read_param_file(data, shown_path(file)).values)
+    except ParamFileError as error:
+        complain(error)
+        raise SystemExit(_UNREADABLE) from error
+
+
+def _show_trials(trials: list[SettingsTrial], unknown: str, as_json: bool) -> None:
+    cannot = [trial for trial in trials if trial.plan is None or trial.plan.get("left_out")]
+    if as_json:
+        print_json({"vehicles": [asdict(trial) for trial in trials], "failed": len(cannot)})
+    else:
+        table = Table("Vehicle", "Would change", Column("Details", overflow="fold"), box=None, pad_edge=False)
+        for trial in trials:
+            table.add_row(Text(trial.vehicle), *map(Text, _summary(trial)))
+        print_table(table)
+        click.echo(
+            f"{len(trials) - len(cannot)} of {len(trials)} vehicles could take all settings; nothing was written"
+        )
+    end(unknown, is_bad=bool(cannot))
+
+
+def _summary(trial: SettingsTrial) -> tuple[str, str]:
+    """The number of changes, and the rest in words."""
+    if trial.plan is None:
+        return "-", trial.error or ""
+    changes, left_out = (trial.plan.get(key) or [] for key in ("changes", "left_out"))
+    names = in_few_words([str(each.get("name")) for each in left_out])
+    details = [f"cannot be set: {names}"] if left_out else []
+    return str(len(changes)), "; ".join([*details, *filter(None, [trial.plan.get("notice")])])

@@ -1,0 +1,250 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`naze-bridge settings`: the flight controller's settings, their backups, and restoring them."""
+
+import sys
+from dataclasses import asdict
+from datetime import datetime
+from pathlib import Path
+
+import click
+from rich.table import Column, Table
+from rich.text import Text
+
+from payloads.mission_data import MOST, Json
+from payloads.settings_comparison import SettingRow, SettingValues, setting_values, settings_difference
+from protocols.param_file import ParamFileError, read_param_file, shown_value, write_param_file
+from service.cli.daemon_client import ask, ask_store, ask_with_progress, bridge_options, daemon_options
+from terminal.command_group import CommandGroup
+from terminal.files import read_file, shown_path, write_file
+from terminal.options import PATH
+from terminal.printing import print_json, print_table
+from terminal.sentences import complain, fail, say
+
+_UNREADABLE = 2
+_STANDARD_OUTPUT = Path("-")
+_BOARD = "board"
+_SOURCE_HELP = "a .param file, a backup's number, or `board` for the flight controller's present settings"
+
+
+@click.group(cls=CommandGroup)
+def settings() -> None:
+    """Read, change, save, back up and restore the flight controller's settings.
+
+    A change acts at once, and is lost with the power unless it is saved. Nothing is written while the craft is armed.
+    """
+
+
+@settings.command("list")
+@bridge_options
+def list_settings(state_dir: Path | None, fc: str | None, as_json: bool) -> None:
+    """List all settings with their values and ranges."""
+    held = _held(state_dir, fc)
+    if as_json:
+        print_json(held)
+        return
+    table = Table("Name", Column("Value", justify="right"), "Range", box=None, pad_edge=False)
+    for each in held["settings"]:
+        table.add_row(each["name"], each["shown"], Text(each["fixed"] or each["range"]))
+    print_table(table)
+    click.echo(f"\n{len(held['settings'])} settings of {held['board']}")
+
+
+@settings.command("get")
+@click.argument("name")
+@bridge_options
+def get_setting(name: str, state_dir: Path | None, fc: str | None, as_json: bool) -> None:
+    """Print the value of the setting NAME."""
+    found = ask(state_dir, fc, {"do": "setting", "name": name})
+    if as_json:
+        print_json(found)
+    else:
+        click.echo(found["shown"])
+
+
+@settings.command("set", context_settings={"ignore_unknown_options": True})
+@click.argument("name")
+@click.argument("value")
+@bridge_options
+def set_setting(name: str, value: str, state_dir: Path | None, fc: str | None, as_json: bool) -> None:
+    """Change the setting NAME to VALUE, until the flight controller's power is off.
+
+    Exit code 1: refused.
+    """
+    _print_text(ask(state_dir, fc, {"do": "set-setting", "name": name, "value": value}), as_json=as_json)
+
+
+@settings.command("save")
+@bridge_options
+def save_settings(state_dir: Path | None, fc: str | None, as_json: bool) -> None:
+    """Save all changes in the flight controller."""
+    _print_text(ask(state_dir, fc, {"do": "save-settings"}), as_json=as_json)
+
+
+@settings.command()
+@click.argument("file", type=PATH)
+@bridge_options
+def backup(file: Path, state_dir: Path | None, fc: str | None, as_json: bool) -> None:
+    """Write the settings to FILE in Mission Planner's .param format; - is standard output."""
+    if as_json and file == _STANDARD_OUTPUT:
+        raise click.UsageError("the file and --json cannot both go to standard output: omit one of them")
+    held = _held(state_dir, fc)
+    now = datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %z")
+    text = write_param_file(_values(held), held["board"], [f"taken: {now}, by naze-bridge"])
+    if file == _STANDARD_OUTPUT:
+        click.echo(text, nl=False)
+        return
+    try:
+        write_file(file, text, ParamFileError)
+    except ParamFileError as error:
+        fail(str(error))
+    if as_json:
+        print_json(held)
+    else:
+        click.echo(f"{len(held['settings'])} settings of {held['board']} written to {shown_path(file)}")
+
+
+@settings.command()
+@click.argument("source")
+@click.option("--dry-run", is_flag=True, help="Show what would be written; write nothing.")
+@bridge_options
+def restore(source: str, dry_run: bool, state_dir: Path | None, fc: str | None, as_json: bool) -> None:
+    """Write the settings of SOURCE to the flight controller, save them, and verify them.
+
+    SOURCE is a .param file or the number of a backup. Everything that differs is shown first, and in a terminal you are
+    asked. Exit code 0: the flight controller holds all settings of SOURCE, 1: it does not, 2: SOURCE is unreadable.
+    """
+    values, board = _source(source, state_dir, fc)
+    request: Json = {"do": "plan-settings", "values": dict(values), "board": board}
+    plan = ask(state_dir, fc, request)
+    if not as_json:
+        _show_plan(plan)
+    if dry_run:
+        if as_json:
+            print_json(plan)
+        raise SystemExit(1 if plan["changes"] or plan["left_out"] else 0)
+    if not plan["changes"] and not as_json:
+        raise SystemExit(1 if plan["left_out"] else 0)
+    if not as_json and sys.stdin.isatty():
+        click.confirm(f"Write and save {len(plan['changes'])} settings?", abort=True, err=True)
+    total = len(plan["changes"])
+    result = ask_with_progress(state_dir, fc, request | {"do": "restore-settings"}, total)
+    if as_json:
+        print_json({"plan": plan, "result": result})
+    else:
+        _show_left_out([each for each in result["left_out"] if each not in plan["left_out"]])
+        say(result["text"])
+    if not result["is_saved"] or result["left_out"]:
+        raise SystemExit(1)
+
+
+@settings.command()
+@click.argument("first")
+@click.argument("second", default=_BOARD)
+@bridge_options
+def diff(first: str, second: str, state_dir: Path | None, fc: str | None, as_json: bool) -> None:
+    """Compare the settings of FIRST and SECOND. Exit code 1 if they differ.
+
+    Each is a .param file, a backup's number, or `board` for the flight controller's present settings (the default of
+    SECOND).
+    """
+    (left, _), (right, _) = (_source(each, state_dir, fc) for each in (first, second))
+    rows = settings_difference(left, right)
+    if as_json:
+        print_json({"equal": not rows, "changes": [asdict(row) for row in rows]})
+    elif rows:
+        print_table(rows_table(rows, first, second))
+    else:
+        click.echo("no difference")
+    if rows:
+        raise SystemExit(1)
+
+
+@settings.command()
+@click.option("--limit", type=click.IntRange(1, MOST), default=20, show_default=True, help="The maximum number.")
+@daemon_options
+def history(limit: int, state_dir: Path | None, as_json: bool) -> None:
+    """List the backups, newest first. One is taken when a board is first met, and at every change."""
+    found = ask_store(state_dir, {"do": "backups", "limit": limit})["backups"]
+    if as_json:
+        print_json(found)
+        return
+    if not found:
+        click.echo("No settings have been backed up yet.")
+        return
+    table = Table(
+        "No.", "Taken", "Settings", "Changed", "Why", Column("Board", overflow="fold"), box=None, pad_edge=False
+    )
+    for each in found:
+        changed = "-" if each["changed_count"] is None else str(each["changed_count"])
+        when = datetime.fromtimestamp(each["taken_at"]).astimezone().strftime("%Y-%m-%d %H:%M")
+        board = Text(f"{each['kind']}, {each['board']}")
+        table.add_row(str(each["number"]), when, str(each["setting_count"]), changed, each["occasion"], board)
+    print_table(table)
+
+
+def rows_table(rows: list[SettingRow], first: str, second: str) -> Table:
+    """Settings that differ, side by side."""
+    table = Table(
+        "Name", *(Column(Text(title), justify="right") for title in (first, second)), box=None, pad_edge=False
+    )
+    for row in rows:
+        table.add_row(
+            row.name, *(Text("-" if value is None else shown_value(value)) for value in (row.left, row.right))
+        )
+    return table
+
+
+def _source(name: str, state_dir: Path | None, fc: str | None) -> tuple[SettingValues, str]:
+    """The settings that a word on the command line names, and the board they are from; "" if it is unknown."""
+    if name == _BOARD:
+        held = _held(state_dir, fc)
+        return _values(held), held["board"]
+    if name.isascii() and name.isdecimal() and not Path(name).exists():
+        if int(name) > MOST:
+            raise click.UsageError(f"{name} is not a backup's number: see `naze-bridge settings history`")
+        stored = ask_store(state_dir, {"do": "backup", "number": int(name)})
+        return setting_values(stored["values"]), stored["kind"]
+    try:
+        found = read_param_file(read_file(Path(name), ParamFileError), shown_path(Path(name)))
+    except ParamFileError as error:
+        complain(error)
+        raise SystemExit(_UNREADABLE) from error
+    return found.values, found.board
+
+
+def _held(state_dir: Path | None, fc: str | None) -> Json:
+    """All settings, with a complaint if they may not be the present ones."""
+    held = ask(state_dir, fc, {"do": "settings"})
+    if not held["is_checked"]:
+        complain("the flight controller cannot be asked now: these are its settings as last read")
+    if not held["is_complete"]:
+        complain("some settings could not be read")
+    return held
+
+
+def _values(held: Json) -> SettingValues:
+    return setting_values({each["name"]: each["value"] for each in held["settings"]})
+
+
+def _show_plan(plan: Json) -> None:
+    if plan["changes"]:
+        rows = [SettingRow(each["name"], each["was"], each["becomes"]) for each in plan["changes"]]
+        print_table(rows_table(rows, "Now", "Restored"))
+    _show_left_out(plan["left_out"])
+    if plan["notice"]:
+        say(plan["notice"], to_error=True)
+    if not plan["changes"] and not plan["left_out"]:
+        click.echo("Nothing to restore: the flight controller has these settings.")
+
+
+def _show_left_out(settings: list[Json]) -> None:
+    for each in settings:
+        held = "" if each["held"] is None else f" stays {shown_value(each['held'])}"
+        say(f"{each['name']}{held}: {each['why']}", prefix="Left out: ", indent=10)
+
+
+def _print_text(answer: Json, *, as_json: bool) -> None:
+    if as_json:
+        print_json(answer)
+    else:
+        say(answer["text"])

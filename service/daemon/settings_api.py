@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The requests about the flight controller's settings, as part of DaemonApi."""
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import asdict
+from functools import partial
+from typing import TypeVar
+
+from bridge.settings.board_setting import BoardSetting, SettingTable, Value, ValueKind, shown
+from bridge.settings.fc_settings import SettingRefusal
+from payloads.mission_data import MOST, Json, whole_number
+from payloads.settings_comparison import SettingValues, setting_values, settings_difference
+from service.daemon.client import ControlError
+from service.daemon.daemon import Daemon
+from storage.mission_store import MissionStore
+from storage.settings_backups import SettingsBackup
+
+#: The values of "do".
+SETTINGS_REQUESTS = frozenset(
+    ("settings", "setting", "set-setting", "save-settings", "plan-settings", "restore-settings", "backups", "backup")
+)
+_MOST_LISTED = 300
+_LONGEST_NAME = 64
+T = TypeVar("T")
+Progress = Callable[[Json], None]
+
+
+class SettingsApi:
+    """The requests, as coroutines with plain data; ControlError or StoreError if one fails."""
+
+    def __init__(self, daemon: Daemon) -> None:
+        self._daemon = daemon
+        self._loop = asyncio.get_running_loop()
+
+    async def do(self, request: Json, progress: Progress) -> Json:
+        match request["do"]:
+            case "settings":
+                return await self.table()
+            case "setting":
+                return _data((await self._setting(request))[0])
+            case "set-setting":
+                return await self._change(request)
+            case "save-settings":
+                return await self.save()
+            case "plan-settings":
+                return await self.plan(*_wanted(request))
+            case "restore-settings":
+                return await self.restore(*_wanted(request), "command line", progress)
+            case "backups":
+                return await self.backups(whole_number(request, "limit", 1, MOST))
+        return await self.backup(whole_number(request, "number", 0, MOST))
+
+    async def table(self) -> Json:
+        """All settings. is_checked False: the flight controller could not be asked, they are as last read."""
+        table = await self._answer(self._daemon.bridge.read_board_settings)
+        return {
+            "board": self._daemon.bridge.kind or "",
+            "is_complete": table.is_complete,
+            "is_checked": self._daemon.bridge.are_settings_checked,
+            "settings": [_data(setting) for setting in table],
+        }
+
+    async def save(self) -> Json:
+        result = await self._wait(self._daemon.bridge.save_board_settings)
+        if result is not None:
+            raise ControlError(result.text)
+        return {"text": "Settings saved"}
+
+    async def plan(self, values: SettingValues, board: str, *, is_checked: bool = True) -> Json:
+        """What a restore would write, and what it cannot write. board: the one the values are from; "": unknown.
+
+        is_checked False: compare with the table as last read, without using the flight controller's line.
+        """
+        plan = partial(self._daemon.bridge.plan_restore, values, board, is_checked=is_checked)
+        return asdict(await self._answer(plan))
+
+    async def restore(self, values: SettingValues, board: str, client: str, progress: Progress) -> Json:
+        """Set, save and verify; `progress` is called with the number of settings set so far."""
+
+        def set_so_far(count: int) -> None:
+            progress({"progress": count})
+
+        restore = partial(self._daemon.bridge.restore_settings, values, board, client, set_so_far)
+        return asdict(await self._answer(restore))
+
+    async def backups(self, limit: int) -> Json:
+        """List the backups, newest first."""
+        return await self._daemon.store.ask(lambda store: backups_listed(store, limit))
+
+    async def newest_backup(self) -> int | None:
+        return await self._daemon.store.ask(lambda store: store.backups.newest())
+
+    async def backup(self, number: int) -> Json:
+        """One backup, with its difference from the same board's one before."""
+        return await self._daemon.store.ask(lambda store: backup_shown(store, number))
+
+    async def _setting(self, request: Json) -> tuple[BoardSetting, SettingTable]:
+        name = str(request.get("name"))[:_LONGEST_NAME]
+        table = await self._answer(self._daemon.bridge.read_board_settings)
+        setting = table.find(name)
+        if setting is None:
+            raise ControlError(f"this flight controller has no setting {name}: see `naze-bridge settings list`")
+        return setting, table
+
+    async def _change(self, request: Json) -> Json:
+        setting, _ = await self._setting(request)
+        value = _value(setting, str(request.get("value")))
+
+        def start(done: Callable[[BoardSetting | SettingRefusal, float], None], now: float) -> None:
+            self._daemon.bridge.change_board_setting(setting.name, value, done, now, "command line")
+
+        after = await self._answer(start)
+        if after.value == setting.value:
+            text = f"{setting.name} is {_shown(after)} already"
+        else:
+            text = f"{setting.name} changed from {_shown(setting)} to {_shown(after)}; not saved yet"
+        return _data(after) | {"was": setting.value, "text": text}
+
+    async def _answer(self, start: Callable[[Callable[[T | SettingRefusal, float], None], float], None]) -> T:
+        """Start an operation and wait for its result; ControlError if it is refused."""
+        result = await self._wait(start)
+        if isinstance(result, SettingRefusal):
+            raise ControlError(result.text)
+        return result
+
+    async def _wait(self, start: Callable[[Callable[[T, float], None], float], None]) -> T:
+        future: asyncio.Future[T] = self._loop.create_future()
+
+        def done(result: T, _at: float) -> None:
+            # The client may have disconnected.
+            if not future.done():
+                future.set_result(result)
+
+        start(done, self._loop.time())
+        self._daemon.flush()
+        return await future
+
+
+def backups_listed(store: MissionStore, limit: int) -> Json:
+    """Answer the request "backups"."""
+    return {"backups": [asdict(line) for line in store.backups.list(min(limit, _MOST_LISTED))]}
+
+
+def backup_shown(store: MissionStore, number: int) -> Json:
+    """Answer the request "backup"; ControlError if there is none of that number."""
+    backup = store.backups.get(number)
+    if backup is None:
+        raise ControlError(f"there is no backup {number}; `naze-bridge settings history` shows the numbers")
+    before = store.backups.before(backup.line)
+    former: SettingsBackup | None = None if before is None else store.backups.get(before)
+    changes = [] if former is None else settings_difference(former.values, backup.values)
+    return asdict(backup.line) | {
+        "before": before,
+        "changes": [asdict(row) for row in changes],
+        "values": dict(backup.values),
+    }
+
+
+def _wanted(request: Json) -> tuple[SettingValues, str]:
+    return setting_values(request.get("values")), str(request.get("board") or "")
+
+
+def _value(setting: BoardSetting, text: str) -> Value:
+    """The value as typed: a number, or the name of one of the setting's choices."""
+    if setting.kind is ValueKind.TEXT:
+        return text
+    for number, choice in enumerate(setting.choices):
+        if choice.lower() == text.lower():
+            return setting.minimum + number
+    try:
+        return float(text)
+    except ValueError:
+        choices = f": it is one of {', '.join(setting.choices)}" if setting.choices else ", and it must be a number"
+        raise ControlError(f"{setting.name} cannot be {text[:_LONGEST_NAME]}{choices}") from None
+
+
+def _data(setting: BoardSetting) -> Json:
+    return {
+        "name": setting.name,
+        "value": setting.value,
+        "shown": _shown(setting),
+        "minimum": setting.minimum,
+        "maximum": setting.maximum,
+        "range": setting.range_text,
+        "unit": setting.unit,
+        "choices": list(setting.choices),
+        "fixed": setting.fixed,
+    }
+
+
+def _shown(setting: BoardSetting) -> str:
+    """The value, or the name of the choice."""
+    if setting.choices and not isinstance(setting.value, str):
+        place = int(setting.value - setting.minimum)
+        if 0 <= place < len(setting.choices):
+            return setting.choices[place]
+    return shown(setting.value)

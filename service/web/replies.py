@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Numbers in paths, JSON responses, and the store's errors as refusals."""
+
+from collections.abc import Awaitable
+from http import HTTPStatus
+
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response
+
+from payloads.mission_data import MOST, Json, to_json
+from service.daemon.client import ControlError
+from storage.store_error import StoreError
+
+
+def path_number(request: Request, name: str) -> int:
+    return whole(request.path_params[name])
+
+
+def whole(text: str) -> int:
+    """A whole number in a request; refused if it is none."""
+    if not text.isascii() or not text.isdecimal() or len(text) > len(str(MOST)) or int(text) > MOST:
+        raise HTTPException(HTTPStatus.NOT_FOUND, f"{text[:20]!r} is not a valid number.")
+    return int(text)
+
+
+async def answered(asked: Awaitable[Json]) -> Json:
+    """Wait for the store; its errors become refusals."""
+    try:
+        return await asked
+    except ControlError as error:
+        raise HTTPException(HTTPStatus.NOT_FOUND, str(error)) from error
+    except StoreError as error:
+        raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, str(error)) from error
+
+
+def begun(write_id: str) -> Response:
+    """The response to a write that was started."""
+    return json_reply({"id": write_id}, HTTPStatus.ACCEPTED)
+
+
+def json_reply(value: Json, status: HTTPStatus = HTTPStatus.OK) -> Response:
+    return text_reply(to_json(value), status)
+
+
+def text_reply(json: str, status: HTTPStatus = HTTPStatus.OK) -> Response:
+    return Response(json, status, media_type="application/json")

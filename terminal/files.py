@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Files that the user names, read and written whole. Errors are the caller's kind of FileError."""
+
+import errno
+import os
+from pathlib import Path
+
+from protocols.file_error import FileError
+from protocols.plain_text import plain_text
+from storage.bounded_file import read_bounded
+from storage.os_error import reason
+
+MAX_BYTES = 8 * 2**20  # 65,535 items, the most that MAVLink can count, are about 5 MB of text
+
+
+def shown_path(path: Path) -> str:
+    """The path in messages: any program may have made the file's name."""
+    return plain_text(str(path))
+
+
+def read_file(path: Path, failure: type[FileError]) -> bytes:
+    """The contents; `failure` if the file cannot be read."""
+    try:
+        return read_bounded(path, MAX_BYTES)
+    except (OSError, ValueError) as error:
+        raise _failed(path, error, failure) from None
+
+
+def write_file(path: Path, text: str, failure: type[FileError]) -> None:
+    """Write a file in one step: a full disk must not destroy the old one. `failure` if that fails.
+
+    A link stays a link, and only regular files are replaced: as root, renaming over a device would destroy it.
+    """
+    try:
+        target = Path(os.path.realpath(path))  # still a link if it leads to itself
+        if target.is_symlink() or (target.exists() and not target.is_file()):
+            raise failure(shown_path(path), "", "it is not a regular file", "name another file")
+        draft = target.with_name(f".naze-bridge-{os.getpid()}")
+        with draft.open("x", encoding="utf-8") as file:  # "x": an existing file, above all a link, is not ours
+            try:
+                file.write(text)
+                file.flush()
+                draft.replace(target)
+            except OSError:
+                draft.unlink(missing_ok=True)
+                raise
+    except (OSError, ValueError) as error:
+        raise _failed(path, error, failure) from None
+
+
+def _failed(path: Path, error: OSError | ValueError, failure: type[FileError]) -> FileError:
+    is_full = isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
+    remedy = "delete other files there" if is_full else "check the path and its permissions"
+    return failure(shown_path(path), "", reason(error), remedy)

@@ -1,0 +1,195 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A restore sets, saves and verifies, on every kind of board; whatever fails before the save loses nothing."""
+
+from collections.abc import Callable
+
+import pytest
+
+from bridge.settings.board_setting import SettingTable, Value
+from bridge.settings.fc_settings import Cause, SettingRefusal
+from bridge.vehicle.settings_restore import RestoreResult
+from protocols.msp.frame import MspParser
+from simulator.board.options import Faults
+from tests.bridge.vehicle.test_board_settings import restart
+from tests.support.settings_client import BOARDS, ready, value_of
+from tests.support.world import World
+
+EEPROM_WRITE, SET_SETTING = 250, 198
+#: Three settings of a board with other values.
+CHANGES: dict[str, dict[str, Value]] = {
+    "patched Harakiri": {"p_roll": 44.0, "i_roll": 33.0, "snr_cf": 0.25},
+    "INAV": {"nav_rth_altitude": 1300.0, "mc_p_roll": 44.0, "mc_p_pitch": 45.0},
+    "MultiWii": {"PITCH_P": 40.0, "ROLL_P": 41.0, "YAW_P": 42.0},
+    "Betaflight": {"PITCH_D": 35.0, "ROLL_D": 36.0, "YAW_P": 37.0},
+}
+NAZE = "patched Harakiri"
+
+
+def restored(
+    world: World, wanted: dict[str, Value], source: str = "", at_progress: Callable[[int], None] = lambda _count: None
+) -> RestoreResult | SettingRefusal:
+    found: list[RestoreResult | SettingRefusal] = []
+    world.bridge.restore_settings(
+        wanted, source, "test", at_progress, lambda result, _at: found.append(result), world.now
+    )
+    world.wait_until(lambda _: bool(found), 90)
+    (result,) = found
+    return result
+
+
+def outcome(result: RestoreResult | SettingRefusal) -> RestoreResult:
+    assert isinstance(result, RestoreResult), result
+    return result
+
+
+def values(table: SettingTable | SettingRefusal) -> dict[str, Value]:
+    assert isinstance(table, SettingTable), table
+    return {setting.name: setting.value for setting in table}
+
+
+def writes(world: World) -> int:
+    """Saves and changes that were sent to the board."""
+    frames = [frame.command for _, _, data in world.written for frame in MspParser().feed(data)]
+    return sum(command in (EEPROM_WRITE, SET_SETTING) for command in frames)
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_a_backup_is_restored_saved_and_verified(name: str) -> None:
+    world, client = ready(BOARDS[name])
+    world.wait_until(lambda world: bool(world.backups), 20)
+    (backup,) = world.backups
+    before = values(client.wait_read())
+    assert backup.values == before
+    for setting, value in CHANGES[name].items():
+        value_of(client.change(setting, value))
+    assert client.save() is None
+    result = outcome(restored(world, dict(backup.values), backup.board.kind))
+    assert (result.is_saved, result.text) == (True, "3 settings restored, saved and verified")
+    assert {*result.changed} == CHANGES[name].keys()
+    restart(world)
+    assert values(client.current()) == before
+    world.run(5)
+    assert [each.occasion.value for each in world.backups][:3] == ["connected", "saved", "saved"]
+    assert world.backups[-1].values == before
+
+
+def test_equal_settings_are_not_written() -> None:
+    world, client = ready(BOARDS[NAZE])
+    before = writes(world)
+    result = outcome(restored(world, values(client.wait_read())))
+    assert (result.is_saved, result.text) == (True, "Nothing to restore")
+    assert writes(world) == before
+
+
+def test_a_value_that_only_the_board_refuses_is_left_out() -> None:
+    world, client = ready(BOARDS[NAZE])
+    result = outcome(restored(world, {"p_roll": 44.0, "esc_moff": 1100.0, "i_roll": 33.0}))
+    assert (result.is_saved, result.changed) == (True, ("p_roll", "i_roll"))
+    assert [each.name for each in result.left_out] == ["esc_moff"]
+    assert "it can only be lowered" in result.left_out[0].why
+    assert client.value("esc_moff") == 1000
+    alone = outcome(restored(world, {"esc_moff": 1100.0}))
+    assert (alone.is_saved, alone.text) == (False, "Nothing written: 1 setting cannot be set")
+
+
+@pytest.mark.parametrize("name", CHANGES)
+@pytest.mark.parametrize("fault", ["arms", "cable"])
+def test_a_fault_in_the_middle_saves_nothing_and_says_what_was_changed(name: str, fault: str) -> None:
+    faults = Faults()
+    world, client = ready(BOARDS[name], faults)
+    before = values(client.wait_read())
+
+    def progress(count: int) -> None:
+        if count == 2 and fault == "arms":
+            faults.armed = True
+        elif count == 2:
+            world.after(0.0, world.unplug)
+
+    result = outcome(restored(world, CHANGES[name], "", progress))
+    assert not result.is_saved
+    first, second, _ = CHANGES[name]
+    assert result.changed == (first, second)
+    assert result.text.startswith("Nothing saved: ")
+    assert f"2 of 3 settings were changed in the board's memory ({first}, {second})" in result.text
+    assert result.text.endswith("to return to the saved settings, switch its power off and on")
+    faults.armed = False
+    if fault == "cable":
+        world.plug()
+    restart(world)
+    world.wait_until(lambda world: world.bridge.vehicle.armed is False, 20)
+    assert values(client.current()) == before
+
+
+def test_a_cable_pulled_during_the_save_leaves_the_outcome_open() -> None:
+    world, _ = ready(BOARDS[NAZE])
+    result = outcome(
+        restored(world, {"p_roll": 44.0}, "", lambda _count: world.after(0.03, world.unplug)),
+    )
+    assert not result.is_saved
+    assert result.text.startswith(("Not known to be saved: ", "Nothing saved: "))
+
+
+def test_an_armed_board_is_not_restored() -> None:
+    faults = Faults()
+    world, _ = ready(BOARDS[NAZE], faults)
+    faults.armed = True
+    world.wait_until(lambda world: world.bridge.vehicle.armed is True, 20)
+    before = writes(world)
+    result = restored(world, {"p_roll": 44.0})
+    assert isinstance(result, SettingRefusal)
+    assert result.cause is Cause.ARMED
+    assert writes(world) == before
+
+
+def test_settings_of_another_firmware_are_refused_without_a_write() -> None:
+    world, _ = ready(BOARDS[NAZE])
+    before = writes(world)
+    result = restored(world, {"p_roll": 44.0}, "INAV 8.0.1")
+    assert isinstance(result, SettingRefusal)
+    assert "INAV 8.0.1" in result.text
+    assert writes(world) == before
+
+
+def test_one_restore_runs_at_a_time() -> None:
+    world, _ = ready(BOARDS[NAZE])
+    second: list[RestoreResult | SettingRefusal] = []
+
+    def progress(_count: int) -> None:
+        world.bridge.restore_settings(
+            {"p_roll": 50.0}, "", "other", lambda _count: None, lambda result, _at: second.append(result), world.now
+        )
+
+    assert outcome(restored(world, {"p_roll": 44.0}, "", progress)).is_saved
+    (refused,) = second
+    assert isinstance(refused, SettingRefusal)
+    assert outcome(restored(world, {"p_roll": 50.0})).is_saved
+
+
+def test_another_clients_change_in_the_middle_prevents_the_save() -> None:
+    world, _ = ready(BOARDS[NAZE])
+
+    def progress(count: int) -> None:
+        if count == 1:
+            world.bridge.change_board_setting("p_roll", 99, lambda _result, _at: None, world.now, "another")
+
+    result = outcome(restored(world, {"p_roll": 44.0, "i_roll": 33.0}, "", progress))
+    assert not result.is_saved
+    assert "p_roll has another value" in result.text
+
+
+def test_the_plan_from_memory_asks_the_board_nothing() -> None:
+    world, client = ready(BOARDS[NAZE])
+    client.wait_read()
+    found: list[object] = []
+    before = len(world.written)
+    world.bridge.plan_restore({"p_roll": 44.0}, "", lambda plan, _at: found.append(plan), world.now, is_checked=False)
+    assert len(found) == 1
+    assert len(world.written) == before
+
+
+def test_without_a_board_nothing_is_planned() -> None:
+    world = World(powered=False)
+    found: list[object] = []
+    world.bridge.plan_restore({"p_roll": 44.0}, "", lambda plan, _at: found.append(plan), world.now, is_checked=False)
+    assert isinstance(found[0], SettingRefusal)
+    assert isinstance(restored(world, {"p_roll": 44.0}), SettingRefusal)

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The settings' history on the page: what changed, what a restore would change, and restoring with the token."""
+
+from typing import Any
+
+import pytest
+
+from protocols.param_file import read_param_file
+from tests.support.chromium import PHONE, Browsers
+from tests.support.programs import run_naze_bridge, until
+from tests.support.web_bench import WebBench
+
+pytest_plugins = ("tests.support.web_fixtures",)
+
+
+def command(bench: WebBench, *words: str) -> str:
+    ended = run_naze_bridge("settings", *words, "--state-dir", bench.daemon.state_dir)
+    assert ended.returncode == 0, ended
+    return ended.stdout.strip()
+
+
+def backups(bench: WebBench) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = bench.ask("/api/settings").data["backups"]
+    return found
+
+
+@pytest.fixture
+def tuned(web: WebBench) -> WebBench:
+    """Two backups: as met, and with another p_roll."""
+    until(lambda: len(backups(web)) == 1, "the first backup")
+    command(web, "set", "p_roll", "44")
+    command(web, "save")
+    until(lambda: len(backups(web)) == 2, "the second backup")
+    return web
+
+
+def test_a_backup_shows_its_changes_and_what_restoring_it_would_change(tuned: WebBench) -> None:
+    newest, first = (tuned.ask(f"/api/settings/{number}").data for number in (2, 1))
+    assert newest["changes"] == [{"name": "p_roll", "left": 35, "right": 44}]
+    assert (newest["before"], newest["plan"]["changes"]) == (1, [])
+    assert first["before"] is None
+    assert first["plan"]["changes"] == [{"name": "p_roll", "was": 44, "becomes": 35}]
+    file = tuned.ask("/api/settings/1/file")
+    assert "settings-1.param" in file.headers["Content-Disposition"]
+    assert read_param_file(file.body, "x").values["p_roll"] == 35
+    assert tuned.state()["newest_backup"] == 2
+
+
+def test_a_restore_needs_the_token(tuned: WebBench) -> None:
+    assert tuned.ask("/api/settings/1/restore", "POST").status == 403
+    assert tuned.ask("/api/settings/1/restore", "POST", Authorization="Bearer wrong").status == 403
+    assert tuned.ask("/api/settings/1/restore").status == 405
+    for wrong in ("99", "x", "-1", "9" * 30):
+        answer = tuned.ask(f"/api/settings/{wrong}/restore", "POST", Authorization=f"Bearer {tuned.token}")
+        assert answer.status == 404
+    assert command(tuned, "get", "p_roll") == "44"
+
+
+def test_a_backup_is_restored_from_the_page(browsers: Browsers, tuned: WebBench) -> None:
+    with browsers.tab(tuned.port, PHONE) as page:
+        page.open()
+        page.wait_text("#settings", "connected")
+        page.press("button[aria-label='Show settings 1']")
+        page.wait_text("#settings tr.detail", "Restoring would change")
+        page.wait_text("#settings tr.detail", "p_roll")
+        assert page.run("return window.innerWidth") == PHONE[0]
+        page.find("#settings tr.detail input").send_keys(tuned.token)
+        page.press("#settings tr.detail button.write")
+        page.wait_text("#settings tr.detail .result", "1 setting restored, saved and verified")
+        until(lambda: len(backups(tuned)) == 3, "the backup after the restore")
+        assert command(tuned, "get", "p_roll") == "35"
+        page.wait_text("#settings", "1 of 201")
+        assert tuned.board is not None
+        tuned.board.set("armed 1")
+        until(lambda: page.text("#badges") == "ARMED", "the armed craft")
+        assert not page.find("#settings tr.detail button.write").is_enabled()
