@@ -24,8 +24,12 @@ _UNCONFIRMED = "interrupted; the flight controller has not confirmed that it kee
 _TOLD_LATER = ("armed", "battery_v", "satellites", "mission_records")
 
 
-async def ask_directly(fc: FcAddress, request: Json, progress: Callable[[int], None] = lambda _: None) -> Json:
+async def ask_directly(
+    fc: FcAddress, request: Json, progress: Callable[[int], None] = lambda _: None, *, even_silent: bool = False
+) -> Json:
     """Send a request to our own bridge on this port; ControlError or StoreError if there is no reply.
+
+    `even_silent`: a port without a flight controller is no error; the status tells how many bytes were received.
 
     If cancelled, a push is aborted, and Interrupted says how it ended.
     """
@@ -41,6 +45,8 @@ async def ask_directly(fc: FcAddress, request: Json, progress: Callable[[int], N
             raise ControlError(daemon.fc.trouble)
         if daemon.fc.found_at is None:
             where = daemon.fc.where
+            if even_silent:
+                return api.status()
             raise ControlError(f"no flight controller answers on {where}: check its power, the wiring and the speed")
         # The controller is identified before its telemetry arrives, and some never send all of it.
         if request == STATUS:

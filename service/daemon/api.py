@@ -132,6 +132,7 @@ class DaemonApi:
             "round_trip_ms": link.round_trip_ms,
             "requests_lost": link.requests_lost,
             "bad_checksums": link.bad_checksums,
+            "fc_bytes_received": daemon.traffic["fc"].bytes_received,
             **daemon.fc.ports(),
             **daemon.followers_status(),
         }

@@ -79,7 +79,7 @@ def _listen(settings: Settings) -> Json:
     from service.cli.direct_bridge import ask_directly  # the whole daemon: --help does without
 
     try:
-        return asyncio.run(ask_directly(settings.fc, STATUS))
+        return asyncio.run(ask_directly(settings.fc, STATUS, even_silent=True))
     except StoreError as error:
         raise ControlError(str(error)) from error
 

@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 from payloads.mission_data import Json
@@ -23,13 +24,15 @@ from service.cli.doctor.port import (
     check_port,
     holder_of_port,
 )
+from service.cli.doctor.power import check_power
+from service.cli.doctor.running import check_daemons, check_running
 from service.cli.doctor.zenoh import check_zenoh
 from service.daemon.client import ControlError
 from service.machine.host import Host
 from service.settings import Settings
 from service.settings.addresses import AutoFc, FcAddress, parse_fc
 
-_ON_PORT = (check_port, check_permission, check_console, check_holder)
+_ON_PORT = (check_permission, check_console, check_holder)
 
 
 def examine(
@@ -41,16 +44,27 @@ def examine(
     if isinstance(fc, AutoFc) and running is not None and "port" not in running:
         fc = parse_fc(running["where"])  # the daemon was started with --fc
     ports: Sequence[FcAddress] = check_candidates(host) if isinstance(fc, AutoFc) else [fc]
-    results = [found for port in ports for check in _ON_PORT if (found := check(host, port)) is not None]
+    source = settings.sources.get("fc", "")
+    checks: Sequence[Callable[[Host, FcAddress], Checked | None]] = (partial(check_port, source=source), *_ON_PORT)
+    results = [found for port in ports for check in checks if (found := check(host, port)) is not None]
     if len(ports) > 1:
         # One port with a flight controller is enough.
         results = [replace(found, grade=Grade.NOTE) if found.grade is Grade.PROBLEM else found for found in results]
     results.append(check_modem_manager(host, ports[0]) if ports else check_no_port(host))
     yield check_versions(host)
+    yield from filter(None, (check_power(host), check_daemons(host)))
     yield from results
     is_free = not any(found.grade is Grade.PROBLEM for found in results)
     is_free = is_free and all(holder_of_port(host, port) is None for port in ports)
-    yield from check_flight_controller(fc, running, ask_port if is_free else None)
+    heard: list[Json] = [] if running is None else [running]
+
+    def ask_and_keep() -> Json:
+        heard.append(ask_port())
+        return heard[-1]
+
+    yield from check_flight_controller(fc, running, ask_and_keep if is_free else None, source)
+    for status in heard:
+        yield from check_running(status)
     yield from check_wifi(host, settings.gcs)
     yield from check_ports(host, settings.gcs)
     yield from check_keys(settings.access)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Checks of the network: the bridge's address for ground stations, and its free ports."""
 
+import os
 import re
 from collections.abc import Sequence
 
@@ -58,8 +59,11 @@ def _check_port(host: Host, link: GcsAddress) -> Checked:
     holder = host.holder(f"socket:[{inode}]")
     if holder is not None and holder.is_naze_bridge:
         return ok("port for ground stations", f"{what} is the running daemon's")
-    user = holder or "another program (see: sudo naze-bridge doctor)"
-    return problem("port for ground stations", f"{what} is used by {user}", "stop it, or give gcs another port")
+    if holder is None and os.geteuid():
+        hidden = "only root sees which: run doctor with sudo"
+        return problem("port for ground stations", f"{what} is used by another program", hidden)
+    remedy = f"stop it: sudo kill {holder.pid}; or give gcs another port" if holder else "restart the Pi"
+    return problem("port for ground stations", f"{what} is used by {holder or 'a program that is gone'}", remedy)
 
 
 def _inode(host: Host, transport: str, port: int) -> str | None:

@@ -12,6 +12,7 @@ from service.machine.host import LOGIN_PROGRAMS, Host, Process
 from service.machine.package import page
 from service.machine.raspberry_pi import boot_file, pi_model
 from service.settings.addresses import FcAddress, SerialFc
+from service.settings.config_files import SETUP_FILE
 
 _PORTS = ("serial0", "naze", "ttyUSB*", "ttyACM*")
 _GROUP = "dialout"
@@ -19,14 +20,22 @@ _RULES = ("/etc/udev/rules.d", "/usr/lib/udev/rules.d", "/lib/udev/rules.d")
 _RULE = "60-naze-bridge.rules"
 
 
-def check_port(host: Host, fc: FcAddress) -> Checked:
+def fc_remedy(port: str, source: str) -> str:
+    """The way to set `fc` so that it takes effect. `source`: where it is set now, "FILE:LINE"; empty: nowhere."""
+    if not source or SETUP_FILE in source:
+        return f"sudo naze-bridge setup --fc {port}"
+    return f'write fc = "{port}" in {source} (the line decides), then: sudo systemctl restart naze-bridge'
+
+
+def check_port(host: Host, fc: FcAddress, source: str = "") -> Checked:
+    """Check that the port exists. `source`: where `fc` is set, as in `Settings.sources`."""
     if not isinstance(fc, SerialFc):
         return ok("port", f"{fc}, no serial port")
     device = host.resolve(fc.path)
     model = pi_model(host)
     if model is not None and fc.path == "/dev/serial0" and str(device) == "/dev/ttyAMA10":
         found = f"/dev/serial0 is the debug socket on a {model.name}: the header's pins are {model.header_uart}"
-        return problem("port", found, f'set fc = "{model.header_uart}", or leave fc out')
+        return problem("port", found, fc_remedy(model.header_uart, source))
     if host.path(device).exists():
         return ok("port", fc.path if str(device) == fc.path else f"{fc.path} is {device}")
     there = [f"/dev/{name}" for pattern in _PORTS for name in host.names("/dev", pattern)]
@@ -37,7 +46,7 @@ def check_port(host: Host, fc: FcAddress) -> Checked:
     else:
         remedy = "enable the UART on the header: sudo naze-bridge setup"
     if there:
-        remedy += f"; or set fc to a port that exists: {', '.join(there)}"
+        remedy += f"; or use {' or '.join(there)}: {fc_remedy(there[0], source)}"
     return problem("port", f"{fc.path} is missing", remedy)
 
 
@@ -49,7 +58,7 @@ def check_candidates(host: Host) -> list[SerialFc]:
 
 
 def check_no_port(host: Host) -> Checked:
-    remedy = "plug the flight controller into USB, or name its port: fc in the settings"
+    remedy = "plug the flight controller into USB, or name its port: sudo naze-bridge setup --fc /dev/NAME"
     return problem("port", "there is no serial port for a flight controller", remedy)
 
 

@@ -26,7 +26,7 @@ export function drawMap(items, position, attitude, trail, width, camera) {
   if (trail.length > 1) svg.append(draw("polyline", { class: "trail", points: line(trail, view) }));
   if (home) svg.append(homeMark(view(home)));
   for (const item of placed.filter((each) => each.seq > 0)) svg.append(itemMark(item, view(placeOf(item))));
-  if (craft) svg.append(craftMark(view(craft), attitude.heading_deg));
+  if (craft) svg.append(craftMark(view(craft), attitude.heading_deg, position.height_m));
   svg.append(...scaleBar(view.pixelsPerMetre, width, height), ...northArrow(width));
   return svg;
 }
@@ -81,7 +81,7 @@ function tracks(items, home, view) {
 }
 
 function itemMark(item, [x, y]) {
-  const group = draw("g", {}, draw("title", {}, `${item.seq} ${item.name}, ${item.alt_m} m`));
+  const group = draw("g", { class: "touched" }, draw("title", {}, `${item.seq} ${item.name}, ${item.alt_m} m`));
   if (ROIS.includes(item.command)) group.append(draw("path", { class: "roi", d: `M${x} ${y - 13}l13 13-13 13-13-13z` }));
   else group.append(draw("circle", { class: "point", cx: x, cy: y, r: 10 }));
   if (LOITERS.includes(item.command)) group.append(draw("circle", { class: "loiter", cx: x, cy: y, r: 15 }));
@@ -91,17 +91,18 @@ function itemMark(item, [x, y]) {
 
 function homeMark([x, y]) {
   return draw(
-    "g", {}, draw("title", {}, "Home"),
+    "g", { class: "touched" }, draw("title", {}, "Home"),
     draw("rect", { class: "home", x: x - 10, y: y - 10, width: 20, height: 20, rx: 4 }),
     draw("text", { class: "home-text", x, y: y + 4.5 }, "H"),
   );
 }
 
-function craftMark([x, y], heading) {
+function craftMark([x, y], heading, height_m) {
   const shape = heading === null
     ? draw("circle", { class: "craft", cx: x, cy: y, r: 7 })
     : draw("path", { class: "craft", d: "M0 -14l8 22-8-5-8 5z", transform: `translate(${x} ${y}) rotate(${round(heading)})` });
-  return draw("g", { id: "craft" }, draw("title", {}, "Craft"), shape);
+  const told = height_m === null || height_m === undefined ? "Craft" : `Craft, ${height_m.toFixed(1)} m above home`;
+  return draw("g", { class: "touched craft-mark" }, draw("title", {}, told), shape);
 }
 
 function scaleBar(pixelsPerMetre, width, height) {

@@ -3,22 +3,24 @@
 import { make } from "./dom.js";
 import { drawMap } from "./map.js";
 
-const STEP = 1.5, LEAST = 1, MOST = 64, PAN_PX = 60;
+const STEP = 1.5, LEAST = 1, MOST = 64, PAN_PX = 60, FINGER_PX = 24;
 const ARROWS = { ArrowLeft: [PAN_PX, 0], ArrowRight: [-PAN_PX, 0], ArrowUp: [0, PAN_PX], ArrowDown: [0, -PAN_PX] };
 
 export class MapView {
   #canvas = make("div", { class: "map-canvas" });
   #tools;
+  #told = make("p", { class: "map-told", role: "status" }); // a finger sees no tooltips
   #contents = null;
   #drawn = "";
   #camera = { zoom: 1, dx: 0, dy: 0 }; // zoom 1: everything fits; dx, dy: pixels
   #fingers = new Map();
 
   constructor(container) {
-    const button = (label, name, press) => make("button", { type: "button", "aria-label": `${name}: ${container.id}`, title: name, onclick: press }, label);
+    const button = (label, name, press) => make("button", { type: "button", "aria-label": `${label === "Fit" ? "Fit: show everything" : name}: ${container.id}`, title: name, onclick: press }, label);
     this.#tools = make("div", { class: "map-tools" },
       button("+", "Zoom in", () => this.#zoom(STEP)), button("−", "Zoom out", () => this.#zoom(1 / STEP)), button("Fit", "Show everything", () => this.#move({ zoom: 1, dx: 0, dy: 0 })));
-    container.append(this.#canvas, this.#tools);
+    container.append(this.#canvas, this.#tools, this.#told);
+    this.#canvas.addEventListener("click", (event) => this.#tell(event));
     container.addEventListener("keydown", (event) => this.#key(event));
     this.#canvas.addEventListener("wheel", (event) => this.#wheel(event), { passive: false });
     this.#canvas.addEventListener("pointerdown", (event) => this.#fingers.set(event.pointerId, [event.clientX, event.clientY]));
@@ -45,6 +47,17 @@ export class MapView {
     this.#canvas.replaceChildren(svg ?? "Neither a mission nor a position is known yet.");
     // Until it is zoomed, one finger scrolls the page.
     this.#canvas.classList.toggle("zoomed", this.#camera.zoom > 1);
+  }
+
+  // The name and height of the mark under a finger.
+  #tell(event) {
+    let nearest = "", least = FINGER_PX;
+    for (const mark of this.#canvas.querySelectorAll("g.touched")) {
+      const box = mark.getBoundingClientRect();
+      const far = Math.hypot(event.clientX - box.left - box.width / 2, event.clientY - box.top - box.height / 2);
+      if (far <= least) [nearest, least] = [mark.querySelector("title").textContent, far];
+    }
+    this.#told.textContent = nearest;
   }
 
   #move(camera) {

@@ -15,7 +15,8 @@ import { showStateBar } from "./state_bar.js";
 import { listTable } from "./tables.js";
 import { followWrites } from "./write_form.js";
 
-const INTERVAL_MS = 1000, TRANSFER_INTERVAL_MS = 250, TRAIL_LENGTH = 600;
+const INTERVAL_MS = 800, TRANSFER_INTERVAL_MS = 250, TRAIL_LENGTH = 600;
+const STALE_MS = 1500, WATCH_MS = 100;
 const map = new MapView(byId("map"));
 const shown = { mission: undefined, newest: undefined, backup: undefined };
 const trail = [];
@@ -29,6 +30,7 @@ async function look() {
     if (last && last.version !== state.version) return location.reload(); // upgraded: these scripts are the old ones
     last = state;
     lastAt = performance.now();
+    document.body.classList.remove("stale");
     showStateBar(state, null);
     showOverview(state);
     followWrites(state, askedAt);
@@ -39,14 +41,26 @@ async function look() {
     await showLinkPlot();
     await showConnect();
     showTrouble(state.store_trouble);
-    document.body.classList.remove("stale");
   } catch (error) {
-    document.body.classList.add("stale");
-    showStateBar(last, (performance.now() - lastAt) / 1000);
-    showTrouble(`${error.message} The values below may be old.`);
+    if (last === null || isStale()) showSilence(error.message);
+    else showTrouble(error.message);
   }
   document.body.dataset.looks = Number(document.body.dataset.looks ?? 0) + 1;
   setTimeout(onceVisible, last?.transfer ? TRANSFER_INTERVAL_MS : INTERVAL_MS);
+}
+
+const isStale = () => performance.now() - lastAt > STALE_MS;
+
+// A request that nobody answers fails only after seconds: by then a green DISARMED would be a guess.
+function watch() {
+  if (last !== null && isStale()) showSilence();
+}
+
+function showSilence(reason = null) {
+  const silent_s = (performance.now() - lastAt) / 1000;
+  document.body.classList.add("stale");
+  showStateBar(last, silent_s, reason !== null);
+  showTrouble(`${reason ?? "The Pi does not answer."} The values below may be old.`);
 }
 
 function onceVisible() {
@@ -97,4 +111,5 @@ function showTrouble(text) {
   setText(byId("trouble"), text);
 }
 
+setInterval(watch, WATCH_MS);
 look();

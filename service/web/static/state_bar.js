@@ -5,8 +5,9 @@ import { byId, make, setText } from "./dom.js";
 export const STALE_S = 3;
 let spoken = null; // the badges that were announced last
 
-// state: of /api/state, or the last one known (null: none) if silent_s is not null.
-export function showStateBar(state, silent_s) {
+// state: of /api/state, or the last one known (null: none) if silent_s is not null. isAnnounced: also to a screen reader,
+// which a short gap in the Wi-Fi should not interrupt.
+export function showStateBar(state, silent_s, isAnnounced = true) {
   const badges = badgesOf(state, silent_s);
   const bar = byId("badges");
   const texts = badges.map((badge) => `${badge.kind} ${badge.text}`).join("|");
@@ -18,7 +19,7 @@ export function showStateBar(state, silent_s) {
   document.title = `${names} · naze-bridge`;
   setText(byId("headline"), headline(state));
   showTransfer(silent_s === null ? state.transfer : null);
-  announce(names);
+  if (isAnnounced) announce(names);
 }
 
 function badgesOf(state, silent_s) {

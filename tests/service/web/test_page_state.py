@@ -64,6 +64,13 @@ def test_old_values_are_marked_stale(lasting_web: WebBench, page: Browser) -> No
     until(lambda: page.text("#badges") == "DISARMED", "the craft again")
 
 
+def test_the_page_itself_notices_that_replies_stop(page: Browser) -> None:
+    """The request that nobody answers fails only after seconds, here never: until then DISARMED was green."""
+    page.run("window.fetch = () => new Promise(() => {})")
+    page.wait_text("#badges", "NO REPLY FROM THE PI")
+    assert page.run("return document.body.classList.contains('stale')")
+
+
 UPGRADE = """
     const fetched = window.fetch;
     window.fetch = async (path, ...options) => {

@@ -62,3 +62,20 @@ def test_a_log_is_downloaded(browsers: Browsers, lasting_web: WebBench, tmp_path
         page.wait_text("#logs", "Downloaded")
         assert page.run("return document.documentElement.scrollWidth") <= PHONE[0]
         assert page.errors() == []
+
+
+def test_on_a_phone_the_map_comes_first_and_a_finger_reads_heights(browsers: Browsers, lasting_web: WebBench) -> None:
+    with browsers.tab(lasting_web.port, PHONE) as page:
+        page.open()
+        until(lambda: len(page.all("#map .point")) > 2, "the waypoints")
+        assert page.run("""
+            const top = (id) => document.getElementById(id).getBoundingClientRect().top;
+            return top("map") < top("vehicle")""")
+        page.run("""
+            const mark = document.querySelectorAll("#map .point")[1], box = mark.getBoundingClientRect();
+            const at = { clientX: box.left + box.width / 2 + 9, clientY: box.top - 5, bubbles: true };
+            document.querySelector("#map svg").dispatchEvent(new MouseEvent("click", at))""")
+        assert page.text("#map .map-told") == page.run(
+            "return document.querySelectorAll('#map .point')[1].parentNode.querySelector('title').textContent"
+        )
+        assert page.text("#map .map-told").endswith(" m")

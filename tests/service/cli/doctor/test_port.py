@@ -19,7 +19,7 @@ def test_a_missing_port_is_a_problem(pi: FaultyMachine) -> None:
     pi.write("/proc/device-tree/model", "Raspberry Pi 4 Model B Rev 1.4\0")
     assert_problem(check_port(pi, PORT), "/dev/serial0 is missing", "sudo naze-bridge setup")
     pi.write("/dev/ttyUSB0")
-    assert_problem(check_port(pi, PORT), "/dev/serial0 is missing", "set fc to a port that exists: /dev/ttyUSB0")
+    assert_problem(check_port(pi, PORT), "/dev/serial0 is missing", "sudo naze-bridge setup --fc /dev/ttyUSB0")
     assert_problem(check_port(pi, SerialFc("/dev/naze", None)), "/dev/naze is missing", "plug the flight controller in")
     # There are no further checks of a missing port.
     assert check_permission(pi, PORT) is check_console(pi, PORT) is check_holder(pi, PORT) is None
@@ -29,7 +29,7 @@ def test_setup_is_no_remedy_for_a_missing_uart_of_another_board(pi: FaultyMachin
     pi.write("/proc/device-tree/model", "Orange Pi 5\0")
     found = check_port(pi, SerialFc("/dev/ttyS4", None))
     assert_problem(found, "/dev/ttyS4 is missing", "enable this UART in the board's own boot settings")
-    assert "setup" not in found.remedy
+    assert "header" not in found.remedy
 
 
 def test_serial0_is_the_wrong_port_on_a_pi_5(pi: FaultyMachine) -> None:
@@ -37,7 +37,7 @@ def test_serial0_is_the_wrong_port_on_a_pi_5(pi: FaultyMachine) -> None:
     pi.write("/dev/ttyAMA10")
     pi.path("/dev/serial0").unlink()
     pi.path("/dev/serial0").symlink_to("ttyAMA10")
-    assert_problem(check_port(pi, PORT), "debug socket on a Raspberry Pi 5", 'fc = "/dev/ttyAMA0"')
+    assert_problem(check_port(pi, PORT), "debug socket on a Raspberry Pi 5", "sudo naze-bridge setup --fc /dev/ttyAMA0")
 
 
 def test_without_a_named_port_every_port_is_checked(pi: FaultyMachine, tmp_path: Path) -> None:

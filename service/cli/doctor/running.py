@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Checks of what a running daemon reports about itself: its line, its stations and its store."""
+
+import re
+from collections.abc import Iterator
+
+from bridge.controllers.harakiri.profile import UNPATCHED
+from payloads.mission_data import Json
+from protocols.mavlink.signing import Check
+from service.cli.doctor.checked import Checked, note, problem
+from service.machine.host import Host
+from service.machine.package import page
+
+#: Damaged replies a minute. A good wire has none for hours.
+_MOST_DAMAGED = 6
+_LEAST_DAMAGED = 10
+_REFUSED = re.compile(r"(\d+) x (.*) \((.*)\)")
+
+
+def check_running(status: Json) -> Iterator[Checked]:
+    """Yield a finding for each trouble in the daemon's status. It may be of doctor's own bridge."""
+    if status["flight_controller"] == UNPATCHED.name:
+        remedy = f"telemetry works; for missions flash the patch: {page('firmware/README.md')}"
+        yield note("missions", "this Harakiri has no mission extension, so it stores none", remedy)
+    yield from _line(status)
+    yield from _refused(status)
+    if status.get("store_trouble"):
+        remedy = "see disk and missions below; then: sudo systemctl restart naze-bridge"
+        yield problem("store", f"the daemon cannot store missions: {status['store_trouble']}", remedy)
+
+
+def _line(status: Json) -> Iterator[Checked]:
+    damaged, found_s = status.get("bad_checksums") or 0, status.get("found_s")
+    if found_s is None or damaged < _LEAST_DAMAGED or damaged * 60 < _MOST_DAMAGED * found_s:
+        return
+    remedy = "shorten the wires, keep them away from motors and regulators, connect GND at both ends, check 3.3 V"
+    yield problem("line", f"{damaged} damaged replies in {found_s / 60:.0f} min", remedy)
+
+
+def _refused(status: Json) -> Iterator[Checked]:
+    for text in status.get("refused", ()):
+        found = _REFUSED.fullmatch(text)
+        if found is None:
+            continue
+        count, why, link = found.groups()
+        if why in (Check.UNSIGNED.value, Check.WRONG.value):
+            remedy = (
+                f"enter the key in the ground station ({page('docs/signing.md')}); "
+                "sudo naze-bridge setup --new-key makes a new one and shows it"
+            )
+            yield note("key", f"{count} requests on {link} were refused: {why}", remedy)
+
+
+def check_daemons(host: Host) -> Checked | None:
+    """Check that only one daemon runs: two take each other's replies from the port."""
+    daemons = [each for each in host.processes() if each.is_naze_bridge and "run" in each.arguments]
+    if len(daemons) < 2:
+        return None
+    pids = [str(each.pid) for each in daemons]
+    remedy = f"stop all but one: sudo kill {' '.join(pids[1:])}; the service: sudo systemctl stop naze-bridge"
+    return problem("daemon", f"{len(daemons)} daemons run (pids {', '.join(pids)})", remedy)
