@@ -7,7 +7,7 @@
 #   make test           run all tests (ARGS="tests/storage -x" runs some)
 #   make lint           check style, format and types
 #   make bench          measure speed and memory
-#   make pictures       retake the docs' pictures of the status page
+#   make pictures       retake the docs' pictures of the status page, and the README's terminal cast
 #   make real-board IMAGE=X.elf  run Harakiri with the patch, built by you, on the emulated board (CUTS=20: fewer power cuts;
 #                       FLY=1: flights too)
 #   make soak           kill -9 and damaged stores by the hundred, then the daemon through all kinds of events and attacks
@@ -80,6 +80,7 @@ bench: $(VENV)/.test-ready
 # The docs' pictures of the status page, taken by its tests.
 pictures: $(VENV)/.test-ready
 	PYTHONPATH=. $(BIN)/python tests/support/take_pictures.py
+	$(BIN)/python -m generators.terminal_cast > docs/pictures/demo.svg
 
 real-board: $(VENV)/.test-ready
 	@test -n '$(IMAGE)' || { echo 'Say which image: make real-board IMAGE=path/to/X.elf' >&2; exit 1; }

@@ -17,9 +17,10 @@ _HERE = Path(__file__).resolve().parent
 _LIB = Path("usr/lib/naze-bridge")
 #: Pages outside docs/ that the docs link to.
 _PAGES = (
-    *("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE"),
-    *("firmware/README.md", "systemd/naze-bridge.service", "systemd/60-naze-bridge.rules"),
+    *("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md", "LICENSE"),
+    *("systemd/naze-bridge.service", "systemd/60-naze-bridge.rules"),
 )
+_NOT_THE_PATCH = ("__pycache__", "build", "tests", "sim", "Makefile")
 _SCHEMAS = "payloads/schemas"
 _SCRIPTS = ("postinst", "prerm", "postrm")
 #: Of pymavlink's 44 MB of dialects the bridge imports one, and pymavlink's own mavutil one; lxml is for its generator.
@@ -55,6 +56,8 @@ def lay_out(root: Path, libraries: Mapping[str, Path], project: Path, version: s
     for page in _PAGES:
         _copy(project / page, documents / Path(page).parent)
     shutil.copytree(project / _SCHEMAS, documents / _SCHEMAS, ignore=shutil.ignore_patterns("__pycache__"))
+    # The patch, so that a pilot needs nothing but the package and Harakiri's sources.
+    shutil.copytree(project / "firmware", documents / "firmware", ignore=shutil.ignore_patterns(*_NOT_THE_PATCH))
     shutil.copytree(project / "examples", documents / "examples", ignore=shutil.ignore_patterns("__pycache__"))
     (documents / "changelog.gz").write_bytes(gzip.compress((project / "CHANGELOG.md").read_bytes(), mtime=0))
     _write(root / "usr/share/man/man1/naze-bridge.1.gz", gzip.compress(man_page(version).encode(), mtime=0))
@@ -63,7 +66,8 @@ def lay_out(root: Path, libraries: Mapping[str, Path], project: Path, version: s
     _copy(_HERE / "lintian-overrides", root / "usr/share/lintian/overrides", "naze-bridge")
     for path in root.rglob("*"):
         if not path.is_symlink():
-            path.chmod(0o755 if path.is_dir() or path.parent == environment / "bin" else 0o644)
+            runs = path.is_dir() or path.parent == environment / "bin" or path == documents / "firmware/apply"
+            path.chmod(0o755 if runs else 0o644)
     _describe(root, version, architecture)
 
 

@@ -81,7 +81,25 @@ def _import_without(library: str, dependency: str) -> None:
     del sys.modules[dependency]
 
 
+def _show_version(context: click.Context, _option: click.Parameter, is_given: bool) -> None:  # click's
+    if not is_given or context.resilient_parsing:
+        return
+    from service.machine.package import address, version  # reads files: not at every start
+
+    click.echo(f"naze-bridge, version {version()}")
+    if (issues := address("Issues")) is not None:
+        click.echo(f"Problems, questions, recordings: {issues}")
+    context.exit()
+
+
 @click.group(cls=_Main, commands=_COMMANDS, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(package_name="naze-bridge")
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_show_version,
+    help="Show the version and exit.",
+)
 def main() -> None:
     """Companion bridge between a MultiWii-family flight controller and MAVLink ground stations."""

@@ -5,12 +5,23 @@ from importlib import metadata
 from pathlib import Path
 
 _INSTALLED = Path("/usr/share/doc/naze-bridge")
+_PLACEHOLDER = "/OWNER/"
 _IN_PACKAGE = Path(__file__).is_relative_to("/usr/lib/naze-bridge")
 
 
 def page(name: str) -> str:
     """The path to give in a message for `name`, a path in the repository such as "docs/signing.md"."""
     return str(_INSTALLED / name) if _IN_PACKAGE else name
+
+
+def address(label: str) -> str | None:
+    """The project's "Repository" or "Issues" address, from pyproject.toml; None if it is not published."""
+    try:
+        urls = metadata.metadata("naze-bridge").get_all("Project-URL") or []
+    except metadata.PackageNotFoundError:
+        return None
+    found = dict(str(url).split(", ", 1) for url in urls).get(label)
+    return None if found is None or _PLACEHOLDER in found else found
 
 
 def version(package: str = "naze-bridge") -> str:

@@ -77,7 +77,7 @@ def parse(words: list[str]) -> bool:
             assert found is not None
             command = found
         command.make_context(name, words, parent=context)
-    except (click.MissingParameter, click.exceptions.NoArgsIsHelpError):
+    except (click.MissingParameter, click.exceptions.NoArgsIsHelpError, click.exceptions.Exit):
         return False
     return True
 

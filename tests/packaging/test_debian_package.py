@@ -128,6 +128,7 @@ def test_the_package_has_the_expected_files(package: Path) -> None:
         "/usr/share/doc/naze-bridge/examples/config.toml",
         "/usr/share/doc/naze-bridge/copyright",
         "/usr/share/doc/naze-bridge/changelog.gz",
+        *(f"/usr/share/doc/naze-bridge/firmware/{name}" for name in ("apply", "naze_mission.c", "harakiri_guard.h")),
         "/usr/share/man/man1/naze-bridge.1.gz",
         "/usr/share/bash-completion/completions/naze-bridge",
     ):
@@ -184,6 +185,7 @@ def test_the_package_has_no_paths_of_the_build_machine(package: Path) -> None:
 def test_it_is_installed_used_upgraded_removed_and_purged(package: Path, root: BareRoot, tmp_path: Path) -> None:
     assert "sudo naze-bridge setup" in root.run("dpkg --install /root/naze-bridge.deb")
     assert root.run("id --name --user naze-bridge") == "naze-bridge\n"
+    assert "Harakiri source tree" in root.run("/usr/share/doc/naze-bridge/firmware/apply --help")
     # Not enabled by default.
     assert "naze-bridge" not in root.run("ls /etc/systemd/system/multi-user.target.wants")
     # The byte code is installed, because the service cannot write it.

@@ -12,7 +12,7 @@ from tests.support.programs import REPOSITORY
 
 #: CHANGELOG.md is not a page: it names what has been removed. docs/cli.md is compared as a whole (test_cli_page.py).
 PAGES = [
-    *(REPOSITORY / name for name in ("README.md", "CONTRIBUTING.md", "firmware/README.md")),
+    *(REPOSITORY / name for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md", "firmware/README.md")),
     *sorted(path for path in (REPOSITORY / "docs").rglob("*.md") if path.name != "cli.md"),
 ]
 _FENCED = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
