@@ -15,6 +15,7 @@ from terminal.sentences import INTERRUPTED, complain
 
 _COMMANDS = {
     "setup": LazyCommand("service.cli.setup.command:setup", "Set this Raspberry Pi up: UART, Wi-Fi, page, service."),
+    "card": LazyCommand("service.cli.card:card", "Prepare a card that sets itself up at its first start."),
     "run": LazyCommand("service.cli.run:run", "Run the bridge in the foreground."),
     "status": LazyCommand("service.cli.status:status", "Show the state of the bridge and the vehicle."),
     "doctor": LazyCommand("service.cli.doctor.command:doctor", "Diagnose setup problems."),

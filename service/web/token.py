@@ -55,8 +55,13 @@ def _read(path: Path) -> bytes | None:
     return secret
 
 
+def new_token() -> str:
+    """A random token."""
+    return "".join(secrets.choice(_ALPHABET) for _ in range(_LENGTH))
+
+
 def _make(path: Path) -> bytes:
-    secret = "".join(secrets.choice(_ALPHABET) for _ in range(_LENGTH)).encode()
+    secret = new_token().encode()
     try:
         replace_file(path, secret + b"\n")
     except OSError as error:

@@ -23,6 +23,7 @@ from tests.support.programs import REPOSITORY, TIMEOUT_S, Daemon, free_port, unt
 
 #: Commands that are not run here, by their beginning, with the reason.
 NOT_RUN = {
+    "naze-bridge card": "needs a card: tests/service/cli/test_card.py runs it",
     "naze-bridge demo": "tests/service/cli/test_demo.py runs it",
     "naze-bridge fleet list": "needs a router: tests/fleet/test_command.py runs it",
     "naze-bridge fleet watch": "needs a router: tests/fleet/test_watch_screen.py runs it",

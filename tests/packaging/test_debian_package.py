@@ -18,6 +18,7 @@ from pathlib import Path
 import pytest
 
 from deb.build import PYTHONS, build, fetch
+from service.cli.card import prepare
 from tests.support.bare_root import BareRoot
 
 _REPOSITORY = Path(__file__).resolve().parents[2]
@@ -219,6 +220,48 @@ def test_it_is_installed_used_upgraded_removed_and_purged(package: Path, root: B
     assert "missions.db" in root.run("ls /var/lib/private/naze-bridge")
     left = root.run("find /etc /usr /var /opt -xdev -name '*naze-bridge*' -not -path '/var/lib/private/*'")
     assert left == ""
+
+
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize("system", ["bookworm", "trixie"])
+def test_in_a_bare_root_a_card_sets_itself_up_at_its_first_start(
+    package: Path, root: BareRoot, tmp_path: Path, system: str
+) -> None:
+    boot = tmp_path / "boot"
+    boot.mkdir()
+    (boot / "config.txt").write_text("[all]\n")
+    (boot / "cmdline.txt").write_text("console=serial0,115200 console=tty1 rootwait systemd.run=/boot/firstrun.sh\n")
+    hook = boot / ("firstrun.sh" if system == "bookworm" else "user-data")
+    hook.write_text("#!/bin/bash\nset +e\nexit 0\n" if system == "bookworm" else "#cloud-config\n")
+    prepare(boot, package, ["--hotspot", "kite", "--country", "DE"], {"password": "long-enough", "web-token": "t" * 16})
+    packed = tmp_path / "boot.tar"
+    with tarfile.open(packed, "w") as archive:
+        archive.add(boot, "firmware")
+    root.put(packed, "/root/boot.tar")
+    root.run("mkdir -p /boot && tar -xf /root/boot.tar -C /boot")
+
+    if system == "bookworm":
+        root.run("bash /boot/firmware/firstrun.sh")
+    else:
+        (command,) = re.findall(r"- \[(.*)\]", hook.read_text())
+        # systemd does not run here to start the unit.
+        root.run(command.replace(",", "").removesuffix(" start"))
+    unit = root.run("cat /etc/systemd/system/multi-user.target.wants/naze-bridge-card.service")
+    (started,) = re.findall("^ExecStart=(.*)$", unit, re.MULTILINE)
+    root.run(started.replace("$$", "$"))
+
+    assert "Set up" not in root.run("cat /var/log/naze-bridge-card.log")
+    assert "naze-bridge, version" in root.run("naze-bridge --version")
+    assert "0.0.0.0:8080" in root.run("cat /etc/naze-bridge/setup.toml")
+    hotspot = root.run("cat /etc/NetworkManager/system-connections/naze-bridge-hotspot.nmconnection")
+    assert "ssid=kite\n" in hotspot
+    assert "autoconnect=true" in hotspot
+    assert root.run("stat -c '%U %a' /var/lib/private/naze-bridge/web-token") == "naze-bridge 600\n"
+    assert "console=serial0" not in root.run("cat /boot/firmware/cmdline.txt")
+    root.run("ls /etc/systemd/system/multi-user.target.wants/naze-bridge.service")
+    # Neither the password nor the unit is left.
+    assert "naze-bridge" not in root.run("ls /boot/firmware")
+    assert "card" not in root.run("ls /etc/systemd/system /etc/systemd/system/multi-user.target.wants")
 
 
 @pytest.mark.timeout(1800)

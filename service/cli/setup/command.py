@@ -76,8 +76,8 @@ def setup(
     except AddressError as error:
         raise click.UsageError(str(error)) from error
     click.echo(f"This is a {model.name}." if (model := pi_model(host)) else "This is not a known Raspberry Pi model.")
-    password = None if password_file is None else _line_of(password_file)
-    key = None if key_file is None else _line_of(key_file)
+    password = None if password_file is None else secret_line(password_file)
+    key = None if key_file is None else secret_line(key_file)
     if key is not None and new_key:
         raise click.UsageError("give either --key-file or --new-key")
     earlier = earlier_choices(host)
@@ -96,11 +96,7 @@ def setup(
         if yes or dry_run:
             raise click.UsageError("a hotspot needs a password: --password-file FILE")
         password = click.prompt("Its password, 8 characters or more", hide_input=True, confirmation_prompt=True)
-    _check_wifi(hotspot, password)
-    if country is not None and not re.fullmatch("[A-Za-z]{2}", country):
-        raise click.UsageError(f"{country!r} is not a country code: two letters, such as DE")
-    if name is not None and not _HOST_NAME.fullmatch(name):
-        raise click.UsageError(f"{name!r} is not a host name: letters, digits and hyphens, at most 63")
+    check_answers(hotspot, password, country, name)
     answers = SetupChoices(
         fc=None if fc == "auto" else fc,
         page=page is not False,
@@ -242,9 +238,10 @@ def _print_addresses(host: Host, answers: SetupChoices) -> None:
         return
     url = f"http://{(addresses or local or ['localhost'])[0]}:{PAGE_PORT}/"
     click.echo(f"Status page: {url}")
-    if token := page_token(host):
+    token = page_token(host)
+    if token:
         click.echo(f"Its token, for changes: {token}")
-    _print_code(url)
+    _print_code(f"{url}#token={token}" if token else url)
 
 
 def _print_code(text: str) -> None:
@@ -254,14 +251,20 @@ def _print_code(text: str) -> None:
     segno.make(text, error="l").terminal(compact=True)
 
 
-def _check_wifi(ssid: str | None, password: str | None) -> None:
+def check_answers(ssid: str | None, password: str | None, country: str | None, name: str | None) -> None:
+    """Refuse answers that cannot be used, each with one sentence (click.UsageError)."""
     if ssid is not None and not (0 < len(ssid.encode()) <= _MOST_SSID and ssid.isprintable()):
         raise click.UsageError(f"{ssid!r} is not a network name: 1 to {_MOST_SSID} characters")
     if password is not None and not (_LEAST_PASSWORD <= len(password) <= _MOST_PASSWORD and password.isascii()):
         raise click.UsageError(f"a Wi-Fi password has {_LEAST_PASSWORD} to {_MOST_PASSWORD} plain characters")
+    if country is not None and not re.fullmatch("[A-Za-z]{2}", country):
+        raise click.UsageError(f"{country!r} is not a country code: two letters, such as DE")
+    if name is not None and not _HOST_NAME.fullmatch(name):
+        raise click.UsageError(f"{name!r} is not a host name: letters, digits and hyphens, at most 63")
 
 
-def _line_of(path: Path) -> str:
+def secret_line(path: Path) -> str:
+    """The only line of a file; click.UsageError if it has another number."""
     try:
         lines = path.read_text().splitlines()
     except OSError as error:

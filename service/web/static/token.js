@@ -2,7 +2,9 @@
 // The token: typed once into any of its fields, kept until the page is closed.
 import { make } from "./dom.js";
 
-let token = "";
+// The QR code of setup and of a card brings it along.
+let token = decodeURIComponent(location.hash.match(/^#token=(.+)$/)?.[1] ?? "");
+if (token) history.replaceState(null, "", location.pathname);
 
 export const currentToken = () => token;
 

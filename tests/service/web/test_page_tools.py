@@ -79,3 +79,11 @@ def test_on_a_phone_the_map_comes_first_and_a_finger_reads_heights(browsers: Bro
             "return document.querySelectorAll('#map .point')[1].parentNode.querySelector('title').textContent"
         )
         assert page.text("#map .map-told").endswith(" m")
+
+
+def test_the_token_in_the_address_is_filled_in_and_hidden(browsers: Browsers, lasting_web: WebBench) -> None:
+    with browsers.tab(lasting_web.port, PHONE) as page:
+        page.driver.get(f"{page.url}#token={lasting_web.token}")
+        page.wait_for_updates(1)
+        assert page.run("return document.querySelector('input.token').value") == lasting_web.token
+        assert page.run("return location.href") == page.url

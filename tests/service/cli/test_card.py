@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A card freshly written by Raspberry Pi Imager gets one line and one folder, however often it is prepared.
+
+tests/packaging/test_debian_package.py starts from such a card.
+"""
+
+import shlex
+import subprocess
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from service.cli.main import main
+
+_SYSTEMD_RUN = "systemd.run=/boot/firstrun.sh systemd.run_success_action=reboot systemd.unit=kernel-command-line.target"
+_FIRSTRUN = "#!/bin/bash\n\nset +e\n\necho kite >/etc/hostname\nrm -f /boot/firstrun.sh\nexit 0\n"
+_USER_DATA = "#cloud-config\nhostname: kite\nusers:\n- name: pilot\n  shell: /bin/bash\n"
+
+
+class Card:
+    def __init__(self, folder: Path) -> None:
+        self.boot = folder / "boot"
+        self.boot.mkdir()
+        for name, text in (("cmdline.txt", "console=tty1 rootwait"), ("config.txt", "[all]\n")):
+            (self.boot / name).write_text(text)
+        self.package = folder / "naze-bridge_1.0_arm64.deb"
+        self.package.write_bytes(b"a package")
+        self.password = folder / "password"
+        self.password.write_text("long-enough\n")
+
+    def bookworm(self) -> None:
+        (self.boot / "cmdline.txt").write_text(f"console=tty1 rootwait {_SYSTEMD_RUN}")
+        (self.boot / "firstrun.sh").write_text(_FIRSTRUN)
+
+    def trixie(self, more: str = "") -> None:
+        (self.boot / "user-data").write_text(_USER_DATA + more)
+        (self.boot / "network-config").write_text("network:\n  version: 2\n")
+
+    def prepare(self, *options: str) -> Result:
+        files = ("--package", str(self.package), "--password-file", str(self.password))
+        words = ("card", str(self.boot), *files, "--hotspot", "pilot's kite", "--country", "de", *options)
+        return CliRunner().invoke(main, words)
+
+
+@pytest.fixture
+def card(tmp_path: Path) -> Card:
+    return Card(tmp_path)
+
+
+def test_bookworms_script_gets_a_line_and_works_as_before(card: Card) -> None:
+    card.bookworm()
+    done = card.prepare()
+    assert done.exit_code == 0, done.output
+    script = card.boot / "firstrun.sh"
+    text = script.read_text()
+    assert text.replace(text.splitlines(keepends=True)[1], "", 1) == _FIRSTRUN
+    subprocess.run(["bash", "-n", script], check=True)
+    assert (card.boot / "cmdline.txt").read_text().endswith(_SYSTEMD_RUN)
+
+
+@pytest.mark.parametrize(
+    ("more", "expected"),
+    [
+        ("", "\nruncmd:\n  - {}\n"),
+        ("runcmd:\n- [rfkill, unblock, wifi]\n", "runcmd:\n- {}\n- [rfkill, unblock, wifi]\n"),
+        (
+            "runcmd:\n    # the pilot's\n    - ls\nssh_pwauth: true\n",
+            "runcmd:\n    - {}\n    # the pilot's\n    - ls\nssh_",
+        ),
+    ],
+)
+def test_trixies_user_data_gets_a_command(card: Card, more: str, expected: str) -> None:
+    card.trixie(more)
+    assert card.prepare().exit_code == 0
+    text = (card.boot / "user-data").read_text()
+    assert expected.format("[sh, /boot/firmware/naze-bridge/enable.sh, start]") in text
+    assert text.startswith(_USER_DATA)
+
+
+@pytest.mark.parametrize("system", [Card.bookworm, Card.trixie])
+def test_it_may_be_prepared_again(card: Card, system: object) -> None:
+    assert callable(system)
+    system(card)
+    card.prepare("--new-key")
+    hooks = {path.name: path.read_text() for path in card.boot.glob("*") if path.is_file()}
+    assert card.prepare("--name", "kite").exit_code == 0
+    assert {path.name: path.read_text() for path in card.boot.glob("*") if path.is_file()} == hooks
+    assert not (card.boot / "naze-bridge" / "key").exists()
+
+
+def test_the_folder_has_the_package_the_answers_and_valid_scripts(card: Card) -> None:
+    card.trixie()
+    done = card.prepare("--new-key", "--name", "kite")
+    folder = card.boot / "naze-bridge"
+    assert (folder / "naze-bridge.deb").read_bytes() == b"a package"
+    assert (folder / "password").read_text() == "long-enough\n"
+    key, token = ((folder / name).read_text().strip() for name in ("key", "web-token"))
+    assert f": {key}" in done.output
+    assert f"http://10.42.0.1:8080/#token={token}" in done.output
+    (setup,) = (line for line in (folder / "first-boot.sh").read_text().splitlines() if " setup --yes" in line)
+    words = shlex.split(setup)
+    assert words[words.index("--hotspot") + 1] == "pilot's kite"
+    assert words[words.index("--country") + 1] == "DE"
+    assert words[words.index("--key-file") + 1] == "$here/key"
+    for script in ("first-boot.sh", "enable.sh"):
+        subprocess.run(["sh", "-n", folder / script], check=True)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda card: (card.boot / "config.txt").unlink(), "is not the boot partition"),
+        (lambda card: card.package.unlink(), "is not a package"),
+        (lambda card: (card.boot / "user-data").unlink(), "Raspberry Pi Imager"),
+        (lambda card: (card.boot / "user-data").write_text("x: 1\n"), "is not cloud-init's"),
+        (lambda card: (card.boot / "user-data").write_text("#cloud-config\nruncmd: [ls]\n"), "list of lines"),
+    ],
+)
+def test_another_folder_is_refused_and_left_as_it_is(card: Card, change: object, words: str) -> None:
+    card.trixie()
+    assert callable(change)
+    change(card)
+    before = sorted(card.boot.rglob("*"))
+    done = card.prepare()
+    assert done.exit_code == 1
+    assert words in " ".join(done.output.split())
+    assert sorted(card.boot.rglob("*")) == before
+
+
+def test_wrong_answers_are_refused(card: Card) -> None:
+    card.trixie()
+    for options in (("--country", "Germany"), ("--name", "my pi"), ("--hotspot", "n" * 33)):
+        assert card.prepare(*options).exit_code == 2
