@@ -51,6 +51,15 @@ def pack_payload(msgid: int, payload: bytes) -> Packed:
     return Packed(msgid, payload, payload.rstrip(b"\0") or b"\0")
 
 
+def repack(frame: MavlinkFrame) -> Packed | None:
+    """A received message, to be framed with other numbers; None if its size is not known."""
+    form = MESSAGE_FORMATS.get(frame.msgid)
+    if form is None or frame.msgid not in CRC_EXTRA:
+        return None
+    whole = frame.payload[: form.base_size].ljust(form.base_size or 0, b"\0")
+    return Packed(frame.msgid, whole, frame.payload.rstrip(b"\0") or b"\0")
+
+
 def _payload_alone(_packer: None, _crc_extra: int, payload: bytes, *, force_mavlink1: bool) -> bytes:
     return payload
 

@@ -59,13 +59,14 @@ def mavlink(name: str, gcs: tuple[str, ...], **where: Any) -> None:
         raise click.UsageError(str(error)) from None
 
     with fleet_session(where) as (session, prefix):
-        chosen(alive(session, prefix), (name,), prefix)
+        bridges = alive(session, prefix)
+        chosen(bridges, (name,), prefix)
 
         def input_changed(accepts: bool) -> None:
             click.echo(f"{name} {'accepts MAVLink again' if accepts else _READ_ONLY}", err=True)
 
         async def relay() -> None:
-            relay = GcsRelay(session, prefix, name, addresses, input_changed)
+            relay = GcsRelay(session, prefix, name, addresses, input_changed, bridges)
             click.echo(f"{name} is at {', '.join(gcs)}. Ctrl-C ends.")
             try:
                 await asyncio.Event().wait()

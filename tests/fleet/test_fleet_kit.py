@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every metric in the dashboards and alerts of examples/fleet exists in a daemon."""
+"""examples/fleet: every metric in the dashboards and alerts exists in a daemon, and the storages are as documented."""
 
 import asyncio
 import json
 import re
 from pathlib import Path
 
+import zenoh
 from prometheus_client.parser import text_string_to_metric_families
 
+from payloads.keys import EVENT, KEYS, MISSION_CURRENT, MISSION_REPORT, OVERVIEW, STATE, ZenohKey, full
 from service.daemon.daemon import Daemon
 from service.settings import Settings
 from service.settings.addresses import parse_fc
@@ -19,6 +21,17 @@ from tests.support.zenoh_router import EXAMPLES
 _NAME = re.compile(r"\b(?:naze_bridge|process)_[a-z_]+")
 #: Metrics that exist only after an event, or only with a session.
 _LATER = {"naze_bridge_missions_total", "naze_bridge_refused_frames_total", "naze_bridge_zenoh_dropped_total"}
+
+
+def test_the_storages_keep_what_they_should_and_no_telemetry() -> None:
+    compose = (EXAMPLES / "fleet" / "docker-compose.yml").read_text()
+    stored = [zenoh.KeyExpr(found) for found in re.findall(r'key_expr:"([^"]+)"', compose)]
+
+    def is_stored(key: ZenohKey) -> bool:
+        return any(each.intersects(zenoh.KeyExpr(full("fleet", "kite", key.suffix))) for each in stored)
+
+    published = [key for key in KEYS if key.is_published]
+    assert {key for key in published if is_stored(key)} == {STATE, OVERVIEW, EVENT, MISSION_CURRENT, MISSION_REPORT}
 
 
 def wanted() -> set[str]:

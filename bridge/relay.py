@@ -1,0 +1,309 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The ground station's end of a slow link to a vehicle: missions are received and read here, and cross it as a whole.
+
+A mission over MAVLink takes a round trip for each item. So the receiver of the bridge itself (bridge/transfers) runs
+beside the ground station, the whole list goes to the vehicle as one command, and the final ack waits for its result.
+Everything else is passed on, with new sequence numbers: stations take gaps for a bad link. Sans-IO.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import count
+from math import inf
+from typing import Any
+
+from bridge.gcs.ground import Ground
+from bridge.gcs.rights import LinkAccess
+from bridge.gcs.station import Peer, Severity, Station
+from bridge.line.conversation import Conversation, Pause
+from bridge.line.runner import Runner
+from bridge.missions.fc_mission_store import PushProgress, StoreReport, StoreState
+from bridge.missions.list_check import ListCheck
+from bridge.missions.mission_service import DeliveryResult, HeldMission, MissionService
+from bridge.model.events import BridgeEvent
+from bridge.model.finding import Finding, News, RejectingFinding, without_defaults
+from bridge.model.mission_log import ArrivedMission
+from bridge.model.refusal import ARMED, Refusal
+from bridge.model.vehicle import FlightState, Source, Vehicle
+from bridge.model.verdict import Result, Verdict
+from bridge.transfers.downloads import MissionDownloads
+from bridge.transfers.uploads import MissionUploads
+from protocols.mavlink.codec import MavlinkDecoder, repack
+from protocols.mavlink.dialect import Message
+from protocols.mavlink.dialect import messages as m
+from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+from protocols.mavlink.mission_messages import item_from_float_message, item_from_int_message
+from protocols.mission_item import MissionItem, MissionResult
+from protocols.mission_record import ListIdentity
+
+#: As a mission file in a command (service/zenoh_link/commands.py).
+_MOST_ITEMS = 1000
+#: How often a conversation looks whether the vehicle has replied.
+_LOOK_S = 0.02
+#: The state's copy of the mission arrives within this time.
+_COPY_S = 5.0
+_UNKNOWN = Refusal(MissionResult.DENIED, "The vehicle's mission is not known yet: try again")
+#: MISSION_ITEM.current of items outside a list.
+_GUIDED = (2, 3)
+
+
+@dataclass(frozen=True, slots=True)
+class WriteResult:
+    """The vehicle's reply to a list. `items`: as stored there, None if it was not accepted."""
+
+    ack: MissionResult
+    text: str
+    findings: Sequence[Finding] = ()
+    items: tuple[MissionItem, ...] | None = None
+
+
+class Relay:
+    """One vehicle and its ground stations.
+
+    `to_vehicle` gets the frames for it, `write` the lists, () to clear; the reply is `wrote`. Missions are received
+    here once the vehicle's mission is known (`holds`), which shows that it stores missions itself.
+    """
+
+    def __init__(self, to_vehicle: Callable[[bytes], object], write: Callable[[Sequence[MissionItem]], object]) -> None:
+        self._to_vehicle = to_vehicle
+        self._write = write
+        self._splitter = MavlinkSplitter()
+        self._peers: list[tuple[Peer, bool]] = []
+        self._end: _End | None = None
+        self._held: tuple[tuple[MissionItem, ...] | None, ListIdentity | None] = None, None
+
+    @property
+    def due(self) -> float:
+        """The time of the next `tick`."""
+        return inf if self._end is None else self._end.due
+
+    def tick(self, now: float) -> None:
+        if self._end is not None:
+            self._end.tick(now)
+
+    def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
+        self._peers.append((peer, until_answered))
+        if self._end is not None:
+            self._end.ground.add_default_peer(peer, until_answered=until_answered)
+
+    def remove_default_peer(self, peer: Peer) -> None:
+        self._peers = [each for each in self._peers if each[0] != peer]
+        if self._end is not None:
+            self._end.ground.remove_default_peer(peer)
+
+    def take_datagrams(self) -> list[tuple[Peer, bytes]]:
+        return [] if self._end is None else self._end.ground.take_datagrams()
+
+    def gcs_received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> None:
+        """Handle bytes from a ground station; before the vehicle was heard they are passed on."""
+        if self._end is None:
+            self._to_vehicle(data)
+        else:
+            self._end.received(peer, data, now, datagram=datagram)
+
+    def gcs_gone(self, peer: Peer, now: float) -> None:
+        if self._end is not None:
+            self._end.uploads.peer_gone(peer, now)
+            self._end.ground.gone(peer)
+
+    def vehicle_received(self, data: bytes, now: float) -> None:
+        """Pass on frames of the vehicle."""
+        for frame in self._splitter.feed(data):
+            if self._end is None:
+                self._end = _End(frame.sender, self._to_vehicle, self._write)
+                for peer, until_answered in self._peers:
+                    self._end.ground.add_default_peer(peer, until_answered=until_answered)
+                self._end.holds(*self._held)
+            self._end.vehicle_sent(frame, now)
+
+    def holds(self, items: tuple[MissionItem, ...] | None, identity: ListIdentity | None) -> None:
+        """The vehicle's mission has changed; None: it is not known."""
+        self._held = items, identity
+        if self._end is not None:
+            self._end.holds(items, identity)
+
+    def wrote(self, result: WriteResult) -> None:
+        """The vehicle has replied to `write`."""
+        if self._end is not None:
+            self._end.missions.results.append(result)
+
+
+class _End:
+    """The vehicle's end of MAVLink's mission protocol, under its ids."""
+
+    def __init__(
+        self,
+        ids: tuple[int, int],
+        to_vehicle: Callable[[bytes], object],
+        write: Callable[[Sequence[MissionItem]], object],
+    ) -> None:
+        self.ids = ids
+        self._to_vehicle = to_vehicle
+        self._targets = {(system, component) for system in (0, ids[0]) for component in (0, ids[1])}
+        self._decoder = MavlinkDecoder()
+        self.ground = Ground(*ids, _ignore, lambda _station, _now: None, None, {}, LinkAccess())
+        self._runner = Runner()
+        self.missions = _RemoteMissions(Vehicle(), self._runner, self.ground, write)
+        self.uploads = MissionUploads(self.missions, self.ground, _ignore, count(1), lambda _peer, _now: None)
+        downloads = self._downloads = MissionDownloads(self.missions, self.ground)
+        uploads = self.uploads
+        self._handlers: Mapping[int, Callable[[Station, Message, float], object]] = {
+            m.MAVLINK_MSG_ID_MISSION_COUNT: lambda s, msg, now: uploads.count(s, msg.count, now),
+            m.MAVLINK_MSG_ID_MISSION_ITEM: partial(self._item, item_from_float_message),
+            m.MAVLINK_MSG_ID_MISSION_ITEM_INT: partial(self._item, item_from_int_message),
+            m.MAVLINK_MSG_ID_MISSION_ACK: lambda s, msg, now: uploads.ack(s, msg.type, now),
+            m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL: lambda s, msg, now: uploads.clear_all(s, msg.mission_type, now),
+            m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST: lambda s, _, now: downloads.request_list(s, now),
+            m.MAVLINK_MSG_ID_MISSION_REQUEST: lambda s, msg, now: downloads.request(s, msg.seq, now, as_int=False),
+            m.MAVLINK_MSG_ID_MISSION_REQUEST_INT: lambda s, msg, now: downloads.request(s, msg.seq, now, as_int=True),
+        }
+
+    @property
+    def due(self) -> float:
+        return min(self._runner.due, self.uploads.due, self.ground.due)
+
+    def tick(self, now: float) -> None:
+        for part in (self._runner, self.uploads, self.ground):
+            if now >= part.due:
+                part.tick(now)
+
+    def vehicle_sent(self, frame: MavlinkFrame, now: float) -> None:
+        packed = repack(frame) if frame.sender == self.ids else None
+        if packed is None:
+            self.ground.forward([frame.raw], self.ground.everyone())
+            return
+        self.ground.multicast(packed, self.ground.everyone())
+        message = self._decoder.decode(frame) if frame.msgid in _HEARD else None
+        if message is not None and frame.msgid == m.MAVLINK_MSG_ID_HEARTBEAT:
+            armed = bool(message.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED)
+            self.missions.vehicle.hear(FlightState(now, Source.MAVLINK, armed))
+        elif message is not None:
+            self.missions.vehicle.hear_home(message.latitude, message.longitude, message.altitude / 1000)
+
+    def holds(self, items: tuple[MissionItem, ...] | None, identity: ListIdentity | None) -> None:
+        is_known = items is not None and identity is not None
+        self.missions.held = HeldMission(identity, (), items) if is_known else None  # type: ignore[arg-type]
+        self.missions.is_local = self.missions.is_local or is_known
+
+    def received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> None:
+        sender = self.ground.sender(peer, now, datagram=datagram)
+        if sender is None:
+            return
+        for frame in self.ground.split(sender, data, datagram=datagram):
+            if not (sender.is_heard or self.ground.admits(sender, now)):
+                return
+            self.ground.heard(sender, frame, frame.sender, now)
+            if not self._is_answered(Station(peer, *frame.sender), frame, now):
+                self._to_vehicle(frame.raw)
+
+    def _item(self, convert: Callable[[Message], MissionItem], station: Station, message: Message, now: float) -> None:
+        self.uploads.item(station, convert(message), self.ground.speaker(station), now)
+
+    def _is_answered(self, station: Station, frame: MavlinkFrame, now: float) -> bool:
+        handler = self._handlers.get(frame.msgid) if self.missions.is_local else None
+        if handler is None or frame.target not in self._targets:
+            return False
+        message = self._decoder.decode(frame)
+        if message is None or getattr(message, "mission_type", 0) != m.MAV_MISSION_TYPE_MISSION:
+            return False
+        if getattr(message, "current", 0) in _GUIDED and not self.uploads.is_writing(station):
+            return False
+        if frame.msgid in _READS:
+            self.uploads.answers.went_on(station)
+            self.uploads.reads(station, now)
+        elif frame.msgid in _ENDS_DOWNLOAD:
+            self.uploads.answers.went_on(station)
+            self._downloads.forget(station)
+        handler(station, message, now)
+        return True
+
+
+_HEARD = (m.MAVLINK_MSG_ID_HEARTBEAT, m.MAVLINK_MSG_ID_HOME_POSITION)
+_READS = (
+    m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST,
+    m.MAVLINK_MSG_ID_MISSION_REQUEST,
+    m.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
+)
+_ENDS_DOWNLOAD = (
+    m.MAVLINK_MSG_ID_MISSION_COUNT,
+    m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL,
+    m.MAVLINK_MSG_ID_MISSION_ACK,
+)
+
+
+class _RemoteMissions(MissionService):
+    """A mission store behind the link. `is_local`: missions are received here."""
+
+    def __init__(
+        self, vehicle: Vehicle, runner: Runner, ground: Ground, write: Callable[[Sequence[MissionItem]], object]
+    ) -> None:
+        super().__init__(vehicle, runner, lambda _mission, _delivery: None)
+        self._ground = ground
+        self._write = write
+        self.is_local = False
+        self.results: list[WriteResult] = []
+
+    def armed_refusal(self) -> Refusal | None:
+        return ARMED if self.vehicle.armed else None
+
+    def preflight(self) -> Conversation[StoreReport | Refusal]:
+        yield from ()
+        return self.armed_refusal() or StoreReport(StoreState.READY, _AnyRules(), None)
+
+    def deliver(
+        self, arrived: ArrivedMission, progress: PushProgress = lambda _records: None, *, is_kept: bool = True
+    ) -> Conversation[DeliveryResult]:
+        """Have the vehicle check, write and verify the list."""
+        verdict = arrived.verdict
+        if verdict.result is Result.REJECTED:
+            return DeliveryResult(verdict.ack, verdict.findings[-1].text(), None)
+        self.results.clear()
+        self._write(verdict.items)
+        while not self.results:
+            yield Pause(_LOOK_S)
+        result = self.results.pop()
+        is_lossy = any(finding.news is News.WARNING for finding in result.findings)
+        if result.items is not None:
+            # Until the vehicle publishes it: Mission Planner may read at once.
+            self.held = HeldMission(ListIdentity(len(result.items), 0), (), result.items)
+            for finding in without_defaults(result.findings):
+                self._ground.say(Severity.NOTICE, finding.text())
+        return DeliveryResult(result.ack, result.text, None, is_lossy)
+
+    def shown(self) -> Conversation[HeldMission | Refusal]:
+        """The copy of the vehicle's state."""
+        waited_s = 0.0
+        while self.held is None and waited_s < _COPY_S:
+            yield Pause(_LOOK_S)
+            waited_s += _LOOK_S
+        return self.held or _UNKNOWN
+
+
+class _AnyRules:
+    """Accepts every list: the vehicle checks it by its own rules."""
+
+    max_items = _MOST_ITEMS
+
+    def begin(self, count: int, _fallback_home: tuple[int, int] | None) -> ListCheck:
+        return _Unchecked(count)
+
+
+class _Unchecked(ListCheck):
+    def __init__(self, count: int) -> None:
+        super().__init__(count)
+        self._items: list[MissionItem] = []
+
+    def _judge(self, item: MissionItem) -> RejectingFinding | None:
+        self._items.append(item)
+        return None
+
+    def _refuse_kept_list(self) -> RejectingFinding | None:
+        return None
+
+    def _conclude(self) -> Verdict[Any]:
+        return Verdict(Result.ACCEPTED, MissionResult.ACCEPTED, items=tuple(self._items))
+
+
+def _ignore(_event: BridgeEvent) -> None:
+    """The vehicle logs its own events."""

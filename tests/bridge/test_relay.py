@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A ground station beside the relay: its mission crosses the link as a whole, and the ack waits for the vehicle."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from bridge.gcs.station import Peer
+from bridge.model.finding import Finding, News
+from bridge.relay import Relay, WriteResult
+from protocols.mavlink.codec import FrameWriter, MavlinkDecoder, pack
+from protocols.mavlink.dialect import Message
+from protocols.mavlink.dialect import messages as m
+from protocols.mavlink.frame import MavlinkSplitter
+from protocols.mission_item import MissionItem, MissionResult
+from protocols.mission_record import ListIdentity
+
+VEHICLE = (7, 1)
+PEER = Peer("udp", "planner")
+PLAN = tuple(
+    MissionItem(seq, 16, 3 if seq else 0, 0.0, 2.0, 0.0, 0.0, 453838000 + 900 * seq, 84733000, 20.0 * bool(seq))
+    for seq in range(146)
+)
+NONE = ListIdentity(0, 0)
+
+
+class Bench:
+    """The relay, a ground station at once beside it, and a vehicle whose replies are made by the test."""
+
+    def __init__(self) -> None:
+        self.to_vehicle: list[bytes] = []
+        self.written: list[Sequence[MissionItem]] = []
+        self.relay = Relay(self.to_vehicle.append, self.written.append)
+        self.now = 100.0
+        self.frames: list[tuple[int, Message]] = []
+        self._writer, self._vehicle = FrameWriter(255, 190), FrameWriter(*VEHICLE)
+        self._decoder = MavlinkDecoder()
+
+    def send(self, message: Message) -> list[Message]:
+        """Send a message of the ground station; the relay's answers."""
+        before = len(self.frames)
+        self.relay.gcs_received(PEER, self._writer.frame(pack(message), 2), self.now, datagram=True)
+        self.run(0.01)
+        return [answer for _, answer in self.frames[before:]]
+
+    def heartbeat(self, *, armed: bool = False) -> None:
+        """Of the vehicle."""
+        message = m.MAVLink_heartbeat_message(2, 3, 81 | (128 * armed), 0, 3, 3)
+        self.relay.vehicle_received(self._vehicle.frame(pack(message), 2), self.now)
+        self._take()
+
+    def run(self, seconds: float) -> None:
+        end = self.now + seconds
+        while (due := max(self.relay.due, self.now)) <= end:
+            self.now = due + 1e-4
+            self.relay.tick(self.now)
+        self.now = end
+        self._take()
+
+    def upload(self, plan: Sequence[MissionItem]) -> None:
+        """Answer every request; afterwards the relay waits for the vehicle."""
+        wanted = self.send(m.MAVLink_mission_count_message(*VEHICLE, len(plan)))
+        while requests := [each.seq for each in wanted if each.get_type() == "MISSION_REQUEST"]:
+            wanted = self.send(item_int(plan[requests[-1]]))
+
+    def last(self, kind: str) -> Message | None:
+        return next((each for _, each in reversed(self.frames) if each.get_type() == kind), None)
+
+    def _take(self) -> None:
+        for _, data in self.relay.take_datagrams():
+            for frame in MavlinkSplitter().feed(data):
+                message = self._decoder.decode(frame)
+                assert message is not None
+                self.frames.append((frame.raw[4], message))
+
+
+def item_int(item: MissionItem) -> Message:
+    place = (item.lat_e7 or 0, item.lon_e7 or 0, item.alt_m)
+    params = (item.p1, item.p2, item.p3, item.p4)
+    return m.MAVLink_mission_item_int_message(*VEHICLE, item.seq, item.frame, item.command, 0, 1, *params, *place)
+
+
+def connected(*, stores: bool = True) -> Bench:
+    bench = Bench()
+    bench.heartbeat()
+    if stores:
+        bench.relay.holds((), NONE)
+    bench.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+    bench.to_vehicle.clear()
+    return bench
+
+
+def test_a_list_crosses_the_link_as_a_whole_and_is_acknowledged_when_the_vehicle_has_verified_it() -> None:
+    bench = connected()
+    bench.upload(PLAN)
+    (written,) = bench.written
+    assert tuple(written) == PLAN
+    assert bench.to_vehicle == []
+    bench.run(2.0)
+    assert bench.last("MISSION_ACK") is None
+    stored = (PLAN[0], *(replace(item, p1=1.0) for item in PLAN[1:]))
+    finding = Finding(1, "p1", 0.0, 1, "0 not allowed", 16, News.NOTICE)
+    bench.relay.wrote(WriteResult(MissionResult.ACCEPTED, "Mission verified: 146 records", [finding], stored))
+    bench.run(0.5)
+    ack = bench.last("MISSION_ACK")
+    assert ack is not None
+    assert ack.type == MissionResult.ACCEPTED
+    texts = [message.text for _, message in bench.frames if message.get_type() == "STATUSTEXT"]
+    assert any("0 not allowed" in text for text in texts)
+    (count,) = bench.send(m.MAVLink_mission_request_list_message(*VEHICLE))
+    assert count.count == 146
+    (item,) = bench.send(m.MAVLink_mission_request_int_message(*VEHICLE, 145))
+    assert (item.seq, item.param1, item.x) == (145, 1.0, PLAN[145].lat_e7)
+    assert bench.to_vehicle == []
+
+
+def test_the_vehicles_refusal_is_the_final_ack() -> None:
+    bench = connected()
+    bench.upload(PLAN[:5])
+    bench.relay.wrote(WriteResult(MissionResult.DENIED, "Rejected, WP 3: too far"))
+    bench.run(0.5)
+    ack = bench.last("MISSION_ACK")
+    assert ack is not None
+    assert ack.type == MissionResult.DENIED
+    assert any(each.text.startswith("Rejected, WP 3") for _, each in bench.frames if each.get_type() == "STATUSTEXT")
+
+
+def test_nothing_is_sent_to_an_armed_vehicle() -> None:
+    bench = connected()
+    bench.heartbeat(armed=True)
+    bench.upload(PLAN[:5])
+    assert bench.written == []
+    ack = bench.last("MISSION_ACK")
+    assert ack is not None
+    assert ack.type == MissionResult.DENIED
+
+
+def test_an_empty_list_clears_the_vehicles() -> None:
+    bench = connected()
+    bench.send(m.MAVLink_mission_clear_all_message(*VEHICLE))
+    bench.run(0.1)
+    assert bench.written == [()]
+
+
+def test_a_vehicle_that_stores_no_missions_gets_every_frame_itself() -> None:
+    bench = connected(stores=False)
+    assert bench.send(m.MAVLink_mission_count_message(*VEHICLE, 5)) == []
+    assert bench.send(m.MAVLink_param_request_list_message(*VEHICLE)) == []
+    assert len(bench.to_vehicle) == 2
+
+
+def test_all_other_frames_and_those_of_other_targets_are_passed_on() -> None:
+    bench = connected()
+    for message in (
+        m.MAVLink_param_request_list_message(*VEHICLE),
+        m.MAVLink_mission_count_message(9, 1, 5),
+        m.MAVLink_mission_count_message(*VEHICLE, 5, m.MAV_MISSION_TYPE_FENCE),
+    ):
+        bench.to_vehicle.clear()
+        assert bench.send(message) == []
+        assert len(bench.to_vehicle) == 1
+
+
+def test_the_sequence_numbers_have_no_gaps() -> None:
+    bench = connected()
+    for _ in range(3):
+        bench.heartbeat()
+        bench.send(m.MAVLink_mission_request_list_message(*VEHICLE))
+    numbers = [number for number, _ in bench.frames]
+    assert numbers == [*range(numbers[0], numbers[0] + len(numbers))]
