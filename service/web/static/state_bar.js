@@ -3,6 +3,8 @@
 import { byId, make, setText } from "./dom.js";
 
 export const STALE_S = 3;
+const LISTEN_MS = 3000;
+let heard = null; // the port's byte count that changed last, and when
 let spoken = null; // the badges that were announced last
 
 // state: of /api/state, or the last one known (null: none) if silent_s is not null. isAnnounced: also to a screen reader,
@@ -42,8 +44,15 @@ export const age = (seconds) => (seconds < 120 ? `${Math.round(seconds)} s` : `$
 function headline(state) {
   if (state === null) return "";
   if (state.port.trouble) return state.port.trouble;
-  if (state.link.flight_controller === null) return `Looking for a flight controller on ${state.port.address}`;
+  if (state.link.flight_controller === null) return `Looking for a flight controller on ${state.port.address}: ${evidence(state.traffic.fc)}`;
   return [state.link.flight_controller, state.last_heard.mode, state.battery.voltage_v && `${state.battery.voltage_v.toFixed(1)} V`].filter(Boolean).join(", ");
+}
+
+// What the wires tell while no frame arrives. Between two states the search listens at one or two speeds.
+function evidence({ bytes_received }) {
+  const arrives = heard !== null && bytes_received > heard.bytes;
+  if (heard === null || bytes_received !== heard.bytes || performance.now() - heard.at > LISTEN_MS) heard = { bytes: bytes_received, at: performance.now(), arrives };
+  return heard.arrives ? "bytes arrive, but no frames. Is the speed right, and MSP on at this UART?" : "silence. Check power, TX to RX, RX to TX, and GND.";
 }
 
 function showTransfer(transfer) {

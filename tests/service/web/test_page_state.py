@@ -86,6 +86,28 @@ def test_an_open_page_is_loaded_again_after_an_upgrade(page: Browser) -> None:
     page.wait_text("#badges", "DISARMED")
 
 
+@pytest.mark.parametrize(
+    ("received", "words"), [("count += 400", "bytes arrive, but no frames"), ("count", "silence. Check power")]
+)
+def test_while_searching_the_page_tells_what_arrives_on_the_wire(page: Browser, received: str, words: str) -> None:
+    page.run(
+        """
+        const fetched = window.fetch;
+        let count = 7;
+        window.fetch = async (path, ...options) => {
+            const reply = await fetched(path, ...options);
+            if (path !== "/api/state") return reply;
+            const state = await reply.json();
+            state.link.flight_controller = null;
+            state.traffic.fc.bytes_received = COUNT;
+            return new Response(JSON.stringify(state));
+        };""".replace("COUNT", received)
+    )
+    page.wait_text("#headline", words)
+    page.wait_for_updates(3)
+    assert words in page.text("#headline")
+
+
 LIVE = """
     return [...document.querySelectorAll('[role=status], [role=alert], [aria-live]')].map((e) => e.textContent);"""
 
