@@ -9,6 +9,7 @@ import click
 
 from fleet.conditions import Condition, matching
 from fleet.enroll_command import enroll, expel
+from fleet.logs_command import fleet_logs
 from fleet.options import (
     address_options,
     fleet_session,
@@ -39,7 +40,7 @@ def fleet() -> None:
     """Monitor and manage many vehicles at once, over Eclipse zenoh (docs/fleet.md)."""
 
 
-for _command in (push_mission, verify_mission, fleet_settings, enroll, expel):
+for _command in (push_mission, verify_mission, fleet_settings, fleet_logs, enroll, expel):
     fleet.add_command(_command)
 
 

@@ -92,7 +92,13 @@ STATUS = _command("status")
 SETTINGS_LIST = _command("settings/list")
 SETTINGS_PLAN = _command("settings/plan")
 SETTINGS_RESTORE = _command("settings/restore")
-COMMAND_KEYS = (UPLOAD, CHECK, CLEAR, RESTORE, STATUS, SETTINGS_LIST, SETTINGS_PLAN, SETTINGS_RESTORE)
+LOG_LIST = _command("log/list")
+LOG_READ = _command("log/read")
+COMMAND_KEYS = (
+    *(UPLOAD, CHECK, CLEAR, RESTORE, STATUS),
+    *(SETTINGS_LIST, SETTINGS_PLAN, SETTINGS_RESTORE),
+    *(LOG_LIST, LOG_READ),
+)
 
 KEYS = (
     *TELEMETRY.values(),

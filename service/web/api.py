@@ -37,6 +37,7 @@ from payloads.mission_data import Json, mission_items, to_json
 from protocols.mission_item import MissionItem
 from service.daemon.api import DaemonApi
 from service.daemon.daemon import Daemon
+from service.daemon.telemetry_logs import TelemetryLogs
 from service.machine.host import Host
 from service.machine.package import version
 from service.recording.tlog_recorder import TLOG_FOLDER
@@ -49,7 +50,6 @@ from service.web.mission_files import MissionFiles, MissionWriter
 from service.web.replies import answered, begun, json_reply, path_number, text_reply, whole
 from service.web.response_cache import ResponseCache
 from service.web.settings_history import SettingsHistory
-from service.web.telemetry_logs import TelemetryLogs
 from service.web.token import Token, TokenError
 from storage.os_error import reason
 from storage.store_error import StoreError

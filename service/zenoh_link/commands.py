@@ -9,7 +9,9 @@ from payloads.mission_data import ACCEPTED, MOST, Json
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
 from service.daemon.api import DaemonApi
+from service.daemon.telemetry_logs import TelemetryLogs
 from service.zenoh_link.liveliness import RENAME
+from service.zenoh_link.log_commands import LogQueries
 from service.zenoh_link.queries import Answerer, QueryRefused, Question
 from service.zenoh_link.settings_commands import SettingsQueries
 
@@ -25,7 +27,7 @@ class CommandQueries:
     They get each command, too, so none that changes a mission is obeyed.
     """
 
-    def __init__(self, api: DaemonApi, others: Set[str]) -> None:
+    def __init__(self, api: DaemonApi, others: Set[str], logs: TelemetryLogs) -> None:
         self._api = api
         self._others = others
         #: Parsing takes about 50 times the file's size in memory.
@@ -38,6 +40,7 @@ class CommandQueries:
             keys.STATUS: self._status,
         }
         self.answerers |= SettingsQueries(api.settings, self._alone).answerers
+        self.answerers |= LogQueries(logs).answerers
 
     def _alone(self, answerer: Answerer) -> Answerer:
         async def answer(question: Question) -> Json:

@@ -27,6 +27,7 @@ from payloads.overview import overview_of
 from payloads.payload import Payloads, plain
 from service.daemon.api import DaemonApi
 from service.daemon.daemon import Daemon, Follower
+from service.daemon.telemetry_logs import TelemetryLogs
 from service.recording.tlog_recorder import TLOG_FOLDER
 from service.settings.zenoh import ZenohProfile, ZenohSettings
 from service.settings.zenoh_config import make_config
@@ -70,10 +71,11 @@ class Node(Follower):
         api = DaemonApi(daemon)
         state_dir = daemon.settings.state_dir
         self._rates = SampleRates(is_metered=settings.profile is ZenohProfile.METERED)
+        self._logs = TelemetryLogs(None if state_dir is None else state_dir / TLOG_FOLDER)
         self._history = History(api, None if state_dir is None else state_dir / TLOG_FOLDER, clock.unix_s)
         self._answerers = Answers(self._data, daemon.bridge, api, self._history).answerers
         if settings.commands:
-            self._answerers |= CommandQueries(api, self._presence.others).answerers
+            self._answerers |= CommandQueries(api, self._presence.others, self._logs).answerers
         self._held: HeldMission | None = None
         self._pending_publish: asyncio.Handle | None = None
         self._tick: asyncio.TimerHandle | None = None
@@ -96,6 +98,7 @@ class Node(Follower):
         if self._outages is not None:
             self._outages.cancel()
         await self._queries.close()
+        self._logs.close()
         self._thread.close()
 
     # The methods of service.daemon.daemon.Follower.

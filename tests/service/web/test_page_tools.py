@@ -6,7 +6,7 @@ from pathlib import Path
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
 
-from service.web.telemetry_logs import PIECE
+from service.daemon.telemetry_logs import PIECE
 from tests.support.chromium import PHONE, Browser, Browsers
 from tests.support.programs import until
 from tests.support.web_bench import WebBench

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from service.web import telemetry_logs
-from service.web.telemetry_logs import PIECE, TelemetryLogs
+from service.daemon import telemetry_logs
+from service.daemon.telemetry_logs import PIECE, TelemetryLogs
 from tests.service.daemon.test_store_worker import HANGS, LOG, hung_file
 from tests.support.web_bench import WebBench
 
