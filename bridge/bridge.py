@@ -55,6 +55,7 @@ from bridge.vehicle.commands import CommandService
 from bridge.vehicle.incoming import Incoming
 from bridge.vehicle.link_announcer import LinkAnnouncer
 from bridge.vehicle.message_router import MessageRouter
+from bridge.vehicle.own_parameters import OwnParameters
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.parameters import Parameters
 from bridge.vehicle.settings_backups import BackupTaker, OnBackup
@@ -166,10 +167,14 @@ class Bridge:
         self._uploads = MissionUploads(missions, ground, emit, incidents, own.let_read)
         self._watch = MissionWatch(missions, ground, emit)
         downloads = MissionDownloads(missions, ground)
-        parameters = self._parameters = Parameters(missions, ground, owner.sysid)
+        own_parameters = OwnParameters(missions, ground, owner.sysid)
+        own_parameters.on_radius_set = self._board_settings.saved_with_mission
+        parameters = self._parameters = Parameters(own_parameters, self._board_settings, ground)
         actions = FcActions(session, missions, runner)
         self._calibration = Calibration(ground, runner, self._announcer)
-        commands = CommandService(ground, own, actions, session, self._calibration, config.version)
+        commands = CommandService(
+            ground, own, actions, session, self._calibration, self._board_settings, parameters, config.version
+        )
         router = MessageRouter(ground, self._uploads, downloads, parameters, commands, own)
         self._incoming = Incoming(
             self._guard,
@@ -188,6 +193,7 @@ class Bridge:
             self._watch,
             self._settings,
             self._board_settings,
+            parameters,
             ground,
             self._announcer,
             self._calibration,

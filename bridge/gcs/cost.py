@@ -22,6 +22,7 @@ class Cost(IntEnum):  # hashed for each datagram: as an int, in C
     RECEIVED: a datagram or a read from a connection.
     ARRIVAL: a new peer, which costs greetings and a log entry.
     ANSWER: a message sent on request. Mission Planner requests about sixty when it connects, most of them parameters.
+    LIST: a list of all parameters, several hundred messages.
     TRANSFER: a message of a mission transfer; over a fast link there may be a thousand items a second.
     TEXT: a STATUSTEXT that a station causes; a mission of 146 items may need one for each.
     UPLOAD: a list that is announced, which costs log entries.
@@ -35,6 +36,7 @@ class Cost(IntEnum):  # hashed for each datagram: as an int, in C
     RECEIVED = auto()
     ARRIVAL = auto()
     ANSWER = auto()
+    LIST = auto()
     TRANSFER = auto()
     TEXT = auto()
     UPLOAD = auto()
@@ -57,6 +59,7 @@ LIMITS = {
     Cost.RECEIVED: Limit(Rate(1500, 3000), Rate(15000, 15000)),
     Cost.ARRIVAL: Limit(Rate(5, 32), Rate(50, 200)),
     Cost.ANSWER: Limit(Rate(50, 600), Rate(500, 3000)),
+    Cost.LIST: Limit(Rate(1 / 2, 10), Rate(2, 40)),
     Cost.TRANSFER: Limit(Rate(1000, 2000), Rate(1000, 8000)),
     Cost.TEXT: Limit(Rate(5, 200), Rate(10, 300)),
     Cost.UPLOAD: Limit(Rate(10, 50), Rate(10, 400)),

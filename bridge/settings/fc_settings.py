@@ -9,6 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from math import isfinite
 
 from bridge.line.conversation import Conversation
 from bridge.settings.board_setting import BoardSetting, SettingTable, Value, ValueKind, shown
@@ -47,7 +48,8 @@ NOT_TAKEN = SettingRefusal(Cause.REFUSED, "The flight controller did not take th
 
 
 def out_of_range(setting: BoardSetting, value: Value) -> SettingRefusal:
-    is_part = setting.kind is ValueKind.INTEGER and not isinstance(value, str) and value % 1
+    is_number = setting.kind is ValueKind.INTEGER and not isinstance(value, str) and isfinite(value)
+    is_part = is_number and value != round(float(value))
     accepted = f"a whole number, {setting.range_text}" if is_part else setting.range_text
     return SettingRefusal(Cause.OUT_OF_RANGE, f"{setting.name} stays {shown(setting.value)}: {accepted}")
 

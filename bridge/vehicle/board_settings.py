@@ -99,6 +99,8 @@ class BoardSettings:
         self.read_so_far: int | None = None
         #: The settings that were changed here, and not saved since.
         self.unsaved: dict[str, Value] = {}
+        #: True if the board's flash holds what is in its RAM, as far as is known here.
+        self.is_saved = False
         #: Called after each reading of the whole table; when the table has changed; after a save; after a change here
         #: that others must not take for foreign.
         self.on_read: Callable[[SettingTable], None] = lambda _table: None
@@ -125,9 +127,15 @@ class BoardSettings:
 
     def may_have_changed(self, now: float) -> None:
         """Something else may have changed settings: read them again."""
-        self._is_doubtful = True
+        self._is_doubtful, self.is_saved = True, False
         if self._fc_settings is not None:
             self.due = min(self.due, now + _AFTER_CHANGE_S)
+
+    def saved_with_mission(self, now: float) -> None:
+        """The board has written its whole configuration, to store a setting of the mission's."""
+        self.may_have_changed(now)
+        self.unsaved.clear()
+        self.is_saved = True
 
     def obstacle(self) -> SettingRefusal | None:
         """The reason why settings can be neither read nor changed now; None if they can."""
@@ -193,6 +201,7 @@ class BoardSettings:
                     listener(self.table, at)
             # A firmware may correct settings that contradict each other.
             self._is_doubtful, self.due = True, at
+            self.is_saved = refused is None
 
         self._missions.runner.start(self._disarmed(fc_settings.save()), done, now)
 
@@ -319,6 +328,7 @@ class BoardSettings:
             self.on_change(at)
             # What was read before may be out of date.
             self._stop_reading()
+            self.is_saved = False
             if isinstance(result, SettingTable) and self._fc_settings is fc_settings:
                 self._take(result, at)
                 self._end(change, self._changed(change, setting), at)

@@ -19,10 +19,14 @@ from bridge.fc.session import FcSession
 from bridge.gcs.flash_budget import TOO_MANY_WRITES
 from bridge.gcs.ground import Ground
 from bridge.gcs.station import Severity, Station
+from bridge.settings.fc_settings import Cause, SettingRefusal
+from bridge.vehicle.board_settings import BoardSettings
 from bridge.vehicle.calibration import Calibration
 from bridge.vehicle.own_vehicle import OwnVehicle
+from bridge.vehicle.parameters import Parameters
 from protocols.mavlink.command import CommandResult
 from protocols.mavlink.dialect import messages
+from protocols.mavlink.metadata_message import COMPONENT_METADATA
 
 _MAX_U16, _MAX_I32 = (1 << 16) - 1, (1 << 31) - 1
 _MAX_MSGID = (1 << 24) - 1
@@ -69,6 +73,13 @@ _REFUSED = {
     messages.MAV_CMD_DO_JUMP_TAG: "The current waypoint cannot be set",
     messages.MAV_CMD_DO_FENCE_ENABLE: "There is no fence",
 }
+#: param1 of MAV_CMD_PREFLIGHT_STORAGE.
+_SAVE = 1
+_NOT_STORED = {
+    Cause.NO_ANSWER: CommandResult.FAILED,
+    Cause.OCCUPIED: CommandResult.TEMPORARILY_REJECTED,
+    Cause.LIMIT: CommandResult.TEMPORARILY_REJECTED,
+}
 _OUTCOMES = {
     ActionResult.DONE: CommandResult.ACCEPTED,
     ActionResult.FREEZES: CommandResult.ACCEPTED,
@@ -93,6 +104,8 @@ class CommandService:
         actions: FcActions,
         session: FcSession,
         calibration: Calibration,
+        settings: BoardSettings,
+        parameters: Parameters,
         version: str,
     ) -> None:
         self._ground = ground
@@ -100,6 +113,8 @@ class CommandService:
         self._actions = actions
         self._session = session
         self._calibration = calibration
+        self._settings = settings
+        self._parameters = parameters
         self._version = version
 
     def take(self, station: Station, command: int, params: Sequence[float], now: float) -> None:
@@ -107,7 +122,9 @@ class CommandService:
         if (sender := self._ground.station(station.peer)) is not None:
             sender.uses_commands = True
         action = _action(command, params)
-        if action is None:
+        if command == messages.MAV_CMD_PREFLIGHT_STORAGE:
+            self._store(station, command, params[0], now)
+        elif action is None:
             self._acknowledge(station, command, self._do(station, command, params, now))
         elif action in (self._actions.present, self._calibration.action):
             # Repeated by the user or duplicated by the network.
@@ -147,6 +164,12 @@ class CommandService:
         match command:
             case messages.MAV_CMD_REQUEST_MESSAGE if params[0] == messages.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
                 return self._tell_interval(station, _msgid(params[1]))
+            case messages.MAV_CMD_REQUEST_MESSAGE if params[0] == COMPONENT_METADATA:
+                metadata = self._parameters.metadata(round(now * 1000) & 0xFFFFFFFF)
+                if metadata is None:
+                    return CommandResult.TEMPORARILY_REJECTED
+                self._ground.to(station, metadata)
+                return CommandResult.ACCEPTED
             case messages.MAV_CMD_REQUEST_MESSAGE:
                 return self._send_once(station, _msgid(params[0]), now, max(_msgid(params[1]), 0))
             case messages.MAV_CMD_SET_MESSAGE_INTERVAL:
@@ -158,9 +181,6 @@ class CommandService:
                 name = "no flight controller" if controller is None else controller.name
                 self._ground.say(Severity.INFO, f"naze-bridge {self._version}: {name}", station)
                 self._vehicle.send_once(station, messages.MAVLINK_MSG_ID_HOME_POSITION, now)
-                return CommandResult.ACCEPTED
-            case messages.MAV_CMD_PREFLIGHT_STORAGE if params[0] == 1:
-                # Mission Planner sends it 10 s after any PARAM_SET, also in flight. Every change is written at once.
                 return CommandResult.ACCEPTED
             case messages.MAV_CMD_RUN_PREARM_CHECKS:
                 self._vehicle.arming_reasons.tell(station)
@@ -182,6 +202,30 @@ class CommandService:
             self.refuse(station, command)
             return CommandResult.DENIED
         return CommandResult.UNSUPPORTED
+
+    def _store(self, station: Station, command: int, what: float, now: float) -> None:
+        """MAV_CMD_PREFLIGHT_STORAGE. Mission Planner sends it 10 s after any PARAM_SET, also in flight."""
+        settings = self._settings
+        if what != _SAVE:
+            self._ground.say(Severity.ERROR, "Settings are only saved, not loaded or reset", station)
+            self._acknowledge(station, command, CommandResult.DENIED)
+        elif settings.is_saved or not (settings.unsaved or settings.obstacle() is None):
+            self._acknowledge(station, command, CommandResult.ACCEPTED)
+        elif not self._ground.allows_write(station, now):
+            self._ground.say(Severity.ERROR, TOO_MANY_WRITES, station)
+            self._acknowledge(station, command, CommandResult.TEMPORARILY_REJECTED)
+        else:
+            settings.save(lambda refused, _at: self._stored(station, command, refused), now)
+
+    def _stored(self, station: Station, command: int, refused: SettingRefusal | None) -> None:
+        if refused is None:
+            self._ground.say(Severity.INFO, "Settings saved", station)
+            self._acknowledge(station, command, CommandResult.ACCEPTED)
+            return
+        if refused.cause is not Cause.NO_ANSWER:
+            self._ground.not_written(station)
+        self._ground.say(Severity.ERROR, refused.text, station)
+        self._acknowledge(station, command, _NOT_STORED.get(refused.cause, CommandResult.DENIED))
 
     def _send_once(self, station: Station, msgid: int, now: float, index: int = 0) -> CommandResult:
         is_known = self._vehicle.send_once(station, msgid, now, index)

@@ -18,7 +18,6 @@ from protocols.mavlink.codec import MavlinkDecoder
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame
-from protocols.mavlink.ftp import refuse
 from protocols.mavlink.mission_messages import item_from_float_message, item_from_int_message
 from protocols.mission_item import MissionItem, MissionResult
 
@@ -95,12 +94,12 @@ class MessageRouter:
             m.MAVLINK_MSG_ID_AUTOPILOT_VERSION_REQUEST: lambda s, _msg, now: vehicle.send_once(
                 s, m.MAVLINK_MSG_ID_AUTOPILOT_VERSION, now
             ),
-            m.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: lambda s, _msg, _now: parameters.send_all(s),
+            m.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: lambda s, _msg, now: parameters.request_list(s, now),
             m.MAVLINK_MSG_ID_PARAM_REQUEST_READ: lambda s, msg, _: parameters.send_one(
                 s, msg.param_id, msg.param_index
             ),
             m.MAVLINK_MSG_ID_PARAM_SET: lambda s, msg, now: parameters.set(s, msg.param_id, msg.param_value, now),
-            m.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: self._ftp,
+            m.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: lambda s, msg, now: parameters.answer_file(s, msg.payload, now),
             # There are none. Without an answer Mission Planner reads nothing else for 25 s.
             m.MAVLINK_MSG_ID_LOG_REQUEST_LIST: lambda s, _msg, _now: ground.to(
                 s, m.MAVLink_log_entry_message(0, 0, 0, 0, 0)
@@ -145,11 +144,6 @@ class MessageRouter:
     def _data_stream(self, station: Station, message: Message, _now: float) -> None:
         rate_hz = message.req_message_rate if message.start_stop else 0
         self._vehicle.set_stream(station.peer, message.req_stream_id, 1 / rate_hz if rate_hz else inf)
-
-    def _ftp(self, station: Station, message: Message, _now: float) -> None:
-        answer = refuse(message.payload)
-        if answer is not None:
-            self._ground.to(station, m.MAVLink_file_transfer_protocol_message(0, station.sysid, station.compid, answer))
 
     def _ping(self, station: Station, message: Message, _now: float) -> None:
         # A PING with targets is itself an answer.

@@ -1,69 +1,87 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The short list of parameters that ground stations need to see (https://mavlink.io/en/services/parameter.html).
+"""MAVLink parameters: the bridge's own, and every setting of the flight controller. Values are REAL32, as ArduPilot's.
 
-QGroundControl reads those of receiver, compass and accelerometer once when it connects (APMRadioComponent.cc,
-APMSensorsComponent.cc): without them it shows two dialogs, opens Vehicle Setup, also in flight, and is "Not Ready" for
-ever. They say what is known here; docs/ground-stations.md lists them. Some names would switch on further requests and
-must not exist: FENCE_TOTAL, RALLY_TOTAL and COMPASS_PRIO1_ID (Mission Planner), FRAME_CLASS (QGroundControl).
+https://mavlink.io/en/services/parameter.html
+
+Ground stations keep the number of parameters that they heard first, so a list waits until the settings were read, and
+is sent again to the stations that had got a shorter one.
 """
 
-import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import inf, isfinite
+from weakref import WeakKeyDictionary
 
 from bridge.gcs.cost import Cost
-from bridge.gcs.flash_budget import TOO_MANY_WRITES
 from bridge.gcs.ground import Ground
+from bridge.gcs.ground_station import GroundStation
 from bridge.gcs.station import Severity, Station
-from bridge.line.conversation import LinkLost
-from bridge.missions.fc_mission_store import AnyFcMissionStore, PushFailure
-from bridge.missions.mission_service import MissionService
-from bridge.model.refusal import Refusal
-from bridge.model.vehicle import Health, Orientation, Readiness
+from bridge.settings.board_setting import BoardSetting, SettingTable, ValueKind, shown
+from bridge.settings.fc_settings import Cause, SettingRefusal
+from bridge.vehicle.board_settings import BoardSettings
+from bridge.vehicle.own_parameters import OwnParameters
+from bridge.vehicle.parameter_files import GENERAL_URI, ParameterFiles
+from bridge.vehicle.parameter_names import parameter_names
+from protocols.float32 import single
 from protocols.mavlink.codec import pack
 from protocols.mavlink.dialect import Message, messages
-from protocols.msp.inav import ARMING_BLOCKERS
-from protocols.msp.mission import MAX_RADIUS_CM
-from protocols.msp.telemetry import Sensor
+from protocols.mavlink.ftp import FtpSession, file_crc32, is_opening
+from protocols.mavlink.metadata_message import component_metadata
 
 _REAL32 = 9
-#: Mission Planner's name for the radius in its plan screen; with this name it is in cm.
-WP_RADIUS = "WPNAV_RADIUS"
-SYSID = "SYSID_THISMAV"
-#: RC_CHANNELS has the sticks in this order on every board.
-_STICKS = ("ROLL", "PITCH", "THROTTLE", "YAW")
-#: The range of MSP's channels, us. ArduPilot's defaults (1100, 1900, 1500) would mean that nothing is calibrated.
-_CALIBRATION = {"MIN": 1000.0, "MAX": 2000.0, "TRIM": 1500.0}
-#: No board tells its sensors' offsets in ArduPilot's units, so a value other than 0 only means "calibrated".
-_ACCELEROMETER_OFFSET_M_S2, _COMPASS_OFFSET_MG = 0.001, 1.0
-#: INAV's reasons not to arm.
-_NO_ACCELEROMETER, _NO_COMPASS = ARMING_BLOCKERS[13], ARMING_BLOCKERS[12]
+#: 500 parameters a second for all lists together: a radio at 57600 baud carries as many.
+_EACH, _INTERVAL_S = 10, 0.02
+#: QGroundControl repeats its request after 5 s, Mission Planner after 4 s.
+_LIST_WITHIN_S = 3.5
+#: Above, REAL32 has no place for every whole number.
+_MOST_EXACT = 2**24
+_ERRORS = {
+    Cause.OUT_OF_RANGE: messages.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE,
+    Cause.FIXED: messages.MAV_PARAM_ERROR_READ_ONLY,
+    Cause.ARMED: messages.MAV_PARAM_ERROR_PERMISSION_DENIED,
+}
+
+
+@dataclass(slots=True)
+class _Dialogue:
+    """What a station has got. next: the index of the list that it is sent; None: of none. count: of the last list."""
+
+    station: Station
+    session: FtpSession
+    next: int | None = None
+    count: int = 0
+    awaits_list: bool = False
 
 
 class Parameters:
-    """Answers PARAM_REQUEST_LIST, PARAM_REQUEST_READ and PARAM_SET. Values are REAL32."""
+    """Answers PARAM_REQUEST_LIST, PARAM_REQUEST_READ and PARAM_SET, and requests for files."""
 
-    def __init__(self, missions: MissionService, ground: Ground, sysid: int) -> None:
-        self._missions = missions
+    def __init__(self, own: OwnParameters, settings: BoardSettings, ground: Ground) -> None:
+        self._own = own
+        self._settings = settings
         self._ground = ground
-        self._sysid = sysid
-        self._is_setting = False
+        #: The flight controller's settings by parameter.
+        self._named: Mapping[str, BoardSetting] = {}
         #: The values that stations know, once one has read them.
         self._told: dict[str, float] = {}
+        self._files = ParameterFiles()
+        self._dialogues: WeakKeyDictionary[GroundStation, _Dialogue] = WeakKeyDictionary()
+        settings.on_table.append(self._take)
+        #: The time of the next `tick`; infinity while no list is sent.
+        self.due = inf
 
-    def send_all(self, station: Station) -> None:
+    def request_list(self, station: Station, now: float) -> None:
         """PARAM_REQUEST_LIST."""
-        self._told = self._values()
-        for name in self._told:
-            if self._ground.allows(station, Cost.ANSWER):
-                self._ground.to(station, _message(self._told, name))
+        dialogue = self._dialogue(station)
+        if dialogue is None or dialogue.awaits_list or not self._ground.allows(station, Cost.LIST):
+            return
+        dialogue.awaits_list, dialogue.station = True, station
 
-    def follow(self) -> None:
-        """Send the values that have changed to all stations, which keep a copy, once any has read them."""
-        if self._told:
-            before, self._told = self._told, self._values()
-            for name, value in self._told.items():
-                if before.get(name) != value:
-                    self._ground.broadcast(_message(self._told, name))
+        def done(_table: SettingTable | SettingRefusal, at: float) -> None:
+            dialogue.awaits_list, dialogue.next = False, 0
+            self.due = min(self.due, at)
+
+        self._settings.current(done, now, _LIST_WITHIN_S)
 
     def send_one(self, station: Station, name: str, index: int) -> None:
         """PARAM_REQUEST_READ: by index, or by name where index is -1."""
@@ -73,104 +91,132 @@ class Parameters:
         self._send(station, name)
 
     def set(self, station: Station, name: str, value: float, now: float) -> None:
-        """PARAM_SET: answered with the value then in force, as the protocol requires."""
-        fc_store, radius_cm = self._missions.fc_store, self._values().get(WP_RADIUS)
-        # Mission Planner keeps metres as text: 2.10 m arrives as 209.99998 cm.
-        wanted_cm = round(value) if math.isfinite(value) else -1
-        if name != WP_RADIUS or wanted_cm == radius_cm:
-            # An equal value is not written: that would erase and rewrite the board's whole configuration.
-            if name != WP_RADIUS and not math.isclose(self._values().get(name, value), value, rel_tol=1e-6):
-                self._ground.say(Severity.ERROR, f"{name} is read-only", station)
+        """PARAM_SET: answered with the value that is then in force, as the protocol requires."""
+        setting = self._named.get(name)
+        if setting is None:
+            self._own.set(station, name, value, now, lambda to: self._send(to, name))
+        elif value == single(float(setting.value)):
             self._send(station, name)
-            return
-        if isinstance(fc_store, Refusal) or radius_cm is None:
-            refusal = f"{WP_RADIUS} cannot be set on this flight controller now"
-        elif not 0 <= wanted_cm <= MAX_RADIUS_CM:
-            # No error: after each Write, Mission Planner sends its default of 30 m if its plan screen was open first.
-            self._ground.say(Severity.NOTICE, f"{WP_RADIUS} stays {radius_cm:.0f}: 0..{MAX_RADIUS_CM} cm", station)
-            self._send(station, name)
-            return
-        elif self._is_setting:
-            # A change is pending; a station that requested another value repeats its request.
-            return
-        elif self._missions.armed_refusal() is not None:
-            refusal = f"{WP_RADIUS} stays {radius_cm:.0f}: {PushFailure.ARMED.value}"
-        elif not self._ground.allows_write(station, now):
-            refusal = TOO_MANY_WRITES
+        elif setting.kind is ValueKind.INTEGER and isfinite(value) and abs(value) >= _MOST_EXACT:
+            above = f"{name} stays {shown(setting.value)}: only up to {_MOST_EXACT - 1} over MAVLink"
+            self._refuse(station, name, SettingRefusal(Cause.OUT_OF_RANGE, above))
         else:
-            self._write(fc_store, wanted_cm, station, now)
+            self._settings.change(
+                setting.name, value, lambda result, _at: self._changed(station, name, result), now, str(station)
+            )
+
+    def answer_file(self, station: Station, payload: Sequence[int], now: float) -> None:
+        """FILE_TRANSFER_PROTOCOL."""
+        dialogue = self._dialogue(station)
+        if dialogue is None:
             return
-        self._ground.say(Severity.ERROR, refusal, station)
+        self._files.show(self._values(), self._named)
+        if is_opening(payload):
+            # What was changed without the bridge follows as PARAM_VALUE.
+            self._settings.current(lambda _table, _at: None, now, _LIST_WITHIN_S)
+        for number, answer in enumerate(dialogue.session.answer(payload)):
+            if number and not self._ground.allows(station, Cost.ANSWER):
+                return
+            self._ground.to(
+                station, messages.MAVLink_file_transfer_protocol_message(0, station.sysid, station.compid, answer)
+            )
+
+    def metadata(self, uptime_ms: int) -> Message | None:
+        """COMPONENT_METADATA, which names the file with the descriptions; None before the settings are known."""
+        if not self._named:
+            return None
+        self._files.show(self._values(), self._named)
+        crc = file_crc32(self._files.general())
+        return component_metadata(uptime_ms, crc, GENERAL_URI)
+
+    def follow(self) -> None:
+        """Send the values that have changed to all stations, which keep a copy, once any has read them."""
+        if not self._told:
+            return
+        before, self._told = self._told, self._values()
+        if len(before) == len(self._told):
+            for name, value in self._told.items():
+                if before.get(name) != value:
+                    self._ground.broadcast(self._message(self._told, name))
+
+    def tick(self, now: float) -> None:
+        """Send the next parameters of each list."""
+        lists = [(peer, dialogue) for peer, dialogue in self._dialogues.items() if dialogue.next is not None]
+        self.due = now + _INTERVAL_S if lists else inf
+        if not lists:
+            return
+        self._told = values = self._values()
+        names = [*values]
+        each = max(_EACH // len(lists), 1)
+        for ground_station, dialogue in lists[:_EACH]:
+            assert dialogue.next is not None
+            for index in range(dialogue.next, min(dialogue.next + each, len(names))):
+                self._ground.to(dialogue.station, self._value_at(values, names[index], index))
+            dialogue.next += each
+            if dialogue.next >= len(names):
+                dialogue.next, dialogue.count = None, len(names)
+            # The others' turn.
+            self._dialogues[ground_station] = self._dialogues.pop(ground_station)
+
+    def _dialogue(self, station: Station) -> _Dialogue | None:
+        ground_station = self._ground.station(station.peer)
+        if ground_station is None:
+            return None
+        if ground_station not in self._dialogues:
+            self._dialogues[ground_station] = _Dialogue(station, FtpSession(self._files.find))
+        return self._dialogues[ground_station]
+
+    def _take(self, table: SettingTable, now: float) -> None:
+        """The settings were read, or one of them has changed."""
+        reserved = self._own.values()
+        numbers = {setting.name: setting for setting in table if setting.kind is not ValueKind.TEXT}
+        self._named = {name: numbers[long] for name, long in parameter_names(numbers, reserved).items()}
+        self.follow()
+        count = len(self._values())
+        for dialogue in self._dialogues.values():
+            if 0 < dialogue.count != count and dialogue.next is None:
+                dialogue.next = 0
+                self.due = min(self.due, now)
+
+    def _changed(self, station: Station, name: str, result: BoardSetting | SettingRefusal) -> None:
+        if isinstance(result, SettingRefusal):
+            self._refuse(station, name, result)
+        else:
+            self._send(station, name)
+
+    def _refuse(self, station: Station, name: str, refused: SettingRefusal) -> None:
+        """Tell the reason, then the value in force. PARAM_ERROR, which MAVLink 1 lacks, spares MAVSDK a wait."""
+        self._ground.say(Severity.ERROR, refused.text, station)
+        self._error(station, name, _ERRORS.get(refused.cause, messages.MAV_PARAM_ERROR_PERMISSION_DENIED))
         self._send(station, name)
 
-    def _write(self, fc_store: AnyFcMissionStore, wanted_cm: int, station: Station, now: float) -> None:
-        def done(failure: PushFailure | LinkLost | None, _at: float) -> None:
-            self._is_setting = False
-            if failure is PushFailure.NO_ANSWER or isinstance(failure, LinkLost):
-                self._ground.say(Severity.ERROR, f"No answer: {WP_RADIUS} may be set, read it again", station)
-            elif failure is not None:
-                self._ground.not_written(station)
-                text = f"{WP_RADIUS} stays {fc_store.wp_radius_cm}: {failure.value}"
-                self._ground.say(Severity.ERROR, text, station)
-            self._send(station if failure else None, WP_RADIUS)
-
-        self._is_setting = True
-        self._missions.runner.start(fc_store.set_wp_radius(wanted_cm), done, now)
-
     def _values(self) -> dict[str, float]:
-        """Every parameter. The radius is last: it is only known of some boards, and the others keep their indexes."""
-        compass, accelerometer = self._sensors()
-        values = {SYSID: float(self._sysid)}
-        for channel, stick in enumerate(_STICKS, 1):
-            values[f"RCMAP_{stick}"] = float(channel)
-            values |= {f"RC{channel}_{kind}": value for kind, value in _CALIBRATION.items()}
-        # Without an id QGroundControl makes no demands on the compass. No board needs it for arming.
-        values |= {f"COMPASS_DEV_ID{number}": 0.0 for number in ("", "2", "3")}
-        values |= {"COMPASS_USE": float(compass is not None), "COMPASS_USE2": 0.0, "COMPASS_USE3": 0.0}
-        offsets = {
-            "COMPASS_OFS": compass or 0.0,
-            "COMPASS_OFS2": 0.0,
-            "COMPASS_OFS3": 0.0,
-            "INS_ACCOFFS": accelerometer,
-        }
-        values |= {f"{name}_{axis}": value for name, value in offsets.items() for axis in "XYZ"}
-        fc_store = self._missions.fc_store
-        if not isinstance(fc_store, Refusal) and fc_store.wp_radius_cm is not None:
-            values[WP_RADIUS] = float(fc_store.wp_radius_cm)
+        """Every parameter. The bridge's own keep their indexes on every board."""
+        values = self._own.values()
+        for name, setting in self._named.items():
+            values[name] = float(setting.value)
         return values
-
-    def _sensors(self) -> tuple[float | None, float]:
-        """The offsets of the compass, None without one, and of the accelerometer; 0: not calibrated."""
-        vehicle = self._missions.vehicle
-        health, readiness, orientation = vehicle.last(Health), vehicle.last(Readiness), vehicle.last(Orientation)
-        blockers = () if readiness is None else readiness.blockers
-        is_fitted = health is not None and Sensor.COMPASS in health.sensors
-        has_north = orientation is not None and orientation.is_north_known and _NO_COMPASS not in blockers
-        return (
-            _COMPASS_OFFSET_MG * has_north if is_fitted else None,
-            0.0 if _NO_ACCELEROMETER in blockers else _ACCELEROMETER_OFFSET_M_S2,
-        )
 
     def _send(self, station: Station | None, name: str) -> None:
         """Send PARAM_VALUE, or PARAM_ERROR without such a parameter; None: to all stations, which keep a copy."""
         values = self._values()
         if name not in values:
-            self._refuse_unknown(station, name)
+            if station is not None and name:
+                self._error(station, name, messages.MAV_PARAM_ERROR_DOES_NOT_EXIST)
         elif station is None:
-            self._ground.broadcast(_message(values, name))
+            self._ground.broadcast(self._message(values, name))
             self._told |= {name: values[name]} if self._told else {}
         else:
-            self._ground.to(station, _message(values, name))
+            self._ground.to(station, self._message(values, name))
 
-    def _refuse_unknown(self, station: Station | None, name: str) -> None:
-        """PARAM_ERROR, which MAVLink 1 lacks: without it MAVSDK waits 3 s."""
-        if station is not None and name:
-            unknown = messages.MAV_PARAM_ERROR_DOES_NOT_EXIST
-            missing = messages.MAVLink_param_error_message(station.sysid, station.compid, name.encode(), -1, unknown)
-            if (receiver := self._ground.station(station.peer)) is not None:
-                self._ground.multicast(pack(missing), [receiver])
+    def _error(self, station: Station, name: str, error: int) -> None:
+        message = messages.MAVLink_param_error_message(station.sysid, station.compid, name.encode(), -1, error)
+        if (receiver := self._ground.station(station.peer)) is not None:
+            self._ground.multicast(pack(message), [receiver])
 
+    def _message(self, values: Mapping[str, float], name: str) -> Message:
+        return self._value_at(values, name, list(values).index(name))
 
-def _message(values: Mapping[str, float], name: str) -> Message:
-    index = list(values).index(name)
-    return messages.MAVLink_param_value_message(name.encode(), values[name], _REAL32, len(values), index)
+    @staticmethod
+    def _value_at(values: Mapping[str, float], name: str, index: int) -> Message:
+        return messages.MAVLink_param_value_message(name.encode(), values[name], _REAL32, len(values), index)

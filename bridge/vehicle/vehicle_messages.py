@@ -78,6 +78,7 @@ _NEVER_ILL = messages.MAV_SYS_STATUS_GEOFENCE
 _CAPABILITIES = (
     messages.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT
     | messages.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+    | messages.MAV_PROTOCOL_CAPABILITY_FTP
     | messages.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
     | messages.MAV_PROTOCOL_CAPABILITY_MAVLINK2
 )
@@ -227,7 +228,7 @@ def _standard_mode(vehicle: Vehicle, mode: FlightMode) -> int:
 
 
 def autopilot_version(vehicle: Vehicle) -> Message:
-    """AUTOPILOT_VERSION: the firmware's version. No FTP capability: Mission Planner would wait 15 s for files."""
+    """AUTOPILOT_VERSION: the firmware's version."""
     version = int.from_bytes(bytes((*(vehicle.version or _UNKNOWN_VERSION), _OFFICIAL)), "big")
     no_hash = [0] * 8
     return messages.MAVLink_autopilot_version_message(

@@ -257,6 +257,7 @@ MESSAGE_FORMATS = {
     387: MessageFormat(4, None, 72, 4, 5),  # CANFD_FRAME
     388: MessageFormat(8, None, 37, 32, 33),  # CAN_FILTER_MODIFY
     390: MessageFormat(156, None, 240, None, None),  # ONBOARD_COMPUTER_STATUS
+    397: MessageFormat(182, None, 108, None, None),  # COMPONENT_METADATA
     420: MessageFormat(20, None, 73, 6, 7),  # RADIO_RC_CHANNELS
     435: MessageFormat(134, None, 46, None, None),  # AVAILABLE_MODES
     436: MessageFormat(193, None, 9, None, None),  # CURRENT_MODE

@@ -4,6 +4,7 @@
 from pathlib import Path
 
 import pytest
+from pymavlink.mavftp import MAVFTP
 
 from protocols.mission_item import Command
 from tests.support.benches import Bench
@@ -34,13 +35,26 @@ def test_load_list_save_and_clear_work(shared: Bench, tmp_path: Path, version: s
 def test_float_items_parameters_and_refusals_work(shared: Bench, tmp_path: Path) -> None:
     plan = mixed_plan(20)
     with MavProxy(tmp_path, shared.daemon.port) as mavproxy:
-        mavproxy.wait_for("Received 36 parameters")
+        mavproxy.wait_for("Received 237 parameters")
         mavproxy.type("set wp_use_mission_int False")
         mavproxy.load(plan)
         mavproxy.wait_for("TYPE_MISSION: ACCEPTED")
         assert shared.board.records() == records_of(judge(plan, use_int=False))
         mavproxy.type("param show WPNAV_RADIUS")
         mavproxy.wait_for("200.0")
+        mavproxy.type("module load ftp")
+        mavproxy.type(f"ftp get @PARAM/param.pck {tmp_path / 'param.pck'}")
+        mavproxy.wait_for("Wrote ")
+        packed = MAVFTP.ftp_param_decode((tmp_path / "param.pck").read_bytes())
+        assert len(packed.params) == 237
+        mavproxy.type("param set p_roll 38")
+        mavproxy.type("param show p_roll")
+        mavproxy.wait_for("38.0")
+        mavproxy.type("param set p_roll 201")
+        mavproxy.wait_for("p_roll stays 38: 1..200")
+        mavproxy.type("long MAV_CMD_PREFLIGHT_STORAGE 1")
+        mavproxy.wait_for("Settings saved")
+        mavproxy.type("param set p_roll 35")
         mavproxy.type("arm throttle")
         mavproxy.wait_for("transmitter sticks")
 

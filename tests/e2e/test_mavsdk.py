@@ -272,6 +272,14 @@ async def test_parameters_and_telemetry_work(shared: Bench) -> None:
         for radius_cm in (300.0, 200.0):
             await parameters.set_param_float("WPNAV_RADIUS", radius_cm)
             assert await parameters.get_param_float("WPNAV_RADIUS") == radius_cm
+        assert (len(found), found["p_pitch"]) == (237, 35.0)
+        await parameters.set_param_float("p_pitch", 38.0)
+        assert await parameters.get_param_float("p_pitch") == 38.0
+        with pytest.raises(ParamError) as refused:
+            await parameters.set_param_float("p_pitch", 201.0)
+        assert refused.value.result == ParamResult.VALUE_OUT_OF_RANGE
+        assert await parameters.get_param_float("p_pitch") == 38.0
+        await parameters.set_param_float("p_pitch", 35.0)
         telemetry = TelemetryAsync(vehicle)
         async for position in telemetry.subscribe_position():
             if math.isfinite(position.latitude_deg):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Parameters: few, true, and set on the flight controller before they are confirmed."""
+"""Parameters: true, and set on the flight controller before they are confirmed."""
 
+import gc
 import math
 
 import pytest
@@ -8,23 +9,28 @@ import pytest
 from bridge.controllers.harakiri.mission_store import HarakiriMissions
 from bridge.missions.fc_mission_store import PushFailure
 from protocols.mavlink.dialect import Message
+from protocols.msp.mission import MissionCommand
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from simulator.commands.fc_kinds import make_board
+from simulator.naze.setting_table import SETTINGS
 from tests.bridge.vehicle.test_commands import answers, m
 from tests.support.screens import Screens
+from tests.support.settings_client import SettingsClient
 from tests.support.world import GroundStation, World, ready_world
 
-#: The parameters of a patched Harakiri; of other boards one less.
-COUNT = 36
+#: The bridge's own parameters for a patched Harakiri; for other boards one less.
+OWN = 36
+#: All, with its settings and modes.
+ALL = OWN + len(SETTINGS) + 15
 
 
 def param_set(name: bytes, value: float) -> Message:
     return m.MAVLink_param_set_message(1, 1, name, value, 9)
 
 
-def values(received: list[Message]) -> list[tuple[str, float, int, int]]:
+def values(received: list[Message]) -> list[tuple[str, float, int]]:
     return [
-        (message.param_id, message.param_value, message.param_index, message.param_count)
+        (message.param_id, message.param_value, message.param_index)
         for message in received
         if message.get_type() == "PARAM_VALUE"
     ]
@@ -32,16 +38,35 @@ def values(received: list[Message]) -> list[tuple[str, float, int, int]]:
 
 def radius_world() -> tuple[World, GroundStation]:
     world = ready_world()
+    SettingsClient(world).wait_read()
     return world, GroundStation(world)
 
 
-def test_the_parameter_list_is_short_and_complete(flying: tuple[World, GroundStation]) -> None:
-    received = answers(flying, m.MAVLink_param_request_list_message(1, 1))
+def parameter_list(world: World, station: GroundStation) -> list[Message]:
+    """All PARAM_VALUEs after a request for the list."""
+    station.take()
+    station.send(m.MAVLink_param_request_list_message(1, 1))
+
+    def is_whole(_: World) -> bool:
+        return any(each.param_index == each.param_count - 1 for each in station.messages("PARAM_VALUE"))
+
+    world.wait_until(is_whole, 10)
+    return station.messages("PARAM_VALUE")
+
+
+def test_the_list_has_the_bridges_own_parameters_and_all_settings_of_the_board(
+    flying: tuple[World, GroundStation],
+) -> None:
+    received = parameter_list(*flying)
     found = values(received)
-    assert found[0] == ("SYSID_THISMAV", 1.0, 0, COUNT)
-    assert found[-1] == ("WPNAV_RADIUS", 200.0, COUNT - 1, COUNT)
-    assert [index for _, _, index, _ in found] == list(range(COUNT))
-    assert {message.param_type for message in received} == {9}
+    assert found[0] == ("SYSID_THISMAV", 1.0, 0)
+    assert found[OWN - 1] == ("WPNAV_RADIUS", 200.0, OWN - 1)
+    assert [index for _, _, index in found] == list(range(ALL))
+    assert {(message.param_type, message.param_count) for message in received} == {(9, ALL)}
+    assert len({message.param_id for message in received}) == ALL
+    held = {each.setting.name: each.value for each in SETTINGS}
+    shown = {name: value for name, value, _ in found}
+    assert all(shown[name] == pytest.approx(value) for name, value in held.items() if len(name) <= 16)
 
 
 @pytest.mark.parametrize(
@@ -53,7 +78,7 @@ def test_the_parameter_list_is_short_and_complete(flying: tuple[World, GroundSta
         (b"WPNAV_RADIUS", -1, "WPNAV_RADIUS"),
         (b"SYSID_THISMAV", -1, "SYSID_THISMAV"),
         (b"WPNAV_RADIUS", 0, "SYSID_THISMAV"),  # the index takes precedence
-        (b"", 36, None),
+        (b"", ALL, None),
         (b"", 32767, None),
         (b"NO_SUCH_NAME", -1, None),
         (b"WPNAV_RADIUS1234", -1, None),
@@ -79,9 +104,8 @@ def test_qgroundcontrol_shows_no_dialog_and_stays_on_the_map(board: str, is_arme
     world.run(3)
     station = GroundStation(world)
     screen = Screens(station).qgc
-    station.send(m.MAVLink_param_request_list_message(1, 1))
-    world.run(1)
-    assert len(screen.parameters) >= COUNT - 1
+    parameter_list(world, station)
+    assert len(screen.parameters) >= OWN - 1
     assert (screen.dialogs, screen.is_in_setup) == ([], False)
     assert screen._components_ok
     # These make Mission Planner ask for fences and show another compass page, and QGroundControl for a frame.
@@ -108,7 +132,7 @@ def test_a_sensor_that_inav_reports_as_not_calibrated_has_no_offset(blocker: int
     world.wait_ready()
     world.run(3)
     station = GroundStation(world)
-    received = answers((world, station), m.MAVLink_param_request_list_message(1, 1))
+    received = parameter_list(world, station)
     assert {value[0]: value[1] for value in values(received)}[name] != 0
     station.take()
     faults.arming_blockers = 1 << blocker
@@ -123,7 +147,7 @@ def test_the_radius_is_set_on_the_flight_controller() -> None:
     other.send(m.MAVLink_ping_message(0, 0, 0, 0))
     station.send(param_set(b"WPNAV_RADIUS", 350.0))
     world.wait_until(lambda _: bool(station.messages("PARAM_VALUE")), 1)
-    assert values(station.messages()) == values(other.messages()) == [("WPNAV_RADIUS", 350.0, COUNT - 1, COUNT)]
+    assert values(station.messages()) == values(other.messages()) == [("WPNAV_RADIUS", 350.0, OWN - 1)]
     assert station.texts() == []
     world.run(2)
     # The firmware applies it in its next loop.
@@ -131,7 +155,7 @@ def test_the_radius_is_set_on_the_flight_controller() -> None:
     world.power_off()
     world.power_on()
     world.run(world.naze.options.boot_ms / 1000 + 3)
-    assert values(answers((world, station), m.MAVLink_param_request_list_message(1, 1)))[-1][1] == 350.0
+    assert radius_now(world, station) == 350.0
 
 
 @pytest.mark.parametrize("value", [200.0, 200.4, 199.949, 199.99998])
@@ -139,8 +163,8 @@ def test_an_unchanged_value_is_not_written(value: float) -> None:
     world, station = radius_world()
     before, operations = len(world.written), world.naze.flash_operations
     received = answers((world, station), param_set(b"WPNAV_RADIUS", value))
-    assert values(received) == [("WPNAV_RADIUS", 200.0, COUNT - 1, COUNT)]
-    assert all(data[4] < 190 for _, _, data in world.written[before:])
+    assert values(received) == [("WPNAV_RADIUS", 200.0, OWN - 1)]
+    assert all(data[4] != MissionCommand.RADIUS for _, _, data in world.written[before:])
     world.run(2)
     assert world.naze.flash_operations == operations
 
@@ -149,7 +173,7 @@ def test_an_unchanged_value_is_not_written(value: float) -> None:
 def test_a_value_out_of_range_is_refused_with_a_text(value: float) -> None:
     world, station = radius_world()
     received = answers((world, station), param_set(b"WPNAV_RADIUS", value))
-    assert values(received) == [("WPNAV_RADIUS", 200.0, COUNT - 1, COUNT)]
+    assert values(received) == [("WPNAV_RADIUS", 200.0, OWN - 1)]
     assert station.texts() == ["WPNAV_RADIUS stays 200: 0..2000 cm"]
 
 
@@ -180,7 +204,7 @@ def test_setting_the_radius_while_armed_is_refused_with_a_text() -> None:
     world.faults.armed = True
     world.run(1)
     received = answers((world, station), param_set(b"WPNAV_RADIUS", 400.0))
-    assert values(received) == [("WPNAV_RADIUS", 200.0, COUNT - 1, COUNT)]
+    assert values(received) == [("WPNAV_RADIUS", 200.0, OWN - 1)]
     assert any("disarm" in text for text in station.texts())
 
 
@@ -194,7 +218,7 @@ def test_a_radius_refused_for_flash_wear_is_reported() -> None:
         assert ended == [None]
     station.send(param_set(b"WPNAV_RADIUS", 400.0))
     world.wait_until(lambda _: bool(station.messages("PARAM_VALUE")), 5)
-    assert values(station.messages()) == [("WPNAV_RADIUS", 550.0, COUNT - 1, COUNT)]
+    assert values(station.messages()) == [("WPNAV_RADIUS", 550.0, OWN - 1)]
     assert " ".join(station.texts()) == f"WPNAV_RADIUS stays 550: {PushFailure.WRITES_SPENT.value}"
 
 
@@ -210,6 +234,7 @@ def test_a_radius_set_just_before_arming_is_not_reported_as_unchanged() -> None:
     """The board changes it, then speaks MAVLink before it is read back."""
     world = World(SimOptions(tele_prot=TelemetryProtocol.MAVLINK), speeds=(115200,))
     world.wait_ready()
+    SettingsClient(world).wait_read()
     station = GroundStation(world)
     station.send(param_set(b"WPNAV_RADIUS", 400.0))
     world.run(0.02)
@@ -219,16 +244,17 @@ def test_a_radius_set_just_before_arming_is_not_reported_as_unchanged() -> None:
     world.faults.armed = False
     world.run(8)
     received = answers((world, station), m.MAVLink_param_request_read_message(1, 1, b"WPNAV_RADIUS", -1))
-    assert ("WPNAV_RADIUS", 400.0, COUNT - 1, COUNT) in values(received)
+    assert ("WPNAV_RADIUS", 400.0, OWN - 1) in values(received)
 
 
 def test_without_the_extension_there_is_no_radius() -> None:
     world = World(faults=Faults(extension=False))
     world.wait_ready()
     station = GroundStation(world)
-    received = answers((world, station), m.MAVLink_param_request_list_message(1, 1), param_set(b"WPNAV_RADIUS", 300.0))
+    station.send(param_set(b"WPNAV_RADIUS", 300.0))
+    received = parameter_list(world, station)
     assert "WPNAV_RADIUS" not in [name for name, *_ in values(received)]
-    assert values(received)[0] == ("SYSID_THISMAV", 1.0, 0, COUNT - 1)
+    assert values(received)[0] == ("SYSID_THISMAV", 1.0, 0)
 
 
 def test_repeated_sets_are_done_one_at_a_time() -> None:
@@ -238,7 +264,7 @@ def test_repeated_sets_are_done_one_at_a_time() -> None:
         if number % 9 == 0:
             world.run(0.0001)
     world.run(4)
-    received = answers((world, station), m.MAVLink_param_request_list_message(1, 1))
+    received = answers((world, station), m.MAVLink_param_request_read_message(1, 1, b"WPNAV_RADIUS", -1))
     assert 300 <= values(received)[-1][1] <= 304
     world.assert_line_was_clean()
 
@@ -255,7 +281,166 @@ def test_a_late_reply_to_the_first_set_does_not_confirm_the_second() -> None:
         station.send(param_set(b"WPNAV_RADIUS", 500.0))
         world.run(3)
         radius_cm = values(station.messages())[-1][1]
-        assert radius_cm == values(answers((world, station), m.MAVLink_param_request_list_message(1, 1)))[-1][1]
+        assert radius_cm == radius_now(world, station)
         info = world.inside.missions.fc_store
         assert isinstance(info, HarakiriMissions)
         assert world.naze._firmware._board.wp_radius_cm == info.wp_radius_cm == radius_cm
+
+
+def radius_now(world: World, station: GroundStation) -> float:
+    received = answers((world, station), m.MAVLink_param_request_read_message(1, 1, b"WPNAV_RADIUS", -1))
+    return values(received)[-1][1]
+
+
+# The flight controller's settings.
+
+
+def settled_world() -> tuple[World, GroundStation]:
+    """A world whose board's settings are known to a station."""
+    world, station = radius_world()
+    SettingsClient(world).wait_read()
+    station.stay_connected()
+    parameter_list(world, station)
+    station.take()
+    return world, station
+
+
+def reply_to(world: World, station: GroundStation, name: bytes, value: float, seconds: float = 1.0) -> list[Message]:
+    station.take()
+    station.send(param_set(name, value))
+    world.run(seconds)
+    return [each for each in station.messages() if each.get_type() in ("PARAM_VALUE", "PARAM_ERROR", "STATUSTEXT")]
+
+
+def test_a_setting_is_set_on_the_board_and_told_to_all() -> None:
+    world, station = settled_world()
+    other = GroundStation(world, "other", sysid=254)
+    other.send(m.MAVLink_ping_message(0, 0, 0, 0))
+    received = reply_to(world, station, b"p_roll", 44.0)
+    assert {(each.param_id, each.param_value) for each in received} == {("p_roll", 44.0)}
+    assert [each.param_value for each in other.messages("PARAM_VALUE")] == [44.0]
+    assert SettingsClient(world).value("p_roll") == 44
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "kept", "error", "sentence"),
+    [
+        (b"p_roll", 201.0, 35.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "p_roll stays 35: 1..200"),
+        (b"p_roll", 40.5, 35.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "p_roll stays 35: a whole number, 1..200"),
+        (b"p_roll", math.nan, 35.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "p_roll stays 35: 1..200"),
+        (b"p_roll", math.inf, 35.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "p_roll stays 35: 1..200"),
+        (b"gbl_flg", 3.0, 1.0, m.MAV_PARAM_ERROR_READ_ONLY, "gbl_flg stays 1: a running Harakiri can crash"),
+        (b"LED_Pattern1", 2.0**24, 1300.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "only up to 16777215 over"),
+    ],
+)
+def test_a_refused_value_is_answered_with_the_reason_and_the_value_in_force(
+    name: bytes, value: float, kept: float, error: int, sentence: str
+) -> None:
+    world, station = settled_world()
+    received = reply_to(world, station, name, value)
+    kinds = [each.get_type() for each in received if each.get_type() != "STATUSTEXT"]
+    assert kinds == ["PARAM_ERROR", "PARAM_VALUE"]
+    assert [each.error for each in received if each.get_type() == "PARAM_ERROR"] == [error]
+    assert received[-1].param_value == kept
+    assert sentence in " ".join(station.texts())
+
+
+def test_a_value_that_real32_rounds_is_not_written_back() -> None:
+    """Mission Planner writes a whole file of parameters, with the values that it had read."""
+    world, station = settled_world()
+    client = SettingsClient(world)
+    client.change("LED_Pattern1", 16777217)
+    received = reply_to(world, station, b"LED_Pattern1", 16777216.0)
+    assert {(each.get_type(), each.param_value) for each in received} == {("PARAM_VALUE", 16777216.0)}
+    assert client.value("LED_Pattern1") == 16777217
+
+
+def test_armed_a_setting_is_refused() -> None:
+    world, station = settled_world()
+    world.faults.armed = True
+    world.run(1)
+    received = reply_to(world, station, b"p_roll", 44.0)
+    assert (received[-1].param_id, received[-1].param_value) == ("p_roll", 35.0)
+    assert "disarm" in " ".join(station.texts())
+
+
+def command_of_storage(what: float) -> Message:
+    return m.MAVLink_command_long_message(1, 1, m.MAV_CMD_PREFLIGHT_STORAGE, 0, what, 0, 0, 0, 0, 0, 0)
+
+
+def test_preflight_storage_saves_once_and_only_what_was_changed() -> None:
+    world, station = settled_world()
+    reply_to(world, station, b"p_roll", 44.0)
+    operations = world.naze.flash_operations
+    for _ in range(3):
+        station.send(command_of_storage(1))
+        world.run(2)
+    assert [ack.result for ack in station.messages("COMMAND_ACK")] == [m.MAV_RESULT_ACCEPTED] * 3
+    assert station.texts().count("Settings saved") == 1
+    written = world.naze.flash_operations
+    assert written > operations
+    world.power_off()
+    world.power_on()
+    world.run(world.naze.options.boot_ms / 1000 + 5)
+    assert SettingsClient(world).value("p_roll") == 44
+
+
+def test_preflight_storage_in_flight_is_denied_while_something_is_unsaved() -> None:
+    world, station = settled_world()
+    reply_to(world, station, b"p_roll", 44.0)
+    world.faults.armed = True
+    world.run(1)
+    station.send(command_of_storage(1))
+    world.run(1)
+    assert [ack.result for ack in station.messages("COMMAND_ACK")] == [m.MAV_RESULT_DENIED]
+    world.faults.armed = False
+    world.run(1)
+    for what in (0, 2, 3):
+        station.take()
+        station.send(command_of_storage(what))
+        world.run(1)
+        assert [ack.result for ack in station.messages("COMMAND_ACK")] == [m.MAV_RESULT_DENIED]
+        assert station.texts() == ["Settings are only saved, not loaded or reset"]
+
+
+def test_a_list_requested_before_the_settings_are_read_waits_for_them() -> None:
+    world = World(speeds=(115200,))
+    world.wait_until(lambda world: world.is_found, 20)
+    station = GroundStation(world)
+    received = parameter_list(world, station)
+    assert {each.param_count for each in received} == {ALL}
+
+
+def test_a_station_with_a_shorter_list_gets_the_whole_one_when_it_is_known() -> None:
+    world = World(powered=False, speeds=(115200,))
+    station = GroundStation(world)
+    station.stay_connected()
+    assert len(parameter_list(world, station)) == OWN - 1
+    station.take()
+    world.power_on()
+    world.run(world.naze.options.boot_ms / 1000 + 6)
+    assert {each.param_index for each in station.messages("PARAM_VALUE") if each.param_count == ALL} == {*range(ALL)}
+
+
+def test_lists_of_many_stations_are_sent_side_by_side_at_a_bounded_rate() -> None:
+    world, _ = settled_world()
+    stations = [GroundStation(world, f"many{number}", sysid=100 + number) for number in range(5)]
+    for station in stations:
+        for _ in range(30):
+            station.send(m.MAVLink_param_request_list_message(1, 1))
+    began = world.now
+    world.wait_until(lambda _: all(len(station.messages("PARAM_VALUE")) >= ALL for station in stations), 20)
+    total = sum(len(station.messages("PARAM_VALUE")) for station in stations)
+    assert total <= 500 * (world.now - began) + 50
+
+
+def test_a_station_that_leaves_takes_its_list_along() -> None:
+    world, station = settled_world()
+    station.send(m.MAVLink_param_request_list_message(1, 1))
+    world.run(0.05)
+    world.bridge.gcs_gone(station.peer, world.now)
+    parameters = world.inside.parameters
+    gc.collect()
+    world.run(2)
+    gc.collect()
+    assert not [each for each in parameters._dialogues if each.peer == station.peer]
