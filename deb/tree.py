@@ -116,6 +116,7 @@ def _describe(root: Path, version: str, architecture: str) -> None:
     fields = (_HERE / "control").read_text().format(version=version, architecture=architecture, kilobytes=size // 1024)
     (folder / "control").write_text(fields)
     (folder / "md5sums").write_text("".join(sums))
+    shutil.copyfile(_HERE / "triggers", folder / "triggers")
     for script in _SCRIPTS:
         shutil.copyfile(_HERE / script, folder / script)
         (folder / script).chmod(0o755)

@@ -191,6 +191,10 @@ def test_it_is_installed_used_upgraded_removed_and_purged(package: Path, root: B
     assert "naze-bridge" not in root.run("ls /etc/systemd/system/multi-user.target.wants")
     # The byte code is installed, because the service cannot write it.
     assert root.run("find /usr/lib/naze-bridge -name 'daemon.cpython-*.pyc'")
+    # After an upgrade of the system to another Python it is compiled for that.
+    root.run("find /usr/lib/naze-bridge -name '*.pyc' -delete")
+    root.run("dpkg-trigger --no-await --by-package=dpkg /usr/bin/python3 && dpkg --triggers-only --pending")
+    assert root.run("find /usr/lib/naze-bridge -name 'daemon.cpython-*.pyc'")
     root.run("echo 'fc = \"sim:\"' >> /etc/naze-bridge/config.toml")
     root.put(_MISSION, "/root/naze-field.waypoints")
 
