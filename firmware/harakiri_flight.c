@@ -126,13 +126,12 @@ static void go(void)
 /* The throttle stick for a climb rate, as GetClimbrateTorcDataTHROTTLE() in mw.c makes it; altitude hold scales a descent. */
 static void climb(int16_t rate_cm_s)
 {
-    float stick = rate_cm_s * 0.8f;
-    rcData[THROTTLE] = cfg.rc_mid;
+    int stick = cfg.rc_mid;
     if (rate_cm_s > 0)
-        rcData[THROTTLE] += (int16_t)stick + cfg.rc_dbah;
+        stick += (int)(rate_cm_s * 0.8f) + cfg.rc_dbah;
     else if (rate_cm_s < 0 && cfg.bar_dscl > 0.1f)
-        rcData[THROTTLE] += (int16_t)(stick / cfg.bar_dscl) - cfg.rc_dbah;
-    rcData[THROTTLE] = constrain(rcData[THROTTLE], cfg.rc_minchk + 1, cfg.rc_maxchk);
+        stick += (int)(rate_cm_s * 0.8f / cfg.bar_dscl) - cfg.rc_dbah;
+    rcData[THROTTLE] = (int16_t)constrain(stick, cfg.rc_minchk + 1, cfg.rc_maxchk);
 }
 
 static void leave(void)
@@ -159,7 +158,7 @@ static void act(void)
     else
         leave();
     if (out.mode == NF_LAND)
-        rcData[THROTTLE] = cfg.rc_minchk - 10; /* starts and continues Autoland */
+        rcData[THROTTLE] = (int16_t)(cfg.rc_minchk - 10); /* starts and continues Autoland */
     else if (!out.pilots_throttle)
         climb(out.climb_cm_s);
 }
@@ -216,7 +215,7 @@ int32_t FlightAutostartHeight(int32_t otherwise_cm)
 void FlightNose(void)
 {
     if (out.nose)
-        magHold = wrap_180(out.heading_cd * 0.01f);
+        magHold = wrap_180((float)out.heading_cd * 0.01f);
 }
 
 bool FlightFlies(void)

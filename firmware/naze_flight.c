@@ -12,7 +12,7 @@ enum {
     NEAR_CM = 300,         /* nearer to a place than this, the bearing to it is noise: the nose stays */
     LIFTED_CM = 30,        /* off the ground */
     CLIMBED_CM = 50,       /* a climb's end: below the height by this */
-    DEAD_ZONE_CM = 60,     /* a height is corrected if it is off by more, ... */
+    DEAD_ZONE_CM = 40,     /* a height is corrected if it is off by more, ... */
     LEVEL_CM = 20,         /* ... until it is off by less */
     SLOWEST_CM_S = 15,     /* climb rate near the height */
     TURNED_CD = 700,       /* a turn's end: short of it by this */

@@ -31,6 +31,7 @@ def test_core_survives_every_power_cut_under_sanitizers(build: str) -> None:
     assert all(whole == all_ for whole, all_ in cuts)
     assert int(cuts[0][0]) > 10_000
     assert re.search(r"\d+ checks passed", printed)
+    assert re.search(r"mission flight on Harakiri: \d+ checks passed", printed)
     assert "300 lists flown" in printed
 
 

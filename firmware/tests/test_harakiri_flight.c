@@ -1,0 +1,273 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Tests of mission flight's Harakiri side: what it sets in the firmware, and that it gives everything back. */
+#include "board.h"
+#include "harakiri_flight.h"
+#include "harakiri_mission.h"
+
+#include <stdio.h>
+
+config_t cfg;
+flags_t f;
+int16_t rcData[8], rcCommand[4];
+uint8_t rcOptions[CHECKBOXITEMS], vbat;
+int32_t Real_GPS_coord[2], GPS_home[2];
+volatile uint8_t GPS_numSat;
+volatile bool GPS_FIX;
+bool GroundAltInitialized, WP_Fastcorner;
+float EstAlt, vario, heading, magHold, waypoint_speed_gov;
+int8_t nav_mode, wp_status, ph_status;
+uint32_t currentTimeMS;
+uint16_t batteryWarningVoltage;
+
+static uint8_t list[4][16];
+static int32_t target_lat;
+static unsigned targets, checks;
+static bool own_gains, auto_first;
+
+#define CHECK(condition) check((condition), #condition, __LINE__)
+
+static void check(bool condition, const char *what, int line)
+{
+    checks++;
+    if (condition)
+        return;
+    printf("test_harakiri_flight.c:%d: failed: %s\n", line, what);
+    exit(1);
+}
+
+bool feature(uint32_t mask)
+{
+    (void)mask;
+    return false;
+}
+
+bool sensors(uint32_t mask)
+{
+    (void)mask;
+    return true;
+}
+
+bool FloppyReadWP(uint16_t *number, wp_t *record)
+{
+    if (*number >= 4)
+        return false;
+    memcpy(record->bytes, list[*number], 16);
+    return true;
+}
+
+nm_list_t MissionStored(void)
+{
+    nm_list_t stored = {nm_crc32(0, list[0], sizeof list), 4};
+    return stored;
+}
+
+float wrap_180(float angle)
+{
+    return angle > 180.0f ? angle - 360.0f : angle;
+}
+
+void GPS_set_next_wp(int32_t *lat, int32_t *lon)
+{
+    (void)lon;
+    target_lat = *lat;
+    targets++;
+    waypoint_speed_gov = 100.0f;
+    auto_first = f.GPS_AUTO_MODE && nav_mode == NAV_MODE_WP;
+}
+
+void GPS_set_nav_gains(uint8_t p, uint8_t i)
+{
+    own_gains = p == cfg.mission_nav_p && i == cfg.mission_nav_i;
+}
+
+void GPS_set_pids(void)
+{
+    own_gains = false;
+}
+
+static void make_list(void)
+{
+    static const uint8_t commands[4] = {0, 0, 0, 5}; /* home, fast corner, braked corner, LAND */
+    for (int i = 0; i < 4; i++) {
+        memset(list[i], 0, 16);
+        ns_put32(list[i], (uint32_t)(450000000 + i * 3000));
+        ns_put32(list[i] + 4, 80000000);
+        list[i][8] = 10;
+        list[i][12] = i == 2;
+        list[i][13] = 2;
+        list[i][15] = commands[i];
+    }
+}
+
+/* One 50 Hz loop of the firmware, with the pilot's sticks in the middle. */
+static bool loop_once(bool switch_on)
+{
+    currentTimeMS += 20;
+    memset(rcOptions, 0, sizeof rcOptions);
+    rcOptions[BOXGPSAUTO] = switch_on;
+    rcData[THROTTLE] = 1510;
+    return FlightRun(false, f.ARMED != 0);
+}
+
+static void loops(int count)
+{
+    while (count--)
+        (void)loop_once(true);
+}
+
+static void take_off_by_hand(void)
+{
+    memset(&cfg, 0, sizeof cfg);
+    FlightDefaults();
+    cfg.mission_fly = 1;
+    cfg.gps_wp_radius = 200;
+    cfg.nav_speed_max = 350;
+    cfg.rc_mid = 1500;
+    cfg.rc_minchk = 1100;
+    cfg.rc_maxchk = 1900;
+    cfg.rc_dbah = 50;
+    cfg.rc_dbgps = 5;
+    cfg.bar_dscl = 0.7f;
+    cfg.al_barolr = cfg.as_clmbr = 50;
+    cfg.mag_calibrated = 1;
+    make_list();
+    Real_GPS_coord[LAT] = 450000000;
+    Real_GPS_coord[LON] = 80000000;
+    GPS_FIX = GroundAltInitialized = true;
+    GPS_numSat = 8;
+    EstAlt = 1000.0f;
+    f.GPS_FIX_HOME = 1;
+    f.ARMED = 0;
+    (void)loop_once(false);
+    f.ARMED = 1;
+    (void)loop_once(false);
+}
+
+static uint8_t asked(int at)
+{
+    uint8_t reply[NM_BUFFER_SIZE];
+    CHECK(FlightRequest(179, reply, 0) == 24);
+    return reply[at];
+}
+
+static void test_settings(void)
+{
+    memset(&cfg, 0xFF, sizeof cfg);
+    FlightDefaults();
+    CHECK(cfg.mission_fly == 0 && cfg.mission_first == 200 && cfg.mission_height == 100 && cfg.mission_climb == 100);
+    CHECK(cfg.mission_nav_p == 70 && cfg.mission_nav_i == 60);
+    cfg.mission_first = 150;
+    FlightDefaults();
+    CHECK(cfg.mission_first == 150);
+}
+
+static void test_it_is_off_until_it_is_set(void)
+{
+    take_off_by_hand();
+    cfg.mission_fly = 0;
+    f.ARMED = 0;
+    (void)loop_once(false);
+    f.ARMED = 1;
+    (void)loop_once(false);
+    cfg.mission_fly = 1; /* in flight: too late */
+    CHECK(!loop_once(true) && !f.GPS_AUTO_MODE && rcData[THROTTLE] == 1510 && asked(4) == NF_DISABLED);
+    (void)loop_once(false);
+}
+
+static void test_a_leg_and_its_end(void)
+{
+    take_off_by_hand();
+    targets = 0;
+    loops(3);
+    CHECK(f.GPS_AUTO_MODE && auto_first && targets == 1 && target_lat == 450003000 && own_gains && WP_Fastcorner);
+    CHECK(rcOptions[BOXBARO] && rcOptions[BOXMAG] && rcOptions[BOXANGLE] && !rcOptions[BOXGPSHOLD] && rcData[THROTTLE] == 1500);
+    heading = 10.0f;
+    loops(1);
+    FlightNose();
+    CHECK(magHold > -36.0f && magHold < 1.0f);
+    EstAlt = 500.0f;
+    loops(1);
+    CHECK(rcData[THROTTLE] > 1550 && rcData[THROTTLE] < 1640); /* climbs, within mission_climb */
+    EstAlt = 1500.0f;
+    loops(1);
+    CHECK(rcData[THROTTLE] < 1450 && rcData[THROTTLE] > 1330);
+    EstAlt = 1000.0f;
+    nav_mode = NAV_MODE_NONE; /* dropped by the firmware */
+    loops(1);
+    CHECK(targets == 2);
+    waypoint_speed_gov = 333.0f;
+    Real_GPS_coord[LAT] = 450002990; /* there: the next one keeps the speed, and brakes */
+    loops(1);
+    CHECK(targets == 3 && target_lat == 450006000 && !WP_Fastcorner && waypoint_speed_gov == 333.0f && asked(8) == 1);
+    CHECK(!loop_once(false) && !f.GPS_AUTO_MODE && !own_gains && rcData[THROTTLE] == 1510 && !rcOptions[BOXBARO]);
+}
+
+static void test_sticks_and_a_lost_fix(void)
+{
+    take_off_by_hand();
+    loops(3);
+    GPS_FIX = false;
+    f.GPS_AUTO_MODE = 0; /* as GPS_alltime() does */
+    loops(1);
+    CHECK(!own_gains && rcOptions[BOXBARO] && !rcOptions[BOXGPSHOLD] && asked(3) == NF_NO_FIX);
+    GPS_FIX = true;
+    loops(1);
+    CHECK(rcOptions[BOXGPSHOLD] && asked(3) == NF_HELD && asked(4) == NF_FIX_LOST);
+    (void)loop_once(false);
+    loops(3);
+    rcCommand[ROLL] = 6;
+    loops(1);
+    rcCommand[ROLL] = 0;
+    CHECK(rcOptions[BOXGPSHOLD] && !f.GPS_AUTO_MODE && asked(4) == NF_STICKS);
+    loops(5);
+    CHECK(asked(3) == NF_HELD && rcData[THROTTLE] == 1510); /* the pilot's */
+    (void)loop_once(false);
+}
+
+static void test_landing_and_announcements(void)
+{
+    uint16_t record;
+    take_off_by_hand();
+    loops(3);
+    CHECK(FlightCurrent(&record) && record == 1 && !FlightReached(&record));
+    Real_GPS_coord[LAT] = 450003000;
+    loops(2);
+    CHECK(FlightReached(&record) && record == 1 && !FlightReached(&record));
+    Real_GPS_coord[LAT] = 450006000;
+    loops(2);
+    CHECK(FlightReached(&record) && record == 2 && !FlightReached(&record));
+    CHECK(asked(3) == NF_SETTLE && rcOptions[BOXGPSHOLD]);
+    f.GPS_HOLD_MODE = 1;
+    ph_status = PH_STATUS_DONE;
+    loops(2);
+    CHECK(asked(3) == NF_DESCENT && rcData[THROTTLE] < cfg.rc_minchk);
+    f.ARMED = 0;
+    CHECK(!loop_once(true) && !FlightCurrent(&record));
+}
+
+static void test_failsafe_and_the_port(void)
+{
+    uint8_t buffer[NM_BUFFER_SIZE];
+    take_off_by_hand();
+    loops(3);
+    CHECK(FlightRefuses(200) && FlightRefuses(201) && FlightRefuses(203) && !FlightRefuses(101));
+    CHECK(FlightRequest(178, buffer, 0) == -1 && FlightRequest(179, buffer, 1) == 24 && buffer[0] == NM_BAD_REQUEST);
+    FlightFailsafe();
+    CHECK(!loop_once(true) && !own_gains && asked(4) == NF_FAILSAFE);
+    loops(10);
+    CHECK(asked(3) == NF_OFF);
+    f.ARMED = 0;
+    CHECK(!FlightRefuses(203));
+}
+
+int main(void)
+{
+    test_settings();
+    test_it_is_off_until_it_is_set();
+    test_a_leg_and_its_end();
+    test_sticks_and_a_lost_fix();
+    test_landing_and_announcements();
+    test_failsafe_and_the_port();
+    printf("  mission flight on Harakiri: %u checks passed\n", checks);
+    return 0;
+}
