@@ -4,13 +4,14 @@
 Whatever fails before the save leaves the saved settings as they were.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from bridge.settings.board_setting import BoardSetting, SettingTable, Value
 from bridge.settings.fc_settings import Cause, SettingRefusal
 from bridge.settings.restore_plan import LeftOut, PlannedChange, RestorePlan, is_restored, plan_restore
 from bridge.vehicle.board_settings import READ_WITHIN_S, BoardSettings
+from bridge.vehicle.parameter_names import parameter_names
 
 _MOST_NAMES = 8
 _NO_BOARD = SettingRefusal(Cause.NO_LINK, "The flight controller is not connected")
@@ -31,6 +32,17 @@ class RestoreResult:
 
 OnPlan = Callable[[RestorePlan | SettingRefusal, float], None]
 OnRestored = Callable[[RestoreResult | SettingRefusal, float], None]
+
+
+def by_setting(values: Mapping[str, Value], known: Collection[str]) -> dict[str, Value]:
+    """The values by the names of known settings, where a ground station's file has a parameter's shorter name."""
+    names = parameter_names(known)
+    return {name if name in known else names.get(name, name): value for name, value in values.items()}
+
+
+def by_parameter(values: Mapping[str, Value]) -> dict[str, Value]:
+    """The values by the names that ground stations use."""
+    return {parameter: values[setting] for parameter, setting in parameter_names(values).items()}
 
 
 class SettingsRestores:
@@ -56,7 +68,7 @@ class SettingsRestores:
             elif kind is None:
                 on_done(_NO_BOARD, at)
             else:
-                on_done(plan_restore(wanted, source, table, kind), at)
+                on_done(plan_restore(by_setting(wanted, table.settings), source, table, kind), at)
 
         if is_checked:
             self._settings.current(read, now, READ_WITHIN_S)

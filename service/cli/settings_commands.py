@@ -87,9 +87,11 @@ def backup(file: Path, state_dir: Path | None, fc: str | None, as_json: bool) ->
     """Write the settings to FILE in Mission Planner's .param format; - is standard output."""
     if as_json and file == _STANDARD_OUTPUT:
         raise click.UsageError("the file and --json cannot both go to standard output: omit one of them")
+    from bridge.vehicle.settings_restore import by_parameter
+
     held = _held(state_dir, fc)
     now = datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %z")
-    text = write_param_file(_values(held), held["board"], [f"taken: {now}, by naze-bridge"])
+    text = write_param_file(by_parameter(_values(held)), held["board"], [f"taken: {now}, by naze-bridge"])
     if file == _STANDARD_OUTPUT:
         click.echo(text, nl=False)
         return
@@ -147,8 +149,10 @@ def diff(first: str, second: str, state_dir: Path | None, fc: str | None, as_jso
     Each is a .param file, a backup's number, or `board` for the flight controller's present settings (the default of
     SECOND).
     """
+    from bridge.vehicle.settings_restore import by_setting  # other commands do without the bridge
+
     (left, _), (right, _) = (_source(each, state_dir, fc) for each in (first, second))
-    rows = settings_difference(left, right)
+    rows = settings_difference(by_setting(left, right), by_setting(right, left))
     if as_json:
         print_json({"equal": not rows, "changes": [asdict(row) for row in rows]})
     elif rows:

@@ -13,6 +13,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
+from bridge.vehicle.settings_restore import by_parameter
 from payloads.mission_data import ACCEPTED, Json, to_json
 from protocols.param_file import write_param_file
 from service.daemon.client import ControlError
@@ -68,7 +69,7 @@ class SettingsHistory:
     async def _file(self, request: Request) -> Response:
         backup = await self._find(request)
         name = f"settings-{backup['number']}.param"
-        text = write_param_file(backup["values"], backup["kind"])
+        text = write_param_file(by_parameter(backup["values"]), backup["kind"])
         headers = {"Content-Disposition": f'attachment; filename="{name}"'}
         return Response(text, headers=headers, media_type="application/octet-stream")
 

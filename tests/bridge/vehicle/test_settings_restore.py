@@ -7,7 +7,7 @@ import pytest
 
 from bridge.settings.board_setting import SettingTable, Value
 from bridge.settings.fc_settings import Cause, SettingRefusal
-from bridge.vehicle.settings_restore import RestoreResult
+from bridge.vehicle.settings_restore import RestoreResult, by_parameter, by_setting
 from protocols.msp.frame import MspParser
 from simulator.board.options import Faults
 from tests.bridge.vehicle.test_board_settings import restart
@@ -148,6 +148,20 @@ def test_settings_of_another_firmware_are_refused_without_a_write() -> None:
     assert isinstance(result, SettingRefusal)
     assert "INAV 8.0.1" in result.text
     assert writes(world) == before
+
+
+@pytest.mark.parametrize("name", ["patched Harakiri", "INAV"])
+def test_a_file_with_the_names_of_parameters_is_restored(name: str) -> None:
+    world, client = ready(BOARDS[name])
+    held = values(client.wait_read())
+    file = by_parameter(held)
+    assert len(file) == len(held)
+    assert max(map(len, file)) <= 16
+    assert by_setting(file, held) == held
+    assert outcome(restored(world, file)).text == "Nothing to restore"
+    long = next(each for each in client.wait_read() if len(each.name) > 16 and not each.fixed and each.value == 0)
+    (parameter,) = by_parameter({long.name: 0.0})
+    assert outcome(restored(world, {parameter: 1.0})).changed == (long.name,)
 
 
 def test_one_restore_runs_at_a_time() -> None:
