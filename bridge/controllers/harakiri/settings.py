@@ -4,6 +4,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+from bridge.controllers.harakiri.setting_texts import TEXTS
 from bridge.controllers.msp_settings import part_settings, some_parts
 from bridge.fc.profile import FlightController
 from bridge.line.conversation import Conversation, Pause, ask, ask_surely
@@ -55,15 +56,6 @@ _FIXED = dict.fromkeys(
     ("gbl_flg", *(f"align_{sensor}_{axis}" for sensor in ("gyro", "acc", "mag") for axis in "xyz")), _CRASHES
 )
 _LOWERED_ONLY = {"esc_moff": "it can only be lowered, a disarmed board sends it to the motors"}
-_UNITS = {
-    "looptime": "us", "mag_dec": "0.01 deg", "gps_wp_radius": "cm", "serial_baudrate": "baud", "gps_baudrate": "baud",
-    "rc_minchk": "us", "rc_mid": "us", "rc_maxchk": "us", "esc_min": "us", "esc_max": "us", "esc_nfly": "us",
-    "esc_moff": "us", "esc_pwm": "Hz", "srv_pwm": "Hz", "fs_rcthr": "us", "fs_delay": "0.1 s", "fs_ofdel": "0.1 s",
-    "vbatmaxcellvoltage": "0.1 V", "vbatmincellvoltage": "0.1 V", "nav_speed_min": "cm/s", "nav_speed_max": "cm/s",
-    "gps_maxangle": "deg", "acc_lpfhz": "Hz", "acc_altlpfhz": "Hz", "acc_gpslpfhz": "Hz", "gy_lpf": "Hz",
-    "maincuthz": "Hz", "gpscuthz": "Hz", "gps_lag": "ms", "tri_ymid": "us", "tri_ymin": "us", "tri_ymax": "us",
-    "rtl_mnh": "m", "rtl_mnd": "m", "snr_min": "cm", "snr_max": "cm",
-}  # fmt: skip
 
 
 class HarakiriFcSettings(FcSettings):
@@ -196,13 +188,15 @@ def _is(listed: Sequence[BoardSetting], whole: TableReply) -> bool:
 def _shown(held: HeldSetting) -> BoardSetting:
     described, value = held
     kind = ValueKind.FLOAT if described.type is SettingType.FLOAT else ValueKind.INTEGER
+    unit, text = TEXTS.get(described.name, ("", ""))
     return BoardSetting(
         described.name,
         kind,
         described.minimum,
         described.maximum,
         value,
-        _UNITS.get(described.name, ""),
+        unit,
+        text=text,
         fixed=_FIXED.get(described.name, ""),
         raised=_LOWERED_ONLY.get(described.name, ""),
         handle=described,
