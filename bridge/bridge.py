@@ -35,7 +35,7 @@ from bridge.model.events import Armed, Disarmed, Emit
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.vehicle import FlightState, Health, MissionLeg, Readiness
 from bridge.model.vehicle_groups import Group
-from bridge.settings.board_setting import SettingTable, Value
+from bridge.settings.board_setting import Value
 from bridge.sharing.msp_sharing import MspSharing
 from bridge.sharing.program import Program
 from bridge.transfers.downloads import MissionDownloads
@@ -48,7 +48,6 @@ from bridge.vehicle.board_settings import (
     OnChanged,
     OnSaved,
     OnTable,
-    TableListener,
 )
 from bridge.vehicle.calibration import Calibration
 from bridge.vehicle.commands import CommandService
@@ -303,23 +302,8 @@ class Bridge:
 
     @property
     def are_settings_checked(self) -> bool:
-        """True if `board_settings` was read from this board since anything else may have changed it."""
+        """True if the settings were read from this board since anything else may have changed them."""
         return self._board_settings.is_checked
-
-    @property
-    def board_settings(self) -> SettingTable | None:
-        """As last read, also of a board that is armed or lost since; None: never."""
-        return self._board_settings.table
-
-    @property
-    def unsaved_settings(self) -> Mapping[str, Value]:
-        """Those that the bridge has changed in the board's RAM, and not saved."""
-        return self._board_settings.unsaved
-
-    def follow_board_settings(self, on_table: TableListener, on_saved: TableListener) -> None:
-        """Call these when the table was read with other values, and when it was saved."""
-        self._board_settings.on_table.append(on_table)
-        self._board_settings.on_saved.append(on_saved)
 
     def read_board_settings(self, on_done: OnTable, now: float, within_s: float = READ_WITHIN_S) -> None:
         """The table, checked against the board if that is possible now, else as last read."""
