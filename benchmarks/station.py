@@ -7,10 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from benchmarks.processes import BenchmarkError
-from protocols.mavlink.codec import FrameWriter, pack
+from protocols.mavlink.codec import FrameWriter, item_message, pack
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
-from protocols.mavlink.mission_messages import item_message
 from protocols.mission_item import MissionItem, MissionResult
 
 _SYSID, _COMPID = 255, 190

@@ -200,7 +200,6 @@ class Ground:
     def heard(self, station: GroundStation, frame: MavlinkFrame, sender: tuple[int, int], now: float) -> None:
         """Note a frame from a station, which counts as connected from now on."""
         peer = station.peer
-        self.frames_received[peer.link, frame.msgid] += 1
         is_unknown = not station.is_heard
         if station.places is None:
             self._takes_place(station, now)

@@ -10,8 +10,8 @@ from bridge.missions.mission_service import HeldMission, MissionService
 from bridge.model.flight_memory import Home
 from bridge.model.refusal import Refusal
 from bridge.model.transfer_memory import Download
+from protocols.mavlink.codec import item_message
 from protocols.mavlink.dialect import messages
-from protocols.mavlink.mission_messages import item_message
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
 
 #: A download has ended after this long without a request, even if its MISSION_ACK was lost. Mission Planner repeats

@@ -14,11 +14,10 @@ from bridge.transfers.uploads import MissionUploads
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.parameters import Parameters
-from protocols.mavlink.codec import MavlinkDecoder
+from protocols.mavlink.codec import MavlinkDecoder, item_from_float_message, item_from_int_message
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame
-from protocols.mavlink.mission_messages import item_from_float_message, item_from_int_message
 from protocols.mission_item import MissionItem, MissionResult
 
 #: MISSION_ITEM.current of items outside a list: Mission Planner's "Fly to here" and "Change altitude".

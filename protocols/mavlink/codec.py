@@ -3,6 +3,7 @@
 
 import struct
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 from fastcrc.crc16 import mcrf4xx
@@ -10,6 +11,7 @@ from fastcrc.crc16 import mcrf4xx
 from protocols.mavlink.dialect import CRC_EXTRA, Message, messages
 from protocols.mavlink.frame import MAGIC_V1, MAGIC_V2, MavlinkFrame
 from protocols.mavlink.message_table import MESSAGE_FORMATS
+from protocols.mission_item import MissionItem, degrees_to_e7
 
 _SIGNED = 0x01
 _CRC_SIZE = 2
@@ -107,3 +109,26 @@ class FrameWriter:
         frame = header + payload
         frame += mcrf4xx(frame[1:] + CRC_EXTRA[msgid]).to_bytes(_CRC_SIZE, "little")
         return frame if sign is None else frame + sign(frame)
+
+
+# Mission items (https://mavlink.io/en/services/mission.html).
+
+
+def item_from_float_message(message: Message) -> MissionItem:
+    """Read MISSION_ITEM: its coordinates are float degrees."""
+    return replace(item_from_int_message(message), lat_e7=degrees_to_e7(message.x), lon_e7=degrees_to_e7(message.y))
+
+
+def item_from_int_message(message: Message) -> MissionItem:
+    """Read MISSION_ITEM_INT: its coordinates are exact."""
+    params = (message.param1, message.param2, message.param3, message.param4)
+    return MissionItem(message.seq, message.command, message.frame, *params, message.x, message.y, message.z)
+
+
+def item_message(item: MissionItem, sysid: int, compid: int, *, as_int: bool) -> Message:
+    """Make the message for one item, addressed to a ground station."""
+    lat_e7, lon_e7 = item.lat_e7 or 0, item.lon_e7 or 0
+    make = messages.MAVLink_mission_item_int_message if as_int else messages.MAVLink_mission_item_message
+    x, y = (lat_e7, lon_e7) if as_int else (lat_e7 / 1e7, lon_e7 / 1e7)
+    params = (item.p1, item.p2, item.p3, item.p4)
+    return make(sysid, compid, item.seq, item.frame, item.command, 0, 1, *params, x, y, item.alt_m, 0)

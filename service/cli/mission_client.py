@@ -4,8 +4,8 @@
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
+from protocols.mavlink.codec import item_from_int_message, item_message
 from protocols.mavlink.dialect import Message, messages
-from protocols.mavlink.mission_messages import item_from_int_message, item_message
 from protocols.mission_item import MissionItem, MissionResult
 
 _REPLY_TIMEOUT_S = 1.0

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.missions.list_check import check_list
+from protocols.mavlink.codec import item_from_float_message, item_from_int_message
 from protocols.mavlink.dialect import Message, messages
-from protocols.mavlink.mission_messages import item_from_float_message, item_from_int_message
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult, degrees_to_e7
 from protocols.msp.mission import WpRecord
 from tests.support.world import GroundStation

@@ -15,8 +15,8 @@ from bridge.controllers.nav.rules import ENDLESS_S, inav_profile, multiwii_profi
 from bridge.missions.list_check import check_list
 from bridge.model.finding import DROPPED, News
 from bridge.model.verdict import Result, Verdict
+from protocols.mavlink.codec import item_from_float_message
 from protocols.mavlink.dialect import messages
-from protocols.mavlink.mission_messages import item_from_float_message
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.msp.nav import FLY_HOME, LAST, LEGS, NavAction, NavRecord, decode_wp, encode_set_wp
 from tests.bridge.controllers.harakiri.test_rules import degrees, numbers
