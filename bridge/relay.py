@@ -29,11 +29,10 @@ from bridge.model.vehicle import FlightState, Source, Vehicle
 from bridge.model.verdict import Result, Verdict
 from bridge.transfers.downloads import MissionDownloads
 from bridge.transfers.uploads import MissionUploads
-from protocols.mavlink.codec import MavlinkDecoder, repack
+from protocols.mavlink.codec import MavlinkDecoder, item_from_float_message, item_from_int_message, repack
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
-from protocols.mavlink.mission_messages import item_from_float_message, item_from_int_message
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.mission_record import ListIdentity
 

@@ -21,7 +21,8 @@ from simulator.board.msp_options import MspOptions
 from simulator.board.nav_waypoint import FLAG_HOME, FLAG_LAST, WAYPOINT_SIZE, NavWaypoint
 from simulator.board.options import Faults
 from simulator.commands.fc_kinds import make_board
-from simulator.inav.mission import CAPACITY
+from simulator.inav.mission import CAPACITY, EEPROM_SIZE
+from simulator.inav.settings import SETTINGS_SIZE
 from tests.bridge.controllers.inav.test_mission_store import ACCEPTED, board_with, without_home
 from tests.bridge.controllers.nav.test_mission_store import RULES, packed, plan
 from tests.support.conversations import Download, Upload, clear_message
@@ -37,7 +38,8 @@ class Bench:
     def __init__(self, *sizes: int, faults: Faults | None = None) -> None:
         records = [record for mission in sets(*sizes) for record in mission]
         filled = records + [NOTHING_MORE] * (CAPACITY - len(records))
-        self.eeprom = bytearray(b"".join(bytes((number,)) + record for number, record in enumerate(filled, 1)))
+        missions = b"".join(bytes((number,)) + record for number, record in enumerate(filled, 1))
+        self.eeprom = bytearray(missions + bytes(SETTINGS_SIZE))
         self.faults = faults or Faults(boxes=0)
         self.board: MspBoard = make_board("inav", MspOptions(), self.faults, memoryview(self.eeprom))
         self.world = World(speeds=(115200,), peer=self.board, plugged=False)
@@ -50,7 +52,7 @@ class Bench:
 
     def stored(self) -> list[list[bytes]]:
         """The missions in the EEPROM, without record numbers."""
-        records = [bytes(self.eeprom[at + 1 : at + WAYPOINT_SIZE]) for at in range(0, len(self.eeprom), WAYPOINT_SIZE)]
+        records = [bytes(self.eeprom[at + 1 : at + WAYPOINT_SIZE]) for at in range(0, EEPROM_SIZE, WAYPOINT_SIZE)]
         missions: list[list[bytes]] = [[]]
         for record in records:
             missions[-1].append(record)
