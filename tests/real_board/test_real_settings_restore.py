@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Backup, change, save, and restore onto a blank board: the image's own table is equal afterwards."""
 
+import pytest
+
 from bridge.settings.board_setting import SettingTable, Value, ValueKind
 from bridge.vehicle.settings_restore import RestoreResult
 from simulator.emulated_naze.board import EmulatedNaze
@@ -27,6 +29,7 @@ def values(table: SettingTable) -> dict[str, Value]:
     return {setting.name: setting.value for setting in table}
 
 
+@pytest.mark.timeout(3600)
 def test_a_backup_is_restored_onto_a_blank_board(image: Image, flash: bytes, figure: Figure) -> None:
     world, client = world_of(image, flash)
     met = values(client.wait_read())
