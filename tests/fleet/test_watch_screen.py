@@ -96,6 +96,18 @@ def test_a_backlog_is_shown_with_its_true_age() -> None:
     assert age_s(200.0) == 0, "its clock was set back"
 
 
+def test_ten_thousand_vehicles_are_counted_as_heard() -> None:
+    watch = Watch(None, "fleet")  # type: ignore[arg-type]
+    for number in range(10_000):
+        watch.token(Sample(f"fleet/kite-{number}/v1/alive/1", kind=zenoh.SampleKind.PUT))  # type: ignore[arg-type]
+    for number in range(7_312):
+        overview = {"link": "MSP", "armed": number % 50 == 0, "time_s": 7}
+        watch.overview(Sample(f"fleet/kite-{number}/v1/overview", overview))  # type: ignore[arg-type]
+    rows = [ScreenRow(vehicle, age_s) for vehicle, age_s in watch.look()]
+    assert lines(rows, 0)[0] == "Heard 7,312 of 10,000 vehicles, 147 armed, 0 with problems"
+    assert {row.vehicle.armed for row in rows if not row.is_heard} == {None}
+
+
 def test_only_vehicles_on_the_screen_send_their_states() -> None:
     config = zenoh.Config()
     config.insert_json5("scouting/multicast/enabled", "false")
