@@ -383,8 +383,9 @@ def test_a_late_duplicate_of_a_count_does_no_harm(shared: Bench) -> None:
     """It never goes back to item 0, and each wrong request costs it one of ten tries."""
     planner = shared.mission_planner()
     plan = plain_plan(30, start=140)
+    late = planner.next_frame(messages.MAVLink_mission_count_message(1, 1, len(plan), 0))
     planner.write_begun(plan, 6)
-    planner.send(messages.MAVLink_mission_count_message(1, 1, len(plan), 0))
+    planner.arrives_late(late)
     planner.listen(0.1)
     planner.write_rest(plan, 6)
     assert shared.board.records() == records_of(judge(plan))

@@ -97,8 +97,17 @@ class MissionPlanner:
 
     def send(self, message: Message) -> None:
         """Send in MAVLink 1 until the vehicle has shown MAVLink 2."""
+        self._send_bytes(self.next_frame(message))
+
+    def next_frame(self, message: Message) -> bytes:
+        """The frame of a message that is sent next."""
         use_2 = self._sees_mavlink_2 and not self._mavlink_1_only
-        self._send_bytes(bytes(message.pack(self._codec, force_mavlink1=not use_2)))
+        return bytes(message.pack(self._codec, force_mavlink1=not use_2))
+
+    def arrives_late(self, frame: bytes) -> None:
+        """A frame sent earlier, or its duplicate, arrives now."""
+        assert self._peer is not None
+        self._socket.sendto(frame, self._peer)
 
     def _send_bytes(self, frame: bytes) -> None:
         self._codec.seq = (self._codec.seq + 1) % 256
