@@ -46,15 +46,28 @@ class Speaker:
     frame was delayed. A sender without numbers seems to lose a frame each time.
     """
 
-    __slots__ = ("_newest", "download", "final_ack", "heard_at", "is_copy", "is_late", "losses", "number")
+    __slots__ = (
+        "_missing",
+        "_newest",
+        "download",
+        "final_ack",
+        "frames",
+        "heard_at",
+        "is_copy",
+        "is_late",
+        "last_lost",
+        "number",
+    )
 
     def __init__(self) -> None:
         self.heard_at = -inf
         #: The number of the last frame, and of the newest one with its bytes.
         self.number = 0
         self._newest = 0, b""
-        #: How often frames were lost.
-        self.losses = 0
+        #: The frames sent so far, as far as their numbers show; those that have not arrived, and the last one of them.
+        self.frames = 0
+        self._missing: list[int] = []
+        self.last_lost = -1
         #: The last frame was sent before one that arrived earlier. It was the same frame again, doubled by the network.
         self.is_late = self.is_copy = False
         self.download: Download | None = None
@@ -65,13 +78,20 @@ class Speaker:
         raw = frame.raw
         self.number = number = raw[4] if raw[0] == MAGIC_V2 else raw[2]  # frame.seq, for each frame
         newest, known = self._newest
-        ahead = (number - newest) & 0xFF
+        ahead = (number - newest) & 0xFF or 256
         self.is_copy = raw == known
-        self.is_late = ahead >= 256 - _MOST_LATE and now < self.heard_at + _RESTARTED_S
-        if self.is_copy or self.is_late:
+        self.is_late = 256 > ahead >= 256 - _MOST_LATE and now < self.heard_at + _RESTARTED_S
+        if self.is_copy:
+            return
+        if self.is_late:
+            if (delayed := self.frames + ahead - 256) in self._missing:
+                self._missing.remove(delayed)
+                self.last_lost = self._missing[-1] if self._missing else -1
             return
         if ahead != 1:
-            self.losses += 1
+            self._missing = [*self._missing, *range(self.frames + 1, self.frames + ahead)][-_MOST_LATE:]
+            self.last_lost = self._missing[-1]
+        self.frames += ahead
         self._newest, self.heard_at = (number, raw), now
 
     def is_older(self, number: int) -> bool:

@@ -4,6 +4,7 @@
 from collections import Counter
 from dataclasses import dataclass, field
 from enum import Enum, auto
+from math import inf
 from typing import Any
 
 from bridge.gcs.ground_station import Speaker
@@ -114,8 +115,8 @@ class ArrivingList:
         self._judged = 0  # items 0.._judged-1 have arrived and are checked
         #: When the list last made progress.
         self.progress_at = now
-        #: The sender's losses before which all items belong to one list; None if that does not matter.
-        self._losses: int | None = 0
+        #: All items are of one list unless a frame after this one of their sender was lost.
+        self._one_until = 0.0
         #: Items 0.._compared-1 were the same the second time; None if they are not requested again.
         self._compared: int | None = None
         #: Items that came unasked: new ones, or repeats of another one than requested a second time.
@@ -144,8 +145,8 @@ class ArrivingList:
 
     def moved(self) -> None:
         """The sender's address has changed: frames may have been lost."""
-        if self._losses is not None:
-            self._losses = -1
+        if self._one_until < inf:
+            self._one_until = -inf
 
     def take(self, item: MissionItem, sender: Speaker, now: float) -> WholeList | Reply | int:
         """Keep an item of this list; the number of the item that is requested next.
@@ -157,7 +158,7 @@ class ArrivingList:
         if held is not None and repr(held) != repr(item):
             return Reply.START_AGAIN
         if not self.items:
-            self._losses = sender.losses
+            self._one_until = sender.frames
         if held is None or seq == self.request.seq:
             self._unasked += not self.request.answered(seq, now)
             self.progress_at = now
@@ -173,7 +174,7 @@ class ArrivingList:
                 self._judged += 1
         elif seq == self._compared:
             self._compared += 1
-        if self._judged >= self._count - 1 and self._losses not in (sender.losses, None):
+        if self._compared is not None or (self._judged >= self._count - 1 and sender.last_lost > self._one_until):
             self._compare(sender)
         wanted = self._judged if self._compared is None else self._compared
         if wanted == self._count:
@@ -184,8 +185,8 @@ class ArrivingList:
     def _compare(self, sender: Speaker) -> None:
         """Begin or end the second reading."""
         if self._unasked >= _UNASKED:
-            self._compared = self._losses = None
+            self._compared, self._one_until = None, inf
         elif self._compared is None:
             self._compared = self._unasked = 0
         elif self._compared == self._judged:
-            self._compared, self._losses = None, sender.losses
+            self._compared, self._one_until = None, sender.frames
