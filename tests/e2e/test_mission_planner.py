@@ -57,11 +57,14 @@ def assert_reads(planner: MissionPlanner, plan: Sequence[PlanRow], *, use_int: b
 
 def test_every_request_while_connecting_is_answered(shared: Bench) -> None:
     planner = shared.mission_planner()
+    planner.wait_for_vehicle()
+    planner.listen(3.0)  # until the settings are read there is no file
     planner.connect()
     assert planner.vehicle == (1, 1)
     assert planner.unacked_commands == []
     assert planner.capabilities & messages.MAV_PROTOCOL_CAPABILITY_MISSION_INT
-    assert not planner.capabilities & messages.MAV_PROTOCOL_CAPABILITY_FTP
+    assert planner.file_of_parameters is not None
+    assert len(planner.parameters) == 237
     assert planner.parameters["WPNAV_RADIUS"] == 200
     assert not {"FENCE_TOTAL", "RALLY_TOTAL"} & planner.parameters.keys()
     heartbeat = planner.messages("HEARTBEAT")[-1]

@@ -8,6 +8,7 @@ sending MISSION_ITEM_INT, and its loops take each other's packets (`own_loss`).
 
 import random
 import socket
+import struct
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -15,8 +16,10 @@ from types import TracebackType
 from typing import Any, Self
 
 from pymavlink.dialects.v10 import ardupilotmega as mavlink_1
+from pymavlink.mavftp import MAVFTP
 
 from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.ftp import FtpOp
 from protocols.mission_item import MissionResult
 from tests.support.mission_planner_screen import MissionPlannerScreen
 from tests.support.plan import PlanRow
@@ -24,6 +27,7 @@ from tests.support.programs import TIMEOUT_S
 
 SYSID, COMPID = 255, 190
 _DATAGRAM_SIZE = 2048
+_NAK, _READ_SIZE = 129, 110
 _INT_CAPABILITY = messages.MAV_PROTOCOL_CAPABILITY_MISSION_INT
 #: Its requests at the first heartbeat: stream and rate.
 _STREAMS = ((2, 2), (6, 2), (10, 4), (11, 4), (12, 2), (1, 2), (3, 2))
@@ -73,6 +77,8 @@ class MissionPlanner:
         self._heartbeat_due = time.monotonic()
         self.vehicle: tuple[int, int] | None = None
         self.capabilities = 0
+        #: The parameters as a file; None: it requested them one by one.
+        self.file_of_parameters: bytes | None = None
         self.parameters: dict[str, float] = {}
         self._parameter_count = 0
         self.texts: list[str] = []
@@ -244,8 +250,13 @@ class MissionPlanner:
         self.command(m.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES, 1)
         self.request_version()
         self.command(42428)
-        self._request_parameters()
-        self._ask_for_files()
+        self.file_of_parameters = self._read_file(b"@PARAM/param.pck?withdefaults=1")
+        if self.file_of_parameters is None:
+            self._request_parameters()
+        else:
+            packed = MAVFTP.ftp_param_decode(self.file_of_parameters)
+            self.parameters |= {name.decode(): value for name, value, _ in packed.params}
+        assert self._read_file(b"@SYS/none.txt") is None
         self.command(m.MAV_CMD_REQUEST_MESSAGE, 259, tries=4)
         self.command(521, 1)
         self.command(m.MAV_CMD_REQUEST_MESSAGE, 269)
@@ -302,13 +313,33 @@ class MissionPlanner:
                     if message.get_type() == "PARAM_VALUE":
                         break
 
-    def _ask_for_files(self) -> None:
-        """FTP: open a file to read, and expect the vehicle's NAK (opcode 129)."""
-        payload = bytes([1, 0, 0, 4, 15, 0, 0, 0, 0, 0, 0, 0]) + b"@PARAM/param.pck"
-        self.send(messages.MAVLink_file_transfer_protocol_message(0, *self._target, list(payload.ljust(251, b"\0"))))
-        for message in self._packets(2.0):
-            if message.get_type() == "FILE_TRANSFER_PROTOCOL" and message.payload[3] == 129:
-                return
+    def _read_file(self, path: bytes) -> bytes | None:
+        """Reset the sessions, open, and read in bursts of session 0; None without the capability or the file."""
+        if not self.capabilities & messages.MAV_PROTOCOL_CAPABILITY_FTP:
+            return None
+        self._ask_file(FtpOp.RESET_SESSIONS)
+        opened = self._ask_file(FtpOp.OPEN_FILE_RO, path)
+        if opened[3] == _NAK:
+            return None
+        size = int.from_bytes(bytes(opened[12:16]), "little")
+        content = b""
+        while len(content) < size:
+            answer = self._ask_file(FtpOp.BURST_READ_FILE, size=_READ_SIZE, offset=len(content))
+            content += bytes(answer[12 : 12 + answer[4]])
+        return content
+
+    def _ask_file(self, opcode: FtpOp, data: bytes = b"", size: int = 0, offset: int = 0) -> list[int]:
+        """The payload of the reply, 2 s a try; of a burst the one with this offset."""
+        header = struct.pack("<HBBBBBBI", 1, 0, opcode, size or len(data), 0, 0, 0, offset)
+        payload = list((header + data).ljust(251, b"\0"))
+        for _ in range(5):
+            self.send(messages.MAVLink_file_transfer_protocol_message(0, *self._target, payload))
+            for message in self._packets(2.0):
+                if message.get_type() != "FILE_TRANSFER_PROTOCOL" or message.payload[5] != opcode:
+                    continue
+                if int.from_bytes(bytes(message.payload[8:12]), "little") == offset:
+                    found: list[int] = message.payload
+                    return found
         raise TimedOut("no answer to a file request")
 
     # -- writing ---------------------------------------------------------------------------------------------
