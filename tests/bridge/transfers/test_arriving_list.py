@@ -9,8 +9,8 @@ import pytest
 from bridge.transfers.upload_states import Delivering
 from protocols.mavlink.dialect import Message
 from protocols.mission_item import MissionItem
-from tests.bridge.transfers.test_uploads import A, acks, holding, receiving, requested, state
 from tests.support.conversations import Upload, count_message, item_message, records_of, waypoints
+from tests.support.upload_bench import A, acks, holding, receiving, requested, state
 from tests.support.world import GroundStation, Radio, World
 
 

@@ -2,8 +2,8 @@
 """The command line and ground stations exclude each other."""
 
 from bridge.transfers.upload_states import Delivering
-from tests.bridge.transfers.test_uploads import OLD, A, acks, hanging_push, holding, requested, state
 from tests.support.conversations import ack_message, count_message, item_message, records_of, waypoints
+from tests.support.upload_bench import OLD, A, acks, hanging_push, holding, requested, state
 
 
 def test_an_upload_during_a_push_from_the_command_line_is_denied() -> None:

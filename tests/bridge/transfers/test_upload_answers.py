@@ -6,7 +6,8 @@ import pytest
 from bridge.transfers.upload_states import Delivering
 from protocols.mavlink.dialect import Message
 from simulator.board.options import SimOptions
-from tests.bridge.transfers.test_uploads import (
+from tests.support.conversations import Upload, ack_message, count_message, item_message, list_message, waypoints
+from tests.support.upload_bench import (
     OLD,
     A,
     acks,
@@ -17,7 +18,6 @@ from tests.bridge.transfers.test_uploads import (
     requested,
     state,
 )
-from tests.support.conversations import Upload, ack_message, count_message, item_message, list_message, waypoints
 
 
 def test_a_refusal_is_remembered_for_ten_seconds() -> None:

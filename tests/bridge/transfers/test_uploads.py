@@ -8,7 +8,7 @@ from itertools import pairwise
 import pytest
 
 from bridge.model.mission_log import Outcome
-from bridge.transfers.upload_states import Asking, Delivering, Receiving, UploadState
+from bridge.transfers.upload_states import Asking, Delivering, Receiving
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
@@ -25,81 +25,22 @@ from tests.support.conversations import (
 )
 from tests.support.fake_controllers import HARAKIRI_CAPABILITY, MspFake, ident
 from tests.support.screens import Screens
+from tests.support.upload_bench import (
+    OLD,
+    OLD_FLASH,
+    OLD_RECORDS,
+    A,
+    acks,
+    assert_refusal_stands,
+    hanging_push,
+    holding,
+    partial_list_message,
+    receiving,
+    refused,
+    requested,
+    state,
+)
 from tests.support.world import GroundStation, Radio, World, flash_holding
-
-OLD = waypoints(20, seed=77)
-OLD_RECORDS = records_of(OLD)
-OLD_FLASH = flash_holding(OLD_RECORDS)
-A = MissionResult
-
-
-def holding(options: SimOptions | None = None, faults: Faults | None = None) -> tuple[World, GroundStation]:
-    """A bridge connected to a board that holds the old list, and one known ground station."""
-    world = World(options, faults, speeds=(115200,), flash=OLD_FLASH)
-    world.wait_ready()
-    assert world.stored == OLD_RECORDS
-    return world, GroundStation(world)
-
-
-def state(world: World) -> type[UploadState] | None:
-    """The state of the first upload; None if there is none."""
-    uploads = list(world.inside.uploads._queue.uploads)
-    return type(uploads[0].state) if uploads else None
-
-
-def receiving(world: World, station: GroundStation, items: list[MissionItem], sent: int) -> None:
-    """Begin an upload and send its first items."""
-    station.send(count_message(len(items)))
-    world.wait_until(lambda w: state(w) is Receiving, 1)
-    for seq in range(sent):
-        station.send(item_message(seq, items[seq]))
-    world.run(0.001)
-    station.take()
-
-
-def acks(station: GroundStation) -> list[MissionResult]:
-    """The acks, without the two copies of a final one, 0.4 and 0.9 s later."""
-    times = [(at, message.type) for at, message in station.received if message.get_type() == "MISSION_ACK"]
-    copies = {(round(at + later_s, 6), ack) for at, ack in times for later_s in (0.4, 0.9)}
-    return [MissionResult(ack) for at, ack in times if (round(at, 6), ack) not in copies]
-
-
-def requested(station: GroundStation) -> list[int]:
-    assert station.messages("MISSION_REQUEST_INT") == []
-    return [message.seq for message in station.messages("MISSION_REQUEST")]
-
-
-def partial_list_message(mission_type: int = 0) -> Message:
-    return messages.MAVLink_mission_write_partial_list_message(1, 1, 0, 0, mission_type)
-
-
-def assert_refusal_stands(world: World, station: GroundStation, result: MissionResult) -> None:
-    """Mission Planner continues after any ack to its count; its further messages get the same refusal."""
-    for seq in (0, 1, 0, 999):
-        station.take()
-        station.send(item_message(seq, OLD[1]))
-        world.run(0.05)
-        assert acks(station) == [result]
-        assert requested(station) == []
-    station.take()
-    station.send(partial_list_message())
-    world.run(0.05)
-    assert acks(station) == [result]
-    assert A.INVALID_SEQUENCE not in acks(station)
-    assert state(world) is None
-
-
-def refused(world: World, station: GroundStation, count: int, result: MissionResult, words: str) -> None:
-    """Announce a list; it is refused with this result and text, and the old list stays."""
-    station.send(count_message(count))
-    world.wait_until(lambda _: bool(acks(station)), 3)
-    assert acks(station) == [result]
-    assert any(words in text for text in station.texts()), station.texts()
-    assert requested(station) == []
-    assert_refusal_stands(world, station, result)
-    if world.naze.stored:
-        assert world.stored == OLD_RECORDS
-
 
 # Before the first item.
 
@@ -353,12 +294,6 @@ def test_a_station_that_disconnects_before_the_ack_is_forgotten() -> None:
     assert acks(station) == []
     assert world.stored == records_of(waypoints(60))
     assert world.inside.ground.station(station.peer) is None
-
-
-def hanging_push(world: World) -> None:
-    """A push from the command line that waits for a disk that hangs."""
-    world.store.delay_s = 60
-    world.push(waypoints(3))
 
 
 def test_an_upload_whose_turn_does_not_come_is_denied() -> None:

@@ -4,7 +4,7 @@
 import pytest
 
 from protocols.msp.nav import NavRecord, UnsafeRecord, decode_wp, encode_set_wp
-from tests.bridge.controllers.nav.test_check import A
+from tests.support.nav_lists import A
 
 
 @pytest.mark.parametrize("number", [0, 255, -1])

@@ -11,51 +11,32 @@ from hypothesis import strategies as st
 
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.items import home_item, items_from_records
-from bridge.controllers.nav.rules import ENDLESS_S, inav_profile, multiwii_profile
+from bridge.controllers.nav.rules import ENDLESS_S, inav_profile
 from bridge.missions.list_check import check_list
 from bridge.model.finding import DROPPED, News
-from bridge.model.verdict import Result, Verdict
+from bridge.model.verdict import Result
 from protocols.mavlink.codec import item_from_float_message
 from protocols.mavlink.dialect import messages
-from protocols.mission_item import Command, MissionItem, MissionResult
+from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.nav import FLY_HOME, LAST, LEGS, NavAction, NavRecord, decode_wp, encode_set_wp
 from tests.bridge.controllers.harakiri.test_rules import degrees, numbers
-
-INAV, MULTIWII = NavRules(inav_profile()), NavRules(multiwii_profile())
-LAT, LON = 453838000, 84733000
-A = NavAction
-C = Command
-
-
-def item(command: int, *, at: bool = True, **fields: Any) -> MissionItem:
-    place = (LAT, LON, 50.0) if at else (0, 0, 0.0)
-    return replace(MissionItem(0, command, 3, 0.0, 0.0, 0.0, 0.0, *place), **fields)
-
-
-HOME = item(C.NAV_WAYPOINT, frame=0, alt_m=123.0)
-WP = item(C.NAV_WAYPOINT)
-
-
-def verdict_on(*items: MissionItem, rules: NavRules = INAV) -> Verdict[NavRecord]:
-    return check_list((HOME, *items), rules)
-
-
-def kept(*items: MissionItem, rules: NavRules = INAV) -> tuple[NavRecord, ...]:
-    verdict = verdict_on(*items, rules=rules)
-    assert verdict.result is Result.ACCEPTED, verdict.findings
-    return verdict.records
-
-
-def findings_for(*items: MissionItem, rules: NavRules = INAV) -> list[tuple[Any, ...]]:
-    return [(f.seq, f.field, f.was, f.becomes) for f in verdict_on(*items, rules=rules).findings]
-
-
-def jump(target: float, repeats: float = 2) -> MissionItem:
-    return item(C.DO_JUMP, at=False, p1=float(target), p2=float(repeats))
-
-
-def speed(metres: float, kind: float = 1, throttle: float = 0) -> MissionItem:
-    return item(C.DO_CHANGE_SPEED, at=False, p1=kind, p2=metres, p3=throttle)
+from tests.support.nav_lists import (
+    HOME,
+    INAV,
+    LAT,
+    LON,
+    MULTIWII,
+    RTL,
+    WP,
+    A,
+    C,
+    findings_for,
+    item,
+    jump,
+    kept,
+    speed,
+    verdict_on,
+)
 
 
 @pytest.mark.parametrize(
@@ -161,8 +142,6 @@ def test_home_is_not_a_record() -> None:
 
 
 # -- flown differently than it reads ---------------------------------------------------------------------------
-
-RTL, RTL_LANDS = (item(C.NAV_RETURN_TO_LAUNCH, at=False, p1=p1) for p1 in (0.0, 1.0))
 
 
 def test_an_rtl_as_first_item_leaves_nothing_to_fly() -> None:

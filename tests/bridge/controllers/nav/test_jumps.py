@@ -9,7 +9,7 @@ from bridge.model.finding import REJECTED
 from bridge.model.verdict import Result
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.nav import LAST, NavRecord
-from tests.bridge.controllers.nav.test_check import (
+from tests.support.nav_lists import (
     MULTIWII,
     RTL,
     RTL_LANDS,

@@ -6,7 +6,7 @@ from dataclasses import replace
 from bridge.controllers.nav.check import NavRules
 from bridge.model.finding import News
 from protocols.mission_item import MissionItem
-from tests.bridge.controllers.nav.test_check import (
+from tests.support.nav_lists import (
     INAV,
     LAT,
     LON,

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from bridge.missions.list_check import check_list
 from bridge.model.finding import DROPPED, News
-from tests.bridge.controllers.nav.test_check import INAV, WP, C, findings_for, item, jump, kept, speed, verdict_on
+from tests.support.nav_lists import INAV, WP, C, findings_for, item, jump, kept, speed, verdict_on
 
 
 def test_speeds_are_stored_in_the_legs_and_shown_as_items() -> None:

@@ -10,7 +10,7 @@ from bridge.missions.list_check import check_count
 from bridge.model.finding import DROPPED, News
 from bridge.model.verdict import Result
 from protocols.mission_item import MissionItem, MissionResult
-from tests.bridge.controllers.nav.test_check import (
+from tests.support.nav_lists import (
     INAV,
     MULTIWII,
     RTL,

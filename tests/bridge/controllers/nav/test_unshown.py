@@ -11,7 +11,7 @@ from bridge.controllers.nav.rules import inav_profile
 from bridge.missions.list_check import check_list
 from bridge.model.finding import News
 from protocols.msp.nav import FLY_HOME, LAST, NavRecord
-from tests.bridge.controllers.nav.test_check import LAT, LON, A
+from tests.support.nav_lists import LAT, LON, A
 
 
 def test_any_record_of_another_planner_is_shown() -> None:
