@@ -138,16 +138,18 @@ class OwnVehicle:
             self.arming_reasons.follow(now)
         for reading in news:
             if rows := self._rows.get(reading):
-                self._send_due(rows, now)
+                self._send_due(rows, now, reading)
         if MissionLeg in news:
             self._follow_mission(now)
         if FlightState in news or Mode in news:
             self._follow_state(now)
 
-    def _send_due(self, rows: Iterable[Row], now: float) -> None:
-        everyone = self._ground.everyone()
+    def _send_due(self, rows: Iterable[Row], now: float, heard: type[Reading] | None = None) -> None:
+        everyone, fresh = self._ground.everyone(), self._session.vehicle.fresh
         at: Moment | None = None
         for row in rows:
+            if row.other is heard and row.reading is not None and heard is not None and fresh(row.reading, now):
+                continue
             stations = take_due(everyone, row.msgid, row.interval_s, now)
             if stations and row.msgid == messages.MAVLINK_MSG_ID_MISSION_CURRENT:
                 self._send_current(stations, now)

@@ -32,7 +32,7 @@ EXTRA1, EXTRA2, EXTRA3 = 10, 11, 12
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One message. It is sent as soon as `reading` or `other` is heard, or by the clock if None.
+    """One message. It is sent as soon as `reading` is heard, or `other` while that is stale, or by the clock if None.
 
     `interval_s`: the default; infinite: only on request.
     """

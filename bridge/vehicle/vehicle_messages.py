@@ -290,6 +290,9 @@ def global_position_int(at: Moment) -> Message:
     if (position := at.fresh(GlobalPosition)) is not None:
         known(altitude_m)
         north_m_s, east_m_s = known(position.north_m_s), known(position.east_m_s)
+    elif place is not None:
+        # A silent GPS is no lost fix.
+        at.need(GpsFix)
     is_north_known = orientation is not None and orientation.is_north_known
     return messages.MAVLink_global_position_int_message(
         at.boot_ms,

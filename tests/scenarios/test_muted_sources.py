@@ -99,8 +99,11 @@ SELDOM_POLLED = {
     (board, name) for board in BOARDS for name in ("battery.voltage_v", "rc.rssi_percent", "rc.channels_us")
 }
 SELDOM_POLLED |= {("inav", name) for name in VALUES if name.startswith("status.")}
-#: VFR_HUD has no "unknown" for these.
-HUD_NEEDS = {ATTITUDE, RC, M_ATTITUDE, RC_CHANNELS_RAW}
+#: These messages have no "unknown" for these.
+NEEDED = {
+    "VFR_HUD": {ATTITUDE, RC, M_ATTITUDE, RC_CHANNELS_RAW},
+    "GLOBAL_POSITION_INT": {RAW_GPS, GPS_RAW_INT},
+}
 #: The messages to ground stations and the value that each shows; None: it shows it as unknown.
 SHOWN: Mapping[str, tuple[str, Callable[[Message], Any]]] = {
     "attitude.roll_deg": ("ATTITUDE", lambda msg: math.degrees(msg.roll)),
@@ -230,8 +233,8 @@ class Sinks:
             return
         if value is not None and not (name == "position.lat_deg" and value == 0):
             assert at - self.muted_at <= STALE_S or age_s == 0.0, (self.world.now, name)
-        is_hud = SHOWN[name][0] == "VFR_HUD"
-        if age_s == 0.0 and not self.is_slowed and not (is_hud and self.muted & HUD_NEEDS):
+        is_silent = self.muted & NEEDED.get(SHOWN[name][0], set())
+        if age_s == 0.0 and not self.is_slowed and not is_silent:
             assert elapsed_s <= STALE_S, (self.world.now, name, elapsed_s)
 
 
