@@ -243,7 +243,7 @@ class World:
 
     def wait_ready(self, seconds: float = 20.0) -> float:
         """Wait until the flight controller is found and its list is read."""
-        return self.wait_until(lambda world: world.is_found and not inside(world.bridge).runner.needs_line, seconds)
+        return self.wait_until(lambda world: world.is_found and not world.bridge.is_busy, seconds)
 
     def receive_from_fc(self, data: bytes) -> None:
         """Let the bridge read bytes that are not from the simulated board."""

@@ -24,7 +24,7 @@ def test_other_firmware_is_telemetry_only(name: bytes) -> None:
         bytes(6) + b"\1\0\0\0\0" if frame.command == 101 else board.answers.get(frame.command)
     )
     world, station = found(board)
-    assert world.kind is other.OTHER_MSP
+    assert world.kind is (other.OTHER_MSP if name == b"INAV" else other.CLEANFLIGHT)
     world.run(1)
     assert world.bridge.vehicle.armed is True
     assert Upload(station, plan(5)).run() is MissionResult.UNSUPPORTED
@@ -65,9 +65,9 @@ def test_similar_firmware_is_not_mistaken_for_harakiri(name: str) -> None:
     fake = OTHERS[name]()
     world = World(peer=fake)
     world.wait_until(lambda w: w.is_found, 3)
-    assert world.kind in (other.OTHER_MSP, other.OLD_MULTIWII)
+    assert world.kind in (other.OTHER_MSP, other.CLEANFLIGHT, other.OLD_MULTIWII)
     world.run(10)
-    assert world.kind in (other.OTHER_MSP, other.OLD_MULTIWII)
+    assert world.kind in (other.OTHER_MSP, other.CLEANFLIGHT, other.OLD_MULTIWII)
     # These command numbers may mean something else to other firmware.
     assert not {190, 191, 192, 193, 194, 195, 196} & set(fake.asked)
 
