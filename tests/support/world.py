@@ -50,7 +50,7 @@ from simulator.board.line import garble
 from simulator.board.options import Faults, SimOptions
 from simulator.naze.board import SimulatedNaze
 from simulator.naze.mission_slots import MissionSlots, flash_size, slot_pages
-from tests.support.inside import Inside, inside
+from tests.support.inside import Inside
 
 #: Limit on waiting conversations: a flood of requests must not fill the bridge's memory.
 MAX_QUEUED = 12
