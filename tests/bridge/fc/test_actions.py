@@ -77,20 +77,41 @@ def test_an_action_is_done_once_on_the_ground(
     assert done(world) == [action]
 
 
-@pytest.mark.parametrize("armed", [False, True])
-def test_storing_is_acknowledged_silently(armed: bool) -> None:
-    """Mission Planner asks for it by itself, 10 s after any PARAM_SET. Nothing is unsaved then."""
+def test_storing_saves_what_may_be_unsaved_and_is_silent_after_that() -> None:
+    """Mission Planner asks for it by itself, 10 s after any PARAM_SET."""
     world, station = a_world()
-    world.faults.armed = armed
+    operations = world.naze.flash_operations
+    for texts in (["Settings saved"], []):
+        station.send(long(STORAGE, (1, 0, 0, 0, 0, 0, 0)))
+        world.run(1)
+        assert results(station) == [ACCEPTED]
+        assert station.texts() == texts
+        station.take()
+    # The firmware does not write an equal configuration again.
+    assert world.naze.flash_operations == operations
+
+
+def test_storing_while_armed_is_acknowledged_silently() -> None:
+    """Nothing was changed here, so nothing is unsaved."""
+    world, station = a_world()
+    world.faults.armed = True
     world.run(1)
     station.take()
-    operations = world.naze.flash_operations
     station.send(long(STORAGE, (1, 0, 0, 0, 0, 0, 0)))
     world.run(1)
     assert results(station) == [ACCEPTED]
     assert station.texts() == []
     assert done(world) == []
-    assert world.naze.flash_operations == operations
+
+
+@pytest.mark.parametrize("what", [0, 2, math.nan, math.inf])
+def test_settings_are_neither_loaded_nor_reset(what: float) -> None:
+    world, station = a_world()
+    station.send(long(STORAGE, (what, 0, 0, 0, 0, 0, 0)))
+    world.run(0.3)
+    assert results(station) == [DENIED]
+    assert station.texts() == ["Settings are only saved, not loaded or reset"]
+    assert done(world) == []
 
 
 @pytest.mark.parametrize(("command", "params", "action"), ALL)
@@ -215,10 +236,6 @@ def test_calibrating_a_missing_sensor_is_denied(monkeypatch: pytest.MonkeyPatch)
         (CALIBRATION, (0, 1, 0, 0, 1, 0, 0)),  # two at once
         (CALIBRATION, (0, 0, 0, 0, 0, 0, 0)),
         (CALIBRATION, (math.nan, 0, 0, 0, 0, 0, 0)),
-        (STORAGE, (0, 0, 0, 0, 0, 0, 0)),  # read
-        (STORAGE, (2, 0, 0, 0, 0, 0, 0)),  # reset to defaults
-        (STORAGE, (math.nan, 0, 0, 0, 0, 0, 0)),
-        (STORAGE, (math.inf, 0, 0, 0, 0, 0, 0)),
     ],
 )
 def test_other_actions_are_unsupported(command: int, params: tuple[float, ...]) -> None:
@@ -241,7 +258,8 @@ def test_no_other_command_reaches_the_flight_controller() -> None:
         station.send(long(command, (1, 1, 1, 1, 1, 1, 1)))
     world.run(1)
     frames = [frame for _, _, data in world.written for frame in MspParser().feed(data)]
-    assert all(frame.command < 190 for frame in frames)
+    # 197 only reads a setting.
+    assert all(frame.command < 190 or frame.command == 197 for frame in frames)
     assert not world.naze.armed
 
 
