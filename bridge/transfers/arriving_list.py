@@ -89,9 +89,10 @@ class ItemRequest:
             return missing >= 0
         known_s, elapsed_s = self._round_trip_s, now - self._first_at
         if self.is_repeated:
-            # Either copy may have been lost.
+            # Either copy may have been lost. At first the longer time counts: MAVSDK goes back to item 0 if that is
+            # requested too early, and then ignores requests beyond item 1.
             self._late = seq, elapsed_s
-            self._round_trip_s = now - self._asked_at if known_s is None else known_s
+            self._round_trip_s = elapsed_s if known_s is None else known_s
         else:
             self._round_trip_s = elapsed_s if known_s is None else known_s * 7 / 8 + elapsed_s / 8
         return True

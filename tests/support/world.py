@@ -242,8 +242,14 @@ class World:
         return self.now - began
 
     def wait_ready(self, seconds: float = 20.0) -> float:
-        """Wait until the flight controller is found and its list is read."""
-        return self.wait_until(lambda world: world.is_found and not world.bridge.is_busy, seconds)
+        """Wait until the flight controller is found and its list is read; its settings may be read after that."""
+        settings = self.inside.board_settings
+
+        def is_ready(world: World) -> bool:
+            is_idle = not world.bridge.is_busy or settings.read_so_far is not None
+            return world.is_found and is_idle and not world.inside.runner.needs_line
+
+        return self.wait_until(is_ready, seconds)
 
     def receive_from_fc(self, data: bytes) -> None:
         """Let the bridge read bytes that are not from the simulated board."""
