@@ -95,7 +95,8 @@ def test_pull_all_reads_missions_that_are_not_loaded(tmp_path: Path) -> None:
         ends = {3: FLAG_LAST, 8: FLAG_LAST}
         saved = [NavWaypoint(1, 453838000, 84733000, 2000, flag=ends.get(n, 0)) for n in range(1, 9)]
         saved += [NavWaypoint()] * (CAPACITY - len(saved))
-        eeprom.write_bytes(b"".join(waypoint.pack(number) for number, waypoint in enumerate(saved, 1)) + bytes(SETTINGS_SIZE))
+        missions = b"".join(waypoint.pack(number) for number, waypoint in enumerate(saved, 1))
+        eeprom.write_bytes(missions + bytes(SETTINGS_SIZE))
         board = Starter(tmp_path, stack).board("--kind", "inav", "--state", str(eeprom))
         assert run_naze_bridge("pull", "--fc", board.link).stdout.endswith("1 more in its store: see --all\n")
         pulled = run_naze_bridge("pull", tmp_path / "held.waypoints", "--all", "--fc", board.link)
