@@ -52,6 +52,7 @@ class PlainStation:
 
     def send(self, message: Any) -> None:
         self._socket.sendall(bytes(message.pack(self._codec)))
+        self._codec.seq = (self._codec.seq + 1) & 0xFF
 
     def send_heartbeat(self) -> None:
         self.send(self._dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
