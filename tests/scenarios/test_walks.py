@@ -76,8 +76,6 @@ async def _ack(daemon: TracedDaemon) -> Walk:
 
 
 async def _arming(daemon: TracedDaemon) -> Walk:
-    await asyncio.sleep(0.5)  # else STATUS comes with another poll's reply
-    daemon.wake_ups.clear()
     daemon.faults.armed = True
     return measure(await daemon.until(_reports_armed))
 
