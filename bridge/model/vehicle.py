@@ -223,13 +223,6 @@ class MissionLeg(Reading):
 
 
 @dataclass(slots=True)
-class MissionStop(Reading):
-    """The reason for which the flight controller does not fly its mission, for the pilot; "" if it gave none."""
-
-    text: str
-
-
-@dataclass(slots=True)
 class GpsTime(Reading):
     """UTC by the flight controller's GPS, seconds since 1970."""
 

@@ -46,7 +46,7 @@ _OUTPUTS = "Motors, servos and relays cannot be driven here"
 _REFUSED = {
     messages.MAV_CMD_COMPONENT_ARM_DISARM: "Arm and disarm with the transmitter sticks",
     messages.MAV_CMD_DO_SET_MODE: "Modes are set with the transmitter switches",
-    messages.MAV_CMD_MISSION_START: "Start it with the transmitter: GPS AUTO or NAV WP",
+    messages.MAV_CMD_MISSION_START: "A mission is started with the transmitter",
     messages.MAV_CMD_DO_SET_MISSION_CURRENT: "The current waypoint cannot be set",
     messages.MAV_CMD_DO_PAUSE_CONTINUE: "A mission is paused with the transmitter",
     messages.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: "The flight controller cannot be rebooted from here",

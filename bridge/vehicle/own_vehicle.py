@@ -20,7 +20,7 @@ from bridge.missions.mission_service import MissionService
 from bridge.model.flight_memory import Home
 from bridge.model.flight_mode import FlightMode
 from bridge.model.mission_progress import FlownMission, MissionProgress, Progress
-from bridge.model.vehicle import STALE_S, FlightState, Health, MissionLeg, MissionStop, Mode, Readiness, Reading
+from bridge.model.vehicle import STALE_S, FlightState, Health, MissionLeg, Mode, Readiness, Reading
 from bridge.model.verdict import SentSeqs
 from bridge.vehicle import vehicle_messages as make
 from bridge.vehicle.arming_reasons import ArmingReasons
@@ -82,7 +82,6 @@ class OwnVehicle:
         self._polls_set_at, self._polls_due = -inf, inf
         #: Armed, mode, failsafe and lost as last announced.
         self._announced: tuple[bool | None, FlightMode | str | None, bool, bool] | None = None
-        self._stop_told = ""
 
     def newcomer(self, station: GroundStation, now: float) -> None:
         """Send a new ground station more heartbeats, so that it connects sooner, then home and why it cannot arm."""
@@ -142,8 +141,6 @@ class OwnVehicle:
                 self._send_due(rows, now, reading)
         if MissionLeg in news:
             self._follow_mission(now)
-        if MissionStop in news:
-            self._tell_stop()
         if FlightState in news or Mode in news:
             self._follow_state(now)
 
@@ -319,15 +316,6 @@ class OwnVehicle:
             for sent_seqs, stations in self._by_item_numbers(everyone):
                 number = (sent_seqs[seq] or 0) if sent_seqs else seq
                 self._ground.multicast(pack(make.mission_item_reached(number)), stations)
-
-    def _tell_stop(self) -> None:
-        """Report once why a mission flight did not start, or stopped."""
-        stop = self._session.vehicle.last(MissionStop)
-        text = "" if stop is None else stop.text
-        if text != self._stop_told:
-            self._stop_told = text
-            if text:
-                self._ground.say(Severity.WARNING, text)
 
     def _send_current(self, receivers: Sequence[GroundStation], now: float) -> None:
         for sent_seqs, stations in self._by_item_numbers(receivers):

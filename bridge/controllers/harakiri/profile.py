@@ -9,7 +9,6 @@ from dataclasses import replace
 from bridge.controllers.harakiri.arming import arming_blockers
 from bridge.controllers.harakiri.check import harakiri_rules
 from bridge.controllers.harakiri.mavlink_missions import HarakiriMavlinkMissions
-from bridge.controllers.harakiri.mission_flight import FLIGHT_DECODERS, FLIGHT_POLL, FLIGHT_SIZE
 from bridge.controllers.harakiri.mission_store import HarakiriMissions
 from bridge.controllers.harakiri.settings import HarakiriFcSettings
 from bridge.controllers.msp_settings import part_settings
@@ -20,9 +19,7 @@ from bridge.line.poll_schedule import BOX_POLL, POLLS
 from bridge.model.airframe import airframe
 from bridge.model.refusal import ARMED, Refusal
 from protocols.mission_item import MissionResult
-from protocols.msp.commands import Msp
 from protocols.msp.mission import INFO_SIZE, MissionCommand, decode_info
-from protocols.msp.mission_flight import decode_flight
 from protocols.rights.msp import Firmware
 
 _FAMILY = "Harakiri"
@@ -44,9 +41,7 @@ def _recognise_patched(board: Interview) -> Conversation[FlightController | None
     info = decode_info((yield from board.ask(MissionCommand.INFO, INFO_SIZE)).payload)
     if info is None:
         return None
-    flight = decode_flight((yield from board.ask(Msp.FLIGHT, FLIGHT_SIZE)).payload)
-    profile = PATCHED if flight is None else FLYING
-    return replace(harakiri, profile=profile, name=profile.name, info=info, firmware=Firmware.HARAKIRI_MISSIONS)
+    return replace(harakiri, profile=PATCHED, name=PATCHED.name, info=info, firmware=Firmware.HARAKIRI_MISSIONS)
 
 
 def _recognise_unpatched(board: Interview) -> Conversation[FlightController | None]:
@@ -74,14 +69,6 @@ PATCHED = Profile(
     restarts_after_calibration=True,
     arming_blockers=arming_blockers,
 )
-FLYING = replace(
-    PATCHED,
-    name="Harakiri with mission flight",
-    recognise=None,
-    polls=(*PATCHED.polls, FLIGHT_POLL),
-    decoders=FLIGHT_DECODERS,
-    check_kind=None,
-)
 UNPATCHED = Profile(
     "Harakiri without the mission extension",
     _FAMILY,
@@ -108,4 +95,4 @@ FRSKY = Profile(
     missions=ARMED,
     notice="FrSky while armed: no attitude, mode or RC",
 )
-PROFILES = (PATCHED, FLYING, UNPATCHED, MAVLINK, FRSKY)
+PROFILES = (PATCHED, UNPATCHED, MAVLINK, FRSKY)
