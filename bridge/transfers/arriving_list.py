@@ -89,7 +89,7 @@ class ItemRequest:
             return missing >= 0
         known_s, elapsed_s = self._round_trip_s, now - self._first_at
         if self.is_repeated:
-            # Either copy may have been lost. At first about the mean of both counts: MAVSDK goes back to item 0 if that is
+            # Either copy may have been lost. At first about the mean counts: MAVSDK goes back to item 0 if that is
             # requested too early, and then ignores requests beyond item 1.
             self._late = seq, elapsed_s
             since_s = now - self._asked_at
