@@ -89,11 +89,9 @@ class ItemRequest:
             return missing >= 0
         known_s, elapsed_s = self._round_trip_s, now - self._first_at
         if self.is_repeated:
-            # Either copy may have been lost. At first about the mean counts: MAVSDK goes back to item 0 if that is
-            # requested too early, and then ignores requests beyond item 1.
+            # Either copy may have been lost.
             self._late = seq, elapsed_s
-            since_s = now - self._asked_at
-            self._round_trip_s = 0.48 * elapsed_s + 0.52 * since_s if known_s is None else known_s
+            self._round_trip_s = now - self._asked_at if known_s is None else known_s
         else:
             self._round_trip_s = elapsed_s if known_s is None else known_s * 7 / 8 + elapsed_s / 8
         return True
@@ -179,6 +177,9 @@ class ArrivingList:
         if self._compared is not None or (self._judged >= self._count - 1 and sender.last_lost > self._one_until):
             self._compare(sender)
         wanted = self._judged if self._compared is None else self._compared
+        if seq == 1 and self.request.seq == 0 and self._compared is None and self._judged < self._count:
+            # Item 0 was requested again too early. MAVSDK goes back to it, and then ignores requests beyond item 1.
+            wanted = 1
         if wanted == self._count:
             return WholeList(tuple(map(self.items.__getitem__, range(wanted))), self._check.finish())
         self.request.asked(wanted, now)
