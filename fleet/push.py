@@ -14,7 +14,7 @@ from fleet.payload import decode, part, text, whole
 from fleet.roll_call import replies_of
 from fleet.session import NO_COMMANDS, ask_each
 from fleet.vehicle import BridgeId
-from payloads.keys import STATE, UPLOAD, ZenohKey, full
+from payloads.keys import STATE, ZenohKey, full
 from payloads.mission_data import ACCEPTED, Json
 
 #: 146 records take 2 s at 115200 baud and half a minute at 9600; a bad line may double that.
@@ -117,7 +117,7 @@ def push(
     show: Callable[[FleetPush], None],
     *,
     staged: bool = False,
-    key: ZenohKey = UPLOAD,
+    key: ZenohKey,
 ) -> None:
     """Send the file to all and wait until each is done; `show` is called after every change.
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`fleet push` and `fleet verify`: one mission for many vehicles."""
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -31,14 +31,32 @@ from fleet.tables import (
 )
 from fleet.trial import Trial, try_mission
 from fleet.vehicle import BridgeId
+from payloads.keys import UPLOAD, ZenohKey
 from protocols.mission_file import MissionFileError, read_mission_file
 from terminal.files import read_file, shown_path
 from terminal.options import PATH
 from terminal.printing import print_json, print_table
 from terminal.sentences import INTERRUPTED, complain
 
-_UNREADABLE = 2
-_GOES_ON = "stopped; transfers in progress continue: `naze-bridge fleet verify` shows their results later"
+UNREADABLE = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Pushed:
+    """What is pushed: where to, and the words for it, of the table, the summary and an interrupted push."""
+
+    key: ZenohKey
+    heading: str
+    held: str
+    goes_on: str
+
+
+_MISSION = Pushed(
+    UPLOAD,
+    "Push",
+    "hold the mission",
+    "stopped; transfers in progress continue: `naze-bridge fleet verify` shows their results later",
+)
 
 
 @click.command("push", short_help="Write a mission file to vehicles, and verify it.")
@@ -65,27 +83,17 @@ def push_mission(
     A vehicle that fails does not stop the others, unless --staged. Exit code 0: all hold it (--dry-run: all would
     accept it), 1: one does not, or did not answer, 2: the file is unreadable.
     """
-    mission, item_count = _read(file, names, to_all)
+    require_choice(names, to_all)
+    mission, item_count = _read(file)
     with fleet_session(where) as (session, prefix):
         bridges, meant, unknown = vehicles_meant(session, prefix, names, conditions)
         if dry_run:
             _show_trials(try_mission(session, prefix, meant, bridges, mission), unknown, as_json)
             return
-        delivery, is_stopped = FleetPush(meant, bridges), False
-        try:
-            with progress_bars(item_count) as show:
-                push(session, prefix, delivery, bridges, mission, show, staged=staged)
-        except KeyboardInterrupt:
-            is_stopped = True
-    if as_json:
-        print_json(push_data(delivery))
-    else:
-        print_table(push_table(delivery))
-        click.echo(push_summary(delivery))
-    if is_stopped:
-        complain(_GOES_ON)
-        raise SystemExit(INTERRUPTED)
-    end(unknown, is_bad=bool(delivery.failed))
+        has_failed = push_file(
+            session, prefix, bridges, meant, mission, item_count, _MISSION, staged=staged, as_json=as_json
+        )
+    end(unknown, is_bad=has_failed)
 
 
 @click.command("verify", short_help="Compare the missions on vehicles with a file.")
@@ -102,7 +110,8 @@ def verify_mission(
 
     Exit code 0: all hold it, 1: one does not, or did not answer, 2: the file is unreadable.
     """
-    mission, _ = _read(file, names, to_all)
+    require_choice(names, to_all)
+    mission, _ = _read(file)
     with fleet_session(where) as (session, prefix):
         bridges, meant, unknown = vehicles_meant(session, prefix, names, conditions)
         trials = try_mission(session, prefix, meant, bridges, mission)
@@ -115,15 +124,48 @@ def verify_mission(
     end(unknown, is_bad=held < len(trials))
 
 
-def _read(file: Path, names: tuple[str, ...], to_all: bool) -> tuple[bytes, int]:
-    if bool(names) == to_all:
-        raise click.UsageError("specify the vehicles: --vehicle NAME, or --all")
+def _read(file: Path) -> tuple[bytes, int]:
     try:
         mission = read_file(file, MissionFileError)
         return mission, len(read_mission_file(mission, shown_path(file)))
     except MissionFileError as error:
         complain(error)
-        raise SystemExit(_UNREADABLE) from error
+        raise SystemExit(UNREADABLE) from error
+
+
+def require_choice(names: tuple[str, ...], to_all: bool) -> None:
+    if bool(names) == to_all:
+        raise click.UsageError("specify the vehicles: --vehicle NAME, or --all")
+
+
+def push_file(
+    session: zenoh.Session,
+    prefix: str,
+    bridges: set[BridgeId],
+    meant: list[str],
+    file: bytes,
+    count: int,
+    what: Pushed,
+    *,
+    staged: bool,
+    as_json: bool,
+) -> bool:
+    """Push a file with `count` parts and print the outcome; True if a vehicle failed."""
+    delivery, is_stopped = FleetPush(meant, bridges), False
+    try:
+        with progress_bars(count) as show:
+            push(session, prefix, delivery, bridges, file, show, staged=staged, key=what.key)
+    except KeyboardInterrupt:
+        is_stopped = True
+    if as_json:
+        print_json(push_data(delivery))
+    else:
+        print_table(push_table(delivery, what.heading))
+        click.echo(push_summary(delivery, what.held))
+    if is_stopped:
+        complain(what.goes_on)
+        raise SystemExit(INTERRUPTED)
+    return bool(delivery.failed)
 
 
 def vehicles_meant(

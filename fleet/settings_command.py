@@ -11,21 +11,24 @@ from rich.text import Text
 
 from fleet.conditions import Condition
 from fleet.options import address_options, all_option, fleet_session, json_option, vehicle_option, where_option
-from fleet.push import FleetPush, push
-from fleet.push_command import end, vehicles_meant
+from fleet.push_command import UNREADABLE, Pushed, end, push_file, require_choice, vehicles_meant
 from fleet.roll_call import alive, chosen
 from fleet.settings import SettingsTrial, read_settings, try_settings, variants
-from fleet.tables import in_few_words, progress_bars, push_data, push_table
+from fleet.tables import in_few_words
 from payloads.keys import SETTINGS_RESTORE
 from protocols.param_file import ParamFileError, read_param_file, shown_value
 from terminal.command_group import CommandGroup
 from terminal.files import read_file, shown_path
 from terminal.options import PATH
 from terminal.printing import print_json, print_table
-from terminal.sentences import INTERRUPTED, complain
+from terminal.sentences import complain
 
-_UNREADABLE = 2
-_GOES_ON = "stopped; restores in progress continue: `naze-bridge fleet settings diff` shows the settings later"
+_SETTINGS = Pushed(
+    SETTINGS_RESTORE,
+    "Restore",
+    "have saved these settings",
+    "stopped; restores in progress continue: `naze-bridge fleet settings diff` shows the settings later",
+)
 
 
 @click.group("settings", cls=CommandGroup)
@@ -89,30 +92,15 @@ def restore_settings(
     A vehicle that fails does not stop the others, unless --staged. Exit code 0: all have them (--dry-run: all could
     take them), 1: one does not, 2: the file is unreadable.
     """
-    if bool(names) == to_all:
-        raise click.UsageError("specify the vehicles: --vehicle NAME, or --all")
+    require_choice(names, to_all)
     data, count = _read(file)
     with fleet_session(where) as (session, prefix):
         bridges, found, unknown = vehicles_meant(session, prefix, names, conditions)
         if dry_run:
             _show_trials(try_settings(session, prefix, found, data), unknown, as_json)
             return
-        delivery, is_stopped = FleetPush(found, bridges), False
-        try:
-            with progress_bars(count) as show:
-                push(session, prefix, delivery, bridges, data, show, staged=staged, key=SETTINGS_RESTORE)
-        except KeyboardInterrupt:
-            is_stopped = True
-    if as_json:
-        print_json(push_data(delivery))
-    else:
-        print_table(push_table(delivery, "Restore"))
-        held = sum(each.result is not None for each in delivery.vehicles.values())
-        click.echo(f"{held} of {len(delivery.vehicles)} vehicles have saved these settings, verified")
-    if is_stopped:
-        complain(_GOES_ON)
-        raise SystemExit(INTERRUPTED)
-    end(unknown, is_bad=bool(delivery.failed))
+        has_failed = push_file(session, prefix, bridges, found, data, count, _SETTINGS, staged=staged, as_json=as_json)
+    end(unknown, is_bad=has_failed)
 
 
 def _read(file: Path) -> tuple[bytes, int]:
@@ -121,7 +109,7 @@ def _read(file: Path) -> tuple[bytes, int]:
         return data, len(read_param_file(data, shown_path(file)).values)
     except ParamFileError as error:
         complain(error)
-        raise SystemExit(_UNREADABLE) from error
+        raise SystemExit(UNREADABLE) from error
 
 
 def _show_trials(trials: list[SettingsTrial], unknown: str, as_json: bool) -> None:

@@ -126,7 +126,7 @@ def progress_bars(item_count: int) -> Iterator[Callable[[FleetPush], None]]:
         yield show
 
 
-def push_table(fleet: FleetPush, what: str = "Push") -> Table:
+def push_table(fleet: FleetPush, what: str) -> Table:
     table = _table("Vehicle", what, "Details")
     for progress in fleet.vehicles.values():
         table.add_row(Text(progress.vehicle), _result(progress), Text(_words(progress)))
@@ -184,11 +184,11 @@ def push_data(fleet: FleetPush) -> Json:
     }
 
 
-def push_summary(fleet: FleetPush) -> str:
+def push_summary(fleet: FleetPush, held_words: str) -> str:
     count, failed, left_out = len(fleet.vehicles), len(fleet.failed), len(fleet.left_out)
     held = sum(each.result is not None for each in fleet.vehicles.values())
     more = (f"; {failed} failed" if failed else "") + (f"; {left_out} not started" if left_out else "")
-    return f"{held} of {count} vehicles hold the mission, verified{more}"
+    return f"{held} of {count} vehicles {held_words}, verified{more}"
 
 
 def _words(progress: PushState) -> str:
