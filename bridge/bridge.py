@@ -160,7 +160,7 @@ class Bridge:
         self._backups = BackupTaker(on_backup)
         self._settings.on_identified = self._backups.identified
         self._board_settings.on_read = lambda table: self._backups.read(table, self._board_settings.unsaved)
-        self._board_settings.on_saved.append(lambda _table, _now: self._backups.saved())
+        self._board_settings.on_saved = self._backups.saved
         self._restores = SettingsRestores(self._board_settings, lambda: self.kind)
         self._reporter = VehicleReporter(session, missions, ground, self._settings, own.also_want, own.progress)
         self._uploads = MissionUploads(missions, ground, emit, incidents, own.let_read)

@@ -51,7 +51,6 @@ T = TypeVar("T")
 #: Called with the setting as read back after a change, or with the reason why it has not this value.
 OnChanged = Callable[[BoardSetting | SettingRefusal, float], None]
 OnTable = Callable[[SettingTable | SettingRefusal, float], None]
-TableListener = Callable[[SettingTable, float], None]
 OnSaved = Callable[[SettingRefusal | None, float], None]
 
 
@@ -104,8 +103,8 @@ class BoardSettings:
         #: Called after each reading of the whole table; when the table has changed; after a save; after a change here
         #: that others must not take for foreign.
         self.on_read: Callable[[SettingTable], None] = lambda _table: None
-        self.on_table: list[TableListener] = []
-        self.on_saved: list[TableListener] = []
+        self.on_table: Callable[[SettingTable, float], None] = lambda _table, _now: None
+        self.on_saved: Callable[[], None] = lambda: None
         self.on_change: Callable[[float], None] = lambda _now: None
         #: The time of the next `tick`, monotonic s.
         self.due = inf
@@ -197,8 +196,7 @@ class BoardSettings:
             self.on_change(at)
             on_done(refused, at)
             if refused is None and self.table is not None:
-                for listener in self.on_saved:
-                    listener(self.table, at)
+                self.on_saved()
             # A firmware may correct settings that contradict each other.
             self._is_doubtful, self.due = True, at
             self.is_saved = refused is None
@@ -277,8 +275,7 @@ class BoardSettings:
         former, self.table = self.table, table
         if former is None or table.differences(former):
             self._emit(SettingsRead(settings=len(table)))
-            for listener in self.on_table:
-                listener(table, now)
+            self.on_table(table, now)
 
     def _answer_askers(self, now: float) -> None:
         askers, self._askers = self._askers, []

@@ -37,14 +37,13 @@ class ParameterFiles:
 
     def find(self, path: str) -> bytes | None:
         """The content of a file; None if there is none of this path."""
-        match path.partition("?")[0].lstrip("/"):
-            case name if name == _PACK and self._settings:
-                return encode_param_pack(self._values)
-            case name if name == _GENERAL and self._settings:
-                return self.general()
-            case name if name == _PARAMETERS and self._settings:
-                return self._descriptions()
-        return None
+        files = {
+            _PACK: lambda: encode_param_pack(self._values),
+            _GENERAL: self.general,
+            _PARAMETERS: self._descriptions,
+        }
+        make = files.get(path.partition("?")[0].lstrip("/"))
+        return make() if make is not None and self._settings else None
 
     def general(self) -> bytes:
         """The file that names the others."""

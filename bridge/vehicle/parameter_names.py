@@ -20,7 +20,6 @@ _NAMES = {
     "gps_ph_brakemaxangle": "gps_ph_brkmaxang",
     "gps_ph_minbrakepercent": "gps_ph_minbrkpct",
     "nav_controls_heading": "nav_ctrl_heading",
-    "nav_rtl_lastturn": "nav_rtl_lastturn",
     "pitch_direction_l": "pitch_dir_l",
     "pitch_direction_r": "pitch_dir_r",
     "power_adc_channel": "power_adc_chan",

@@ -66,7 +66,7 @@ class Parameters:
         self._told: dict[str, float] = {}
         self._files = ParameterFiles()
         self._dialogues: WeakKeyDictionary[GroundStation, _Dialogue] = WeakKeyDictionary()
-        settings.on_table.append(self._take)
+        settings.on_table = self._take
         #: The time of the next `tick`; infinity while no list is sent.
         self.due = inf
 
