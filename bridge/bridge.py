@@ -108,7 +108,8 @@ class Bridge:
         self._config, owner = config, config.settings
         self._emit = emit
         self._was_armed = False
-        #: The line's state, speed or polls may have changed since the last `take_fc_output`.
+        #: The line's state, speed or polls may have changed since the last `take_fc_output`. A conversation that starts
+        #: has output, or waits for a reply or timeout that the line already expects.
         self._has_line_changed = True
         self._line_due = now  # of the line itself, as of the last `take_fc_output`
         #: The armed craft, for the BridgeConfig of a restarted bridge; it changes rarely. None: it is not armed.
@@ -307,24 +308,20 @@ class Bridge:
 
     def read_board_settings(self, on_done: OnTable, now: float, within_s: float = READ_WITHIN_S) -> None:
         """The table, checked against the board if that is possible now, else as last read."""
-        self._has_line_changed = True
         self._board_settings.current(on_done, now, within_s)
 
     def change_board_setting(self, name: str, value: Value, on_done: OnChanged, now: float, client: str) -> None:
         """Change a setting in the board's RAM; `on_done` gets it as read back, maybe before this returns."""
-        self._has_line_changed = True
         self._board_settings.change(name, value, on_done, now, client)
 
     def save_board_settings(self, on_done: OnSaved, now: float) -> None:
         """Write the settings to the board's flash."""
-        self._has_line_changed = True
         self._board_settings.save(on_done, now)
 
     def plan_restore(
         self, wanted: Mapping[str, Value], source: str, on_done: OnPlan, now: float, *, is_checked: bool = True
     ) -> None:
         """What a restore would change; see SettingsRestores.plan."""
-        self._has_line_changed = True
         self._restores.plan(wanted, source, on_done, now, is_checked=is_checked)
 
     def restore_settings(
@@ -337,7 +334,6 @@ class Bridge:
         now: float,
     ) -> None:
         """Set, save and verify settings; see SettingsRestores.restore."""
-        self._has_line_changed = True
         self._restores.restore(wanted, source, client, progress, on_done, now)
 
     # For metrics, the status and other followers.
@@ -377,11 +373,9 @@ class Bridge:
 
     def abort(self, now: float) -> None:
         """End the running conversation cleanly."""
-        self._has_line_changed = True
         self._runner.stop(now)
 
     def store_answered(self, effect: StoreEffect, answer: object, now: float) -> None:
-        self._has_line_changed = True
         self._runner.store_answered(effect, answer, now)
 
     @property
