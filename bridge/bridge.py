@@ -11,7 +11,7 @@ An autopilot that speaks MAVLink itself is not represented but passed through, b
     FcSession <-> Routes <-> Ground
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import count
 from math import inf
@@ -30,12 +30,11 @@ from bridge.gcs.routes import Routes
 from bridge.gcs.station import Peer, Severity
 from bridge.line.conversation import StoreEffect
 from bridge.line.runner import Runner
-from bridge.missions.mission_service import NO_LINK, EndingListener, HeldMission, MissionService, MissionTransfer
+from bridge.missions.mission_service import NO_LINK, EndingListener, MissionService
 from bridge.model.events import Armed, Disarmed, Emit
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.vehicle import FlightState, Health, MissionLeg, Readiness
 from bridge.model.vehicle_groups import Group
-from bridge.settings.board_setting import Value
 from bridge.sharing.msp_sharing import MspSharing
 from bridge.sharing.program import Program
 from bridge.transfers.downloads import MissionDownloads
@@ -43,22 +42,18 @@ from bridge.transfers.local_missions import LocalMissions
 from bridge.transfers.mission_watch import MissionWatch
 from bridge.transfers.uploads import FC_LOST, STOPPED, MissionUploads
 from bridge.vehicle.board_settings import (
-    READ_WITHIN_S,
     BoardSettings,
-    OnChanged,
-    OnSaved,
-    OnTable,
 )
 from bridge.vehicle.calibration import Calibration
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.incoming import Incoming
 from bridge.vehicle.link_announcer import LinkAnnouncer
+from bridge.vehicle.local_settings import LocalSettings
 from bridge.vehicle.message_router import MessageRouter
 from bridge.vehicle.own_parameters import OwnParameters
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.parameters import Parameters
 from bridge.vehicle.settings_backups import BackupTaker, OnBackup
-from bridge.vehicle.settings_restore import OnPlan, OnRestored, SettingsRestores
 from bridge.vehicle.settings_seal import SettingsSeal
 from bridge.vehicle.vehicle_report import VehicleReporter
 from protocols.mavlink.frame import MavlinkFrame
@@ -147,24 +142,28 @@ class Bridge:
         #: Its readings, which are kept when it is lost.
         self.vehicle = self._session.vehicle
         missions = self._missions = MissionService(self.vehicle, runner, on_ending)
-        self._local = LocalMissions(missions, ground, emit, incidents)
         self._sharing = MspSharing(session, runner, missions, emit, self._say_refused)
+
+        def is_transferring() -> bool:
+            return self.missions.transfer is not None
+
         own = self._own_vehicle = OwnVehicle(session, missions, ground, self._announcer, config.unix_time_s, now)
         #: The seal of the flight controller's settings.
-        self._settings = SettingsSeal(session, missions, ground, emit, config.seals, lambda: self.transfer is not None)
-        self._board_settings = BoardSettings(
-            session, missions, emit, lambda: self.transfer is not None, lambda: self._sharing.due < inf
-        )
-        self._board_settings.on_change = self._settings.changed_here
-        self._settings.on_found_change = self._board_settings.may_have_changed
+        self._seal = SettingsSeal(session, missions, ground, emit, config.seals, is_transferring)
+        self._board_settings = BoardSettings(session, missions, emit, is_transferring, lambda: self._sharing.due < inf)
+        self._board_settings.on_change = self._seal.changed_here
+        self._seal.on_found_change = self._board_settings.may_have_changed
         self._sharing.on_change = self._program_changed_settings
         self._backups = BackupTaker(on_backup)
-        self._settings.on_identified = self._backups.identified
+        self._seal.on_identified = self._backups.identified
         self._board_settings.on_read = lambda table: self._backups.read(table, self._board_settings.unsaved)
         self._board_settings.on_saved = self._backups.saved
-        self._restores = SettingsRestores(self._board_settings, lambda: self.kind)
-        self._reporter = VehicleReporter(session, missions, ground, self._settings, own.also_want, own.progress)
+        #: The board's settings, for the command line, the page and zenoh.
+        self.settings = LocalSettings(self._board_settings, session)
+        self._reporter = VehicleReporter(session, missions, ground, self._seal, own.also_want, own.progress)
         self._uploads = MissionUploads(missions, ground, emit, incidents, own.let_read)
+        #: Missions, for the same.
+        self.missions = LocalMissions(missions, self._uploads, ground, emit, incidents)
         self._watch = MissionWatch(missions, ground, emit)
         downloads = MissionDownloads(missions, ground)
         own_parameters = OwnParameters(missions, ground, owner.sysid)
@@ -191,7 +190,7 @@ class Bridge:
             self._sharing,
             self._uploads,
             self._watch,
-            self._settings,
+            self._seal,
             self._board_settings,
             parameters,
             ground,
@@ -206,8 +205,6 @@ class Bridge:
         self.displaced = ground.displaced
         #: Other programs, on a share.
         self.program_joined, self.program_left = self._sharing.join, self._sharing.leave
-        #: Requests of the command line, the page and zenoh.
-        self.push, self.pull, self.check = self._local.push, self._local.pull, self._local.check
         #: The store's work, in order.
         self.store_effects = runner.store_effects
         self.report, self.group, self.take_fresh = self._reporter.whole, self._reporter.group, self._reporter.take_fresh
@@ -271,70 +268,11 @@ class Bridge:
         self._has_line_changed = True
         self._sharing.received(program, data, now)
 
-    # Missions.
-
-    @property
-    def held(self) -> HeldMission | None:
-        """The flight controller's mission, as last read."""
-        return self._missions.held
-
-    @property
-    def others(self) -> tuple[HeldMission, ...]:
-        return self._missions.others
-
-    @property
-    def transfer(self) -> MissionTransfer | None:
-        """The mission being received or written."""
-        return self._missions.writing or self._uploads.receiving
-
     def stop_missions(self, now: float) -> None:
         """Accept no more transfers. An upload that still receives items ends; a running push continues."""
         self._missions.close()
         self._sharing.stop()
         self._uploads.end(STOPPED, now)
-
-    # The board's settings.
-
-    @property
-    def kind(self) -> str | None:
-        """The board's firmware and its version; None without a board."""
-        controller = self._session.state.controller
-        return None if controller is None else controller.kind
-
-    @property
-    def are_settings_checked(self) -> bool:
-        """True if the settings were read from this board since anything else may have changed them."""
-        return self._board_settings.is_checked
-
-    def read_board_settings(self, on_done: OnTable, now: float, within_s: float = READ_WITHIN_S) -> None:
-        """The table, checked against the board if that is possible now, else as last read."""
-        self._board_settings.current(on_done, now, within_s)
-
-    def change_board_setting(self, name: str, value: Value, on_done: OnChanged, now: float, client: str) -> None:
-        """Change a setting in the board's RAM; `on_done` gets it as read back, maybe before this returns."""
-        self._board_settings.change(name, value, on_done, now, client)
-
-    def save_board_settings(self, on_done: OnSaved, now: float) -> None:
-        """Write the settings to the board's flash."""
-        self._board_settings.save(on_done, now)
-
-    def plan_restore(
-        self, wanted: Mapping[str, Value], source: str, on_done: OnPlan, now: float, *, is_checked: bool = True
-    ) -> None:
-        """What a restore would change; see SettingsRestores.plan."""
-        self._restores.plan(wanted, source, on_done, now, is_checked=is_checked)
-
-    def restore_settings(
-        self,
-        wanted: Mapping[str, Value],
-        source: str,
-        client: str,
-        progress: Callable[[int], None],
-        on_done: OnRestored,
-        now: float,
-    ) -> None:
-        """Set, save and verify settings; see SettingsRestores.restore."""
-        self._restores.restore(wanted, source, client, progress, on_done, now)
 
     # For metrics, the status and other followers.
 
@@ -355,7 +293,7 @@ class Bridge:
             fc_requests_lost=None if state.link is None else state.link.requests_lost,
             fc_round_trips=None if state.link is None else state.link.round_trips,
             firmware_version=self.vehicle.version,
-            settings=self._settings.state,
+            settings=self._seal.state,
         )
 
     # Time.
@@ -406,7 +344,7 @@ class Bridge:
         self._ground.say(Severity.NOTICE if self.vehicle.armed else Severity.WARNING, text)
 
     def _program_changed_settings(self, now: float) -> None:
-        self._settings.changed_here(now)
+        self._seal.changed_here(now)
         self._board_settings.may_have_changed(now)
 
     def _newcomer(self, station: GroundStation, now: float) -> None:
@@ -419,7 +357,7 @@ class Bridge:
         # A passed-through autopilot represents itself.
         self._own_vehicle.due = inf if self.is_passing_through else min(self._own_vehicle.due, now)
         self._backups.found()
-        self._settings.found(controller, now)
+        self._seal.found(controller, now)
         self._board_settings.found(controller, now)
         if controller is None:
             trouble = self._session.state.trouble
@@ -479,6 +417,6 @@ class Bridge:
         if armed and self._uploads.due < inf:
             self._uploads.end(ARMED, now)
         if armed:
-            self._settings.armed()
+            self._seal.armed()
         self._ground.record_flight(on=armed and not self.is_passing_through)
         self._emit(Armed() if armed else Disarmed())

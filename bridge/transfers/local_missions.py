@@ -9,11 +9,12 @@ from bridge.gcs.station import Severity
 from bridge.line.conversation import Conversation
 from bridge.missions.fc_mission_store import StoreReport
 from bridge.missions.list_check import check_list
-from bridge.missions.mission_service import DeliveryResult, HeldMission, MissionService
+from bridge.missions.mission_service import DeliveryResult, HeldMission, MissionService, MissionTransfer
 from bridge.model.events import Emit, PushEnded, PushStarted
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.refusal import Refusal
 from bridge.model.verdict import Result, Verdict
+from bridge.transfers.uploads import MissionUploads
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.plain_text import plain_text
 
@@ -23,11 +24,28 @@ _WOULD_ERASE = Refusal(MissionResult.DENIED, "No item can be stored: this would 
 class LocalMissions:
     """Writes, reads and checks whole lists, by the same rules as uploads from ground stations."""
 
-    def __init__(self, missions: MissionService, ground: Ground, emit: Emit, incidents: Iterator[int]) -> None:
+    def __init__(
+        self, missions: MissionService, uploads: MissionUploads, ground: Ground, emit: Emit, incidents: Iterator[int]
+    ) -> None:
         self._missions = missions
+        self._uploads = uploads
         self._ground = ground
         self._emit = emit
         self._incidents = incidents
+
+    @property
+    def held(self) -> HeldMission | None:
+        """The flight controller's mission, as last read."""
+        return self._missions.held
+
+    @property
+    def others(self) -> tuple[HeldMission, ...]:
+        return self._missions.others
+
+    @property
+    def transfer(self) -> MissionTransfer | None:
+        """The mission being received or written."""
+        return self._missions.writing or self._uploads.receiving
 
     def push(
         self,

@@ -68,18 +68,18 @@ class DaemonApi:
         def written(records: int) -> None:
             progress({"progress": records})
 
-        self._daemon.bridge.push(items, source, written, done, self._loop.time(), may_erase=may_erase)
+        self._daemon.bridge.missions.push(items, source, written, done, self._loop.time(), may_erase=may_erase)
         self._daemon.flush()
         return await future
 
     async def check(self, items: list[MissionItem]) -> Json:
         """The verdict on a list for the current flight controller."""
-        check = self._daemon.bridge.check
+        check = self._daemon.bridge.missions.check
         return verdict_data(await self._answer(lambda answered, now: check(items, answered, now)))
 
     async def pull(self) -> Json:
-        held = await self._answer(self._daemon.bridge.pull)
-        return _held(held) | {"others": [_held(other) for other in self._daemon.bridge.others]}
+        held = await self._answer(self._daemon.bridge.missions.pull)
+        return _held(held) | {"others": [_held(other) for other in self._daemon.bridge.missions.others]}
 
     async def _answer(self, start: Callable[[Callable[[T | Refusal], None], float], None]) -> T:
         """Start an operation and wait for its result; ControlError if it is refused."""

@@ -53,16 +53,16 @@ class SettingsApi:
 
     async def table(self) -> Json:
         """All settings. is_checked False: the flight controller could not be asked, they are as last read."""
-        table = await self._answer(self._daemon.bridge.read_board_settings)
+        table = await self._answer(self._daemon.bridge.settings.read)
         return {
-            "board": self._daemon.bridge.kind or "",
+            "board": self._daemon.bridge.settings.kind or "",
             "is_complete": table.is_complete,
-            "is_checked": self._daemon.bridge.are_settings_checked,
+            "is_checked": self._daemon.bridge.settings.is_checked,
             "settings": [_data(setting) for setting in table],
         }
 
     async def save(self) -> Json:
-        result = await self._wait(self._daemon.bridge.save_board_settings)
+        result = await self._wait(self._daemon.bridge.settings.save)
         if result is not None:
             raise ControlError(result.text)
         return {"text": "Settings saved"}
@@ -72,7 +72,7 @@ class SettingsApi:
 
         is_checked False: compare with the table as last read, without using the flight controller's line.
         """
-        plan = partial(self._daemon.bridge.plan_restore, values, board, is_checked=is_checked)
+        plan = partial(self._daemon.bridge.settings.plan, values, board, is_checked=is_checked)
         return asdict(await self._answer(plan))
 
     async def restore(self, values: SettingValues, board: str, client: str, progress: Progress) -> Json:
@@ -81,7 +81,7 @@ class SettingsApi:
         def set_so_far(count: int) -> None:
             progress({"progress": count})
 
-        restore = partial(self._daemon.bridge.restore_settings, values, board, client, set_so_far)
+        restore = partial(self._daemon.bridge.settings.restore, values, board, client, set_so_far)
         return asdict(await self._answer(restore))
 
     async def backups(self, limit: int) -> Json:
@@ -97,7 +97,7 @@ class SettingsApi:
 
     async def _setting(self, request: Json) -> tuple[BoardSetting, SettingTable]:
         name = str(request.get("name"))[:_LONGEST_NAME]
-        table = await self._answer(self._daemon.bridge.read_board_settings)
+        table = await self._answer(self._daemon.bridge.settings.read)
         setting = table.find(name)
         if setting is None:
             raise ControlError(f"this flight controller has no setting {name}: see `naze-bridge settings list`")
@@ -108,7 +108,7 @@ class SettingsApi:
         value = _value(setting, str(request.get("value")))
 
         def start(done: Callable[[BoardSetting | SettingRefusal, float], None], now: float) -> None:
-            self._daemon.bridge.change_board_setting(setting.name, value, done, now, "command line")
+            self._daemon.bridge.settings.change(setting.name, value, done, now, "command line")
 
         after = await self._answer(start)
         if after.value == setting.value:

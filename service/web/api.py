@@ -111,7 +111,7 @@ class Api:
     async def _state(self, _request: Request) -> Response:
         daemon = self._daemon
         now = asyncio.get_running_loop().time()
-        transfer, refused = daemon.bridge.transfer, daemon.bridge.counters().refused
+        transfer, refused = daemon.bridge.missions.transfer, daemon.bridge.counters().refused
         try:
             listed = (await self._api.list_missions(1))["missions"]
             newest = {key: listed[0][key] for key in ("number", "outcome")} if listed else None
@@ -138,7 +138,7 @@ class Api:
 
     async def _held(self, _request: Request) -> Response:
         """The mission as last read: an unauthenticated request must not use the flight controller's line."""
-        held = self._daemon.bridge.held
+        held = self._daemon.bridge.missions.held
         if held is None:
             return json_reply({"count": None, "checksum": None, "items": []})
         if self._held_text is None or self._held_text[0] is not held:

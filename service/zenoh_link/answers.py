@@ -44,7 +44,7 @@ class Answers:
         return found | {"missions": [_with_units(each) for each in found["missions"]]}
 
     async def _mission_current(self, _: Question) -> Json:
-        return mission_current(self._bridge.held)
+        return mission_current(self._bridge.missions.held)
 
     async def _mission_list(self, question: Question) -> Json:
         limit = question.whole_number("limit", _USUAL_LIMIT, _MAX_LIMIT)

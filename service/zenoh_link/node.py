@@ -186,7 +186,7 @@ class Node(Follower):
             overview = overview_of(state)
             if self._rates.admits_overview(overview.marks, self._loop.time()):
                 self._publisher.put(keys.OVERVIEW, plain(overview))
-        held = self._daemon.bridge.held
+        held = self._daemon.bridge.missions.held
         if held is not self._held:
             self._held = held
             self._send_reliably(keys.MISSION_CURRENT, partial(vehicle_data.mission_current, held))

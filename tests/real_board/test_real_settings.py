@@ -21,7 +21,7 @@ def world(image: Image, flash: bytes) -> World:
 
 
 def test_a_pid_changed_in_memory_is_reported(world: World, image: Image, figure: Figure) -> None:
-    settings = world.inside.settings
+    settings = world.inside.seal
     world.wait_until(lambda _: settings.state is not None, 30)
     assert settings.state is not None
     seal = settings.state.seal

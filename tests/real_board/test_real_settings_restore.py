@@ -21,7 +21,7 @@ _BLANK = b"\xff" * 0x2_0000
 def world_of(image: Image, flash: bytes) -> tuple[World, SettingsClient]:
     world = World(speeds=(115200,), peer=EmulatedNaze(image, flash=memoryview(bytearray(flash))))
     world.wait_ready()
-    world.wait_until(lambda world: world.bridge.are_settings_checked and bool(world.backups), 60)
+    world.wait_until(lambda world: world.bridge.settings.is_checked and bool(world.backups), 60)
     return world, SettingsClient(world)
 
 
@@ -48,7 +48,7 @@ def test_a_backup_is_restored_onto_a_blank_board(image: Image, flash: bytes, fig
     blank, fresh = world_of(image, _BLANK)
     began = blank.now
     results: list[object] = []
-    blank.bridge.restore_settings(
+    blank.bridge.settings.restore(
         backup.values, backup.board.kind, "test", lambda _count: None, lambda each, _at: results.append(each), blank.now
     )
     blank.wait_until(lambda _: bool(results), 120)
@@ -61,7 +61,7 @@ def test_a_backup_is_restored_onto_a_blank_board(image: Image, flash: bytes, fig
     blank.power_on()
     blank.wait_until(lambda world: not world.is_found, 10)
     blank.wait_until(lambda world: world.is_found, 60)
-    blank.wait_until(lambda world: world.bridge.are_settings_checked, 60)
+    blank.wait_until(lambda world: world.bridge.settings.is_checked, 60)
     left_out = {each.name for each in result.left_out}
     held = values(fresh.wait_read())
     assert {name for name in held if held[name] != backup.values.get(name)} <= left_out

@@ -16,7 +16,7 @@ class Inside:
         self.missions = bridge._missions
         self.uploads = bridge._uploads
         self.sharing = bridge._sharing
-        self.settings = bridge._settings
+        self.seal = bridge._seal
         self.board_settings = bridge._board_settings
         self.parameters = bridge._parameters
 

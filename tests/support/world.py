@@ -270,7 +270,7 @@ class World:
     def push(self, items: Sequence[Any]) -> list[Any]:
         """Push like the command line; the returned list receives the outcome."""
         outcome: list[Any] = []
-        self.bridge.push(items, "test", lambda _: None, lambda *args: outcome.append(args), self.now)
+        self.bridge.missions.push(items, "test", lambda _: None, lambda *args: outcome.append(args), self.now)
         self._flush()
         return outcome
 

@@ -45,7 +45,7 @@ def recover(world: World) -> None:
     with pytest.raises(BugError):
         world.run(10)
     world.bridge.restart("internal error", world.now)
-    world.wait_until(lambda w: w.bridge.held is not None, 30)
+    world.wait_until(lambda w: w.bridge.missions.held is not None, 30)
 
 
 def test_a_download_works_again(world: World) -> None:

@@ -55,7 +55,7 @@ class Craft:
 
     def pull(self) -> HeldMission:
         held: list[Any] = []
-        self.world.bridge.pull(held.append, self.world.now)
+        self.world.bridge.missions.pull(held.append, self.world.now)
         self.world.wait_until(lambda _: bool(held), TIMEOUT_S)
         assert isinstance(held[0], HeldMission), held[0]
         return held[0]
@@ -224,7 +224,7 @@ def test_an_armed_craft_is_not_asked_for_its_list(craft: Craft) -> None:
     craft.arm()
     craft.world.inside.missions.held = None
     answers: list[HeldMission | Refusal] = []
-    craft.world.bridge.pull(answers.append, craft.world.now)
+    craft.world.bridge.missions.pull(answers.append, craft.world.now)
     craft.world.wait_until(lambda _: bool(answers), TIMEOUT_S)
     (answer,) = answers
     assert isinstance(answer, Refusal)

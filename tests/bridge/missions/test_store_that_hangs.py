@@ -70,13 +70,13 @@ def test_a_list_whose_board_is_gone_when_the_store_answers_is_not_kept() -> None
     world.inside.missions.held = None
     world.store.delay_s = 2.0
     answers: list[HeldMission | Refusal] = []
-    world.bridge.pull(answers.append, world.now)
+    world.bridge.missions.pull(answers.append, world.now)
     world.run(1)
     assert not answers
     world.unplug()
     world.wait_until(lambda _: bool(answers), 3)
     assert isinstance(answers[0], HeldMission)
-    assert world.bridge.held is None
+    assert world.bridge.missions.held is None
 
 
 def test_a_late_reply_of_the_store_is_dropped() -> None:

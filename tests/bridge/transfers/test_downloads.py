@@ -273,7 +273,7 @@ def test_waiting_downloads_are_refused_when_the_link_is_lost() -> None:
     bridge = world.bridge
     answers: list[HeldMission | Refusal] = []
     for _ in range(600):
-        bridge.pull(answers.append, world.now)
+        bridge.missions.pull(answers.append, world.now)
     bridge.fc_closed(world.now, "unplugged")
     assert len(answers) == 600
     assert {answer.text for answer in answers if isinstance(answer, Refusal)} == {"No link to the flight controller"}

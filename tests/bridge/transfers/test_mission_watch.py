@@ -33,7 +33,7 @@ def test_a_mission_selected_by_sticks_is_noticed_within_two_seconds(armed: bool)
     bench.world.run(3)
     bench.faults.selected_mission = 2
     bench.world.run(2.0)
-    held = bench.world.bridge.held
+    held = bench.world.bridge.missions.held
     assert held is not None
     assert [record.pack() for record in held.records] == sets(4, 6)[1]
     assert "changed: 6 records" in bench.text()
@@ -48,7 +48,7 @@ def test_another_clients_list_is_noticed_and_its_progress_is_correct() -> None:
     bench.faults.stick_loads += 1
     bench.world.run(2.0)
     assert "changed: 4 records" in bench.text()
-    held = bench.world.bridge.held
+    held = bench.world.bridge.missions.held
     assert held is not None
     assert [record.pack() for record in held.records] == sets(4)[0]
     bench.faults.armed, bench.faults.boxes = True, NAV_WP
@@ -79,7 +79,7 @@ def test_a_list_of_the_same_size_is_noticed_within_two_seconds(kind: str, size: 
         MultiWiiMission(memoryview(eeprom), options.capacity).store(size // 2, unpack_waypoint(b"\0" + changed)[1])
     world.run(2.0)
     assert f"Mission on the flight controller changed: {size} records" in " ".join(station.texts())
-    assert [record.pack() for record in world.bridge.held.records] == packed(moved)  # type: ignore[union-attr]
+    assert [record.pack() for record in world.bridge.missions.held.records] == packed(moved)  # type: ignore[union-attr]
 
 
 def with_the_longest_list(streams_hz: int = 0) -> tuple[MspBoard, World, GroundStation]:
@@ -101,7 +101,7 @@ def test_another_list_of_the_longest_size_is_noticed_within_two_seconds(streams_
         mission.write(number, unpack_waypoint(bytes((number,)) + record)[1])
     world.run(2.0)
     assert f"Mission on the flight controller changed: {CAPACITY} records" in " ".join(station.texts())
-    assert [record.pack() for record in world.bridge.held.records] == other  # type: ignore[union-attr]
+    assert [record.pack() for record in world.bridge.missions.held.records] == other  # type: ignore[union-attr]
 
 
 def test_one_changed_record_in_the_longest_list_is_noticed_from_the_upload() -> None:
@@ -127,10 +127,10 @@ def test_a_reloaded_former_list_is_noticed_within_two_seconds(streams_hz: int) -
     for number, record in enumerate(records, 1):
         mission.write(number, unpack_waypoint(bytes((number,)) + record)[1])
     world.run(10)
-    assert [record.pack() for record in world.bridge.held.records] == records  # type: ignore[union-attr]
+    assert [record.pack() for record in world.bridge.missions.held.records] == records  # type: ignore[union-attr]
     mission.load()
     world.run(2.0)
-    assert [record.pack() for record in world.bridge.held.records] == ours  # type: ignore[union-attr]
+    assert [record.pack() for record in world.bridge.missions.held.records] == ours  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize("streams_hz", [0, 50])
@@ -143,7 +143,7 @@ def test_a_list_that_the_sticks_load_is_read_at_once(streams_hz: int) -> None:
         board._eeprom[(number - 1) * WAYPOINT_SIZE + 1 : number * WAYPOINT_SIZE] = changed
         board.faults.stick_loads += 1
         world.run(3)
-        assert world.bridge.held.records[number - 1].pack() == changed  # type: ignore[union-attr]
+        assert world.bridge.missions.held.records[number - 1].pack() == changed  # type: ignore[union-attr]
 
 
 def test_a_list_that_another_client_is_writing_is_reported_once_it_is_complete() -> None:

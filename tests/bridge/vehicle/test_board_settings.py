@@ -145,7 +145,7 @@ def test_nothing_that_could_arm_or_spin_or_crash_is_set(board: str, name: str, v
 def test_a_change_through_the_bridge_raises_no_alarm(name: str) -> None:
     board = BOARDS[name]
     world, client = ready(board)
-    world.wait_until(lambda world: inside(world.bridge).settings.state is not None, 20)
+    world.wait_until(lambda world: inside(world.bridge).seal.state is not None, 20)
     setting = {"INAV": "mc_p_roll", "MultiWii": "ROLL_P"}.get(name, "BOX_ANGLE")
     assert value_of(client.change(setting, 7)) == 7
     assert client.save() is None
@@ -155,7 +155,7 @@ def test_a_change_through_the_bridge_raises_no_alarm(name: str) -> None:
 
 def test_a_change_on_the_board_itself_is_found_by_the_seal_and_read() -> None:
     world, client = ready(BOARDS["MultiWii"])
-    world.wait_until(lambda world: inside(world.bridge).settings.state is not None, 20)
+    world.wait_until(lambda world: inside(world.bridge).seal.state is not None, 20)
     pids = bytes((77,)) + bytes((33, 30, 23)) * 9 + bytes((33, 30))
     world.naze.receive(MspFrame(Direction.REQUEST, SET_PID, pids).encode(), world.now)
     world.naze.advance(world.now + 0.02)

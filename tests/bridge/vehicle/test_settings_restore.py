@@ -29,7 +29,7 @@ def restored(
     world: World, wanted: dict[str, Value], source: str = "", at_progress: Callable[[int], None] = lambda _count: None
 ) -> RestoreResult | SettingRefusal:
     found: list[RestoreResult | SettingRefusal] = []
-    world.bridge.restore_settings(
+    world.bridge.settings.restore(
         wanted, source, "test", at_progress, lambda result, _at: found.append(result), world.now
     )
     world.wait_until(lambda _: bool(found), 90)
@@ -169,7 +169,7 @@ def test_one_restore_runs_at_a_time() -> None:
     second: list[RestoreResult | SettingRefusal] = []
 
     def progress(_count: int) -> None:
-        world.bridge.restore_settings(
+        world.bridge.settings.restore(
             {"p_roll": 50.0}, "", "other", lambda _count: None, lambda result, _at: second.append(result), world.now
         )
 
@@ -184,7 +184,7 @@ def test_another_clients_change_in_the_middle_prevents_the_save() -> None:
 
     def progress(count: int) -> None:
         if count == 1:
-            world.bridge.change_board_setting("p_roll", 99, lambda _result, _at: None, world.now, "another")
+            world.bridge.settings.change("p_roll", 99, lambda _result, _at: None, world.now, "another")
 
     result = outcome(restored(world, {"p_roll": 44.0, "i_roll": 33.0}, "", progress))
     assert not result.is_saved
@@ -196,7 +196,7 @@ def test_the_plan_from_memory_asks_the_board_nothing() -> None:
     client.wait_read()
     found: list[object] = []
     before = len(world.written)
-    world.bridge.plan_restore({"p_roll": 44.0}, "", lambda plan, _at: found.append(plan), world.now, is_checked=False)
+    world.bridge.settings.plan({"p_roll": 44.0}, "", lambda plan, _at: found.append(plan), world.now, is_checked=False)
     assert len(found) == 1
     assert len(world.written) == before
 
@@ -204,6 +204,6 @@ def test_the_plan_from_memory_asks_the_board_nothing() -> None:
 def test_without_a_board_nothing_is_planned() -> None:
     world = World(powered=False)
     found: list[object] = []
-    world.bridge.plan_restore({"p_roll": 44.0}, "", lambda plan, _at: found.append(plan), world.now, is_checked=False)
+    world.bridge.settings.plan({"p_roll": 44.0}, "", lambda plan, _at: found.append(plan), world.now, is_checked=False)
     assert isinstance(found[0], SettingRefusal)
     assert isinstance(restored(world, {"p_roll": 44.0}), SettingRefusal)

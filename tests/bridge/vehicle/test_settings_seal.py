@@ -66,7 +66,7 @@ def sealed(make: Callable[[], object], seals: SealsOfThisRun | None = None) -> t
     """A world whose board's settings were read."""
     world = World(speeds=(115200,), peer=make(), seals=seals)
     world.wait_ready(40)
-    world.wait_until(lambda world: world.inside.settings.state is not None, 20)
+    world.wait_until(lambda world: world.inside.seal.state is not None, 20)
     station = GroundStation(world)
 
     def beat() -> None:
@@ -115,15 +115,15 @@ def test_a_change_without_the_bridge_is_reported_once_by_name(name: str) -> None
 def test_a_change_through_the_bridge_is_not_reported(name: str) -> None:
     case = CASES[name]
     world, station = sealed(case.make)
-    seal = world.inside.settings.state and str(world.inside.settings.state.seal)
+    seal = world.inside.seal.state and str(world.inside.seal.state.seal)
     reply = ShareProgram(world, may_write=True).outcome(case.command, case.payload)
     assert reply is not None
     assert reply.direction is Direction.REPLY
     world.run(2 * ROUND_S)
     assert world.events("settings.changed_on_board") == []
     assert warnings(station) == []
-    assert world.inside.settings.state is not None
-    assert str(world.inside.settings.state.seal) != seal
+    assert world.inside.seal.state is not None
+    assert str(world.inside.seal.state.seal) != seal
     # A later change on the board is compared with it.
     on_the_board(world, case.command, bytes(len(case.payload)))
     world.run(ROUND_S)
@@ -168,7 +168,7 @@ def test_a_change_through_the_bridge_survives_a_restart_before_the_next_reading(
     board = naze()
     world, _ = sealed(lambda: board, seals)
     on_the_board(world, SET_PID, bytes(30))
-    world.inside.settings.changed_here(world.now)
+    world.inside.seal.changed_here(world.now)
     world.run(1)
     again, _ = sealed(lambda: board, seals)
     assert again.events("settings.changed_on_board") == []
@@ -198,7 +198,7 @@ def test_an_armed_board_is_not_asked_and_its_changes_are_told_after_the_flight()
 def test_readings_wait_for_the_end_of_a_transfer() -> None:
     world, _ = sealed(naze)
     station = GroundStation(world, "slow", radio=Radio(delay_s=0.05))
-    world.run(world.inside.settings.due - world.now - 0.1)
+    world.run(world.inside.seal.due - world.now - 0.1)
     began = world.now
     upload = Upload(station, waypoints(60))
     assert upload.run() is MissionResult.ACCEPTED

@@ -178,7 +178,7 @@ def test_an_item_with_impossible_values_ends_the_reading(x: float, z: float) -> 
     wrong = messages.MAVLink_mission_item_message(255, 190, 1, 3, 16, 0, 1, 0, 2, 0, 0, x, 8.4, z)
     frame = bytes(wrong.pack(messages.MAVLink(None, srcSystem=1, srcComponent=200), force_mavlink1=True))
     answers: list[HeldMission | Refusal] = []
-    world.bridge.pull(answers.append, world.now)
+    world.bridge.missions.pull(answers.append, world.now)
     end = world.now + 30
     while not answers and world.now < end:
         world.run(0.01)

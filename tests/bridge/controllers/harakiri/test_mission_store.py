@@ -165,7 +165,7 @@ def test_a_pull_over_a_bad_line_is_exact_or_fails() -> None:
         world.faults.bit_error_rate = 1e-3
         world.inside.missions.held = None
         answers: list[HeldMission | Refusal] = []
-        world.bridge.pull(answers.append, world.now)
+        world.bridge.missions.pull(answers.append, world.now)
         world.wait_until(lambda _, answers=answers: bool(answers), 60)  # type: ignore[misc]
         if isinstance(answers[0], HeldMission):
             held += 1

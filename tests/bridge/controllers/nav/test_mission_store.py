@@ -146,7 +146,7 @@ def test_after_arming_during_a_transfer_the_last_record_is_not_sent() -> None:
     assert not inav.is_valid
     assert len(inav.records) < 59
     assert any("armed during the write" in text for text in station.texts())
-    assert world.bridge.held is None
+    assert world.bridge.missions.held is None
 
 
 def test_a_save_that_fails_is_reported() -> None:
@@ -169,7 +169,7 @@ def test_a_cleared_list_is_one_return_home_and_reads_as_empty() -> None:
         assert download.run()[1:] == []
         assert download.count == 1  # home
         other, other_station = found(board)
-        assert other.bridge.held is not None
+        assert other.bridge.missions.held is not None
         assert Download(other_station).run()[1:] == []
 
 

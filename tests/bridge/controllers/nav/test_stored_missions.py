@@ -65,7 +65,7 @@ class Bench:
         self.faults.armed = True
         self.world.run(3)
         assert self.board.armed
-        held = self.world.bridge.held
+        held = self.world.bridge.missions.held
         self.faults.armed = False
         self.world.run(3)
         return [] if held is None else [record.pack() for record in held.records]
@@ -84,7 +84,7 @@ def others_of(bench: Bench) -> list[list[bytes]]:
     def packed_records(held: HeldMission) -> list[bytes]:
         return [record.pack() for record in held.records]
 
-    return [packed_records(held) for held in bench.world.bridge.others]
+    return [packed_records(held) for held in bench.world.bridge.missions.others]
 
 
 # -- several missions ----------------------------------------------------------------------------------------
@@ -215,7 +215,7 @@ def test_while_armed_the_missing_mission_is_reported_but_not_loaded() -> None:
 
 def pulled(bench: Bench) -> HeldMission | Refusal:
     answers: list[HeldMission | Refusal] = []
-    bench.world.bridge.pull(answers.append, bench.world.now)
+    bench.world.bridge.missions.pull(answers.append, bench.world.now)
     bench.world.wait_until(lambda _: bool(answers), 30)
     return answers[0]
 
