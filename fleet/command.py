@@ -54,8 +54,8 @@ def list_vehicles(as_json: bool, limit: int | None, conditions: list[Condition],
 
     Exit code 0, even if there are none; 1: a vehicle, or the router, does not answer, or cannot be reached.
     """
-    with fleet_session(where) as (session, prefix):
-        found = matching(everyone := roll_call(session, prefix), conditions)
+    with fleet_session(where) as (session, prefix), fleet_session(where) as (second, _):
+        found = matching(everyone := roll_call(session, prefix, second), conditions)
     shown, unanswered = found[:limit], sum(not vehicle.answers for vehicle in everyone)
     if as_json:
         counts = {"alive": len(everyone), "unanswered": unanswered}
@@ -80,7 +80,11 @@ def list_vehicles(as_json: bool, limit: int | None, conditions: list[Condition],
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per line for each change.")
 def watch(as_json: bool, conditions: list[Condition], **where: Any) -> None:
     """Show which vehicles are alive and their state, until Ctrl-C: armed ones and problems first."""
-    with fleet_session(where) as (session, prefix), watching(session, prefix) as seen:
+    with (
+        fleet_session(where) as (session, prefix),
+        fleet_session(where) as (roll, _),
+        watching(session, roll, prefix) as seen,
+    ):
         try:
             if as_json:
                 print_changes(seen, conditions)

@@ -63,26 +63,37 @@ class ScreenRow:
 def show_screen(seen: Watch, session: zenoh.Session, conditions: Sequence[Condition]) -> None:
     """Draw the fleet until KeyboardInterrupt."""
     console = Console(highlight=False)
-    top = 0
+    top, was_connected = 0, True
     with _scrolling(), Live(console=console, auto_refresh=False, vertical_overflow="crop") as live:
         while True:
             page = max(console.height - _OTHER_LINES, 1)
             rows = _rows(seen, conditions)
             top = max(0, min(top, len(rows) - page))
             seen.follow([row.vehicle.name for row in rows[top : top + page]])
-            live.update(screen(rows, top, page, is_connected=is_connected(session)), refresh=True)
+            connected = is_connected(session)
+            if connected and not was_connected:
+                seen.call_roll()
+            was_connected = connected
+            live.update(screen(rows, top, page, is_connected=connected, is_listed=seen.is_listed), refresh=True)
             top += _wait_for_scroll(_REFRESH_S, page)
 
 
-def screen(rows: Sequence[ScreenRow], top: int, page: int, *, is_connected: bool) -> Group | Text:
-    """The screen: counts, then armed vehicles, those with problems, the others, and those not heard yet."""
+def screen(rows: Sequence[ScreenRow], top: int, page: int, *, is_connected: bool, is_listed: bool) -> Group | Text:
+    """The screen: counts, then armed vehicles, those with problems, the others, and those not heard yet.
+
+    `is_listed`: there are no more vehicles than these.
+    """
     if not is_connected:
         return Text("The router is gone; waiting for it. Ctrl-C ends.", style="red")
     if not rows:
-        return Text("No such vehicle is alive. Ctrl-C ends.")
+        return Text(
+            "No such vehicle is alive. Ctrl-C ends." if is_listed else "Waiting for the router's list. Ctrl-C ends."
+        )
     counts = Counter(map(_rank, rows))
     heard = len(rows) - counts[_Rank.UNHEARD]
-    there = f"{len(rows):,} vehicles" if heard == len(rows) else f"Heard {heard:,} of {len(rows):,} vehicles"
+    there = f"{len(rows):,} vehicles"
+    if heard < len(rows) or not is_listed:
+        there = f"Heard {heard:,} of {'' if is_listed else 'at least '}{there}"
     ill = sum(bool(row.problem) for row in rows[: counts[_Rank.ARMED]]) + counts[_Rank.ILL]
     head = f"{there}, {counts[_Rank.ARMED]:,} armed, {ill:,} with problems"
     shown = rows[top : top + page]

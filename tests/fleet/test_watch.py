@@ -66,7 +66,8 @@ def test_a_storage_does_not_answer_for_a_silent_vehicle(stored: tuple[Fleet, zen
     kite.send_signal(signal.SIGSTOP)
     try:
         until(lambda: not fleet.listed()["kite"]["answers"], "its silence")
-        with client(fleet.router.endpoint) as session, watching(session, "fleet") as seen:
+        endpoint = fleet.router.endpoint
+        with client(endpoint) as session, client(endpoint) as roll, watching(session, roll, "fleet") as seen:
             until(seen.look, "its token")
             assert not seen.look()[0][0].answers
     finally:

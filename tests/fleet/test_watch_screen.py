@@ -23,10 +23,10 @@ def vehicle(number: int, **known: Any) -> FleetVehicle:
     return FleetVehicle(name, str(number), **(usual | {"mission_checksum": "0123abcd", "battery_v": 12.3} | known))
 
 
-def lines(rows: list[ScreenRow], top: int) -> list[str]:
+def lines(rows: list[ScreenRow], top: int, *, is_listed: bool = True) -> list[str]:
     console = Console(width=80, height=24, highlight=False)
     with console.capture() as capture:
-        console.print(screen(rows, top, 24 - 5, is_connected=True))
+        console.print(screen(rows, top, 24 - 5, is_connected=True, is_listed=is_listed))
     return capture.get().splitlines()
 
 
@@ -59,6 +59,8 @@ def test_a_vehicle_that_was_not_heard_yet_is_counted_as_such() -> None:
     unheard = [ScreenRow(FleetVehicle(f"owl-{number}", "1"), None) for number in range(2000)]
     shown = lines([*armed, *unheard], 0)
     assert shown[0] == "Heard 3 of 2,003 vehicles, 3 armed, 0 with problems"
+    assert lines(armed, 0, is_listed=False)[0] == "Heard 3 of at least 3 vehicles, 3 armed, 0 with problems"
+    assert lines([], 0, is_listed=False) == ["Waiting for the router's list. Ctrl-C ends."]
     row = next(line for line in shown if line.startswith("owl-0 "))
     assert row.split(maxsplit=1)[1].split() == ["-"] * 5 + ["not", "heard", "yet"]
 
@@ -81,7 +83,7 @@ class Sample:
 def test_a_backlog_is_shown_with_its_true_age() -> None:
     """The vehicle's clock is an hour behind; 8 s of states arrive at once after a stall."""
     now = 5000.0
-    watch = Watch(None, "fleet", lambda: now)  # type: ignore[arg-type]
+    watch = Watch(None, None, "fleet", lambda: now)  # type: ignore[arg-type]
     watch.token(Sample("fleet/kite/v1/alive/1", kind=zenoh.SampleKind.PUT))  # type: ignore[arg-type]
 
     def age_s(made_at: float) -> float | None:
@@ -97,7 +99,7 @@ def test_a_backlog_is_shown_with_its_true_age() -> None:
 
 
 def test_ten_thousand_vehicles_are_counted_as_heard() -> None:
-    watch = Watch(None, "fleet")  # type: ignore[arg-type]
+    watch = Watch(None, None, "fleet")  # type: ignore[arg-type]
     for number in range(10_000):
         watch.token(Sample(f"fleet/kite-{number}/v1/alive/1", kind=zenoh.SampleKind.PUT))  # type: ignore[arg-type]
     for number in range(7_312):
@@ -116,7 +118,7 @@ def test_only_vehicles_on_the_screen_send_their_states() -> None:
     cbor = compact.dumps("overview", {"time_s": 7} | plain(overview))
     encoding = encoding_of(OVERVIEW, PayloadEncoding.CBOR)
     fields = ("battery_v", "height_m", "mission_checksum", "heading_deg", "speed_m_s", "fix", "mission_state")
-    with zenoh.open(config) as session, watching(session, "fleet") as watch:
+    with zenoh.open(config) as session, watching(session, session, "fleet") as watch:
         states = [session.declare_publisher(f"fleet/{name}/v1/state") for name in ("kite", "owl")]
         tokens = [session.liveliness().declare_token(f"fleet/{name}/v1/alive/1") for name in ("kite", "owl")]
 
