@@ -16,6 +16,7 @@ from benchmarks.processes import ROOT, daemon, running
 OURS, FLOOR, MAVPROXY, MAVP2P = "naze-bridge", "C floor", "MAVProxy", "mavp2p"
 MAVLINK_ROUTER = "mavlink-router"
 _SPEED = 57600
+_MAVPROXY = Path(sys.executable).parent / "mavproxy.py"
 #: Starts a forwarder in a folder, on a line; yields its process id.
 _Start = Callable[[Path, Line], AbstractContextManager[int]]
 
@@ -29,11 +30,13 @@ class Forwarder:
 
 
 def forwarders() -> list[Forwarder]:
-    """The forwarders on this machine: the floor needs cc.
+    """The forwarders on this machine: the floor needs cc, MAVProxy comes with `make test`'s dependencies.
 
     mavlink-router and mavp2p are looked for as $MAVLINK_ROUTERD and $MAVP2P, and on the path.
     """
-    found = [Forwarder(OURS, _naze_bridge), Forwarder(MAVPROXY, _mavproxy)]
+    found = [Forwarder(OURS, _naze_bridge)]
+    if _MAVPROXY.exists():
+        found.append(Forwarder(MAVPROXY, _mavproxy))
     if shutil.which("cc"):
         found.insert(0, Forwarder(FLOOR, _floor))
     if router := os.environ.get("MAVLINK_ROUTERD") or shutil.which("mavlink-routerd"):
@@ -61,7 +64,7 @@ def _naze_bridge(folder: Path, line: Line) -> Iterator[int]:
 @contextmanager
 def _mavproxy(folder: Path, line: Line) -> Iterator[int]:
     """The daemon with its default modules."""
-    program = [sys.executable, str(Path(sys.executable).parent / "mavproxy.py"), "--daemon"]
+    program = [sys.executable, str(_MAVPROXY), "--daemon"]
     link = [f"--master={line.tty}", f"--baudrate={_SPEED}", f"--out=127.0.0.1:{line.port}", "--mav20"]
     with running([*program, *link, f"--state-basedir={folder}"], folder / "mavproxy.log") as process:
         yield process.pid
