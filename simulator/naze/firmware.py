@@ -21,10 +21,11 @@ from simulator.board.traps import Trap, TrapCounters
 from simulator.naze import frsky
 from simulator.naze.cli import BANNER, PROMPT, CliRequest, CommandLine
 from simulator.naze.guard import accepts
-from simulator.naze.mavlink_port import MavlinkSchedule, MavlinkSender
+from simulator.naze.mavlink_port import MavlinkSchedule, MavlinkSender, Stream
 from simulator.naze.mission_slots import StoredConfig
 from simulator.naze.mission_store import Floppy
 from simulator.naze.missions import Board, BootMissions
+from simulator.naze.parameters import Parameters
 from simulator.naze.settings_commands import STORED_SIZE, SettingsCommands
 from simulator.naze.uart import Uart
 
@@ -90,18 +91,16 @@ class Firmware:
                 self._config.finish()
         self._board = Board(options, faults, self._config.load())
         self._missions = boot_missions(flash, self._board) if faults.extension else None
-        self._settings = (
-            SettingsCommands(self._board, self._config.load_settings(STORED_SIZE), self._missions.spend_write)
-            if self._missions
-            else None
-        )
+        spend_write = self._missions.spend_write if self._missions else lambda: True
+        self._settings = SettingsCommands(self._board, self._config.load_settings(STORED_SIZE), spend_write)
         # The extension enlarges the buffer for its longest CHUNK: mask, number, records.
         self._msp = MspReceiver(3 + options.chunk_records * RECORD_SIZE) if faults.extension else MspReceiver()
         self._answers = MspAnswers(lambda: self.craft_at(self._clock), options.tree)
         self._mavlink = MavlinkSplitter()
         self._sender = MavlinkSender()
         # Harakiri's own list and MAVLink upload, also alongside the extension.
-        self._floppy = Floppy(flash, self._board, self._missions, self._send_message)
+        self._parameters = Parameters(self._board, self._settings, spend_write, self._send_message)
+        self._floppy = Floppy(flash, self._board, self._missions, self._send_message, self._parameters.reset)
         if not (self._missions or self._config.is_valid):
             self._floppy.clear()
         self._cli = CommandLine(options.tree, self._cli_status)
@@ -180,11 +179,10 @@ class Firmware:
         self._home = (here.lat_e7, here.lon_e7) if self.armed else None
         if self._missions:
             self._missions.drop_stale(self._clock)
-        match self._options.tele_prot:
-            case TelemetryProtocol.FRSKY_9600:
-                self._uart.set_baud(_FRSKY_BAUD if self.armed else self._options.baud, self._clock)
-            case TelemetryProtocol.MAVLINK_57600:
-                self._uart.set_baud(_MINIMOSD_BAUD if self.armed else self._options.baud, self._clock)
+        bauds = {TelemetryProtocol.FRSKY_9600: _FRSKY_BAUD, TelemetryProtocol.MAVLINK_57600: _MINIMOSD_BAUD}
+        if (armed_baud := bauds.get(self._options.tele_prot)) is not None:
+            self._uart.set_baud(armed_baud if self.armed else self._options.baud, self._clock)
+            self._parameters.reset()
 
     def _write_config_if_due(self) -> None:
         due = self._board.config_write_due
@@ -194,7 +192,7 @@ class Firmware:
     def _write_config(self) -> None:
         """Write the whole configuration; the firmware does not verify it (writeParams)."""
         self._board.config_write_due = None
-        settings = self._settings.encode() if self._settings else b""
+        settings = self._settings.encode()
         with contextlib.suppress(FlashError):
             # With the extension the list has flash of its own; without it, it is part of the configuration.
             if self._missions:
@@ -240,7 +238,8 @@ class Firmware:
 
     def _choose_protocol(self) -> None:
         if not self.armed:
-            if self._clock - self._last_valid >= _AUTOSENSE_SECONDS - _EPSILON:
+            is_silent = self._clock - self._last_valid >= _AUTOSENSE_SECONDS - _EPSILON
+            if is_silent and not self._parameters.is_listing:
                 self._switch(Protocol.AUTOSENSE)
             return
         match self._options.tele_prot:
@@ -262,7 +261,7 @@ class Firmware:
         if self.protocol is not Protocol.MSP:
             due.append(self._schedule.next_due(self.protocol is Protocol.AUTOSENSE))
         if not self.armed:
-            if self.protocol is not Protocol.AUTOSENSE:
+            if self.protocol is not Protocol.AUTOSENSE and not self._parameters.is_listing:
                 due.append(self._last_valid + _AUTOSENSE_SECONDS)
         elif self._options.tele_prot is TelemetryProtocol.FRSKY_9600:
             due.append(self._frsky_time + frsky.PERIOD_SECONDS)
@@ -271,7 +270,11 @@ class Firmware:
     def _send_telemetry(self) -> None:
         if self.protocol is Protocol.MSP:
             return
-        for message in self._schedule.take_due(self._clock, self.protocol is Protocol.AUTOSENSE):
+        is_sensing = self.protocol is Protocol.AUTOSENSE
+        for message in self._schedule.take_due(self._clock, is_sensing, self._parameters.is_listing):
+            if message is Stream.PARAM_VALUE:
+                self._parameters.send_next()
+                continue
             uptime = self._clock - self._booted_at
             frame = self._sender.telemetry(message, self.craft_at(self._clock), uptime)
             self._uart.write(frame, self._clock)
@@ -293,6 +296,7 @@ class Firmware:
                 if frame.version == 1:
                     self._switch(Protocol.MAVLINK)
                     self._floppy.take(frame, self._clock)
+                    self._parameters.take(frame, self._clock)
                     return True
         if self.protocol is not Protocol.MAVLINK and self._faults.msp and (request := self._msp.push(byte)):
             self._switch(Protocol.MSP)
@@ -319,7 +323,7 @@ class Firmware:
         self._uart.write(frame, self._clock)
 
     def _extension_answer(self, command: int, payload: bytes) -> bytes | None:
-        if not (self._missions and self._settings):
+        if self._missions is None:
             return None
         answer = self._missions.answer(command, payload, self._clock)
         self._counters.flash_writes = self._missions.writes

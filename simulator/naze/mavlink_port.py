@@ -33,7 +33,10 @@ SLOT_SECONDS = 0.010
 
 
 class Stream(Enum):
-    """The messages of the stream: divisor (the first that divides wins), message id, payload layout."""
+    """The messages of the stream: divisor (the first that divides wins), message id, payload layout.
+
+    PARAM_VALUE has its slots only while the parameters are listed; simulator.naze.parameters fills it.
+    """
 
     SCALED_PRESSURE = (199, 29, "<Iffh")
     HEARTBEAT = (101, 0, "<IBBBBB")
@@ -41,6 +44,7 @@ class Stream(Enum):
     GPS_RAW_INT = (47, 24, "<QiiiHHHHBB")
     RC_CHANNELS_RAW = (43, 35, "<IHHHHHHHHBB")
     VFR_HUD = (11, 74, "<ffffhH")
+    PARAM_VALUE = (10, 22, "")
     ATTITUDE = (3, 30, "<Iffffff")
 
 
@@ -60,20 +64,21 @@ class MavlinkSchedule:
         divisors = [message.value[0] for message in ((Stream.HEARTBEAT,) if only_heartbeat else Stream)]
         return self._time + SLOT_SECONDS * min(divisor - self._slot % divisor for divisor in divisors)
 
-    def take_due(self, now: float, only_heartbeat: bool) -> list[Stream]:
+    def take_due(self, now: float, only_heartbeat: bool, is_listing: bool) -> list[Stream]:
         due = []
         while self._time + SLOT_SECONDS <= now + 1e-9:
             self._time += SLOT_SECONDS
             self._slot = (self._slot + 1) & 0xFFFF
-            if message := self._message(self._slot, only_heartbeat):
+            if message := self._message(self._slot, only_heartbeat, is_listing):
                 due.append(message)
         return due
 
     @staticmethod
-    def _message(slot: int, only_heartbeat: bool) -> Stream | None:
+    def _message(slot: int, only_heartbeat: bool, is_listing: bool) -> Stream | None:
         if only_heartbeat:
             return None if slot % Stream.HEARTBEAT.value[0] else Stream.HEARTBEAT
-        return next((message for message in Stream if slot % message.value[0] == 0), None)
+        possible = (message for message in Stream if is_listing or message is not Stream.PARAM_VALUE)
+        return next((message for message in possible if slot % message.value[0] == 0), None)
 
 
 class MavlinkSender:
@@ -117,6 +122,8 @@ def _fields(message: Stream, craft: Craft, uptime_ms: int) -> tuple[float, ...]:
         case Stream.RC_CHANNELS_RAW:
             roll, pitch, yaw, throttle_us, *aux = channels_us(armed, craft.boxes)
             return uptime_ms, roll, pitch, throttle_us, yaw, *aux, 0, _RSSI
+        case Stream.PARAM_VALUE:
+            return ()
         case Stream.VFR_HUD:
             return 0.0, flight.speed_ms, flight.height_m, flight.climb_ms, heading, throttle
         case Stream.ATTITUDE:

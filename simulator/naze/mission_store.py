@@ -39,19 +39,25 @@ _NOT_ALONE = (WpCommand.SETROI, WpCommand.RETURN_TO_LAUNCH, WpCommand.LAND, WpCo
 
 
 class Floppy:
-    """One boot's store. `send` packs and sends a message to a partner.
+    """One boot's store. `send` packs and sends a message to a partner. `on_reset`: called at the end of a transfer.
 
     With the extension, `missions` keeps the list, and an interrupted upload leaves the old one. Without it, the list
     is written with the configuration, complete or not.
     """
 
     def __init__(
-        self, flash: NorFlash, board: Board, missions: Missions | None, send: Callable[[Packed], None]
+        self,
+        flash: NorFlash,
+        board: Board,
+        missions: Missions | None,
+        send: Callable[[Packed], None],
+        on_reset: Callable[[], None],
     ) -> None:
         self._board = board
         self._missions = missions
         self._slots = MissionSlots(flash, board.options)
         self._send = send
+        self._on_reset = on_reset
         self._decoder = MavlinkDecoder()
         self._partner = (0, 0)
         self.load()
@@ -115,6 +121,7 @@ class Floppy:
     def _reset(self) -> None:
         self._receiving = self._sending = self._knows_roi = False
         self._expected = 0
+        self._on_reset()
 
     def _is_free(self) -> bool:
         busy = self._receiving or self._sending or self._board.write_pending

@@ -23,7 +23,8 @@ _NAMES = [held.setting.name for held in SETTINGS]
 _RADIUS, _MOTORS_OFF, _SENSOR = (_NAMES.index(name) for name in ("gps_wp_radius", "esc_moff", "acc_hdw"))
 _TRIMS = [_NAMES.index(name) for name in ("rc_trm_rll", "rc_trm_ptch")]
 _ALIGNMENT = ("align_gyro", "align_acc", "align_mag")
-_FIXED = [at for at, name in enumerate(_NAMES) if name == "gbl_flg" or name.startswith(_ALIGNMENT)]
+#: A running firmware may crash with another value.
+CRASHING = frozenset(name for name in _NAMES if name == "gbl_flg" or name.startswith(_ALIGNMENT))
 #: Of all values in the configuration, bytes.
 STORED_SIZE = 4 * len(SETTINGS)
 
@@ -41,7 +42,7 @@ class SettingsCommands:
 
     def encode(self) -> bytes:
         """The values for the configuration."""
-        return b"".join(held.setting.pack(held.value) for held in self._table())
+        return b"".join(held.setting.pack(held.value) for held in self.table)
 
     def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
         """The reply's payload; None if it is another command."""
@@ -53,12 +54,13 @@ class SettingsCommands:
                 return self._set(body, now).encode()
         return None
 
-    def _table(self) -> list[HeldSetting]:
+    @property
+    def table(self) -> list[HeldSetting]:
         self._held[_RADIUS] = self._held[_RADIUS]._replace(value=self._board.wp_radius_cm)
         return self._held
 
     def _all(self, status: ReplyStatus) -> TableReply:
-        return TableReply(status, len(self._held), table_checksum(self._table()))
+        return TableReply(status, len(self._held), table_checksum(self.table))
 
     def _read(self, body: bytes) -> SettingsReply | TableReply:
         first, count = _READ.unpack(body) if len(body) == _READ.size else (0, 0)
@@ -70,7 +72,7 @@ class SettingsCommands:
             return self._all(ReplyStatus.OK)
         if first >= len(self._held):
             return SettingsReply(ReplyStatus.RANGE, first)
-        found = self._table()[first : first + count]
+        found = self.table[first : first + count]
         while len((reply := SettingsReply(ReplyStatus.OK, first, found)).encode()) > REPLY_SIZE:
             found.pop()
         return reply
@@ -87,18 +89,20 @@ class SettingsCommands:
             return self._save(int.from_bytes(bits, "little"), now)
         if index >= len(self._held):
             return SettingsReply(ReplyStatus.RANGE, index)
-        held = self._table()[index]
+        held = self.table[index]
         if held.setting.identity != identity:
             return SettingsReply(ReplyStatus.CHECKSUM, index)
         value = held.setting.unpack(bits)
         is_whole = held.setting.pack(value) == bits  # an integer wider than its variable is out of range
-        is_dangerous = (index == _MOTORS_OFF and value > held.value) or (index in _FIXED and value != held.value)
+        may_crash = held.setting.name in CRASHING and value != held.value
+        is_dangerous = (index == _MOTORS_OFF and value > held.value) or may_crash
         if not (held.setting.accepts(value) and is_whole) or is_dangerous:
             return SettingsReply(ReplyStatus.RANGE, index, [held])
-        self._change(index, value)
+        self.change(index, value)
         return SettingsReply(ReplyStatus.OK, index, [self._held[index]])
 
-    def _change(self, index: int, value: float) -> None:
+    def change(self, index: int, value: float) -> None:
+        """Set a value in RAM, with its effect on others."""
         if value == self._held[index].value:
             return
         self._held[index] = self._held[index]._replace(value=value)
@@ -109,7 +113,7 @@ class SettingsCommands:
                 self._held[trim] = self._held[trim]._replace(value=0.0)
 
     def _save(self, expected: int, now: float) -> TableReply:
-        if table_checksum(self._table()) != expected:
+        if table_checksum(self.table) != expected:
             return self._all(ReplyStatus.CHECKSUM)
         if not self._spend_write():
             return self._all(ReplyStatus.BUSY)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from protocols.mavlink.codec import FrameWriter, MavlinkDecoder, pack
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
-from protocols.mavlink.frame import MavlinkSplitter
+from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from tests.support.naze_bench import WireBench
 
 #: A command that the firmware does not store.
@@ -28,6 +28,7 @@ class MavlinkGround:
         self._writer = FrameWriter(255, 190)
         self._splitter = MavlinkSplitter()
         self._decoder = MavlinkDecoder()
+        self._frames: list[MavlinkFrame] = []
 
     def send(self, message: Message) -> None:
         self._bench.send(self._writer.frame(pack(message), 1))
@@ -35,11 +36,14 @@ class MavlinkGround:
     def wait(self, *wanted: int, seconds: float = 2.0) -> Message | None:
         """The next message of one of these kinds."""
         end = self._bench.now + seconds
-        while self._bench.now < end:
-            for frame in self._splitter.feed(self._bench.run(0.02)):
+        while True:
+            while self._frames:
+                frame = self._frames.pop(0)
                 if frame.msgid in wanted:
                     return self._decoder.decode(frame)
-        return None
+            if self._bench.now >= end:
+                return None
+            self._frames += self._splitter.feed(self._bench.run(0.02))
 
     def answer_to(self, message: Message) -> int | None:
         """The result of the ACK to a message."""
