@@ -41,9 +41,7 @@ from bridge.transfers.downloads import MissionDownloads
 from bridge.transfers.local_missions import LocalMissions
 from bridge.transfers.mission_watch import MissionWatch
 from bridge.transfers.uploads import FC_LOST, STOPPED, MissionUploads
-from bridge.vehicle.board_settings import (
-    BoardSettings,
-)
+from bridge.vehicle.board_settings import BoardSettings
 from bridge.vehicle.calibration import Calibration
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.incoming import Incoming

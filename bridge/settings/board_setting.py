@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any
 
+from protocols.float32 import single
+
 #: A text only where the setting is one.
 Value = float | str
 
@@ -58,6 +60,12 @@ class BoardSetting:
         is_number = self.kind is not ValueKind.TEXT and math.isfinite(value) and self.minimum <= value <= self.maximum
         return is_number and (self.kind is ValueKind.FLOAT or value == int(value))
 
+    def holds(self, value: Value) -> bool:
+        """True if the board would store it as the value it has."""
+        if isinstance(value, str) or self.kind is not ValueKind.FLOAT:
+            return value == self.value
+        return single(value) == self.value
+
 
 @dataclass(frozen=True, slots=True)
 class SettingTable:
@@ -102,7 +110,7 @@ def shown(value: Value) -> str:
     """A value as the board's command line would take it; floats with the digits that single precision has."""
     if isinstance(value, str):
         return value
-    return str(int(value)) if value == int(value) and abs(value) < 1e15 else f"{value:.7g}"
+    return str(int(value)) if abs(value) < 1e15 and value == int(value) else f"{value:.7g}"
 
 
 def _value(table: SettingTable, name: str) -> Value | None:

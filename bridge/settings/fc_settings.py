@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from math import isfinite
+from typing import ClassVar
 
 from bridge.line.conversation import Conversation
 from bridge.settings.board_setting import BoardSetting, SettingTable, Value, ValueKind, shown
@@ -54,8 +55,9 @@ def out_of_range(setting: BoardSetting, value: Value) -> SettingRefusal:
     return SettingRefusal(Cause.OUT_OF_RANGE, f"{setting.name} stays {shown(setting.value)}: {accepted}")
 
 
-def fixed(setting: BoardSetting) -> SettingRefusal:
-    return SettingRefusal(Cause.FIXED, f"{setting.name} stays {shown(setting.value)}: {setting.fixed}")
+def fixed(setting: BoardSetting, why: str = "") -> SettingRefusal:
+    """why: the reason, if it is not the setting's own."""
+    return SettingRefusal(Cause.FIXED, f"{setting.name} stays {shown(setting.value)}: {why or setting.fixed}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +75,14 @@ class TableReading:
 
 
 class FcSettings(ABC):
-    """The settings of one flight controller. Its conversations run while it is disarmed."""
+    """The settings of one flight controller. Its conversations run while it is disarmed.
+
+    read_only: the reason why none can be changed or saved; empty if they can. is_read_when_asked: the table is not read
+    before a client asks for it, and not again by itself after a failure.
+    """
+
+    read_only: ClassVar[str] = ""
+    is_read_when_asked: ClassVar[bool] = False
 
     @abstractmethod
     def read(self, former: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:

@@ -1,45 +1,39 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The flight controller's settings for all clients: the table as last read, one change at a time, and the save.
 
-The table is read when the board is found, while it is disarmed and no mission needs the line. It is kept when the
-board is lost or armed, and read again when something else may have changed it. Changes are in the board's RAM until
-they are saved.
+The table is read when the board is found, or when a client asks for it if reading disturbs the board; only while it is
+disarmed and no mission needs the line. It is kept when the board is lost or armed, and read again when something else
+may have changed it. Changes are in the board's RAM until they are saved.
 """
 
-from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import inf
-from typing import TypeVar
 
 from bridge.fc.profile import FlightController
 from bridge.fc.session import FcSession
-from bridge.line.conversation import Conversation, LinkLost, Pause, ask_status
+from bridge.line.conversation import LinkLost
 from bridge.missions.mission_service import MissionService
 from bridge.model.events import Emit, SettingChanged, SettingsRead, SettingsSaved
-from bridge.settings.board_setting import BoardSetting, SettingTable, Value, ValueKind, shown
+from bridge.settings.board_setting import BoardSetting, SettingTable, Value, shown
 from bridge.settings.fc_settings import (
     ARMED,
     NO_ANSWER,
     Cause,
     FcSettings,
     SettingRefusal,
-    TableReading,
     fixed,
     out_of_range,
 )
-from protocols.float32 import single
+from bridge.settings.while_disarmed import while_disarmed
+from bridge.vehicle.setting_clients import Change, Changes, OnChanged, OnTable, TableClients
+from bridge.vehicle.table_reader import TableReader
 
 #: After the board was found: its list is read first.
 _FIRST_S, _RETRY_S, _AFTER_CHANGE_S = 0.2, 0.3, 5.0
-#: Of readings that failed.
-_MOST_RETRY_S = 60.0
-#: Changes that wait: of one client, which repeats them, and of all.
-_MOST_OF_ONE, _MOST_WAITING = 8, 64
 #: A change is a handful of short requests.
 _CHANGE_SIZE = 200
-#: A client waits this long for a first table; INAV's takes 20 s.
-READ_WITHIN_S = 30.0
+#: A client waits this long for a table: INAV's takes 20 s, a Harakiri's over MAVLink 24 s, and again for a lost value.
+READ_WITHIN_S = 60.0
 
 _NO_BOARD = SettingRefusal(Cause.NO_LINK, "No flight controller whose settings can be read")
 _OCCUPIED = SettingRefusal(Cause.OCCUPIED, "A mission is being transferred: try again when it has ended")
@@ -47,19 +41,7 @@ _UNREAD = SettingRefusal(Cause.OCCUPIED, "The settings have not been read yet: t
 _TOO_MANY = SettingRefusal(Cause.OCCUPIED, "Too many changes at once: try again")
 _NO_ARM_FLAG = SettingRefusal(Cause.REFUSED, "Nothing is changed: this board does not report whether it is armed")
 
-T = TypeVar("T")
-#: Called with the setting as read back after a change, or with the reason why it has not this value.
-OnChanged = Callable[[BoardSetting | SettingRefusal, float], None]
-OnTable = Callable[[SettingTable | SettingRefusal, float], None]
 OnSaved = Callable[[SettingRefusal | None, float], None]
-
-
-@dataclass(frozen=True, slots=True)
-class _Change:
-    name: str
-    value: Value
-    client: str
-    on_done: OnChanged
 
 
 class BoardSettings:
@@ -82,20 +64,15 @@ class BoardSettings:
         self._fc_settings: FcSettings | None = None
         #: The one that the table was read from.
         self._read_from: FcSettings | None = None
-        self._is_doubtful = True
-        #: The table being read, between two of its requests.
-        self._reading: Conversation[SettingTable | None] | None = None
-        #: A conversation for the settings runs or waits.
-        self._is_busy = False
-        #: When the line has carried the last change or request; when to read again after a failure.
-        self._free_at = self._read_at = 0.0
-        self._retry_s = _RETRY_S
-        self._changes: deque[_Change] = deque()
-        self._askers: list[tuple[float, OnTable]] = []
+        #: Something else may have changed the table since; a client waits for it.
+        self._is_doubtful, self._is_asked = True, False
+        self._reader = TableReader(missions.runner, self._pace, self._paused, self._read)
+        self._table_clients = TableClients()
+        self._changes, self._is_changing = Changes(), False
+        #: When the line has carried the last change.
+        self._line_free_at = 0.0
         #: As last read; also of a board that is armed or lost since.
         self.table: SettingTable | None = None
-        #: The number of settings read so far while a table is read; None: it is not.
-        self.read_so_far: int | None = None
         #: The settings that were changed here, and not saved since.
         self.unsaved: dict[str, Value] = {}
         #: True if the board's flash holds what is in its RAM, as far as is known here.
@@ -116,13 +93,14 @@ class BoardSettings:
         opens = None if controller is None else controller.profile.settings
         self._controller = controller
         self._fc_settings = None if opens is None or controller is None else opens(controller)
-        self._retry_s, self._read_at = _RETRY_S, now
-        self._stop_reading()
+        self._reader.forget_failures()
+        self._reader.stop()
+        self._is_asked = False
         if self._fc_settings is not None:
             self._is_doubtful = True
             self.due = now + _FIRST_S
         else:
-            self._answer_askers(now)
+            self._table_clients.answer(self._as_last_read(), now)
 
     def may_have_changed(self, now: float) -> None:
         """Something else may have changed settings: read them again."""
@@ -148,6 +126,11 @@ class BoardSettings:
         return None if armed is False else _UNREAD
 
     @property
+    def read_so_far(self) -> int | None:
+        """The number of settings read so far while a table is read; None: it is not."""
+        return self._reader.so_far
+
+    @property
     def is_checked(self) -> bool:
         """True if the table was read from this board since anything else may have changed it."""
         is_read = self._read_from is not None and self._read_from is self._fc_settings
@@ -158,33 +141,34 @@ class BoardSettings:
     def current(self, on_done: OnTable, now: float, within_s: float) -> None:
         """The table, checked against the board if that is possible within this time, else as last read."""
         if self._fc_settings is None or self._session.vehicle.armed or self._missions.occupied() is not None:
-            on_done(self.table or self.obstacle() or _NO_BOARD, now)
+            on_done(self._as_last_read(), now)
             return
-        self._askers.append((now + within_s, on_done))
-        self.due = now
+        self._table_clients.add(now + within_s, on_done)
+        self._is_asked, self.due = True, now
 
     def change(self, name: str, value: Value, on_done: OnChanged, now: float, client: str = "") -> None:
         """Change a setting in the board's RAM; `on_done` gets it as read back, maybe before this returns.
 
         The same request of a client that still waits is not repeated, and gets no answer of its own.
         """
-        if any((each.name, each.value, each.client) == (name, value, client) for each in self._changes):
+        change = Change(name, value, client, on_done)
+        if self._changes.has(change):
             return
         refused = self._refusal(name, value)
-        if refused is None and (
-            len(self._changes) >= _MOST_WAITING or sum(each.client == client for each in self._changes) >= _MOST_OF_ONE
-        ):
+        if refused is None and not self._changes.has_room_for(change):
             refused = _TOO_MANY
         if refused is not None:
             on_done(refused, now)
             return
-        self._changes.append(_Change(name, value, client, on_done))
+        self._changes.append(change)
         self._next(now)
 
     def save(self, on_done: OnSaved, now: float) -> None:
         """Write the settings to the board's flash."""
-        obstacle, fc_settings = self.obstacle(), self._fc_settings
-        if obstacle is not None or fc_settings is None:
+        obstacle, fc_settings, controller = self.obstacle(), self._fc_settings, self._controller
+        if obstacle is None and fc_settings is not None and fc_settings.read_only:
+            obstacle = SettingRefusal(Cause.FIXED, f"Nothing is saved: {fc_settings.read_only}")
+        if obstacle is not None or fc_settings is None or controller is None:
             on_done(obstacle or _NO_BOARD, now)
             return
 
@@ -201,70 +185,51 @@ class BoardSettings:
             self._is_doubtful, self.due = True, at
             self.is_saved = refused is None
 
-        self._missions.runner.start(self._disarmed(fc_settings.save()), done, now)
+        self._missions.runner.start(while_disarmed(controller.arm_bit, fc_settings.save()), done, now)
 
     def tick(self, now: float) -> None:
         self.due = inf
-        if self._askers:
-            self._askers, waiting = [], self._askers
-            for until, asker in waiting:
-                if now < until:
-                    self._askers.append((until, asker))
-                else:
-                    asker(self.table or self.obstacle() or _UNREAD, now)
+        self._table_clients.answer(self.table or self.obstacle() or _UNREAD, now, if_late=True)
         self._next(now)
-        if self._fc_settings is None or not (self._is_doubtful or self._askers or self._changes):
-            self._stop_reading()
+        if self._fc_settings is None or not (self._is_wanted(self._fc_settings) or self._changes):
+            self._reader.stop()
             return
-        next_at = max(self._free_at, self._read_at)
+        next_at = max(self._line_free_at, self._reader.next_at)
         self.due = next_at if next_at > now else now + _RETRY_S
         if self._session.vehicle.armed:
-            self._stop_reading()
-        elif self._may_read(now):
-            self._read(self._fc_settings, now)
+            self._reader.stop()
+        elif now >= next_at and self._may_read():
+            self._reader.read_on(self._fc_settings, self.table, self._is_doubtful, now)
 
     # Reading.
 
-    def _may_read(self, now: float) -> bool:
-        is_free = not (self._is_busy or self._changes or self._others_wait() or self._missions.runner.needs_line)
-        return is_free and now >= max(self._free_at, self._read_at) and self.obstacle() is None
+    def _is_wanted(self, fc_settings: FcSettings) -> bool:
+        return self._is_asked or (self._is_doubtful and not fc_settings.is_read_when_asked)
 
-    def _read(self, fc_settings: FcSettings, now: float) -> None:
-        """Begin to read the table, or go on; one request at a time, so that others can use the line in between."""
+    def _may_read(self) -> bool:
+        is_busy = self._reader.is_asking or self._is_changing or self._changes
+        is_free = not (is_busy or self._others_wait() or self._missions.runner.needs_line)
+        return is_free and self.obstacle() is None
 
-        def done(result: SettingTable | Pause | LinkLost | None, at: float) -> None:
-            self._is_busy = False
-            if self._fc_settings is not fc_settings or self._reading is not reading:
-                return
-            if isinstance(result, Pause):
-                self._free_at = self.due = at + result.seconds
-                self._next(at)
-                return
-            self._stop_reading()
-            if isinstance(result, SettingTable):
-                self._is_doubtful, self._retry_s = False, _RETRY_S
-                self._read_from = fc_settings
-                self._take(result, at)
-                self.on_read(result)
-                self._answer_askers(at)
-            else:
-                self._retry_s = min(2 * self._retry_s, _MOST_RETRY_S)
-                self._read_at = self.due = at + self._retry_s
-            self._next(at)
+    def _paused(self, now: float) -> None:
+        self.due = self._reader.line_free_at
+        self._next(now)
 
-        if self._reading is None:
-            how = TableReading(self._pace, self._progress, self._is_doubtful)
-            self._reading, self.read_so_far = fc_settings.read(self.table, how), 0
-        self._is_busy, reading = True, self._reading
-        self._missions.runner.start(_up_to_pause(reading), done, now, in_background=True)
-
-    def _stop_reading(self) -> None:
-        if self._reading is not None and not self._is_busy:
-            self._reading.close()
-        self._reading = self.read_so_far = None
-
-    def _progress(self, count: int) -> None:
-        self.read_so_far = count
+    def _read(self, table: SettingTable | None, now: float) -> None:
+        """The reader has ended; None: in vain."""
+        fc_settings = self._fc_settings
+        if table is not None:
+            self._is_doubtful = self._is_asked = False
+            self._read_from = fc_settings
+            self._take(table, now)
+            self.on_read(table)
+            self._table_clients.answer(self._as_last_read(), now)
+        elif fc_settings is not None and fc_settings.is_read_when_asked:
+            self._is_asked = False
+            self._table_clients.answer(NO_ANSWER, now)
+        else:
+            self.due = self._reader.next_at
+        self._next(now)
 
     def _pace(self, size: int) -> float:
         """The rest of the line carries these bytes in this time, which has already passed in part."""
@@ -277,10 +242,8 @@ class BoardSettings:
             self._emit(SettingsRead(settings=len(table)))
             self.on_table(table, now)
 
-    def _answer_askers(self, now: float) -> None:
-        askers, self._askers = self._askers, []
-        for _, asker in askers:
-            asker(self.table or self.obstacle() or _NO_BOARD, now)
+    def _as_last_read(self) -> SettingTable | SettingRefusal:
+        return self.table or self.obstacle() or _NO_BOARD
 
     # Changing.
 
@@ -293,38 +256,42 @@ class BoardSettings:
             return obstacle
         if setting is None:
             return _UNREAD
-        if setting.fixed and value != setting.value:
-            return fixed(setting)
+        read_only = "" if self._fc_settings is None else self._fc_settings.read_only
+        if (read_only or setting.fixed) and value != setting.value:
+            return fixed(setting, read_only)
         if not setting.accepts(value):
             return out_of_range(setting, value)
         if self._read_from is not self._fc_settings:
             return _UNREAD
+        if setting.holds(value):
+            return None
         return _NO_ARM_FLAG if self._controller is not None and self._controller.arm_bit is None else None
 
     def _next(self, now: float) -> None:
         """Carry out the next change."""
-        if self._is_busy or not self._changes:
+        if self._reader.is_asking or self._is_changing or not self._changes:
             return
-        if now < self._free_at:
-            self.due = min(self.due, self._free_at)
+        line_free_at = max(self._line_free_at, self._reader.line_free_at)
+        if now < line_free_at:
+            self.due = min(self.due, line_free_at)
             return
-        change, fc_settings, table = self._changes[0], self._fc_settings, self.table
+        change, fc_settings, table, controller = self._changes[0], self._fc_settings, self.table, self._controller
         refused = self._refusal(change.name, change.value)
         setting = None if table is None else table.find(change.name)
-        if refused is not None or fc_settings is None or table is None or setting is None:
+        if refused is not None or fc_settings is None or table is None or setting is None or controller is None:
             self._end(change, refused or _NO_BOARD, now)
             return
-        if _is_equal(setting, change.value):
+        if setting.holds(change.value):
             self._end(change, setting, now)
             return
 
         def done(result: SettingTable | SettingRefusal | LinkLost, at: float) -> None:
-            self._is_busy = False
-            self._free_at = at + self._pace(_CHANGE_SIZE)
+            self._is_changing = False
+            self._line_free_at = at + self._pace(_CHANGE_SIZE)
             # Without an answer it may be changed all the same.
             self.on_change(at)
             # What was read before may be out of date.
-            self._stop_reading()
+            self._reader.stop()
             self.is_saved = False
             if isinstance(result, SettingTable) and self._fc_settings is fc_settings:
                 self._take(result, at)
@@ -333,13 +300,13 @@ class BoardSettings:
                 self.may_have_changed(at)
                 self._end(change, result if isinstance(result, SettingRefusal) else NO_ANSWER, at)
 
-        self._is_busy = True
-        conversation = self._disarmed(fc_settings.change(table, setting, change.value))
+        self._is_changing = True
+        conversation = while_disarmed(controller.arm_bit, fc_settings.change(table, setting, change.value))
         self._missions.runner.start(conversation, done, now, in_background=True)
 
-    def _changed(self, change: _Change, before: BoardSetting) -> BoardSetting | SettingRefusal:
+    def _changed(self, change: Change, before: BoardSetting) -> BoardSetting | SettingRefusal:
         after = None if self.table is None else self.table.find(before.name)
-        if after is None or not _is_equal(after, change.value):
+        if after is None or not after.holds(change.value):
             value = shown(before.value if after is None else after.value)
             return SettingRefusal(Cause.REFUSED, f"{before.name} stays {value}: the flight controller refused it")
         self.unsaved[after.name] = after.value
@@ -348,37 +315,7 @@ class BoardSettings:
         )
         return after
 
-    def _end(self, change: _Change, result: BoardSetting | SettingRefusal, now: float) -> None:
+    def _end(self, change: Change, result: BoardSetting | SettingRefusal, now: float) -> None:
         self._changes.popleft()
         change.on_done(result, now)
         self._next(now)
-
-    def _disarmed(self, conversation: Conversation[T]) -> Conversation[T | SettingRefusal]:
-        """Run it if STATUS says disarmed now: telemetry may not show it yet."""
-        controller = self._controller
-        status = yield from ask_status()
-        if status is None or controller is None or controller.arm_bit is None:
-            conversation.close()
-            return NO_ANSWER
-        if status.box_flags >> controller.arm_bit & 1:
-            conversation.close()
-            return ARMED
-        return (yield from conversation)
-
-
-def _up_to_pause(conversation: Conversation[SettingTable | None]) -> Conversation[SettingTable | Pause | None]:
-    """Go on with a conversation up to its next pause, or its end."""
-    answer = None
-    try:
-        while not isinstance(effect := conversation.send(answer), Pause):
-            answer = yield effect
-    except StopIteration as end:
-        table: SettingTable | None = end.value
-        return table
-    return effect
-
-
-def _is_equal(setting: BoardSetting, value: Value) -> bool:
-    if isinstance(value, str) or setting.kind is not ValueKind.FLOAT:
-        return value == setting.value
-    return single(value) == setting.value

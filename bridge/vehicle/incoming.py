@@ -114,6 +114,6 @@ class Incoming:
             answers(answer)
         elif message is not None and frame.msgid == m.MAVLINK_MSG_ID_PARAM_SET and self.routes is None:
             # The protocol's answer is the current value.
-            self._parameters.send_one(station, message.param_id, -1)
+            self._parameters.send(station, message.param_id)
         if is_first:
             answers(m.MAVLink_statustext_message(Severity.WARNING, f"Refused: {refused.why}".encode()))

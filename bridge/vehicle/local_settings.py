@@ -2,7 +2,8 @@
 """Operations on the board's settings for the command line, the status page and zenoh. Sans-IO."""
 
 from bridge.fc.session import FcSession
-from bridge.vehicle.board_settings import READ_WITHIN_S, BoardSettings, OnTable
+from bridge.vehicle.board_settings import READ_WITHIN_S, BoardSettings
+from bridge.vehicle.setting_clients import OnTable
 from bridge.vehicle.settings_restore import SettingsRestores
 
 

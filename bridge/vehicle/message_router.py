@@ -94,8 +94,8 @@ class MessageRouter:
                 s, m.MAVLINK_MSG_ID_AUTOPILOT_VERSION, now
             ),
             m.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: lambda s, _msg, now: parameters.request_list(s, now),
-            m.MAVLINK_MSG_ID_PARAM_REQUEST_READ: lambda s, msg, _: parameters.send_one(
-                s, msg.param_id, msg.param_index
+            m.MAVLINK_MSG_ID_PARAM_REQUEST_READ: lambda s, msg, now: parameters.send_one(
+                s, msg.param_id, msg.param_index, now
             ),
             m.MAVLINK_MSG_ID_PARAM_SET: lambda s, msg, now: parameters.set(s, msg.param_id, msg.param_value, now),
             m.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: lambda s, msg, now: parameters.answer_file(s, msg.payload, now),

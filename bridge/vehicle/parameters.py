@@ -77,26 +77,37 @@ class Parameters:
             return
         dialogue.awaits_list, dialogue.station = True, station
 
-        def done(_table: SettingTable | SettingRefusal, at: float) -> None:
+        def done(table: SettingTable | SettingRefusal, at: float) -> None:
+            if isinstance(table, SettingRefusal) and table.cause is Cause.NO_ANSWER:
+                self._ground.say(Severity.WARNING, table.text, station)
             dialogue.awaits_list, dialogue.next = False, 0
             self.due = min(self.due, at)
 
         self._settings.current(done, now, _LIST_WITHIN_S)
 
-    def send_one(self, station: Station, name: str, index: int) -> None:
+    def send_one(self, station: Station, name: str, index: int, now: float) -> None:
         """PARAM_REQUEST_READ: by index, or by name where index is -1."""
         names = list(self._values())
         if index >= 0:
-            name = names[index] if index < len(names) else ""
-        self._send(station, name)
+            self.send(station, names[index] if index < len(names) else "")
+            return
+
+        def done(table: SettingTable | SettingRefusal, _at: float) -> None:
+            if not isinstance(table, SettingRefusal) or table.cause is not Cause.OCCUPIED:
+                self.send(station, name)
+
+        if name in names or self._settings.table is not None:
+            self.send(station, name)
+        else:
+            self._settings.current(done, now, _LIST_WITHIN_S)
 
     def set(self, station: Station, name: str, value: float, now: float) -> None:
         """PARAM_SET: answered with the value that is then in force, as the protocol requires."""
         setting = self._named.get(name)
         if setting is None:
-            self._own.set(station, name, value, now, lambda to: self._send(to, name))
+            self._own.set(station, name, value, now, lambda to: self.send(to, name))
         elif value == single(float(setting.value)):
-            self._send(station, name)
+            self.send(station, name)
         elif setting.kind is ValueKind.INTEGER and isfinite(value) and abs(value) >= _MOST_EXACT:
             above = f"{name} stays {shown(setting.value)}: only up to {_MOST_EXACT - 1} over MAVLink"
             self._refuse(station, name, SettingRefusal(Cause.OUT_OF_RANGE, above))
@@ -182,13 +193,13 @@ class Parameters:
         if isinstance(result, SettingRefusal):
             self._refuse(station, name, result)
         else:
-            self._send(station, name)
+            self.send(station, name)
 
     def _refuse(self, station: Station, name: str, refused: SettingRefusal) -> None:
         """Tell the reason, then the value in force. PARAM_ERROR, which MAVLink 1 lacks, spares MAVSDK a wait."""
         self._ground.say(Severity.ERROR, refused.text, station)
         self._error(station, name, _ERRORS.get(refused.cause, messages.MAV_PARAM_ERROR_PERMISSION_DENIED))
-        self._send(station, name)
+        self.send(station, name)
 
     def _values(self) -> dict[str, float]:
         """Every parameter. The bridge's own keep their indexes on every board."""
@@ -197,7 +208,7 @@ class Parameters:
             values[name] = float(setting.value)
         return values
 
-    def _send(self, station: Station | None, name: str) -> None:
+    def send(self, station: Station | None, name: str) -> None:
         """Send PARAM_VALUE, or PARAM_ERROR without such a parameter; None: to all stations, which keep a copy."""
         values = self._values()
         if name not in values:

@@ -22,6 +22,11 @@ class SettingsClient:
         self._world, self._name = world, name
         self._settings = inside(world.bridge).board_settings
 
+    @property
+    def is_idle(self) -> bool:
+        """True while no table is read."""
+        return self._settings.read_so_far is None
+
     def wait_read(self, seconds: float = 30) -> SettingTable:
         self._world.wait_until(lambda _: self._settings.table is not None, seconds)
         table = self._settings.table

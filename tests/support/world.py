@@ -44,6 +44,7 @@ from protocols.msp.command_line import is_clean
 from protocols.msp.frame import MspFrame, MspParser
 from protocols.msp.mission import WpRecord, unpack_records
 from protocols.rights.effect import Effect
+from protocols.rights.mavlink import effect_of
 from protocols.rights.msp import Firmware, msp_right
 from simulator.board.flash import ERASED, PAGE_SIZE, NorFlash
 from simulator.board.line import garble
@@ -358,6 +359,7 @@ class World:
             # The board counts hazard runs.
             (sent,) = MavlinkSplitter().feed(data)
             assert sent.raw == data
+            assert effect_of(sent) in (Effect.READ, Effect.DIALOGUE, Effect.CHANGE), sent
         else:
             rubbed_out = b"\x7f" if isinstance(self.inside.session.state, Cli) else b""
             frames = MspParser().feed(data)

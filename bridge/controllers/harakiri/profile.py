@@ -9,6 +9,7 @@ from dataclasses import replace
 from bridge.controllers.harakiri.arming import arming_blockers
 from bridge.controllers.harakiri.check import harakiri_rules
 from bridge.controllers.harakiri.mavlink_missions import HarakiriMavlinkMissions
+from bridge.controllers.harakiri.mavlink_settings import HarakiriMavlinkSettings
 from bridge.controllers.harakiri.mission_store import HarakiriMissions
 from bridge.controllers.harakiri.settings import HarakiriFcSettings
 from bridge.controllers.msp_settings import part_settings
@@ -85,6 +86,7 @@ MAVLINK = Profile(
     _FAMILY,
     Spoken.MAVLINK,
     missions=HarakiriMavlinkMissions,
+    settings=HarakiriMavlinkSettings,
     arming_blockers=arming_blockers,
     mavlink_sender=(1, 1, 200),  # baseflight_mavlink.c; other autopilots send as component 1
 )

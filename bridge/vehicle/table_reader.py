@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reads a board's settings in the background: one request at a time, so that others can use the line in between."""
+
+from collections.abc import Callable
+
+from bridge.line.conversation import Conversation, LinkLost, Pause
+from bridge.line.runner import Runner
+from bridge.settings.board_setting import SettingTable
+from bridge.settings.fc_settings import FcSettings, TableReading
+
+#: After a failure; doubled after each further one.
+_RETRY_S, _MOST_RETRY_S = 0.3, 60.0
+
+
+class TableReader:
+    """pace: see TableReading. on_pause: called between two requests; on_end: with the table, None after a failure."""
+
+    def __init__(
+        self,
+        runner: Runner,
+        pace: Callable[[int], float],
+        on_pause: Callable[[float], None],
+        on_end: Callable[[SettingTable | None, float], None],
+    ) -> None:
+        self._runner = runner
+        self._pace = pace
+        self._on_pause = on_pause
+        self._on_end = on_end
+        self._reading: Conversation[SettingTable | None] | None = None
+        self._retry_s, self._retry_at = _RETRY_S, 0.0
+        #: True while one of its requests is on the line.
+        self.is_asking = False
+        #: When the line has carried the last request.
+        self.line_free_at = 0.0
+        #: The number of settings read so far; None: it does not read.
+        self.so_far: int | None = None
+
+    @property
+    def next_at(self) -> float:
+        """The earliest time for the next request."""
+        return max(self.line_free_at, self._retry_at)
+
+    def read_on(self, fc_settings: FcSettings, former: SettingTable | None, is_doubtful: bool, now: float) -> None:
+        """Begin to read the table, or go on up to the next pause. former, is_doubtful: see FcSettings.read."""
+        if self._reading is None:
+            how = TableReading(self._pace, self._progress, is_doubtful)
+            self._reading, self.so_far = fc_settings.read(former, how), 0
+        reading, self.is_asking = self._reading, True
+
+        def done(result: SettingTable | Pause | LinkLost | None, at: float) -> None:
+            self.is_asking = False
+            if self._reading is not reading:
+                return
+            if isinstance(result, Pause):
+                self.line_free_at = at + result.seconds
+                self._on_pause(at)
+                return
+            self.stop()
+            if isinstance(result, SettingTable):
+                self._retry_s = _RETRY_S
+                self._on_end(result, at)
+            else:
+                self._retry_s = min(2 * self._retry_s, _MOST_RETRY_S)
+                self._retry_at = at + self._retry_s
+                self._on_end(None, at)
+
+        self._runner.start(_up_to_pause(reading), done, now, in_background=True)
+
+    def stop(self) -> None:
+        """Forget the values read so far: they may be out of date."""
+        if self._reading is not None and not self.is_asking:
+            self._reading.close()
+        self._reading = self.so_far = None
+
+    def forget_failures(self) -> None:
+        """Another board, or the same again."""
+        self._retry_s, self._retry_at = _RETRY_S, 0.0
+
+    def _progress(self, count: int) -> None:
+        self.so_far = count
+
+
+def _up_to_pause(conversation: Conversation[SettingTable | None]) -> Conversation[SettingTable | Pause | None]:
+    """Go on with a conversation up to its next pause, or its end."""
+    answer = None
+    try:
+        while not isinstance(effect := conversation.send(answer), Pause):
+            answer = yield effect
+    except StopIteration as end:
+        table: SettingTable | None = end.value
+        return table
+    return effect
