@@ -43,6 +43,21 @@ _LOOK_S = 0.02
 #: The state's copy of the mission arrives within this time.
 _COPY_S = 5.0
 _UNKNOWN = Refusal(MissionResult.DENIED, "The vehicle's mission is not known yet: try again")
+#: A ground station's messages about the mission that is on a vehicle.
+MISSION_REQUESTS = frozenset(
+    (
+        m.MAVLINK_MSG_ID_MISSION_COUNT,
+        m.MAVLINK_MSG_ID_MISSION_ITEM,
+        m.MAVLINK_MSG_ID_MISSION_ITEM_INT,
+        m.MAVLINK_MSG_ID_MISSION_ACK,
+        m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL,
+        m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST,
+        m.MAVLINK_MSG_ID_MISSION_REQUEST,
+        m.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
+        m.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST,
+        m.MAVLINK_MSG_ID_MISSION_SET_CURRENT,
+    )
+)
 #: MISSION_ITEM.current of items outside a list.
 _GUIDED = (2, 3)
 
@@ -71,6 +86,11 @@ class Relay:
         self._peers: list[tuple[Peer, bool]] = []
         self._end: _End | None = None
         self._held: tuple[tuple[MissionItem, ...] | None, ListIdentity | None] = None, None
+
+    @property
+    def system(self) -> int | None:
+        """The vehicle's system id; None before it was heard."""
+        return None if self._end is None else self._end.ids[0]
 
     @property
     def due(self) -> float:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from fleet.enrolment import EnrolmentError, FleetFolder, FleetRouter, Role
+from fleet.enrolment import SYSIDS, EnrolmentError, FleetFolder, FleetRouter, Role
 from fleet.options import check_endpoint
 from payloads.names import DEFAULT_PREFIX, ZenohSettingsError
 from terminal.options import PATH
@@ -42,14 +42,18 @@ def enroll(name: str, role: str, folder: Path, prefix: str, router: str) -> None
     """
     fleet, way_in = FleetFolder(folder.absolute()), FleetRouter(router, prefix)
     try:
-        files = fleet.enroll(name, Role(role), way_in)
+        enrolled = fleet.enroll(name, Role(role), way_in)
     except ZenohSettingsError as error:
         raise click.UsageError(str(error)) from error
     except EnrolmentError as error:
         fail(str(error))
-    click.echo(f"Copy into one folder of {name}: {', '.join(str(file) for file in files)}")
+    click.echo(f"Copy into one folder of {name}: {', '.join(map(str, enrolled.files))}")
     if role == Role.VEHICLE.value:
-        click.echo(f'In its configuration file:\n\n[zenoh]\nvehicle = "{name}"\nconfig_file = "{files[0].name}"')
+        sysid = "" if enrolled.member.sysid is None else f"sysid = {enrolled.member.sysid}\n\n"
+        table = f'[zenoh]\nvehicle = "{name}"\nconfig_file = "{enrolled.files[0].name}"'
+        click.echo(f"In its configuration file:\n\n{sysid}{table}")
+        if not sysid:
+            click.echo(f"\nNo system id is left for it: {len(SYSIDS)} vehicles have one.")
     if way_in.is_tls:
         click.echo(f"\nCertificates: python make_certificates.py {folder} ROUTER_HOST {name} (examples/zenoh-tls)")
     click.echo(f"\nThen restart the router in {fleet.path} with router.json5.")

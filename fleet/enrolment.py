@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The members of a fleet, and the router's access control made from them: `fleet enroll`, `fleet expel`.
 
-A folder holds `members.json` (names and roles), `passwords.txt` (the router's) or the certificates that
+A folder holds `members.json` (names, roles, system ids), `passwords.txt` (the router's) or the certificates that
 examples/zenoh-tls/make_certificates.py makes, `router.json5`, and one `NAME.json5` for each member. These name other
 files without a folder: payloads/zenoh_file.py finds them beside the configuration, zenohd in its working directory.
 
@@ -11,10 +11,11 @@ fleet, but gives rights only to the names in its configuration, and an expelled 
 
 import json
 import secrets
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
+from typing import Any
 
 from payloads.mission_data import Json
 from payloads.names import check_name
@@ -33,6 +34,8 @@ _EXPRESSIONS = ("**", "**/@adv/**", "@cmd/**", "@mavlink/**")
 _VIEWED = ("*/v1/**", "*/v1/**/@adv/**")
 
 
+#: Of vehicles; ground stations have the others.
+SYSIDS = range(1, 251)
 #: NAME.json5, NAME.pem and NAME.key are the router's, or those of the certificate authority.
 _RESERVED = ("router", "ca")
 _ROUTER, _MEMBERS, _PASSWORDS, _CA = "router.json5", "members.json", "passwords.txt", "ca.pem"
@@ -49,6 +52,22 @@ class Role(Enum):
 
 class EnrolmentError(Exception):
     """A member cannot be enrolled or expelled; one sentence."""
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """`sysid`: a vehicle's MAVLink system id, which no other vehicle of the fleet has; else None."""
+
+    role: Role
+    sysid: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Enrolled:
+    """A new member, and its own files."""
+
+    member: Member
+    files: Sequence[Path]
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,37 +89,38 @@ class FleetFolder:
 
     path: Path
 
-    def members(self) -> dict[str, Role]:
-        """Names and roles, also of expelled members."""
+    def members(self) -> dict[str, Member]:
+        """By name, also the expelled ones. A vehicle without a system id gets one."""
         try:
             found = json.loads(self._read(_MEMBERS) or "{}")
-            return {name: Role(role) for name, role in found.items()}
-        except (ValueError, AttributeError) as error:
+            return _with_sysids({name: _member(data) for name, data in found.items()})
+        except (ValueError, AttributeError, LookupError) as error:
             raise EnrolmentError(f"{self.path / _MEMBERS} is not a list of members: {error}") from error
 
-    def enroll(self, name: str, role: Role, router: FleetRouter) -> list[Path]:
-        """Add a member and write the router's configuration; returns the member's own files. ZenohSettingsError."""
+    def enroll(self, name: str, role: Role, router: FleetRouter) -> Enrolled:
+        """Add a member and write the router's configuration. ZenohSettingsError."""
         _check_member(name)
         check_name("--prefix", router.prefix)
         members = self.members()
-        former = members.get(name, role)
-        if former is Role.EXPELLED and router.is_tls:
+        former = members.get(name, Member(role))
+        if former.role is Role.EXPELLED and router.is_tls:
             raise EnrolmentError(f"{name} was expelled, and its certificate is still valid: choose another name")
-        if former not in (role, Role.EXPELLED):
-            raise EnrolmentError(f"{name} is a {former.value} already: choose another name")
-        members[name] = role
+        if former.role not in (role, Role.EXPELLED):
+            raise EnrolmentError(f"{name} is a {former.role.value} already: choose another name")
+        members = _with_sysids(members | {name: Member(role, former.sysid)})
         own = self._write(f"{name}.json5", self._session(name, router), 0o600)
         self._write(_ROUTER, self._router_config(members, router), 0o644)
         self._write_members(members)
-        return [own, *(self.path / file for file in (_CA, f"{name}.pem", f"{name}.key") if router.is_tls)]
+        files = [own, *(self.path / file for file in (_CA, f"{name}.pem", f"{name}.key") if router.is_tls)]
+        return Enrolled(members[name], files)
 
     def expel(self, name: str) -> None:
         """Remove a member's rights, password and login. May be repeated, for example after the disk was full."""
         members = self.members()
         if name not in members:
-            present = [each for each, role in sorted(members.items()) if role is not Role.EXPELLED]
+            present = sorted(each for each, member in members.items() if member.role is not Role.EXPELLED)
             raise EnrolmentError(f"{name} is not a member; there are: {', '.join(present) or 'none'}")
-        self._write_members(members | {name: Role.EXPELLED})
+        self._write_members(members | {name: Member(Role.EXPELLED)})
         passwords = self._passwords()
         if passwords.pop(name, None) is not None:
             self._write_passwords(passwords)
@@ -125,7 +145,7 @@ class FleetFolder:
             raise EnrolmentError(by_hand)
         return config
 
-    def _router_config(self, members: Mapping[str, Role], router: FleetRouter) -> Json:
+    def _router_config(self, members: Mapping[str, Member], router: FleetRouter) -> Json:
         """Rules for each vehicle, nothing for unknown sessions."""
         scheme = router.endpoint.partition("/")[0]
         port = router.endpoint.rpartition(":")[2]
@@ -141,7 +161,9 @@ class FleetFolder:
                 "link": {"tcp": {"so_sndbuf": _BUFFER_BYTES, "so_rcvbuf": _BUFFER_BYTES}, **tls},
                 "auth": {} if router.is_tls else {"usrpwd": {"dictionary_file": _PASSWORDS}},
             },
-            "access_control": access_control(router.prefix, members, by_certificate=router.is_tls),
+            "access_control": access_control(
+                router.prefix, {name: each.role for name, each in members.items()}, by_certificate=router.is_tls
+            ),
         }
 
     @staticmethod
@@ -174,8 +196,12 @@ class FleetFolder:
     def _write_passwords(self, passwords: Mapping[str, str]) -> None:
         self._write_text(_PASSWORDS, "".join(f"{name}:{password}\n" for name, password in passwords.items()), 0o600)
 
-    def _write_members(self, members: Mapping[str, Role]) -> None:
-        self._write(_MEMBERS, {name: role.value for name, role in members.items()}, 0o644)
+    def _write_members(self, members: Mapping[str, Member]) -> None:
+        data = {
+            name: {"role": each.role.value} | ({} if each.sysid is None else {"sysid": each.sysid})
+            for name, each in members.items()
+        }
+        self._write(_MEMBERS, data, 0o644)
 
     def _write(self, name: str, content: Json, mode: int) -> Path:
         return self._write_text(name, json.dumps(content, indent=2) + "\n", mode)
@@ -198,6 +224,29 @@ class FleetFolder:
             return ""
         except (OSError, UnicodeDecodeError) as error:
             raise EnrolmentError(f"{path} cannot be read: {reason(error)}") from error
+
+
+def _member(data: Any) -> Member:
+    """Formerly only the role was kept. ValueError, LookupError."""
+    if isinstance(data, str):
+        return Member(Role(data))
+    sysid = data.get("sysid")
+    if sysid is not None and sysid not in SYSIDS:
+        raise ValueError(f"{sysid!r} is not a system id")
+    return Member(Role(data["role"]), sysid)
+
+
+def _with_sysids(members: Mapping[str, Member]) -> dict[str, Member]:
+    """Assign the lowest free system ids; beyond the last there are none. ValueError if two members have the same."""
+    taken: dict[int, str] = {}
+    for name, each in members.items():
+        if each.sysid is not None and (other := taken.setdefault(each.sysid, name)) != name:
+            raise ValueError(f"{other} and {name} both have system id {each.sysid}")
+    free = (sysid for sysid in SYSIDS if sysid not in taken)
+    return {
+        name: replace(each, sysid=next(free, None)) if each.role is Role.VEHICLE and each.sysid is None else each
+        for name, each in members.items()
+    }
 
 
 def _check_member(name: str) -> None:

@@ -8,12 +8,11 @@ from typing import Any
 import click
 
 from fleet.command import fleet
-from fleet.options import FleetAddress, address_options, fleet_session
+from fleet.options import FleetAddress, address_options, all_option, fleet_session, vehicle_option
+from fleet.push_command import require_choice
 from fleet.roll_call import alive, chosen
 from payloads.names import ZenohSettingsError
 from terminal.sentences import INTERRUPTED, fail
-
-_READ_ONLY = "accepts no MAVLink: zenoh.mavlink_in is off there, the router denies access, or it is not connected"
 
 
 def _daemon_address(config: Path) -> FleetAddress:
@@ -32,8 +31,9 @@ def _daemon_address(config: Path) -> FleetAddress:
 fleet.context_settings["obj"] = _daemon_address
 
 
-@fleet.command(short_help="Connect a ground station with one vehicle, until Ctrl-C.")
-@click.option("--vehicle", "name", metavar="NAME", required=True, help="The vehicle to connect with.")
+@fleet.command(short_help="Connect a ground station with vehicles, until Ctrl-C.")
+@vehicle_option
+@all_option
 @click.option(
     "--gcs",
     metavar="ADDRESS",
@@ -43,16 +43,19 @@ fleet.context_settings["obj"] = _daemon_address
     help="The ground station, as for `run`; may be repeated.",
 )
 @address_options
-def mavlink(name: str, gcs: tuple[str, ...], **where: Any) -> None:
-    """Connect a ground station (Mission Planner, QGroundControl) with one vehicle through zenoh, until Ctrl-C.
+def mavlink(names: tuple[str, ...], to_all: bool, gcs: tuple[str, ...], **where: Any) -> None:
+    """Connect a ground station (Mission Planner, QGroundControl) with vehicles through zenoh, until Ctrl-C.
 
-    The vehicle must accept MAVLink (mavlink_in = true in its [zenoh] table); otherwise the station can only watch.
+    The vehicles must accept MAVLink (mavlink_in = true in their [zenoh] table); otherwise the station can only watch.
+    Several vehicles need different system ids: `fleet enroll` assigns them. With --all the station also gets vehicles
+    that appear later.
     """
     # Imported here, because the other commands do not need them.
-    from service.cli.gcs_relay import GcsRelay
+    from service.cli.fleet_relay import FleetRelay
     from service.links.gcs_links import LinkError
     from service.settings.addresses import parse_gcs
 
+    require_choice(names, to_all)
     try:
         addresses = [parse_gcs(address) for address in gcs]
     except ValueError as error:
@@ -60,21 +63,9 @@ def mavlink(name: str, gcs: tuple[str, ...], **where: Any) -> None:
 
     with fleet_session(where) as (session, prefix):
         bridges = alive(session, prefix)
-        chosen(bridges, (name,), prefix)
-
-        def input_changed(accepts: bool) -> None:
-            click.echo(f"{name} {'accepts MAVLink again' if accepts else _READ_ONLY}", err=True)
-
-        async def relay() -> None:
-            relay = GcsRelay(session, prefix, name, addresses, input_changed, bridges)
-            click.echo(f"{name} is at {', '.join(gcs)}. Ctrl-C ends.")
-            try:
-                await asyncio.Event().wait()
-            finally:
-                relay.close()
-
+        vehicles = chosen(bridges, names, prefix)
         try:
-            asyncio.run(relay())
+            asyncio.run(FleetRelay(session, prefix, vehicles, bridges, is_all=to_all).run(addresses))
         except LinkError as error:
             fail(str(error))
         except KeyboardInterrupt:

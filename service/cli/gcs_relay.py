@@ -1,178 +1,102 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`fleet mavlink`: one vehicle's MAVLink between zenoh and local ground stations; missions as commands."""
+"""`fleet mavlink`: the MAVLink of vehicles between zenoh and local ground stations."""
 
 import asyncio
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from math import inf
 
 import zenoh
 
 from bridge.gcs.station import Peer
-from bridge.relay import Relay, WriteResult
-from fleet.payload import decode, part, text, whole
-from fleet.session import send_query
-from fleet.vehicle import BridgeId, replier
-from payloads.keys import CLEAR, MAVLINK_IN, MAVLINK_OUT, MISSION_CURRENT, STATUS, UPLOAD, full
-from payloads.mission_data import Json, mission_findings, mission_items
-from protocols.mission_file import write_qgc_wpl
-from protocols.mission_item import MissionItem, MissionResult
-from protocols.mission_record import ListIdentity
+from bridge.relays import Relays
+from fleet.vehicle import BridgeId
+from service.cli.vehicle_relay import VehicleRelay
 from service.links.gcs_links import GcsLink, open_link
-from service.machine.threads import post
 from service.settings.addresses import GcsAddress
-
-#: The router reports a vehicle's subscription within this time.
-_FIRST_MATCH_S = 2.0
-_ASK_TIMEOUT_S, _WRITE_TIMEOUT_S = 10.0, 120.0
-_NO_RESULT = "No result from the vehicle: read the mission to see what it holds"
 
 
 class GcsRelay:
     """Implements GcsEvents. Must be made on a running event loop; LinkError if a link cannot be opened.
 
-    If the vehicle takes commands, missions are received here and sent to it as a whole (bridge/relay.py).
-    `bridges`: those that are alive. `on_input`: called with False if the vehicle does not accept frames, or is gone;
-    with True when it does again.
+    `on_input`: called with a vehicle's name and False if it does not accept frames, or is gone; with True when it does
+    again. `clashes`: see Relays.
     """
 
     def __init__(
         self,
         session: zenoh.Session,
         prefix: str,
-        vehicle: str,
         gcs: Sequence[GcsAddress],
-        on_input: Callable[[bool], None],
-        bridges: Collection[BridgeId],
+        on_input: Callable[[str, bool], None],
+        clashes: Callable[[str, str, int], object],
     ) -> None:
         self._loop = asyncio.get_running_loop()
-        self._session, self._prefix, self._vehicle, self._bridges = session, prefix, vehicle, bridges
-        self._relay = Relay(lambda data: self._input.put(data), self._write)
-        self.add_default_peer, self.remove_default_peer = self._relay.add_default_peer, self._relay.remove_default_peer
+        self._session, self._prefix, self._on_input = session, prefix, on_input
+        self._relays, self._clashes = Relays(self._left_out), clashes
+        self._vehicles: dict[str, VehicleRelay] = {}
+        self.add_default_peer = self._relays.add_default_peer
+        self.remove_default_peer = self._relays.remove_default_peer
         self._timer: asyncio.TimerHandle | None = None
         self._links: dict[str, GcsLink] = {}
         for address in gcs:
             link = open_link(address, self)
             self._links[link.name] = link
-        self._input = session.declare_publisher(
-            self._key(MAVLINK_IN.suffix),
-            congestion_control=zenoh.CongestionControl.DROP,
-            priority=zenoh.Priority.DATA_HIGH,
-        )
-        self._on_input = on_input
-        self._accepts_input: bool | None = None
-        self._matching = self._input.declare_matching_listener(
-            lambda status: post(self._loop, self._input_is, status.matching)
-        )
-        # A vehicle that never accepted frames causes no event.
-        self._loop.call_later(_FIRST_MATCH_S, lambda: self._input_is(self._accepts_input is True))
-        self._subscribers = [session.declare_subscriber(self._key(MAVLINK_OUT.suffix), self._heard)]
-        # Only a vehicle that takes commands can be sent a whole mission.
-        send_query(session, self._key(STATUS.suffix), self._takes_commands, _ASK_TIMEOUT_S)
+
+    @property
+    def heard(self) -> set[str]:
+        """The vehicles that were heard."""
+        return self._relays.heard
+
+    def add(self, name: str, bridges: Container[BridgeId]) -> None:
+        """Connect a vehicle. `bridges`: those that are alive, also later."""
+        if name in self._vehicles:
+            return
+        vehicle = VehicleRelay(self._session, self._prefix, name, bridges, self._vehicle_sent, self._on_input)
+        self._vehicles[name] = vehicle
+        self._relays.add(name, vehicle.relay)
+
+    def remove(self, name: str) -> None:
+        """Disconnect a vehicle."""
+        self._relays.remove(name)
+        if (vehicle := self._vehicles.pop(name, None)) is not None:
+            vehicle.close()
 
     def close(self) -> None:
         if self._timer is not None:
             self._timer.cancel()
-        for subscriber in self._subscribers:
-            subscriber.undeclare()  # type: ignore[no-untyped-call]
+        for name in [*self._vehicles]:
+            self.remove(name)
         for link in self._links.values():
             link.close()
 
     def gcs_data(self, peer: Peer, data: bytes, *, datagram: bool) -> None:
-        self._relay.gcs_received(peer, data, self._loop.time(), datagram=datagram)
+        self._relays.gcs_received(peer, data, self._loop.time(), datagram=datagram)
         self._flush()
 
     def gcs_gone(self, peer: Peer) -> None:
-        self._relay.gcs_gone(peer, self._loop.time())
+        self._relays.gcs_gone(peer, self._loop.time())
 
     def displaced(self, peers: Mapping[Peer, float]) -> Peer:
         """The longest-silent connection."""
         return min(peers, key=peers.__getitem__)
 
-    def _input_is(self, accepted: bool) -> None:
-        was_refused, self._accepts_input = self._accepts_input is False, accepted
-        if was_refused is accepted:
-            self._on_input(accepted)
-
-    def _heard(self, sample: zenoh.Sample) -> None:
-        post(self._loop, self._vehicle_sent, sample.payload.to_bytes())
-
-    def _vehicle_sent(self, data: bytes) -> None:
-        self._relay.vehicle_received(data, self._loop.time())
+    def _vehicle_sent(self, name: str, data: bytes) -> None:
+        """Frames of a vehicle, or none: its relay has something to send."""
+        self._relays.vehicle_received(name, data, self._loop.time())
         self._flush()
 
+    def _left_out(self, name: str, other: str, system: int) -> None:
+        self._vehicles.pop(name).close()
+        self._clashes(name, other, system)
+
     def _flush(self) -> None:
-        for peer, data in self._relay.take_datagrams():
+        for peer, data in self._relays.take_datagrams():
             self._links[peer.link].send(peer, data)
         if self._timer is not None:
             self._timer.cancel()
-        due = self._relay.due
+        due = self._relays.due
         self._timer = None if due == inf else self._loop.call_at(due, self._tick)
 
     def _tick(self) -> None:
-        self._relay.tick(self._loop.time())
+        self._relays.tick(self._loop.time())
         self._flush()
-
-    # The vehicle's mission, and commands. Called on zenoh's threads, except for `_write`.
-
-    def _key(self, suffix: str) -> str:
-        return full(self._prefix, self._vehicle, suffix)
-
-    def _takes_commands(self, reply: zenoh.Reply | None) -> None:
-        if reply is not None and reply.ok is not None:
-            post(self._loop, self._follow_mission)
-
-    def _follow_mission(self) -> None:
-        key = self._key(MISSION_CURRENT.suffix)
-        self._subscribers.append(self._session.declare_subscriber(key, self._mission))
-        send_query(self._session, key, self._mission_replied, _ASK_TIMEOUT_S)
-
-    def _mission_replied(self, reply: zenoh.Reply | None) -> None:
-        # A storage may know an older one.
-        if reply is not None and reply.ok is not None and replier(reply) in self._bridges:
-            self._mission(reply.ok)
-
-    def _mission(self, sample: zenoh.Sample) -> None:
-        data = decode(sample) or {}
-        count, checksum, items = whole(data, "count"), text(data, "checksum"), _items(part(data, "items"))
-        identity = None if count is None or checksum is None else ListIdentity(count, int(checksum, 16))
-        post(self._loop, self._relay.holds, items, identity)
-
-    def _write(self, items: Sequence[MissionItem]) -> None:
-        replied: list[WriteResult] = []
-
-        def reply(answer: zenoh.Reply | None) -> None:
-            if answer is None:
-                result = replied[-1] if replied else WriteResult(MissionResult.ERROR, _NO_RESULT)
-                post(self._loop, self._wrote, result)
-                return
-            data = decode(answer.ok or answer.err) or {}  # type: ignore[arg-type]
-            if isinstance(part(data, "result"), dict) or text(data, "error") is not None:
-                replied.append(_result(data))
-
-        payload = write_qgc_wpl(items).encode() if items else None
-        command = UPLOAD if items else CLEAR
-        send_query(self._session, self._key(command.suffix), reply, _WRITE_TIMEOUT_S, payload)
-
-    def _wrote(self, result: WriteResult) -> None:
-        self._relay.wrote(result)
-        self._flush()
-
-
-def _items(data: object) -> tuple[MissionItem, ...] | None:
-    try:
-        return tuple(mission_items(data))
-    except ValueError:
-        return None
-
-
-def _result(data: Json) -> WriteResult:
-    """The reply to a command: a result, or the reason for a refusal."""
-    found = part(data, "result")
-    result = found if isinstance(found, dict) else {}
-    ack = MissionResult.__members__.get((text(result, "ack") or "").removeprefix("MAV_MISSION_"), MissionResult.DENIED)
-    try:
-        findings = mission_findings(part(result, "findings") or [])
-    except (TypeError, ValueError):
-        findings = []
-    items = _items(part(result, "stored")) if ack is MissionResult.ACCEPTED else None
-    return WriteResult(ack, text(result, "text") or text(data, "error") or _NO_RESULT, findings, items)

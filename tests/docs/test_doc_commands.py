@@ -40,6 +40,7 @@ NOT_RUN = {
     "python -m benchmarks.light_fleet": "needs a router, and takes long; its module is checked",
     "python -m benchmarks.light_watch": "takes long, and it measures; lint checks its types",
     "python -m benchmarks.far_mission": "takes long, and it measures; lint checks its types",
+    "python -m benchmarks.fleet_mavlink": "takes long, and it measures; lint checks its types",
     "python -m benchmarks.zenoh_volume": "takes ten minutes, and it measures; lint checks its types",
     "python examples/zenoh_router.py": "tests/support/zenoh_router.py runs it, for all tests of fleets",
     "python examples/zenoh-tls/make_certificates.py": "tests/support/secured_fleet.py runs it",

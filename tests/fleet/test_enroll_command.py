@@ -18,6 +18,31 @@ def test_a_vehicle_with_any_name_has_a_rule_of_its_own(tmp_path: Path) -> None:
     assert len(set(rules)) == len(rules)
 
 
+def test_each_vehicle_gets_a_system_id_that_no_other_has(tmp_path: Path) -> None:
+    """Also those of a list from before there were ids; an expelled one's is free again."""
+
+    def enroll(name: str, *more: str) -> str:
+        return run_naze_bridge("fleet", "enroll", name, "--folder", tmp_path, *more).stdout
+
+    (tmp_path / "members.json").write_text(json.dumps({"anna": "pilot", "kite": "vehicle"}))
+    assert "\nsysid = 2\n\n[zenoh]\n" in enroll("owl")
+    assert "\nsysid = 1\n" in enroll("kite")
+    assert "sysid" not in enroll("anna", "--role", "pilot")
+    assert "\nsysid = 3\n" in enroll("crow")
+    run_naze_bridge("fleet", "expel", "owl", "--folder", tmp_path)
+    assert "\nsysid = 2\n" in enroll("swift")
+    members = tmp_path / "members.json"
+    members.write_text(members.read_text().replace('"sysid": 3', '"sysid": 2'))
+    same = run_naze_bridge("fleet", "enroll", "lark", "--folder", tmp_path).stderr
+    assert "both have system id 2" in same
+
+
+def test_beyond_250_vehicles_there_is_no_system_id(tmp_path: Path) -> None:
+    (tmp_path / "members.json").write_text(json.dumps({f"kite-{number}": "vehicle" for number in range(250)}))
+    enrolled = run_naze_bridge("fleet", "enroll", "owl", "--folder", tmp_path)
+    assert (enrolled.returncode, "No system id is left" in enrolled.stdout) == (0, True)
+
+
 def test_a_full_router_is_reported(tmp_path: Path) -> None:
     endpoint = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
     config = tmp_path / "router.json5"

@@ -12,7 +12,7 @@ import pytest
 
 from fleet.logs import Log, fetch_log
 from service.recording.tlog_recorder import TLOG_FOLDER
-from tests.support.fleet_bench import Fleet
+from tests.support.fleet_bench import I_KNOW, Fleet
 from tests.support.programs import Program, until
 
 NAME = "2026-05-01 10-00-00 flight.tlog"
@@ -24,11 +24,11 @@ CONTENT = random.Random(1).randbytes(100_000) + bytes(100_000)
 def fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fleet]:
     with ExitStack() as stack:
         fleet = Fleet(tmp_path_factory.mktemp("fleet"), stack)
-        for name, commands in (("kite", None), ("owl", "")):
+        for name, commands in (("kite", I_KNOW), ("owl", "")):
             logs = fleet.folder / name / "state" / TLOG_FOLDER
             logs.mkdir(parents=True)
             (logs / NAME).write_bytes(CONTENT)
-            fleet.start(name, **({} if commands is None else {"commands": commands}))
+            fleet.start(name, commands=commands)
         fleet.wait("kite", "owl")
         yield fleet
 

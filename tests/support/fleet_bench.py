@@ -31,13 +31,21 @@ class Fleet:
         self.boards: dict[str, Board] = {}
 
     def start(
-        self, folder: str, *, name: str = "", fc: str = "sim:", commands: str = I_KNOW, encoding: str = "json"
+        self,
+        folder: str,
+        *,
+        name: str = "",
+        fc: str = "sim:",
+        commands: str = I_KNOW,
+        encoding: str = "json",
+        sysid: int = 1,
     ) -> Daemon:
         """Start a vehicle; `name` if it differs from its folder's."""
         own = self.folder / folder
         own.mkdir(exist_ok=True)
         config = own / "config.toml"
         config.write_text(
+            f"sysid = {sysid}\n"
             f'[zenoh]\nvehicle = "{name or folder}"\nconnect = ["{self.router.endpoint}"]\nencoding = "{encoding}"\n'
             + commands
         )

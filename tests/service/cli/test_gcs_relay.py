@@ -19,11 +19,13 @@ from tests.support.programs import Program, free_port, until
 
 @contextmanager
 def relay(folder: Path, fleet: Fleet, vehicle: str, gcs: str) -> Iterator[Program]:
-    """The command as a process."""
-    where = ("--connect", fleet.router.endpoint)
-    program = Program(folder / "relay.log", "fleet", "mavlink", "--vehicle", vehicle, "--gcs", gcs, *where)
+    """The command as a process. `vehicle`: a name, or --all."""
+    vehicles = (vehicle,) if vehicle == "--all" else ("--vehicle", vehicle)
+    program = Program(
+        folder / "relay.log", "fleet", "mavlink", *vehicles, "--gcs", gcs, "--connect", fleet.router.endpoint
+    )
     try:
-        until(lambda: f"{vehicle} is at" in program.printed or not program.is_alive, "the relay")
+        until(lambda: " at udp" in program.printed or not program.is_alive, "the relay")
         yield program
     finally:
         code = program.end()
