@@ -19,6 +19,8 @@ _SEARCH_TIMEOUT_S = 12.0
 _PORTS_SEARCHED = 3
 #: A round of telemetry takes a second; at 9600 baud two.
 _TELEMETRY_TIMEOUT_S = 3.0
+#: A board that is found by its MAVLink telemetry counts as armed until its heartbeat says otherwise.
+_HEARTBEAT_TIMEOUT_S = 1.5
 _INTERVAL_S = 0.05
 _UNCONFIRMED = "interrupted; the flight controller has not confirmed that it keeps its mission: see `naze-bridge pull`"
 _TOLD_LATER = ("armed", "battery_v", "satellites", "mission_records")
@@ -51,6 +53,8 @@ async def ask_directly(
         # The controller is identified before its telemetry arrives, and some never send all of it.
         if request == STATUS:
             await _wait(lambda: None not in map(api.status().get, _TOLD_LATER), _TELEMETRY_TIMEOUT_S)
+        else:
+            await _wait(lambda: api.status()["armed"] is not True, _HEARTBEAT_TIMEOUT_S)
         job = asyncio.ensure_future(api.do(request, lambda answer: progress(answer["progress"])))
         return await asyncio.shield(job)
     except asyncio.CancelledError:
