@@ -221,10 +221,11 @@ class MissionChangedOnBoard(BridgeEvent):
 
 
 class SettingsRead(BridgeEvent):
-    """All settings of the flight controller were read, for the first time or with other values."""
+    """All settings of the flight controller were read, for the first time or with other values, named by `changed`."""
 
     name_in_log = "settings.read"
     settings: int
+    changed: str
 
 
 class SettingChanged(BridgeEvent):
@@ -245,7 +246,7 @@ class SettingsSaved(BridgeEvent):
 
 
 class SettingsChangedOnBoard(BridgeEvent):
-    """PIDs, modes, rates or MISC changed, but not through the bridge."""
+    """Settings changed, but not through the bridge."""
 
     name_in_log = "settings.changed_on_board"
     level: Level = "warning"

@@ -131,7 +131,7 @@ class MissionIdentity:
 
 @dataclass(frozen=True, slots=True)
 class SettingsIdentity:
-    """The identity of the flight controller's PIDs, modes, rates and MISC."""
+    """The identity of the flight controller's settings."""
 
     seal: Annotated[str, "CRC-32 over them, 8 hexadecimal digits"]
     changed: Annotated[str | None, "the last change that did not come through the bridge, for people"]

@@ -30,6 +30,8 @@ from bridge.vehicle.table_reader import TableReader
 
 #: After the board was found: its list is read first.
 _FIRST_S, _RETRY_S, _AFTER_CHANGE_S = 0.2, 0.3, 5.0
+#: Names in the log of settings that have changed.
+_MOST_NAMED = 20
 #: A change is a handful of short requests.
 _CHANGE_SIZE = 200
 #: A client waits this long for a table: INAV's takes 20 s, a Harakiri's over MAVLink 24 s, and again for a lost value.
@@ -108,9 +110,14 @@ class BoardSettings:
         if self._fc_settings is not None:
             self.due = min(self.due, now + _AFTER_CHANGE_S)
 
+    def changed_with_others(self, now: float) -> None:
+        """The bridge has begun a calibration, which may change settings."""
+        self.on_change(now)
+        self.may_have_changed(now)
+
     def saved_with_mission(self, now: float) -> None:
         """The board has written its whole configuration, to store a setting of the mission's."""
-        self.may_have_changed(now)
+        self.changed_with_others(now)
         self.unsaved.clear()
         self.is_saved = True
 
@@ -238,8 +245,9 @@ class BoardSettings:
 
     def _take(self, table: SettingTable, now: float) -> None:
         former, self.table = self.table, table
-        if former is None or table.differences(former):
-            self._emit(SettingsRead(settings=len(table)))
+        changed = table.differences(former or table)
+        if former is None or changed:
+            self._emit(SettingsRead(settings=len(table), changed=", ".join(changed[:_MOST_NAMED])))
             self.on_table(table, now)
 
     def _as_last_read(self) -> SettingTable | SettingRefusal:

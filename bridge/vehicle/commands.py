@@ -159,6 +159,7 @@ class CommandService:
         if command == messages.MAV_CMD_DO_START_MAG_CAL:
             self._acknowledge(station, command, result)
         self._calibration.begin(station, command, action, now, restarts=outcome is ActionResult.FREEZES)
+        self._settings.changed_with_others(now)
 
     def _do(self, station: Station, command: int, params: Sequence[float], now: float) -> CommandResult:
         match command:

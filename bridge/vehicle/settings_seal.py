@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reports settings of the flight controller that changed without the bridge: by its sticks, its display or its USB.
 
-PIDs, modes, rates and MISC are read when the board is found, and again while it is disarmed and the line is idle. The
-seal of each board is remembered, so that a change between two flights is noticed, too.
+PIDs, modes, rates and MISC, and the checksum of all settings where the board has one, are read when the board is found,
+and again while it is disarmed and the line is idle. The seal of each board is remembered, so that a change between two
+flights is noticed, too.
 """
 
 from collections.abc import Callable
@@ -152,6 +153,9 @@ class SettingsSeal:
                 changed.append(ChangedPart(wanted.part, changed_names(wanted, before, after, names)))
         if not parts:
             return changed
+        if len(changed) > 1:
+            # The checksum also changes with the parts that are named.
+            changed = [each for each in changed if each.part is not Part.OTHERS]
         seal = Seal(parts)
         if seal != former:
             self._memory.keep(self._board, seal)
@@ -172,10 +176,10 @@ class SettingsSeal:
             if instead is None and wanted.instead not in self._unknown:
                 return None
             command = wanted.instead if instead and instead[0] else command
-        payload = yield from self._ask(command, firmware)
+        payload = yield from self._ask(command, firmware, wanted.body)
         if payload is not None and wanted.settings(payload) != before:
-            payload = yield from self._ask(command, firmware, surely=True)
-        return None if payload is None else wanted.settings(payload)
+            payload = yield from self._ask(command, firmware, wanted.body, surely=True)
+        return wanted.settings(payload) if payload is not None and payload.startswith(wanted.begins) else None
 
     def _names(self, wanted: SettingsRequest, controller: FlightController) -> Conversation[SettingNames]:
         if wanted.part is Part.PIDS:
@@ -187,13 +191,15 @@ class SettingsSeal:
         names = yield from self._ask(Msp.BOXNAMES, controller.firmware, surely=True)
         return SettingNames(boxes_by_id=dict(zip(ids or b"", decode_box_names(names or b""), strict=False)))
 
-    def _ask(self, command: int, firmware: Firmware, *, surely: bool = False) -> Conversation[bytes | None]:
+    def _ask(
+        self, command: int, firmware: Firmware, body: bytes = b"", *, surely: bool = False
+    ) -> Conversation[bytes | None]:
         """The payload of a reply; None without one. A command that the board does not know is asked only once."""
-        right = msp_right(firmware, command, b"")
+        right = msp_right(firmware, command, body)
         if right.effect is not Effect.READ or command in self._unknown:
             return None
         asking = ask_surely if surely else partial(ask, tries=1)
-        reply: MspFrame | None = yield from asking(request(command), command, right.reply)
+        reply: MspFrame | None = yield from asking(request(command, body), command, right.reply)
         if reply is not None and reply.direction is Direction.REPLY:
             self._known.add(command)
             return reply.payload

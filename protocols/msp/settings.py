@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The settings that MSP can read: PIDs, modes, rates and MISC, and the names of those in which two replies differ.
+"""The settings that MSP can read in parts, and the names of those in which two replies differ.
 
 Layouts: Harakiri's serial.c; MultiWii's Protocol.cpp; baseflight's serial.c; Cleanflight's and Betaflight's msp.c;
 INAV's fc_msp.c.
@@ -11,6 +11,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from protocols.msp.commands import Msp
+from protocols.msp.setting_table import TABLE_BODY, SettingCommand
 from protocols.rights.msp import Firmware
 
 
@@ -21,6 +22,8 @@ class Part(Enum):
     MODES = "modes"
     RATES = "rates"
     MISC = "MISC"
+    #: Known by a checksum over all settings, those of other parts included.
+    OTHERS = "other settings"
 
 
 #: (name, bytes) from the first byte on; "": it has no name. None: it counts by itself and is not a setting.
@@ -32,7 +35,8 @@ class SettingsRequest:
     """A request for a part. `pid_size`: bytes for each PID; `layout`: of rates and MISC.
 
     setter: the command that takes the same payload, but of mode ranges one at a time, behind its number.
-    instead: a command that takes its place if the first byte of its reply is set.
+    instead: a command that takes its place if the first byte of its reply is set. body: the request's payload. begins:
+    the first bytes of a reply with settings.
     """
 
     part: Part
@@ -41,6 +45,8 @@ class SettingsRequest:
     layout: Layout = ()
     pid_size: int = 3
     instead: int | None = None
+    body: bytes = b""
+    begins: bytes = b""
 
     def settings(self, payload: bytes) -> bytes:
         """The payload with its counters as zeros."""
@@ -114,10 +120,13 @@ BOXES, RANGES = SettingsRequest(Part.MODES, Msp.BOX, 203), SettingsRequest(Part.
 _RATES_7, _RATES = (SettingsRequest(Part.RATES, Msp.RC_TUNING, 204, layout) for layout in (_OLD_RATES, _NEW_RATES))
 _MISC = SettingsRequest(Part.MISC, Msp.MISC, 207)
 _MISC_22 = SettingsRequest(Part.MISC, Msp.MISC, 207, _NEW_MISC)
+_OTHERS = SettingsRequest(
+    Part.OTHERS, SettingCommand.SETTING, SettingCommand.SET_SETTING, body=TABLE_BODY, begins=b"\0\xff\xff"
+)
 _NEW = (_PIDS, RANGES, _RATES, _MISC_22)
 SETTINGS: Mapping[Firmware, tuple[SettingsRequest, ...]] = {
     Firmware.HARAKIRI: (_PIDS, BOXES, _RATES_7, _MISC),
-    Firmware.HARAKIRI_MISSIONS: (_PIDS, BOXES, _RATES_7, _MISC),
+    Firmware.HARAKIRI_MISSIONS: (_PIDS, BOXES, _RATES_7, _MISC, _OTHERS),
     Firmware.BASEFLIGHT: (_PIDS, BOXES, _RATES_7, _MISC_22),
     Firmware.MULTIWII: (_PIDS, BOXES, _RATES_7, SettingsRequest(Part.MISC, Msp.MISC, 207, _MULTIWII_MISC)),
     Firmware.CLEANFLIGHT: _NEW,
@@ -162,6 +171,8 @@ def fields(request: SettingsRequest, payload: bytes, names: SettingNames) -> tup
                 if label and at + size <= len(payload):
                     found.append(Field(label, at, size))
                 at += size
+        case Part.OTHERS:
+            found = []
     return tuple(found)
 
 
@@ -179,6 +190,8 @@ def changed_names(request: SettingsRequest, before: bytes, after: bytes, names: 
             found = _changed_items(before, after, size, names.boxes)
         case Part.RATES | Part.MISC:
             found = _changed_fields(before, after, request.layout)
+        case Part.OTHERS:
+            return ()
     return tuple(dict.fromkeys(name for name in found if name))
 
 

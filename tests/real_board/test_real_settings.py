@@ -3,10 +3,12 @@
 
 import pytest
 
+from protocols.msp.setting_table import encode_set_setting
 from protocols.msp.settings import Part
 from simulator.emulated_naze.board import EmulatedNaze
 from simulator.emulated_naze.image import Image
 from tests.support.real_bench import Figure
+from tests.support.settings_client import SettingsClient
 from tests.support.world import World
 
 _CFG_SIZE = 3 * 1024
@@ -42,3 +44,18 @@ def test_a_pid_changed_in_memory_is_reported(world: World, image: Image, figure:
     world.run(_READING_S)
     assert len(world.events("settings.changed_on_board")) == 1
     assert world.naze.counters.hazard_runs == 0
+
+
+def test_any_other_setting_changed_in_memory_is_reported_and_read(world: World, figure: Figure) -> None:
+    settings, client = world.inside.seal, SettingsClient(world)
+    table = client.wait_read()
+    world.wait_until(lambda _: settings.state is not None, 30)
+    index, handle = list(table.settings).index("nav_speed_max"), table.settings["nav_speed_max"].handle
+    world.naze.receive(encode_set_setting(index, handle, 777), world.now)
+    world.run(1)
+    settings.due = world.now
+    world.run(_READING_S)
+    (event,) = world.events("settings.changed_on_board")
+    assert event.facts["detail"] == "Settings changed elsewhere: other settings"
+    world.wait_until(lambda _: client.value("nav_speed_max") == 777, 10)
+    figure("nav_speed_max set without the bridge", "reported, and read by the bridge")

@@ -13,12 +13,15 @@ from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from protocols.msp.mission import MissionCommand
+from protocols.msp.setting_table import SettingCommand, encode_set_setting
 from protocols.msp.settings import Part
 from simulator.board.msp_board import MspBoard
 from simulator.board.telemetry_only import BETAFLIGHT, TelemetryFirmware
 from simulator.commands.fc_kinds import make_board
 from simulator.naze.board import SimulatedNaze
+from simulator.naze.setting_table import SETTINGS
 from tests.support.conversations import Upload, waypoints
+from tests.support.settings_client import SettingsClient
 from tests.support.share_program import ShareProgram
 from tests.support.world import GroundStation, Radio, World
 
@@ -128,6 +131,51 @@ def test_a_change_through_the_bridge_is_not_reported(name: str) -> None:
     on_the_board(world, case.command, bytes(len(case.payload)))
     world.run(ROUND_S)
     assert len(world.events("settings.changed_on_board")) == 1
+
+
+def set_on_the_board(world: World, name: str, value: float) -> None:
+    index = [held.setting.name for held in SETTINGS].index(name)
+    frame = encode_set_setting(index, SETTINGS[index].setting, value)
+    world.naze.receive(frame, world.now)
+    world.naze.advance(world.now + 0.02)
+
+
+def test_a_change_of_any_other_setting_of_a_patched_harakiri_is_reported_and_all_are_read_again() -> None:
+    world, station = sealed(naze)
+    client = SettingsClient(world)
+    client.wait_read()
+    world.run(1)
+    set_on_the_board(world, "nav_speed_max", 777)
+    world.run(ROUND_S)
+    (event,) = world.events("settings.changed_on_board")
+    assert event.facts["detail"] == "Settings changed elsewhere: other settings"
+    assert warnings(station) == [event.facts["detail"]]
+    assert client.value("nav_speed_max") == 777
+    assert world.events("settings.read")[-1].facts["changed"] == "nav_speed_max"
+
+
+def test_while_the_checksum_holds_a_list_comes_from_memory() -> None:
+    world, _ = sealed(naze)
+    client = SettingsClient(world)
+    client.wait_read()
+    world.run(1)
+    before = world.now
+    assert client.current() is not None
+    assert requests(world, before).count(SettingCommand.SETTING) == 1
+
+
+def test_the_radius_set_and_a_calibration_begun_by_a_station_are_no_foreign_changes() -> None:
+    world, station = sealed(naze)
+    SettingsClient(world).wait_read()
+    station.send(messages.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", 450, 9))
+    world.run(2 * ROUND_S)
+    assert SettingsClient(world).value("gps_wp_radius") == 450
+    parameters = (0, 0, 0, 0, 4, 0, 0)
+    station.send(messages.MAVLink_command_long_message(1, 1, messages.MAV_CMD_PREFLIGHT_CALIBRATION, 0, *parameters))
+    world.run(1)
+    set_on_the_board(world, "rc_trm_rll", 1)
+    world.run(2 * ROUND_S)
+    assert world.events("settings.changed_on_board") == []
 
 
 def test_a_change_between_two_runs_is_reported() -> None:

@@ -34,6 +34,7 @@ from protocols.msp.nav import (
     encode_read_wp,
     encode_set_wp,
 )
+from protocols.msp.setting_table import SettingCommand, encode_save
 from protocols.msp.settings import SETTINGS
 from protocols.rights.effect import Effect
 from protocols.rights.msp import MSP_RIGHTS, Firmware, msp_right
@@ -68,12 +69,13 @@ READS: list[tuple[Iterable[Firmware], bytes]] = [
     (NAV, encode_read_wp(0)),
     (HARAKIRI, INFO_REQUEST),
     (MISSIONS, encode_read(0, 15)),
-    *(((firmware,), request(wanted.command)) for firmware, parts in SETTINGS.items() for wanted in parts),
+    *(((firmware,), request(wanted.command, wanted.body)) for firmware, parts in SETTINGS.items() for wanted in parts),
     (INAV, request(Msp.INAV_EZ_TUNE)),
     (EVERY, request(Msp.PIDNAMES)),
     (NUMBERED, request(Msp.UID)),
 ]
 CHANGES: list[tuple[Iterable[Firmware], bytes]] = [
+    (MISSIONS, encode_save(0)),
     *((set(EVERY) - {Firmware.UNKNOWN}, request(action)) for action in MspAction),
     *(((Firmware.MULTIWII,), encode_read_wp(number)) for number in range(1, 255)),
     (INAV, LOAD_REQUEST),
@@ -102,7 +104,7 @@ def test_requests_of_the_bridge_have_the_effect_of_their_use(
 
 def test_every_command_of_the_bridge_is_among_them() -> None:
     sent = {frame.command for _, frame in frames([*READS, *CHANGES])}
-    assert sent == {*Msp, *MspAction, *MissionCommand, *Nav, MIXER, 0x1003}
+    assert sent == {*Msp, *MspAction, *MissionCommand, *SettingCommand, *Nav, MIXER, 0x1003}
 
 
 @pytest.mark.parametrize("firmware", Firmware)
