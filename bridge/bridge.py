@@ -149,8 +149,8 @@ class Bridge:
         #: The seal of the flight controller's settings.
         self._seal = SettingsSeal(session, missions, ground, emit, config.seals, is_transferring)
         self._board_settings = BoardSettings(session, missions, emit, is_transferring, lambda: self._sharing.due < inf)
-        self._board_settings.on_change = self._seal.changed_here
-        self._seal.on_found_change = self._board_settings.may_have_changed
+        self._board_settings.on_change = self._changed_settings
+        self._seal.on_found_change = self._found_changed_settings
         self._sharing.on_change = self._program_changed_settings
         self._backups = BackupTaker(on_backup)
         self._seal.on_identified = self._backups.identified
@@ -341,8 +341,16 @@ class Bridge:
         """A program's request was refused. In flight a warning would cover what concerns the craft."""
         self._ground.say(Severity.NOTICE if self.vehicle.armed else Severity.WARNING, text)
 
-    def _program_changed_settings(self, now: float) -> None:
+    def _changed_settings(self, now: float) -> None:
         self._seal.changed_here(now)
+        self._missions.settings_changed()
+
+    def _found_changed_settings(self, now: float) -> None:
+        self._board_settings.may_have_changed(now)
+        self._missions.settings_changed()
+
+    def _program_changed_settings(self, now: float) -> None:
+        self._changed_settings(now)
         self._board_settings.may_have_changed(now)
 
     def _newcomer(self, station: GroundStation, now: float) -> None:

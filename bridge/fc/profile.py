@@ -19,6 +19,7 @@ from bridge.model.flight_mode import ARM_BOX
 from bridge.model.refusal import Refusal
 from bridge.model.vehicle import Vehicle
 from bridge.settings.fc_settings import FcSettings
+from protocols.inav_dump import SavedSettings
 from protocols.mission_item import MissionResult
 from protocols.msp.mission import Info
 from protocols.rights.msp import Firmware
@@ -47,11 +48,12 @@ NO_MISSIONS = Refusal(MissionResult.UNSUPPORTED, "This flight controller stores 
 
 @dataclass(frozen=True, slots=True)
 class RuleSettings:
-    """The inputs of the mission rules. None: the firmware's default. capacity: records."""
+    """The inputs of the mission rules. None: the firmware's default. capacity: records. saved: a board's settings."""
 
     takeoff_max_m: int
     wp_radius_cm: int | None = None
     capacity: int | None = None
+    saved: SavedSettings | None = None
 
 
 #: Opens the mission store of a board.

@@ -148,6 +148,9 @@ class FcMissionStore(ABC, Generic[RecordT]):
         yield from ()
         return True
 
+    def settings_changed(self) -> None:
+        """The board's own settings may have changed: its rules may depend on them."""
+
     def load(self) -> Conversation[Loading]:
         """Make it load its saved mission if it holds none."""
         yield from ()

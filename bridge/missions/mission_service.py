@@ -152,6 +152,11 @@ class MissionService:
         self.held, self.loading = None, Loading.NOT_NEEDED
         self.is_settled = False
 
+    def settings_changed(self) -> None:
+        """The board's own settings may have changed."""
+        if not isinstance(self.fc_store, Refusal):
+            self.fc_store.settings_changed()
+
     @property
     def others(self) -> tuple[HeldMission, ...]:
         """Further missions in the flight controller's store, as last read."""

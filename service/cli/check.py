@@ -9,18 +9,22 @@ from typing import Any
 import click
 
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M, USUAL_CAPACITY, USUAL_WP_RADIUS_CM
+from bridge.controllers.inav.limits import SETTING_NAMES
 from bridge.controllers.nav.rules import INAV_CAPACITY, MULTIWII_CAPACITY
 from bridge.controllers.table import PROFILES
 from bridge.fc.profile import RuleSettings
 from bridge.missions.list_check import MissionRules, check_list
 from bridge.model.finding import DROPPED, without_defaults
 from bridge.model.verdict import Result, Verdict
+from bridge.vehicle.parameter_names import parameter_names
 from payloads.mission_data import verdict_data
+from protocols.file_error import FileError
+from protocols.inav_dump import InavDumpError, SavedSettings, read_inav_settings
 from protocols.mission_file import MissionFileError
 from protocols.mission_item import MissionItem, MissionResult, degrees_to_e7, is_on_earth
 from protocols.mission_record import identify
 from service.settings import SettingsError, takeoff_limit_m
-from terminal.files import shown_path
+from terminal.files import read_file, shown_path
 from terminal.mission_source import load_mission
 from terminal.mission_table import mission_table
 from terminal.options import PATH
@@ -83,6 +87,14 @@ def _place(_ctx: click.Context, _param: click.Parameter, text: str | None) -> tu
     f"MultiWii {MULTIWII_CAPACITY}.",
 )
 @click.option(
+    "--settings",
+    "settings_file",
+    type=PATH,
+    metavar="FILE",
+    help="The settings of an INAV, which decide about arming, heights and places to land at: its `dump` or `diff all`, "
+    "or a .param file.",
+)
+@click.option(
     "--takeoff-max-m",
     type=click.IntRange(2, 255),
     show_default=f"of this machine's daemon, else {TAKEOFF_MAX_M}",
@@ -100,6 +112,7 @@ def check(
     kind: str,
     wp_radius_cm: int,
     capacity: int | None,
+    settings_file: Path | None,
     takeoff_max_m: int | None,
     home: tuple[int, int] | None,
     as_json: bool,
@@ -115,9 +128,24 @@ def check(
         limit_m = takeoff_limit_m() if takeoff_max_m is None else takeoff_max_m
     except SettingsError as error:
         raise click.UsageError(f"{error}; or give --takeoff-max-m") from error
-    rules = _RULES[kind](RuleSettings(limit_m, wp_radius_cm, capacity))
+    saved = None if settings_file is None else _saved_settings(settings_file, kind)
+    try:
+        rules = _RULES[kind](RuleSettings(limit_m, wp_radius_cm, capacity, saved))
+    except ValueError as error:
+        raise click.UsageError(f"{settings_file}: {error}; save the settings again") from error
     codes = [_check_file(path, rules, home, strict, as_json) for path in files]
     ctx.exit(max(codes, key=_RANKS.index))
+
+
+def _saved_settings(path: Path, kind: str) -> SavedSettings:
+    if kind != "inav":
+        raise click.UsageError("--settings is for --kind inav: no others' settings are needed")
+    try:
+        saved = read_inav_settings(read_file(path, InavDumpError), shown_path(path))
+    except FileError as error:
+        raise click.UsageError(str(error)) from error
+    names = parameter_names(SETTING_NAMES)
+    return saved._replace(values={names.get(name, name): value for name, value in saved.values.items()})
 
 
 def _check_file(path: Path, rules: MissionRules, home: tuple[int, int] | None, strict: bool, as_json: bool) -> ExitCode:

@@ -10,6 +10,7 @@ from simulator.board.options import Faults
 from simulator.board.telemetry_only import BASEFLIGHT, BETAFLIGHT, TelemetryFirmware
 from simulator.inav.firmware import InavFirmware
 from simulator.inav.mission import EEPROM_SIZE
+from simulator.inav.places import PLACES_SIZE
 from simulator.inav.settings import SETTINGS_SIZE
 from simulator.multiwii.firmware import MultiWiiFirmware
 from simulator.multiwii.mission import blank_eeprom
@@ -25,7 +26,8 @@ KINDS = tuple(_FIRMWARE)
 
 def new_eeprom(kind: str, options: MspOptions) -> bytearray:
     """The EEPROM of a factory-new board."""
-    return blank_eeprom(options.capacity) if kind == "multiwii" else bytearray(EEPROM_SIZE + SETTINGS_SIZE)
+    inav_size = EEPROM_SIZE + SETTINGS_SIZE + PLACES_SIZE
+    return blank_eeprom(options.capacity) if kind == "multiwii" else bytearray(inav_size)
 
 
 def make_board(

@@ -16,6 +16,7 @@ from simulator.board.waypoint_craft import WaypointCraft
 from simulator.inav.boxes import ANGLE, ARM, BOXES, NAMES, NAV_ALTHOLD, NAV_RTH, NAV_WP, PLANE_BOXES
 from simulator.inav.mission import CAPACITY, EEPROM_SIZE, FAKE, InavMission
 from simulator.inav.navigation import InavNavigation
+from simulator.inav.places import PLACES_SIZE, InavPlaces
 from simulator.inav.settings import InavSettings
 
 _PLANE = 1
@@ -23,6 +24,7 @@ _SENSORS = 0b1000_1111  # accelerometer, barometer, compass, GPS, thermometer; b
 _PITOT = 1 << 6
 _CYCLE_TIME_US = 500
 _ARMED_FLAGS = 0b1100  # armed, and armed once
+_IN_GEOZONE, _NAVIGATION_UNSAFE = 1 << 6, 1 << 11
 _LOAD_PERCENT = 7
 _WIND_CMS = 250  # from ahead
 _CELLS, _BATTERY_PERCENT = 3, 88
@@ -106,8 +108,10 @@ class InavFirmware(MspFirmware):
         )
         self._mission = InavMission(boot.eeprom)
         self._craft = WaypointCraft()
-        self._navigation = InavNavigation(self._mission, self._craft)
-        self._settings = InavSettings(boot.eeprom[EEPROM_SIZE:], has_ez_tune=self._version >= (7, 0, 0))
+        settings, places = boot.eeprom[EEPROM_SIZE:-PLACES_SIZE], boot.eeprom[-PLACES_SIZE:]
+        self._settings = InavSettings(settings, has_ez_tune=self._version >= (7, 0, 0))
+        self._places = InavPlaces(places, self._version)
+        self._navigation = InavNavigation(self._mission, self._craft, self._settings)
         self._booted_at = boot.now
         self._name = b"INAV"
         self._stick_loads = boot.faults.stick_loads
@@ -125,8 +129,8 @@ class InavFirmware(MspFirmware):
         """Fly until `now`, arm and disarm. CrashError: the check before arming found a JUMP with an invalid target."""
         self._fly_until(now)
         self._follow_sticks(now)
-        flyable = self.armed or self._mission.is_flyable()
-        if self._faults.armed and not self.armed and flyable and not self._faults.arming_blockers:
+        blockers = self._arming_blockers()
+        if self._faults.armed and not self.armed and not blockers:
             self.armed = True
             self._mission.follow_selection()
             self._home = self._craft.position
@@ -135,6 +139,14 @@ class InavFirmware(MspFirmware):
             self.armed = False
             self._navigation.disarm()
             self._craft.rest()
+
+    def _arming_blockers(self) -> int:
+        """The arming flags that prevent it. CrashError: a JUMP has an invalid target."""
+        flags = self._faults.arming_blockers
+        is_near = self._mission.is_near(self._craft.position, int(self._settings["nav_wp_max_safe_distance"]))
+        if not (self.armed or (is_near and self._mission.is_flyable())):
+            flags |= _NAVIGATION_UNSAFE
+        return flags | (_IN_GEOZONE if not self.armed and self._places.blocks_arming(self._craft.position) else 0)
 
     def _follow_sticks(self, now: float) -> None:
         if self._faults.selected_mission:
@@ -200,12 +212,14 @@ class InavFirmware(MspFirmware):
                 return self._when_disarmed(command, True)
             case MspCommand.EEPROM_WRITE:
                 if not self.armed:
-                    self._settings.save()
+                    self._save_settings()
                     self._busy += self._options.eeprom_write_ms / 1000
                 return self._when_disarmed(command, True)
         if not self.armed and self._settings.write(command, payload):
             return reply(command)
         answer = self._read(command)
+        if answer is None:
+            answer = self._places.answer(command, payload)
         return error(command) if answer is None else reply(command, answer)
 
     def _when_disarmed(self, command: int, done: bool) -> bytes:
@@ -214,9 +228,15 @@ class InavFirmware(MspFirmware):
     def _save(self) -> bool:
         saved = self._mission.save()
         if saved:
+            self._save_settings()
             self._counters.flash_writes += 1
             self._busy += self._options.eeprom_write_ms / 1000
         return saved
+
+    def _save_settings(self) -> None:
+        """All of the configuration is written at once."""
+        self._settings.save()
+        self._places.save()
 
     def _set_waypoint(self, payload: bytes) -> bytes:
         """Acknowledge any waypoint of the right size, even if it is not stored."""
@@ -253,7 +273,7 @@ class InavFirmware(MspFirmware):
             case InavCommand.STATUS_EX:
                 return (self._sensors.payload(MspCommand.STATUS, craft) or b"") + bytes(5)
             case InavCommand.INAV_STATUS:
-                flags = self._faults.arming_blockers | (_ARMED_FLAGS if self.armed else 0)
+                flags = self._arming_blockers() | (_ARMED_FLAGS if self.armed else 0)
                 status = struct.pack("<HHHHBI", _CYCLE_TIME_US, 0, self._sensors.sensors, _LOAD_PERCENT, 0, flags)
                 return status + craft.boxes.to_bytes(8, "little") + b"\0"
             case InavCommand.INAV_ANALOG:

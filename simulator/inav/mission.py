@@ -6,10 +6,12 @@ After setWaypoint, getWaypoint, loadNonVolatileWaypointList and saveNonVolatileW
 """
 
 from dataclasses import replace
+from math import hypot
 
 from protocols.msp.nav import NavAction
+from simulator.board.flight import METRES_PER_DEGREE, METRES_PER_DEGREE_EAST
 from simulator.board.msp_firmware import CrashError
-from simulator.board.nav_waypoint import FLAG_LAST, WAYPOINT_SIZE, NavWaypoint, unpack_waypoint, wrap16
+from simulator.board.nav_waypoint import FLAG_HOME, FLAG_LAST, WAYPOINT_SIZE, NavWaypoint, unpack_waypoint, wrap16
 
 CAPACITY = 120
 EEPROM_SIZE = CAPACITY * WAYPOINT_SIZE
@@ -133,6 +135,16 @@ class InavMission:
             if self[target].action not in _GEO_ACTIONS:
                 return False
         return True
+
+    def is_near(self, position: tuple[int, int], within_m: int) -> bool:
+        """True if INAV allows arming here: the first waypoint, whatever its action, is near. 0 m: anywhere."""
+        first = self[0]
+        is_at_home = first.flag == FLAG_HOME or not (first.lat_e7 or first.lon_e7)
+        if not (self.count and within_m) or is_at_home:
+            return True
+        north = (first.lat_e7 - position[0]) / 1e7 * METRES_PER_DEGREE
+        east = (first.lon_e7 - position[1]) / 1e7 * METRES_PER_DEGREE_EAST
+        return hypot(north, east) <= within_m
 
     def start_jumps(self) -> None:
         """Set the counter of each JUMP, which INAV keeps in p3."""

@@ -14,12 +14,12 @@ from simulator.board.nav_status import Error, Mode, NavStatus, State
 from simulator.board.nav_waypoint import FLAG_HOME, FLAG_LAST
 from simulator.board.waypoint_craft import WaypointCraft
 from simulator.inav.mission import CAPACITY, InavMission
+from simulator.inav.settings import InavSettings
 
 _CRUISE_MS = 3.0
 _MAX_MS = 10.0
 _MIN_MISSION_CMS = 50
 _HOVER_HEIGHT_M = 10.0
-_RTH_HEIGHT_M = 10.0
 _MEAN_SEA_LEVEL = 1
 
 
@@ -44,12 +44,13 @@ _RETURNING = frozenset((Phase.RTH_ENROUTE, Phase.RTH_HOVER, Phase.RTH_LANDING, P
 class InavNavigation:
     """Flies `craft`. An index is a waypoint's number less 1."""
 
-    def __init__(self, mission: InavMission, craft: WaypointCraft) -> None:
+    def __init__(self, mission: InavMission, craft: WaypointCraft, settings: InavSettings) -> None:
         self._mission = mission
+        self._settings = settings
         self._craft = craft
         self._home = craft.position
         self._restarts = True
-        self._held_s = 0.0
+        self._held_s = self._rth_height_m = 0.0
         self.phase = Phase.IDLE
         self.index = 0
 
@@ -98,7 +99,7 @@ class InavNavigation:
             case Phase.FINISHED | Phase.RTH_HOVER:
                 self._craft.hover(self._craft.height_m, seconds)
             case Phase.RTH_ENROUTE:
-                if self._craft.fly_to(self._home, _RTH_HEIGHT_M, _CRUISE_MS, seconds):
+                if self._craft.fly_to(self._home, self._rth_height_m, _CRUISE_MS, seconds):
                     self.phase = Phase.RTH_LANDING if self._mission.lands_after_rth else Phase.RTH_HOVER
 
     def _begin(self) -> None:
@@ -115,6 +116,7 @@ class InavNavigation:
             match waypoint.action:
                 case NavAction.RTH:
                     self._restarts = True
+                    self._rth_height_m = self._height_home_m()
                     self.phase = Phase.RTH_ENROUTE
                     return
                 case NavAction.JUMP if waypoint.p3:
@@ -134,11 +136,21 @@ class InavNavigation:
                     self.phase = Phase.PRE_ACTION
                     return
 
+    def _height_home_m(self) -> float:
+        """By nav_rth_alt_mode. MAX is simulated as AT_LEAST."""
+        here_m, setting_m = self._craft.height_m, int(self._settings["nav_rth_altitude"]) / 100
+        return (here_m, here_m + setting_m, setting_m, *[max(here_m, setting_m)] * 2)[
+            int(self._settings["nav_rth_alt_mode"])
+        ]
+
     def _fly_leg(self, seconds: float) -> None:
         waypoint = self._mission[self.index]
         height = waypoint.alt_cm / 100
         if waypoint.p3 & _MEAN_SEA_LEVEL:
             height -= FIELD_ALTITUDE_M
+        highest_cm = int(self._settings["nav_max_altitude"])
+        if highest_cm and not self._settings["nav_wp_enforce_altitude"]:
+            height = min(height, highest_cm / 100)
         flies_home = waypoint.flag == FLAG_HOME or not (waypoint.lat_e7 or waypoint.lon_e7)
         target = self._home if flies_home else (waypoint.lat_e7, waypoint.lon_e7)
         wanted = waypoint.p2 if waypoint.action == NavAction.POSHOLD_TIME else waypoint.p1

@@ -7,6 +7,7 @@ from operator import xor
 from typing import NamedTuple
 
 from protocols.msp.frame import Direction, MspParser, request
+from protocols.msp.inav_settings import COMMON_SET_SETTING
 from protocols.msp.nav import NavAction
 from simulator.board.msp_options import MspOptions
 from simulator.board.nav_waypoint import FLAG_LAST, NavWaypoint, unpack_waypoint
@@ -92,6 +93,10 @@ class MspBench:
         """Write a list one record at a time, the last with its flag."""
         for number, waypoint in enumerate(waypoints, 1):
             self.write(number, replace(waypoint, flag=FLAG_LAST if number == len(waypoints) else waypoint.flag))
+
+    def set(self, setting: str, value: int) -> None:
+        """Set one of INAV's 16-bit settings."""
+        assert self.payload_v2(COMMON_SET_SETTING, setting.encode() + b"\0" + value.to_bytes(2, "little")) == b""
 
     def restart(self) -> None:
         self.board.power_off(self.now)

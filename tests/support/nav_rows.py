@@ -121,7 +121,7 @@ ROWS = (
     Row("DO_CHANGE_SPEED 0", (ONE, act(Command.DO_CHANGE_SPEED, 1, 0), leg(11)), "1 2 hovers", "1 2 hovers"),
     Row(
         "DO_CHANGE_SPEED, then a DO_JUMP to before it",
-        (leg(11), leg(1), act(Command.DO_CHANGE_SPEED, 1, 5), leg(9), act(Command.DO_JUMP, 1, 1), leg(1)),
+        (leg(4), leg(1), act(Command.DO_CHANGE_SPEED, 1, 5), leg(9), act(Command.DO_JUMP, 1, 1), leg(1)),
         "1 2 3 (5 m/s) 1 2 3 (5 m/s) 5 (5 m/s) hovers",
         "1 2 3 1 2 3 5 hovers",
     ),

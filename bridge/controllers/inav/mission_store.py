@@ -7,15 +7,34 @@ armed, only the loaded one. Writing record 1 wipes them all, so they are written
 
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from itertools import chain
 
+from bridge.controllers.inav.limits import SETTING_NAMES, InavLimits
+from bridge.controllers.inav.settings import read_values
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.mission_store import NOTHING, NavMissions
 from bridge.controllers.nav.stored_missions import Mission, erased, flown, split_missions
 from bridge.line.conversation import Conversation, LinkLost, Pause, ask
-from bridge.missions.fc_mission_store import Loading, PushFailed, PushFailure, PushProgress, PushResult
+from bridge.missions.fc_mission_store import (
+    Loading,
+    PushFailed,
+    PushFailure,
+    PushProgress,
+    PushResult,
+    StoreReport,
+)
+from bridge.model.vehicle import Power
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, request
+from protocols.msp.inav_places import (
+    SAFEHOME,
+    SAFEHOME_SIZE,
+    SAFEHOMES,
+    Safehome,
+    decode_safehome,
+    encode_read_safehome,
+)
 from protocols.msp.nav import (
     INFO_SIZE,
     LOAD_REQUEST,
@@ -54,6 +73,17 @@ class InavMissions(NavMissions):
     #: The same, as of the last check for changes, and whether the sticks were held for LOAD.
     _last_look: tuple[NavInfo, int] | None = None
     _sticks_held = False
+    #: The board's own settings about missions, as last read; they may have changed since if they are doubtful.
+    _limits: InavLimits | None = None
+    _are_limits_doubtful = True
+
+    def report(self) -> Conversation[StoreReport | None]:
+        """Also read the settings that the rules depend on, if they may have changed."""
+        yield from self._read_limits()
+        return (yield from super().report())
+
+    def settings_changed(self) -> None:
+        self._are_limits_doubtful = True
 
     def erased_by(self, records: Sequence[NavRecord]) -> tuple[Mission, ...]:
         """The last of the others, as many as do not fit."""
@@ -91,6 +121,7 @@ class InavMissions(NavMissions):
 
         A list that is incomplete, with another size each time, is still being written; once it is complete, it is read.
         """
+        yield from self._read_limits()
         seen = yield from self._look()
         if seen is None:
             return True
@@ -142,7 +173,28 @@ class InavMissions(NavMissions):
         self._known = () if loaded == NOTHING else loaded
 
     def _rules(self) -> NavRules:
-        return NavRules(self._profile, self._known or (), self.others)
+        limits = self._limits
+        if limits is not None:
+            power, selected = self._vehicle.last(Power), self._seen[1] if self._seen and self.others else 1
+            cell_v = power.voltage_v / power.cells if power and power.voltage_v and power.cells else None
+            limits = replace(limits, cell_voltage=cell_v, selected=selected)
+        return NavRules(replace(self._profile, limits=limits), self._known or (), self.others)
+
+    def _read_limits(self) -> Conversation[None]:
+        if not self._are_limits_doubtful or self._vehicle.armed:
+            return
+        self._are_limits_doubtful = False
+        safehomes: list[Safehome] = []
+        values = yield from read_values(SETTING_NAMES)
+        for index in range(SAFEHOMES if values else 0):
+            reply = yield from ask(encode_read_safehome(index), SAFEHOME, SAFEHOME_SIZE)
+            safehome = None if reply is None else decode_safehome(reply.payload)
+            if safehome is not None:
+                safehomes.append(safehome)
+        if values is None:
+            self._are_limits_doubtful = True
+        elif values:
+            self._limits = InavLimits(safehomes=tuple(safehomes)).with_settings(values)
 
     def _store_content(self, records: Mission) -> Mission:
         """SAVE selects the first mission, so the new one goes there."""

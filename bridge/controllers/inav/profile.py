@@ -3,6 +3,7 @@
 
 from dataclasses import replace
 
+from bridge.controllers.inav.limits import saved_limits
 from bridge.controllers.inav.mission_store import InavMissions
 from bridge.controllers.inav.settings import InavFcSettings
 from bridge.controllers.inav.telemetry import INAV_DECODERS, INAV_POLLS, arming_blockers
@@ -70,5 +71,5 @@ PROFILE = Profile(
     missions=lambda board, vehicle, _: InavMissions(inav_profile(board.capacity), board, vehicle),
     settings=InavFcSettings,
     check_kind="inav",
-    rules=lambda settings: NavRules(inav_profile(settings.capacity or INAV_CAPACITY)),
+    rules=lambda settings: NavRules(inav_profile(settings.capacity or INAV_CAPACITY, saved_limits(settings.saved))),
 )

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """All settings of an INAV, one request each, by their place in its table; and its modes."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 from bridge.controllers.msp_settings import some_parts
@@ -92,6 +93,19 @@ class InavFcSettings(FcSettings):
 
     def save(self) -> Conversation[SettingRefusal | None]:
         return (yield from write_eeprom())
+
+
+def read_values(names: Iterable[str]) -> Conversation[dict[str, Value] | None]:
+    """The values of these settings; those that this version lacks are missing. None: it does not answer."""
+    values: dict[str, Value] = {}
+    for name in names:
+        reply = yield from _ask(encode_about_name(name))
+        if reply is None:
+            return None
+        info = None if reply.direction is Direction.ERROR else decode_setting_info(reply.payload)
+        if info is not None and info.name == name:
+            values[name] = info.value
+    return values
 
 
 def _ask(payload: bytes) -> Conversation[MspFrame | None]:

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 
+from bridge.controllers.nav.leg_limits import LegLimits
 from bridge.controllers.nav.mission_store import NOTHING, NavMissions
-from bridge.controllers.nav.rules import LegLimits
 from bridge.line.conversation import Conversation, LinkLost, ask
 from bridge.missions.fc_mission_store import PushProgress, PushResult, StoreReport
 from protocols.msp.frame import request

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 from bridge.controllers.nav.flown_path import flown_size, jump_within_jump, lands_after_rth
 from bridge.controllers.nav.items import GROUND_SPEED, home_item, items_from_records, leg_speed, sent_seqs
+from bridge.controllers.nav.judgement import Departure, Judgement
 from bridge.controllers.nav.jumps import Jumps
 from bridge.controllers.nav.landing import placed_landing
-from bridge.controllers.nav.leg_limits import limited_legs
 from bridge.controllers.nav.leg_speed import LegSpeed
 from bridge.controllers.nav.rules import (
     HOLD,
@@ -42,6 +42,8 @@ from protocols.msp.nav import LAST, LEGS, TURNS, NavAction, NavRecord
 #: The greatest height at which single precision still resolves a centimetre.
 _MAX_HEIGHT_CM = 3_276_700
 _FULL_CIRCLE = 360
+#: A field's MISSION_ACK.
+_ACKS = {"lat_e7": MissionResult.INVALID_PARAM5_X, "alt_m": MissionResult.INVALID_PARAM7}
 #: DO_CHANGE_SPEED's param3 without a throttle: none, no change, as set.
 _NO_THROTTLE = (0, -1, -2)
 
@@ -73,6 +75,7 @@ class NavCheck(ListCheck):
         super().__init__(count)
         self._rules = rules
         self._profile = profile = rules.profile
+        self._fallback_home = fallback_home
         self._home = home_item(fallback_home)
         self._records: list[NavRecord] = []
         #: The item of each record.
@@ -247,9 +250,10 @@ class NavCheck(ListCheck):
         if self._profile.jumps_back_only and (place := jump_within_jump(self._records)) is not None:
             why = "a jump inside another jump's loop never ends"
             return reject(MissionResult.INVALID_PARAM1, self._sent[place], "p1", why)
-        if self._profile.limits is not None:
-            for place, name, why in limited_legs(self._records, self._profile.limits):
-                self._warn(self._sent[place], name, why)
+        limits = self._profile.limits
+        for judgement in limits.judge(self._records, self._departure()) if limits else ():
+            if rejection := self._apply(judgement):
+                return rejection
         lands = lands_after_rth(self._records)
         returns = () if self._profile.own_rth_landing else zip(self._sent, self._records, strict=True)
         for item, record in returns:
@@ -259,6 +263,23 @@ class NavCheck(ListCheck):
         for place, item in self._jumps.wanted:
             if place < len(self._records) and self._speed_differs(place, item):
                 self._warn(item, "p1", "later legs are flown at their own speeds again")
+        return None
+
+    def _departure(self) -> Departure:
+        place = self._fallback_home
+        here = () if place is None else (home_item(place),)
+        home = (self._home,) if self._home.lat_e7 or self._home.lon_e7 else ()
+        return Departure((*home, *here), self._home.alt_m or None)
+
+    def _apply(self, judgement: Judgement) -> RejectingFinding | None:
+        place, field, why, news = judgement
+        if place is None:
+            self._findings.append(Finding(None, "count", None, None, why, news=news or News.WARNING))
+        elif news is None:
+            return reject(_ACKS.get(field, MissionResult.INVALID), self._sent[place], field, why)
+        else:
+            value = given(getattr(self._sent[place], field))
+            self._note(self._sent[place], field, value, value, why, news)
         return None
 
     def _speed_differs(self, place: int, jump: MissionItem) -> bool:

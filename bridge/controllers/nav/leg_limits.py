@@ -2,8 +2,9 @@
 """Legs that a MultiWii flies differently because of its settings (docs/inav.md)."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
-from bridge.controllers.nav.rules import LegLimits
+from bridge.controllers.nav.judgement import Departure, Judgement
 from bridge.model.ground_track import distance_m, passing_distance_m
 from protocols.msp.nav import LEGS, TURNS, NavAction, NavRecord
 
@@ -11,28 +12,38 @@ from protocols.msp.nav import LEGS, TURNS, NavAction, NavRecord
 _STRAYS_M = 5
 
 
-def limited_legs(records: Sequence[NavRecord], limits: LegLimits) -> Iterable[tuple[int, str, str]]:
-    """The place, field and reason of each such leg, once; a leg after a JUMP has the JUMP's place."""
-    return dict.fromkeys(_limited(records, limits))
+@dataclass(frozen=True, slots=True)
+class LegLimits:
+    """MultiWii's wp_radius, safe_wp_distance (it stops before a leg of this length) and nav_max_altitude."""
+
+    radius_cm: int
+    stops_at_m: int
+    highest_m: int
+
+    def judge(self, records: Sequence[NavRecord], departure: Departure) -> Iterable[Judgement]:
+        """Each such leg, once; a leg after a JUMP has the JUMP's place."""
+        return dict.fromkeys(_limited(records, self))
 
 
-def _limited(records: Sequence[NavRecord], limits: LegLimits) -> Iterable[tuple[int, str, str]]:
+def _limited(records: Sequence[NavRecord], limits: LegLimits) -> Iterable[Judgement]:
     before: NavRecord | None = None
     roi: NavRecord | None = None
     near_m = limits.radius_cm / 100 + _STRAYS_M
     for place, target in _flown(records):
         record = records[target]
         if record.action not in TURNS and record.alt_cm > 100 * limits.highest_m:
-            yield target, "alt_m", f"flown at {limits.highest_m} m, the board's nav_max_altitude"
+            yield Judgement(target, "alt_m", f"flown at {limits.highest_m} m, the board's nav_max_altitude")
         if record.action in TURNS:
             roi = record if record.action == NavAction.SET_POI else None
         if record.action not in LEGS:
             continue
         if before is not None and distance_m(before, record) >= limits.stops_at_m:
-            yield place, "lat_e7", f"{limits.stops_at_m} m or more from the waypoint before: the mission stops there"
+            why = f"{limits.stops_at_m} m or more from the waypoint before: the mission stops there"
+            yield Judgement(place, "lat_e7", why)
         # With a region of interest set, MultiWii compares its distance with wp_radius, not the waypoint's.
         if roi is not None and passing_distance_m(before or record, record, roi) < near_m:
-            yield place, "lat_e7", f"passes the ROI at less than {near_m:g} m: the board may end this leg there"
+            why = f"passes the ROI at less than {near_m:g} m: the board may end this leg there"
+            yield Judgement(place, "lat_e7", why)
         before = record
 
 

@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum, auto
 
+from bridge.controllers.nav.judgement import BoardLimits
+from bridge.controllers.nav.leg_limits import LegLimits
 from bridge.missions.list_check import UNUSED, Range
 from protocols.mission_item import ROI_COMMANDS, Command
 from protocols.msp.nav import NavAction
@@ -22,15 +24,6 @@ HOLD = Range(0, ENDLESS_S - 1, f"seconds 0..{ENDLESS_S - 1}")
 
 
 @dataclass(frozen=True, slots=True)
-class LegLimits:
-    """MultiWii's wp_radius, safe_wp_distance (it stops before a leg of this length) and nav_max_altitude."""
-
-    radius_cm: int
-    stops_at_m: int
-    highest_m: int
-
-
-@dataclass(frozen=True, slots=True)
 class NavProfile:
     """The differences between INAV and MultiWii NAV.
 
@@ -38,7 +31,7 @@ class NavProfile:
     mean sea level. leg_speed: legs may have a speed. rth_height: an RTH may have an altitude. jumps_back_only: a JUMP
     must go back, and no other may be in its loop; if False, it may go to any leg that is not adjacent. longest_hold: s.
     ends_on_any_record: the end of a list is noticed on a SET_POI or SET_HEAD, too. own_rth_landing: an RTH's own p1
-    decides if it lands; else the last record's p1 does. limits: of its legs; None: unlimited.
+    decides if it lands; else the last record's p1 does. limits: its own settings; None: unknown.
     """
 
     name: str
@@ -51,7 +44,7 @@ class NavProfile:
     longest_hold: Range
     ends_on_any_record: bool
     own_rth_landing: bool
-    limits: LegLimits | None = None
+    limits: BoardLimits | None = None
 
     @property
     def max_items(self) -> int:
@@ -59,7 +52,7 @@ class NavProfile:
         return (2 if self.leg_speed else 1) * self.capacity + 1
 
 
-def inav_profile(capacity: int = INAV_CAPACITY) -> NavProfile:
+def inav_profile(capacity: int = INAV_CAPACITY, limits: BoardLimits | None = None) -> NavProfile:
     """INAV. It stores no POSHOLD_UNLIM."""
     return NavProfile(
         "INAV",
@@ -72,6 +65,7 @@ def inav_profile(capacity: int = INAV_CAPACITY) -> NavProfile:
         longest_hold=HOLD,
         ends_on_any_record=True,
         own_rth_landing=False,
+        limits=limits,
     )
 
 

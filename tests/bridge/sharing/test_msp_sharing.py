@@ -67,6 +67,7 @@ def test_a_reply_with_the_text_of_its_request_is_not_an_echo() -> None:
     """SETTING_INFO's reply ends in the name that was asked for, and the port may read it in two parts."""
     board = FakeInav(drop=lambda frame: "request" if frame.command == SETTING_INFO else "")
     world, program = ready(board)
+    world.run(5)  # the bridge has asked for settings itself, and given up
     name = b"nav_wp_multi_mission_index\0"
     program.ask(SETTING_INFO, name, is_v2=True)
     world.run(0.02)

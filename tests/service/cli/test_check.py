@@ -180,6 +180,24 @@ def test_each_kind_of_flight_controller_has_its_rules(tmp_path: Path, kind: str,
     assert run("--kind", kind, LONG).exit_code == (1 if kind == "inav" else 0)
 
 
+def test_an_inavs_saved_settings_decide_about_its_missions(tmp_path: Path) -> None:
+    home, point = (replace(item, p2=0.0) for item in (HOME, POINT))
+    mission, dump = tmp_path / "mission.waypoints", tmp_path / "dump.txt"
+    mission.write_text(write_qgc_wpl([home, replace(point, alt_m=30.0)]))
+    dump.write_text("# INAV\nset nav_max_altitude = 2000\n")
+    found = run("--kind", "inav", "--settings", dump, mission)
+    assert found.exit_code == 1
+    assert "WP 1: nav_max_altitude is 20 m, it would not climb to 30 m" in found.stdout
+    dump.write_text("NVMAXALT,0\nnav_max_altitude,3000\n")
+    assert run("--kind", "inav", "--settings", dump, mission).exit_code == 0
+    for text, wrong in (("set nav_rth_alt_mode = X\n", "nav_rth_alt_mode cannot be X"), ("", "has no settings")):
+        dump.write_text(text)
+        refused = run("--kind", "inav", "--settings", dump, mission)
+        assert refused.exit_code == 2
+        assert wrong in refused.stderr
+    assert "--settings is for --kind inav" in run("--settings", dump, mission).stderr
+
+
 def test_home_and_the_take_off_limit_may_be_given(tmp_path: Path) -> None:
     path = tmp_path / "nowhere.waypoints"
     climb = replace(POINT, command=22, lat_e7=0, lon_e7=0, alt_m=25.0)

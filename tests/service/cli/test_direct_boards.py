@@ -13,6 +13,7 @@ from protocols.mission_item import Command
 from simulator.board.nav_waypoint import FLAG_LAST, NavWaypoint
 from simulator.commands.fc_kinds import KINDS
 from simulator.inav.mission import CAPACITY
+from simulator.inav.places import PLACES_SIZE
 from simulator.inav.settings import SETTINGS_SIZE
 from tests.support.benches import Starter
 from tests.support.plan import HOME, PlanRow, plan_text, waypoint
@@ -96,7 +97,7 @@ def test_pull_all_reads_missions_that_are_not_loaded(tmp_path: Path) -> None:
         saved = [NavWaypoint(1, 453838000, 84733000, 2000, flag=ends.get(n, 0)) for n in range(1, 9)]
         saved += [NavWaypoint()] * (CAPACITY - len(saved))
         missions = b"".join(waypoint.pack(number) for number, waypoint in enumerate(saved, 1))
-        eeprom.write_bytes(missions + bytes(SETTINGS_SIZE))
+        eeprom.write_bytes(missions + bytes(SETTINGS_SIZE + PLACES_SIZE))
         board = Starter(tmp_path, stack).board("--kind", "inav", "--state", str(eeprom))
         assert run_naze_bridge("pull", "--fc", board.link).stdout.endswith("1 more in its store: see --all\n")
         pulled = run_naze_bridge("pull", tmp_path / "held.waypoints", "--all", "--fc", board.link)

@@ -104,6 +104,7 @@ def test_home_and_position_have_their_altitude_above_sea_level() -> None:
 
 def test_home_is_the_place_of_arming() -> None:
     bench = MspBench("inav", faults=Faults(boxes=0))
+    bench.set("nav_wp_max_safe_distance", 0)
     bench.upload([waypoint(100)])
     bench.faults.armed, bench.faults.boxes = True, 1 << 13
     bench.run(60)

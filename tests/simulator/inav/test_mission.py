@@ -281,6 +281,7 @@ def several() -> MspBench:
 
 def test_all_missions_are_counted_while_disarmed_but_one_while_armed() -> None:
     bench = several()
+    bench.set("nav_wp_max_safe_distance", 0)
     assert bench.info() == (120, True, 6)
     bench.faults.selected_mission = 3
     bench.faults.armed = True

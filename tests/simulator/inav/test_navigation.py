@@ -22,6 +22,7 @@ class Flight:
 
     def __init__(self, *waypoints: NavWaypoint) -> None:
         self.bench = MspBench("inav", faults=Faults(boxes=0))
+        self.bench.set("nav_wp_max_safe_distance", 0)
         self.bench.upload(list(waypoints))
         self.bench.faults.armed = True
         self.bench.faults.boxes = NAV_WP

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridge.controllers.inav import profile as inav
+from bridge.controllers.inav.limits import InavLimits
 from bridge.controllers.multiwii import profile as multiwii
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile, multiwii_profile
@@ -40,7 +41,7 @@ MIXED = [
     (197, 0),
     (177, 5),
     (16, 0),
-    (20, 0),
+    (20, 1),
 ]
 
 
@@ -219,7 +220,7 @@ wild = st.builds(
 @settings(max_examples=25, deadline=None)
 def test_the_board_arms_with_any_list_that_the_rules_accept(items: list[MissionItem]) -> None:
     sent = [plan(1)[0], *items]
-    if not check_list(sent, NavRules(inav_profile())).records:
+    if not check_list(sent, NavRules(inav_profile(limits=InavLimits()))).records:
         return
     board, world, station = board_with()
     assert Upload(station, sent).run() is ACCEPTED

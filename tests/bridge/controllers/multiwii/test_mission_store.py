@@ -34,7 +34,7 @@ def test_a_multiwiis_own_limits_are_warned_of_and_read_for_each_list() -> None:
     _, station = found(multiwii)
     sent = plan(10)
     sent[5] = replace(sent[5], lat_e7=453848000)  # 110 m away
-    sent[6] = replace(sent[6], command=201, lon_e7=84734000)  # a ROI, 11 m away
+    sent[6] = replace(sent[6], command=201, lon_e7=84733400)  # a ROI, 11 m away
     assert Upload(station, sent).run() is ACCEPTED
     assert not [text for text in station.texts() if "WP" in text]
     multiwii.answers = {**multiwii.answers, 122: nav_config(60, 100, 25, wp_radius=900)}

@@ -25,11 +25,12 @@ CLEARED = bytes((NavAction.RTH, *bytes(18), LAST))
 
 
 def plan(count: int, seed: int = 0) -> list[MissionItem]:
-    """Waypoints that INAV stores unchanged."""
+    """Waypoints that INAV stores unchanged, further apart than its nav_wp_radius."""
     home, *legs = waypoints(count, seed)
     # The fake's own home, so that it reads back as sent.
     home = replace(home, lat_e7=453838000, lon_e7=84733000)
-    return [replace(item, p2=0.0) for item in (home, *legs)]
+    apart = (replace(leg, lat_e7=leg.lat_e7 + 37 * leg.seq, lon_e7=leg.lon_e7 - 91 * leg.seq) for leg in legs)
+    return [replace(item, p2=0.0) for item in (home, *apart)]
 
 
 def packed(items: list[MissionItem]) -> list[bytes]:

@@ -22,6 +22,7 @@ from simulator.board.nav_waypoint import FLAG_HOME, FLAG_LAST, WAYPOINT_SIZE, Na
 from simulator.board.options import Faults
 from simulator.commands.fc_kinds import make_board
 from simulator.inav.mission import CAPACITY, EEPROM_SIZE
+from simulator.inav.places import PLACES_SIZE
 from simulator.inav.settings import SETTINGS_SIZE
 from tests.bridge.controllers.inav.test_mission_store import ACCEPTED, board_with, without_home
 from tests.bridge.controllers.nav.test_mission_store import RULES, packed, plan
@@ -39,7 +40,7 @@ class Bench:
         records = [record for mission in sets(*sizes) for record in mission]
         filled = records + [NOTHING_MORE] * (CAPACITY - len(records))
         missions = b"".join(bytes((number,)) + record for number, record in enumerate(filled, 1))
-        self.eeprom = bytearray(missions + bytes(SETTINGS_SIZE))
+        self.eeprom = bytearray(missions + bytes(SETTINGS_SIZE + PLACES_SIZE))
         self.faults = faults or Faults(boxes=0)
         self.board: MspBoard = make_board("inav", MspOptions(), self.faults, memoryview(self.eeprom))
         self.world = World(speeds=(115200,), peer=self.board, plugged=False)
@@ -135,7 +136,7 @@ def test_record_fields_without_an_item_field_survive_a_read_and_a_write() -> Non
         waypoint(2, flag=FLAG_HOME),
         waypoint(0, lat_e7=0, lon_e7=0, flag=FLAG_HOME),
         waypoint(3, NavAction.LAND, p2=130, p3=1),
-        waypoint(4, NavAction.RTH, lat_e7=0, lon_e7=0, alt_cm=0, flag=FLAG_LAST),
+        waypoint(4, NavAction.RTH, lat_e7=0, lon_e7=0, alt_cm=0, p1=1, flag=FLAG_LAST),
     ]
     bench = Bench(9)
     bench.eeprom[: 5 * WAYPOINT_SIZE] = b"".join(leg.pack(number) for number, leg in enumerate(legs, 1))

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The settings of an INAV that decide whether it arms with a mission, and how it flies it (docs/inav.md).
+
+From navigationIsBlockingArming, updateClimbRateToAltitudeController, updateDesiredRTHAltitude,
+navigationRTHAllowsLanding and findNearestSafeHome (src/main/navigation/navigation.c, 6.1.1 to 9.1.0).
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from enum import IntEnum
+from typing import Any
+
+from bridge.controllers.nav.judgement import Departure, Judgement
+from bridge.model.finding import News
+from bridge.model.ground_track import distance_m
+from protocols.inav_dump import SavedSettings
+from protocols.msp.inav_places import Safehome
+from protocols.msp.nav import FLY_HOME, LEGS, NavAction, NavRecord
+
+_ABOVE_SEA = 1
+
+
+class RthAltMode(IntEnum):
+    """nav_rth_alt_mode."""
+
+    CURRENT = 0
+    EXTRA = 1
+    FIXED = 2
+    MAX = 3
+    AT_LEAST = 4
+
+
+class RthAllowLanding(IntEnum):
+    """nav_rth_allow_landing."""
+
+    NEVER = 0
+    ALWAYS = 1
+    FS_ONLY = 2
+
+
+class SafehomeUsageMode(IntEnum):
+    """safehome_usage_mode."""
+
+    OFF = 0
+    RTH = 1
+    RTH_FS = 2
+
+
+@dataclass(frozen=True, slots=True)
+class InavLimits:
+    """Fields with a name of INAV's are settings, in INAV's units: distances and altitudes in cm, but the first in m.
+
+    Their defaults are INAV's; 0 turns the first, nav_max_altitude and nav_wp_enforce_altitude off.
+    vbat_warning_cell_voltage: 0.01 V. cell_voltage: of the battery, as last heard. selected: the mission that was
+    selected, from 1, if there are several.
+    """
+
+    nav_wp_max_safe_distance: int = 100
+    nav_wp_radius: int = 100
+    nav_wp_enforce_altitude: int = 0
+    nav_max_altitude: int = 0
+    nav_rth_altitude: int = 1000
+    nav_rth_alt_mode: int = RthAltMode.AT_LEAST
+    nav_rth_allow_landing: int = RthAllowLanding.ALWAYS
+    safehome_usage_mode: int = SafehomeUsageMode.RTH
+    safehome_max_distance: int = 20000
+    vbat_warning_cell_voltage: int = 350
+    safehomes: tuple[Safehome, ...] = ()
+    cell_voltage: float | None = None
+    selected: int = 1
+
+    def with_settings(self, values: Mapping[str, float | str]) -> "InavLimits":
+        """With these settings; ValueError for one that is neither a number nor one of its choices."""
+        return replace(self, **{name: _number(name, values[name]) for name in SETTING_NAMES if name in values})
+
+    def judge(self, records: Sequence[NavRecord], departure: Departure) -> Iterable[Judgement]:
+        """Rejects a list only if INAV would not arm, or would not fly it as it is shown."""
+        yield from self._first(records[0], departure)
+        before: NavRecord | None = None
+        highest_cm = 0
+        for place, record in enumerate(records):
+            if record.action == NavAction.RTH:
+                yield from self._return(place, record, highest_cm, departure)
+            if record.action not in LEGS:
+                continue
+            height_cm = _above_home_cm(record, departure)
+            highest_cm = max(highest_cm, height_cm or 0)
+            limit_cm = self.nav_max_altitude
+            if height_cm is not None and height_cm > limit_cm > 0 and not self.nav_wp_enforce_altitude:
+                why = f"nav_max_altitude is {limit_cm / 100:g} m, it would not climb to {height_cm / 100:g} m"
+                yield Judgement(place, "alt_m", why, None)
+            if before is not None and (metres := distance_m(before, record)) * 100 < self.nav_wp_radius:
+                within = f"within nav_wp_radius ({self.nav_wp_radius / 100:g} m)"
+                why = f"{metres:.1f} m from the waypoint before, {within}: it may count as reached at once"
+                yield Judgement(place, "lat_e7", why, News.NOTICE)
+            before = record
+        yield from self._of_the_board()
+
+    def _first(self, first: NavRecord, departure: Departure) -> Iterable[Judgement]:
+        """INAV measures the distance to the first record, whatever its action, from where it is armed."""
+        limit_m = self.nav_wp_max_safe_distance
+        if not limit_m or first.flag == FLY_HOME or not (first.lat_e7 or first.lon_e7):
+            return
+        distances = [distance_m(start, first) for start in departure.places]
+        if max(distances, default=0.0) > limit_m:
+            would = "it would not arm" if min(distances) > limit_m else "it arms only near the craft's place, not there"
+            why = f"{max(distances):.0f} m from home, nav_wp_max_safe_distance is {limit_m} m: {would}"
+            yield Judgement(0, "lat_e7", why, None if min(distances) > limit_m else News.WARNING)
+
+    def _return(self, place: int, rth: NavRecord, highest_cm: int, departure: Departure) -> Iterable[Judgement]:
+        if self.nav_rth_alt_mode == RthAltMode.FIXED and self.nav_rth_altitude < highest_cm:
+            why = f"returns at nav_rth_altitude ({self.nav_rth_altitude / 100:g} m, FIXED), below the mission's"
+            yield Judgement(place, "alt_m", f"{why} {highest_cm / 100:g} m")
+        if not rth.p1 and self.nav_rth_allow_landing == RthAllowLanding.ALWAYS:
+            why = "hovers above home: nav_rth_allow_landing (ALWAYS) is for the pilot's RTH only, param1 1 lands"
+            yield Judgement(place, "p1", why, News.NOTICE)
+        if rth.p1 and self.nav_rth_allow_landing == RthAllowLanding.NEVER:
+            yield Judgement(place, "p1", "lands, although nav_rth_allow_landing is NEVER", News.NOTICE)
+        if self.safehome_usage_mode != SafehomeUsageMode.RTH:
+            return
+        for start in departure.places[:1]:
+            near = [(distance_m(start, each), each.number) for each in self.safehomes if each.enabled]
+            metres, number = min(near, default=(0.0, 0))
+            if near and metres * 100 <= self.safehome_max_distance:
+                limit = f"safehome_max_distance is {self.safehome_max_distance / 100:g} m"
+                yield Judgement(place, "p1", f"returns to safehome {number}, {metres:.0f} m from home ({limit})")
+
+    def _of_the_board(self) -> Iterable[Judgement]:
+        if self.selected > 1:
+            why = f"nav_wp_multi_mission_index changes from {self.selected} to 1: the new mission is stored first"
+            yield Judgement(None, "", why, News.NOTICE)
+        if self.cell_voltage is not None and self.cell_voltage * 100 < self.vbat_warning_cell_voltage:
+            warns = f"vbat_warning_cell_voltage is {self.vbat_warning_cell_voltage / 100:.2f} V"
+            yield Judgement(None, "", f"Battery at {self.cell_voltage:.2f} V per cell, {warns}")
+
+
+_CHOICES: Mapping[str, type[IntEnum]] = {
+    "nav_rth_alt_mode": RthAltMode,
+    "nav_rth_allow_landing": RthAllowLanding,
+    "safehome_usage_mode": SafehomeUsageMode,
+}
+_OTHER_FIELDS = ("safehomes", "cell_voltage", "selected")
+SETTING_NAMES = tuple(field.name for field in fields(InavLimits) if field.name not in _OTHER_FIELDS)
+
+
+def saved_limits(saved: SavedSettings | None) -> InavLimits | None:
+    """The settings in a file; those that it lacks, as `diff all` does, have INAV's defaults. ValueError."""
+    return None if saved is None else InavLimits(safehomes=saved.safehomes).with_settings(saved.values)
+
+
+def _number(name: str, value: float | str) -> Any:
+    if name in _CHOICES and isinstance(value, str) and value in _CHOICES[name].__members__:
+        return _CHOICES[name][value]
+    try:
+        return int(float(value))
+    except ValueError:
+        raise ValueError(f"{name} cannot be {value}") from None
+
+
+def _above_home_cm(record: NavRecord, departure: Departure) -> int | None:
+    """The leg's height; None if it is above sea level, and home's altitude is not known."""
+    if not record.p3 & _ABOVE_SEA:
+        return record.alt_cm
+    return None if departure.altitude_m is None else record.alt_cm - round(100 * departure.altitude_m)

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""An INAV's own settings decide whether it arms with a list, and how it flies it: the answer comes at Write."""
+
+from dataclasses import replace
+
+import pytest
+
+from bridge.controllers.inav.limits import InavLimits, RthAllowLanding, RthAltMode, SafehomeUsageMode, saved_limits
+from bridge.controllers.nav.check import NavRules
+from bridge.controllers.nav.rules import inav_profile
+from bridge.missions.list_check import check_list
+from bridge.model.finding import without_defaults
+from protocols.inav_dump import read_inav_settings
+from protocols.mission_item import MissionItem, MissionResult
+from protocols.msp.inav_places import Safehome
+from tests.bridge.controllers.inav.test_mission_store import ACCEPTED, board_with
+from tests.support.conversations import Upload
+from tests.support.nav_lists import HOME, LAT, LON, RTL, RTL_LANDS, WP
+from tests.support.settings_client import SettingsClient
+
+#: 100 m to the north.
+NORTH = 8983
+NEAR, FAR = replace(WP, lat_e7=LAT + NORTH // 2), replace(WP, lat_e7=LAT + 2 * NORTH)
+
+
+def texts(*items: MissionItem, here: tuple[int, int] | None = None, **limits: object) -> list[str]:
+    rules = NavRules(inav_profile(limits=InavLimits(**limits)))  # type: ignore[arg-type]
+    return [finding.text() for finding in without_defaults(check_list((HOME, *items), rules, here).findings)]
+
+
+def test_a_first_waypoint_at_which_inav_would_not_arm_rejects_the_list() -> None:
+    reason = "200 m from home, nav_wp_max_safe_distance is 100 m: it would not arm"
+    assert texts(FAR, NEAR) == [f"Rejected, WP 1: {reason}"]
+    assert texts(FAR, here=(LAT, LON + 1000)) == [f"Rejected, WP 1: {reason}"]
+    assert texts(NEAR, FAR) == texts(FAR, nav_wp_max_safe_distance=0) == texts(FAR, nav_wp_max_safe_distance=201) == []
+
+
+def test_a_first_waypoint_near_the_craft_but_not_near_the_plans_home_is_only_a_warning() -> None:
+    """Nobody knows yet where the craft will be armed."""
+    warning = "WP 1: 200 m from home, nav_wp_max_safe_distance is 100 m: it arms only near the craft's place, not there"
+    assert texts(FAR, here=(LAT + 2 * NORTH, LON)) == [warning]
+
+
+def test_a_leg_that_inav_would_fly_lower_rejects_the_list() -> None:
+    reason = "Rejected, WP 1: nav_max_altitude is 40 m, it would not climb to 50 m"
+    assert texts(WP, nav_max_altitude=4000) == [reason]
+    assert texts(WP, nav_max_altitude=5000) == texts(WP, nav_max_altitude=4000, nav_wp_enforce_altitude=100) == []
+    # Home is 123 m above the sea.
+    above_sea = replace(WP, frame=0, alt_m=173.0)
+    assert texts(above_sea, nav_max_altitude=4000) == [reason]
+    assert texts(above_sea, nav_max_altitude=5000) == []
+
+
+def test_waypoints_within_the_radius_are_named() -> None:
+    close = replace(WP, lat_e7=LAT + NORTH // 50)
+    (news,) = texts(WP, close, nav_wp_radius=500)
+    assert news == "WP 2: 2.0 m from the waypoint before, within nav_wp_radius (5 m): it may count as reached at once"
+    assert texts(WP, close, nav_wp_radius=100) == []
+
+
+@pytest.mark.parametrize(
+    ("rtl", "limits", "news"),
+    [
+        (RTL_LANDS, {}, []),
+        (RTL, {"nav_rth_allow_landing": RthAllowLanding.NEVER}, []),
+        (RTL, {}, ["hovers above home: nav_rth_allow_landing (ALWAYS) is for the pilot's RTH only, param1 1 lands"]),
+        (
+            RTL_LANDS,
+            {"nav_rth_allow_landing": RthAllowLanding.NEVER},
+            ["lands, although nav_rth_allow_landing is NEVER"],
+        ),
+        (
+            RTL_LANDS,
+            {"nav_rth_alt_mode": RthAltMode.FIXED},
+            ["returns at nav_rth_altitude (10 m, FIXED), below the mission's 50 m"],
+        ),
+        (RTL_LANDS, {"nav_rth_alt_mode": RthAltMode.FIXED, "nav_rth_altitude": 5000}, []),
+        (
+            RTL_LANDS,
+            {"safehomes": (Safehome(0, False, LAT, LON), Safehome(3, True, LAT + NORTH, LON))},
+            ["returns to safehome 3, 100 m from home (safehome_max_distance is 200 m)"],
+        ),
+        (
+            RTL_LANDS,
+            {"safehomes": (Safehome(3, True, LAT + NORTH, LON),), "safehome_usage_mode": SafehomeUsageMode.RTH_FS},
+            [],
+        ),
+        (RTL_LANDS, {"safehomes": (Safehome(3, True, LAT + 3 * NORTH, LON),)}, []),
+    ],
+)
+def test_a_return_home_that_differs_from_what_is_shown_is_named(
+    rtl: MissionItem, limits: dict[str, object], news: list[str]
+) -> None:
+    assert texts(WP, rtl, **limits) == [f"WP 2: {each}" for each in news]
+
+
+def test_a_low_battery_and_another_selected_mission_are_named() -> None:
+    assert texts(WP, cell_voltage=3.42, selected=2) == [
+        "nav_wp_multi_mission_index changes from 2 to 1: the new mission is stored first",
+        "Battery at 3.42 V per cell, vbat_warning_cell_voltage is 3.50 V",
+    ]
+
+
+def test_the_boards_settings_are_read_by_name_and_again_after_a_change() -> None:
+    _, world, station = board_with()
+    legs = [HOME, replace(NEAR, alt_m=20.0), replace(FAR, alt_m=60.0)]
+    assert Upload(station, legs).run() is ACCEPTED
+    client = SettingsClient(world)
+    client.wait_read()
+    client.change("nav_max_altitude", 5000)
+    assert Upload(station, legs).run() is MissionResult.INVALID_PARAM7
+    assert "Rejected, WP 2: nav_max_altitude is 50 m, it would not climb to 60 m" in " ".join(station.texts())
+    client.change("nav_max_altitude", 6000)
+    assert Upload(station, legs).run() is ACCEPTED
+
+
+DUMP = f"""# INAV/SITL 9.1.0
+batch start
+safehome 0 1 {LAT + NORTH} {LON}
+safehome 1 0 0 0
+set nav_wp_max_safe_distance = 1500
+set nav_rth_alt_mode = FIXED
+set nav_rth_altitude = 2000
+battery_profile 1
+set vbat_warning_cell_voltage = 350
+battery_profile 2
+set vbat_warning_cell_voltage = 300
+"""
+
+
+def test_settings_are_read_from_a_dump_and_from_a_param_file() -> None:
+    limits = saved_limits(read_inav_settings(DUMP.encode(), "dump.txt"))
+    assert limits == InavLimits(
+        nav_wp_max_safe_distance=1500,
+        nav_rth_alt_mode=RthAltMode.FIXED,
+        nav_rth_altitude=2000,
+        safehomes=(Safehome(0, True, LAT + NORTH, LON), Safehome(1, False, 0, 0)),
+    )
+    params = read_inav_settings(b"# board: INAV 9.1.0\nnav_max_altitude,12000\nnav_rth_alt_mode,2\n", "a.param")
+    assert saved_limits(params) == InavLimits(nav_max_altitude=12000, nav_rth_alt_mode=RthAltMode.FIXED)
+
+
+def test_a_value_that_no_inav_has_is_refused() -> None:
+    with pytest.raises(ValueError, match="nav_rth_alt_mode cannot be SOMETIMES"):
+        saved_limits(read_inav_settings(b"set nav_rth_alt_mode = SOMETIMES\n", "dump.txt"))
