@@ -76,6 +76,8 @@ class InavMissions(NavMissions):
     #: The board's own settings about missions, as last read; they may have changed since if they are doubtful.
     _limits: InavLimits | None = None
     _are_limits_doubtful = True
+    #: A board that does not answer about them is asked again only at the next upload.
+    _are_limits_silent = False
 
     def report(self) -> Conversation[StoreReport | None]:
         """Also read the settings that the rules depend on, if they may have changed."""
@@ -83,7 +85,7 @@ class InavMissions(NavMissions):
         return (yield from super().report())
 
     def settings_changed(self) -> None:
-        self._are_limits_doubtful = True
+        self._are_limits_doubtful, self._are_limits_silent = True, False
 
     def erased_by(self, records: Sequence[NavRecord]) -> tuple[Mission, ...]:
         """The last of the others, as many as do not fit."""
@@ -121,7 +123,8 @@ class InavMissions(NavMissions):
 
         A list that is incomplete, with another size each time, is still being written; once it is complete, it is read.
         """
-        yield from self._read_limits()
+        if not self._are_limits_silent:
+            yield from self._read_limits()
         seen = yield from self._look()
         if seen is None:
             return True
@@ -192,7 +195,7 @@ class InavMissions(NavMissions):
             if safehome is not None:
                 safehomes.append(safehome)
         if values is None:
-            self._are_limits_doubtful = True
+            self._are_limits_doubtful = self._are_limits_silent = True
         elif values:
             self._limits = InavLimits(safehomes=tuple(safehomes)).with_settings(values)
 

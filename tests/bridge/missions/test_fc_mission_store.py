@@ -46,7 +46,7 @@ class Craft:
     def plan(self, count: int, seed: int = 0) -> list[MissionItem]:
         """A list that it stores without a finding, apart from positions in single precision."""
         items = waypoints(count, seed)
-        return [replace(item, p2=self.radius_m, lon_e7=item.lon_e7 - 91 * item.seq) for item in items]
+        return [replace(item, p2=self.radius_m, lon_e7=(item.lon_e7 or 0) - 91 * item.seq) for item in items]
 
     def upload(self, items: Sequence[MissionItem]) -> MissionResult | None:
         return Upload(self.station, items, tries=TRIES).run(TIMEOUT_S)

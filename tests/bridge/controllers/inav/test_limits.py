@@ -2,6 +2,7 @@
 """An INAV's own settings decide whether it arms with a list, and how it flies it: the answer comes at Write."""
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -23,8 +24,8 @@ NORTH = 8983
 NEAR, FAR = replace(WP, lat_e7=LAT + NORTH // 2), replace(WP, lat_e7=LAT + 2 * NORTH)
 
 
-def texts(*items: MissionItem, here: tuple[int, int] | None = None, **limits: object) -> list[str]:
-    rules = NavRules(inav_profile(limits=InavLimits(**limits)))  # type: ignore[arg-type]
+def texts(*items: MissionItem, here: tuple[int, int] | None = None, **limits: Any) -> list[str]:
+    rules = NavRules(inav_profile(limits=InavLimits(**limits)))
     return [finding.text() for finding in without_defaults(check_list((HOME, *items), rules, here).findings)]
 
 
@@ -89,7 +90,7 @@ def test_waypoints_within_the_radius_are_named() -> None:
     ],
 )
 def test_a_return_home_that_differs_from_what_is_shown_is_named(
-    rtl: MissionItem, limits: dict[str, object], news: list[str]
+    rtl: MissionItem, limits: dict[str, Any], news: list[str]
 ) -> None:
     assert texts(WP, rtl, **limits) == [f"WP 2: {each}" for each in news]
 

@@ -29,8 +29,7 @@ def plan(count: int, seed: int = 0) -> list[MissionItem]:
     home, *legs = waypoints(count, seed)
     # The fake's own home, so that it reads back as sent.
     home = replace(home, lat_e7=453838000, lon_e7=84733000)
-    apart = (replace(leg, lat_e7=leg.lat_e7 + 37 * leg.seq, lon_e7=leg.lon_e7 - 91 * leg.seq) for leg in legs)
-    return [replace(item, p2=0.0) for item in (home, *apart)]
+    return [replace(item, p2=0.0, lon_e7=(item.lon_e7 or 0) - 91 * item.seq) for item in (home, *legs)]
 
 
 def packed(items: list[MissionItem]) -> list[bytes]:
