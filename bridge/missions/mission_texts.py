@@ -8,6 +8,7 @@ from typing import Any
 
 from bridge.model.finding import DROPPED, Finding, News, without_defaults
 from bridge.model.verdict import Verdict
+from protocols.mission_item import Command
 
 _MOST_LINES = 10
 #: A longer text would be split, and Mission Planner's HUD shows only the last piece.
@@ -24,10 +25,17 @@ def summary(sent: int, verdict: Verdict[Any]) -> str | None:
     dropped = sum(finding.becomes == DROPPED for finding in verdict.findings)
     kept = [finding for finding in warnings if finding.becomes != DROPPED]
     relative = sum(finding.field == "frame" and finding.seq != 0 for finding in kept)
-    raised = sum(finding.field == "alt_m" and finding.becomes != finding.was for finding in kept)
+    heights = [finding for finding in kept if finding.field == "alt_m" and finding.becomes != finding.was]
+    raised, landings = len(heights), sum(finding.command == Command.NAV_LAND for finding in heights)
     home = sum(finding.seq == 0 for finding in kept)
     differing = len(kept) - relative - raised - home
-    counts = {"dropped": dropped, "Alt now relative": relative, "Alt raised": raised, "flown differently": differing}
+    counts = {
+        "dropped": dropped,
+        "Alt now relative": relative,
+        "Alt raised": raised - landings,
+        "LAND flown to first": landings,
+        "flown differently": differing,
+    }
     news = [f"{count} {what}" for what, count in counts.items() if count] or ["check home"]
     stored = f"{len(verdict.items)} of {sent} stored: "
     text = stored + ", ".join(news)

@@ -108,6 +108,7 @@ ROWS = (
         "DO_JUMP back, once", (ONE, TWO, THREE, act(Command.DO_JUMP, 1, 1)), "1 2 3 1 2 3 hovers", "1 2 3 1 2 3 hovers"
     ),
     Row("DO_JUMP back, for ever", (ONE, TWO, act(Command.DO_JUMP, 1, -1)), "never ends", "never ends"),
+    Row("DO_JUMP back, Repeat# -5", (ONE, TWO, act(Command.DO_JUMP, 1, -5)), "never ends", "never ends"),
     Row("DO_JUMP forward", (ONE, act(Command.DO_JUMP, 4, 1), TWO, THREE), "1 4 hovers", ""),
     Row(
         "DO_JUMP within another's loop",

@@ -4,6 +4,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 from bridge.controllers.nav.flown_path import flown_size, jump_within_jump, lands_after_rth
 from bridge.controllers.nav.items import GROUND_SPEED, home_item, items_from_records, leg_speed, sent_seqs
@@ -130,7 +131,7 @@ class NavCheck(ListCheck):
             if missing_coordinate(item) and self._records and self._records[-1].action == NavAction.RTH:
                 self._records[-1] = replace(self._records[-1], p1=LANDS.high)
                 return self._drop(item, "command", item.command, "the RTL before it now lands")
-            item = placed_landing(item, self._records, self._note)
+            item = placed_landing(item, self._records, self._note, partial(self._note, news=News.WARNING))
         if rule.position and (missing := missing_coordinate(item)) and not self._flew_home():
             return self._drop(item, *missing, "no Lat/Long")
         if rejection := refuse_frame(item, needs_position=rule.position):
@@ -198,7 +199,10 @@ class NavCheck(ListCheck):
         """Reserve a record; its target is known once all items have arrived."""
         if not (math.isfinite(item.p1) and item.p1 == math.trunc(item.p1) and 1 <= item.p1 < self._count):
             return reject(MissionResult.INVALID_PARAM1, item, "p1", "there is no such item to jump to")
-        repeats = self._fit(item, "p2", REPEATS)
+        is_endless = item.p2 < REPEATS.low
+        if is_endless:
+            self._note(item, "p2", item.p2, REPEATS.low, "for ever", News.WARNING)
+        repeats = REPEATS.low if is_endless else self._fit(item, "p2", REPEATS)
         self._unused(item, "p3", "p4")
         self._jumps.wanted.append((len(self._records), item))
         self._speed.at_jump[len(self._records)] = self._speed.cms

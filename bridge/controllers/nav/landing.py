@@ -13,7 +13,7 @@ from protocols.msp.nav import LEGS, NavRecord
 _ROUNDED_TO_0_M = 0.005
 
 
-def placed_landing(item: MissionItem, records: Sequence[NavRecord], note: Note) -> MissionItem:
+def placed_landing(item: MissionItem, records: Sequence[NavRecord], note: Note, warn: Note) -> MissionItem:
     """Fill in a LAND's missing position and altitude from the previous leg.
 
     INAV flies there at the LAND's own altitude: at 0 m it would hit any obstacle.
@@ -27,7 +27,7 @@ def placed_landing(item: MissionItem, records: Sequence[NavRecord], note: Note) 
         item = replace(item, lat_e7=before.lat_e7, lon_e7=before.lon_e7)
     if item.alt_m <= _ROUNDED_TO_0_M and before.alt_cm > 0:
         height_m = before.alt_cm / 100
-        note(item, "alt_m", item.alt_m, height_m, "flown there, then landed")
+        warn(item, "alt_m", item.alt_m, height_m, "flown there, then landed")
         frame = Frame.GLOBAL if before.p3 & 1 else Frame.GLOBAL_RELATIVE_ALT
         item = replace(item, alt_m=height_m, frame=int(frame))
     return item

@@ -5,6 +5,8 @@ from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.missions.list_check import check_list
 from bridge.missions.mission_texts import finding_lines, summary
 from bridge.model.finding import News
+from protocols.mission_item import Command
+from tests.support import nav_lists
 from tests.support.rule_items import SPEED, WAYPOINT, item, mission
 
 
@@ -24,6 +26,13 @@ def test_at_most_ten_lines_are_sent() -> None:
     lines = finding_lines(verdict.findings)
     assert len(lines) == 11
     assert lines[-1][1] == "and 28 more: see the status page or naze-bridge missions show"
+
+
+def test_a_landing_that_is_flown_to_first_is_counted() -> None:
+    """As Mission Planner sends it, at 0 m."""
+    verdict = nav_lists.verdict_on(nav_lists.WP, nav_lists.item(Command.NAV_LAND, alt_m=0.0), nav_lists.jump(1, -5))
+    assert summary(4, verdict) == "4 of 4 stored: 1 LAND flown to first, more"
+    assert (News.WARNING, "WP 3: Repeat# changed from -5 to -1 (for ever)") in finding_lines(verdict.findings)
 
 
 def test_a_list_with_every_item_dropped_is_a_warning() -> None:
