@@ -10,8 +10,8 @@
 #   make pictures       retake the docs' pictures of the status page, and the README's terminal cast
 #   make real-board IMAGE=X.elf  run Harakiri with the patch, built by you, on the emulated board (CUTS=20: fewer power cuts;
 #                       FLY=1: flights too)
-#   make soak           kill -9 and damaged stores by the hundred, then the daemon through all kinds of events and attacks
-#                       for 30 min (MINUTES=10: for ten; SOAK_SEED=7: others)
+#   make soak           kill -9 and damaged stores by the hundred, networks of 50 daemons cut, then the daemon through all
+#                       kinds of events and attacks for 30 min (MINUTES=10: for ten; SOAK_SEED=7: others)
 #   make fuzz           10,500,000 random inputs over UDP, TCP and UART and in files: hours (EXAMPLES=500: a 26th of them)
 #   make deb            build the Debian packages for amd64, arm64 and armhf in dist/ (ARCH=arm64: only that one)
 #   make image-check    the first hour in a bare Debian with systemd: install, setup, a verified mission (root)
@@ -89,6 +89,7 @@ real-board: $(VENV)/.test-ready
 soak: $(VENV)/.test-ready
 	STORE_KILLS=200 STORE_DAMAGES=300 $(BIN)/python -m pytest --timeout 0 \
 	    tests/storage/test_store_durability.py tests/storage/test_salvage.py
+	FLEET_DAEMONS=50 FLEET_CUTS=5 $(BIN)/python -m pytest tests/fleet/test_fleet_soak.py
 	SOAK_MINUTES=$(or $(MINUTES),30) $(BIN)/python -m pytest tests/e2e/test_soak.py $(ARGS)
 
 fuzz: $(VENV)/.test-ready

@@ -27,6 +27,8 @@ _TIMEOUT_S = 20.0
 _LIST_TIMEOUT_S = 60.0
 #: No queue delays samples for longer: beyond this the vehicle's clock was set.
 _CLOCK_WAS_SET_S = 60.0
+#: A vehicle's clock that was set back by less is noticed after this time, or twice as long.
+_RECENT_S = 120.0
 
 
 class Watch:
@@ -151,26 +153,33 @@ class Watch:
         name, made_s = vehicle_in(sample.key_expr), number(state, "time_s")
         now = self._clock()
         offset_s = now - (now if made_s is None else made_s)
-        before = self._heard.get(name)
-        least_s = offset_s if before is None else min(offset_s, before.offset_s)
-        if offset_s - least_s > _CLOCK_WAS_SET_S:
-            least_s = offset_s
         session_id = next(iter(self._bridges.get(name, ())), "")
         vehicle = vehicle_of(BridgeId(name, session_id), state)
-        self._heard[name] = _Heard(vehicle, now - (offset_s - least_s), least_s)
+        self._heard[name] = _heard(self._heard.get(name), vehicle, offset_s, now)
 
 
 @dataclass(frozen=True, slots=True)
 class _Heard:
     """`made_at`: when the vehicle made the values, by our clock.
 
-    `offset_s`: the least difference seen between our clock and its own. Any delay beyond that was spent in queues, so
-    a backlog is shown with its true age, even if the clocks differ.
+    `least_s`: the least recent difference between our clock and its own. Any delay beyond that was spent in queues, so
+    a backlog is shown with its true age, even if the clocks differ. `recent_s`: the same since `since`.
     """
 
     vehicle: FleetVehicle
     made_at: float
-    offset_s: float
+    least_s: float
+    recent_s: float
+    since: float
+
+
+def _heard(before: _Heard | None, vehicle: FleetVehicle, offset_s: float, now: float) -> _Heard:
+    if before is None or offset_s - before.least_s > _CLOCK_WAS_SET_S:
+        return _Heard(vehicle, now, offset_s, offset_s, now)
+    least_s, recent_s, since = min(before.least_s, offset_s), min(before.recent_s, offset_s), before.since
+    if now - since > _RECENT_S:
+        least_s, recent_s, since = recent_s, offset_s, now
+    return _Heard(vehicle, now - (offset_s - least_s), least_s, recent_s, since)
 
 
 @contextmanager

@@ -10,6 +10,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -36,6 +37,9 @@ PRELOADED = (
     "tests.support.forked",
     "uvicorn",
 )
+
+#: An environment variable: the name of a file with the seconds by which the process's wall clock is wrong.
+CLOCK_FILE = "TEST_CLOCK_FILE"
 
 _context = multiprocessing.get_context("forkserver")
 _context.set_forkserver_preload(list(PRELOADED))
@@ -78,6 +82,8 @@ def _run(arguments: Sequence[str], directory: Path, environment: dict[str, str],
 
     os.environ.clear()
     os.environ.update(environment)
+    if CLOCK_FILE in environment:
+        _follow_clock(Path(environment[CLOCK_FILE]))
     os.chdir(directory)
     for stream, path, mode in ((0, os.devnull, os.O_RDONLY), (1, output, os.O_WRONLY), (2, error, os.O_WRONLY)):
         descriptor = os.open(path, mode | os.O_CREAT | os.O_APPEND, 0o644)
@@ -86,3 +92,9 @@ def _run(arguments: Sequence[str], directory: Path, environment: dict[str, str],
     sys.stdin, sys.stdout = open(0), open(1, "w")  # noqa: SIM115
     sys.stderr = open(2, "w", buffering=1, errors="backslashreplace")  # noqa: SIM115
     main(list(arguments), prog_name="naze-bridge")
+
+
+def _follow_clock(file: Path) -> None:
+    """The monotonic clock goes on, as it does when a Pi's clock is set."""
+    true_time = time.time
+    time.time = lambda: true_time() + float(file.read_text())

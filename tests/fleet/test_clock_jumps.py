@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The wall clock of a vehicle, or of the watching machine, steps by hours: values and their ages stay true."""
+
+import json
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+from fleet.watch import watching
+from fleet.watch_screen import ScreenRow
+from tests.support.fleet_bench import Fleet
+from tests.support.forked import CLOCK_FILE
+from tests.support.plan import plain_plan
+from tests.support.programs import Program, until
+from tests.support.zenoh_router import client
+
+_STEPS_S = (6 * 3600.0, -6 * 3600.0, 0.0)
+
+
+class WallClock:
+    """The clock of the processes started while this is in the environment."""
+
+    def __init__(self, file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        self._file = file
+        self.step(0.0)
+        monkeypatch.setenv(CLOCK_FILE, str(file))
+
+    def step(self, wrong_by_s: float) -> None:
+        new = self._file.with_suffix(".new")
+        new.write_text(str(wrong_by_s))
+        new.rename(self._file)
+
+
+@pytest.fixture
+def clock(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> WallClock:
+    return WallClock(tmp_path / "clock", monkeypatch)
+
+
+@pytest.fixture
+def fleet(tmp_path: Path) -> Iterator[Fleet]:
+    with ExitStack() as stack:
+        yield Fleet(tmp_path, stack)
+
+
+def test_a_vehicles_clock_steps(fleet: Fleet, clock: WallClock) -> None:
+    """It flies on, is seen as it is, and takes missions."""
+    board = fleet.board("kite")
+    kite = fleet.start("kite", fc=board.fc)
+    fleet.wait("kite")
+    endpoint = fleet.router.endpoint
+    with client(endpoint) as session, client(endpoint) as roll, watching(session, roll, "fleet") as watch:
+        watch.follow(["kite"])
+        is_armed = False
+        for number, step_s in enumerate(_STEPS_S):
+            clock.step(step_s)
+            is_armed = not is_armed
+            board.set(f"armed {is_armed:d}")
+
+            def is_shown(expected: bool = is_armed) -> bool:
+                rows = [ScreenRow(vehicle, age_s) for vehicle, age_s in watch.look()]
+                return [(row.vehicle.armed, row.problem) for row in rows if (row.age_s or 0) < 5] == [(expected, "")]
+
+            until(is_shown, f"the arming after a step of {step_s} s")
+            assert fleet.listed()["kite"]["armed"] is is_armed
+            board.set("armed 0")
+            is_armed = False
+            until(lambda: fleet.listed()["kite"]["armed"] is False, "disarmed")
+            kite.push(plain_plan(5 + number))
+            until(lambda count=5 + number: fleet.listed()["kite"]["mission_count"] == count, "the mission")  # type: ignore[misc]
+    assert [mission["outcome"] for mission in kite.missions()] == ["VERIFIED"] * len(_STEPS_S)
+
+
+def test_the_watching_machines_clock_steps(fleet: Fleet, clock: WallClock, monkeypatch: pytest.MonkeyPatch) -> None:
+    watch = Program(fleet.folder / "watch.log", "fleet", "watch", "--json", "--connect", fleet.router.endpoint)
+    monkeypatch.delenv(CLOCK_FILE)
+    board = fleet.board("kite")
+    fleet.start("kite", fc=board.fc)
+    try:
+        for step_s in _STEPS_S:
+            clock.step(step_s)
+            for armed in (True, False):
+                board.set(f"armed {armed:d}")
+
+                def is_printed(expected: bool = armed) -> bool:
+                    lines = [json.loads(line) for line in watch.printed.splitlines()]
+                    return bool(lines) and lines[-1]["alive"] and lines[-1]["armed"] is expected
+
+                until(is_printed, f"armed {armed} after a step of {step_s} s")
+    finally:
+        watch.end()
+    assert "Traceback" not in watch.printed
