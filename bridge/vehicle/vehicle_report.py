@@ -144,13 +144,11 @@ class VehicleReporter:
         return self._makers[group](now)
 
     def whole(self, now: float) -> VehicleReport:
-        held = self._missions.on_board
+        held = self._missions.held
         mission = None
         if held is not None:
-            state, item = None, None
-            if self._fresh(MissionLeg, now) is not None:
-                state, item = self._progress.progress.text, self._missions.seq_of(self._progress.number) or None
-            mission = MissionIdentity(held.identity.count, f"{held.identity.checksum:08x}", state, item)
+            state = None if self._fresh(MissionLeg, now) is None else self._progress.progress.text
+            mission = MissionIdentity(held.identity.count, f"{held.identity.checksum:08x}", state)
         settings = None
         if (sealed := self._settings.state) is not None:
             settings = SettingsIdentity(str(sealed.seal), None if sealed.change is None else sealed.change.text())

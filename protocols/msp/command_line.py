@@ -15,6 +15,9 @@ from collections import deque
 HAZARDS = frozenset((0x0D, 0x23, 0x52))
 RUN_LENGTH = 3
 
+#: Harakiri's, when it waits for a command.
+PROMPT = b"\r\n# "
+
 _DEL = b"\x7f"
 _UNPRINTABLE = bytes(byte for byte in range(256) if not ord(" ") <= byte <= ord("~"))
 _HEADER = b"$M<"

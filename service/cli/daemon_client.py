@@ -22,6 +22,9 @@ from terminal.sentences import INTERRUPTED, complain, fail
 _GOES_ON = "the daemon continues, and the result follows; to exit now, press Ctrl-C again"
 _LEFT = "interrupted; the daemon continues: see `naze-bridge missions list`, or `settings history`"
 _WRITES = ("push", "restore", "restore-settings")
+_FLASHES_ON = "interrupted; the daemon continues, do not switch the board off: see `naze-bridge status`"
+_FLASH_BROKEN = "interrupted: the board stays in its boot loader; run the same command again"
+_FLASHES = ("flash-firmware", "restore-firmware")
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -44,7 +47,7 @@ def bridge_options(command: F) -> F:
 
 
 def ask(
-    state_dir: Path | None, fc: str | None, request: Json, progress: Callable[[int], None] = lambda _: None
+    state_dir: Path | None, fc: str | None, request: Json, progress: Callable[[Any], None] = lambda _: None
 ) -> Json:
     """Ask the bridge; a refusal ends the program with status 1, an unusable option with 2."""
     try:
@@ -54,8 +57,7 @@ def ask(
 
         return asyncio.run(ask_directly(parse_fc(fc), request, progress))
     except (KeyboardInterrupt, Interrupted) as error:
-        said = _LEFT if fc is None and request["do"] in _WRITES else str(error) or "interrupted"
-        complain(said)
+        complain(_interruption(request, str(error), is_own=fc is not None))
         raise SystemExit(INTERRUPTED) from None
     except (AddressError, SettingsError) as error:
         raise click.UsageError(str(error)) from error
@@ -74,6 +76,32 @@ def ask_with_progress(state_dir: Path | None, fc: str | None, request: Json, tot
         task = bar.add_task("Flight controller", total=total)
         with nullcontext() if fc is not None else _first_interrupt(lambda: bar.console.out(f"naze-bridge: {_GOES_ON}")):
             return ask(state_dir, fc, request, lambda records: bar.update(task, completed=records))
+
+
+def ask_with_steps(state_dir: Path | None, fc: str | None, request: Json) -> Json:
+    """Ask the bridge for something in steps of "step", "done" and "total", with a progress bar on standard error."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+    columns = (TextColumn("[progress.description]{task.description}"), BarColumn(), MofNCompleteColumn())
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("Starting", total=None)
+
+        def show(step: Json) -> None:
+            if step["total"]:
+                bar.update(task, description=step["step"].capitalize(), completed=step["done"], total=step["total"])
+            else:
+                console.out(f"naze-bridge: {step['step']}")
+
+        with nullcontext() if fc is not None else _first_interrupt(lambda: bar.console.out(f"naze-bridge: {_GOES_ON}")):
+            return ask(state_dir, fc, request, show)
+
+
+def _interruption(request: Json, why: str, *, is_own: bool) -> str:
+    if request["do"] in _FLASHES:
+        return _FLASH_BROKEN if is_own else _FLASHES_ON
+    return _LEFT if not is_own and request["do"] in _WRITES else why or "interrupted"
 
 
 @contextmanager

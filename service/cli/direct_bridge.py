@@ -4,11 +4,13 @@
 import asyncio
 from collections.abc import Callable
 from contextlib import suppress
+from typing import Any
 
 from payloads.mission_data import Json
 from service.daemon.api import DaemonApi
 from service.daemon.client import STATUS, ControlError, Interrupted
 from service.daemon.daemon import Daemon
+from service.daemon.firmware_api import FIRMWARE_REQUESTS
 from service.machine.log_setup import set_up_logging
 from service.settings import Settings, takeoff_limit_m
 from service.settings.addresses import AutoFc, FcAddress
@@ -27,7 +29,7 @@ _TOLD_LATER = ("armed", "battery_v", "satellites", "mission_records")
 
 
 async def ask_directly(
-    fc: FcAddress, request: Json, progress: Callable[[int], None] = lambda _: None, *, even_silent: bool = False
+    fc: FcAddress, request: Json, progress: Callable[[Any], None] = lambda _: None, *, even_silent: bool = False
 ) -> Json:
     """Send a request to our own bridge on this port; ControlError or StoreError if there is no reply.
 
@@ -45,7 +47,7 @@ async def ask_directly(
         await _wait(lambda: bool(daemon.fc.trouble) or daemon.fc.found_at is not None, timeout_s)
         if daemon.fc.trouble:
             raise ControlError(daemon.fc.trouble)
-        if daemon.fc.found_at is None:
+        if daemon.fc.found_at is None and request["do"] not in FIRMWARE_REQUESTS:
             where = daemon.fc.where
             if even_silent:
                 return api.status()

@@ -13,11 +13,11 @@ from bridge.controllers.table import PROFILES
 from bridge.fc.profile import RuleSettings
 from bridge.missions.list_check import check_list
 from bridge.model.verdict import Result
+from protocols.firmware_image import Image
 from protocols.mission_file import MissionFileError
 from protocols.msp.mission import WpRecord
 from service.settings import SettingsError, takeoff_limit_m
 from simulator.commands.image import read_image
-from simulator.emulated_naze.image import Image
 from simulator.sky.earth import Place
 from simulator.sky.sky import Weather
 from terminal.files import shown_path

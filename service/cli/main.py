@@ -26,6 +26,7 @@ _COMMANDS = {
     "clear": LazyCommand("service.cli.mission_commands:clear", "Clear the mission on the flight controller."),
     "missions": LazyCommand("service.cli.stored_missions:missions", "List, show, compare and restore missions."),
     "settings": LazyCommand("service.cli.settings_commands:settings", "The flight controller's settings and backups."),
+    "firmware": LazyCommand("service.cli.firmware_commands:firmware", "Build and flash a Harakiri with the patch."),
     "fleet": LazyCommand("service.cli.fleet_command:fleet", "Manage many vehicles over Eclipse zenoh."),
     "sim": LazyCommand("simulator.commands.sim:sim", "Simulate a flight controller."),
     "demo": LazyCommand("service.cli.demo:demo", "Demonstrate a mission upload to a simulated Naze."),

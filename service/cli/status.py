@@ -101,10 +101,7 @@ def _mission(facts: Json) -> str:
     count = facts["mission_records"]
     if count is None:
         return "not read yet"
-    if not count:
-        return "none stored"
-    stored = f"{count} records, checksum {facts['mission_checksum']}"
-    return f"{stored}, {facts['mission_state']} at item {item}" if (item := facts["mission_item"]) else stored
+    return f"{count} records, checksum {facts['mission_checksum']}" if count else "none stored"
 
 
 def _settings(facts: Json) -> str:

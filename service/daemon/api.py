@@ -14,6 +14,7 @@ from protocols.mission_item import MissionItem
 from protocols.mission_record import pack_records
 from service.daemon.client import ControlError
 from service.daemon.daemon import Daemon
+from service.daemon.firmware_api import FIRMWARE_REQUESTS, FirmwareApi
 from service.daemon.settings_api import SETTINGS_REQUESTS, SettingsApi
 from service.daemon.store_worker import as_dicts
 from service.machine.package import version
@@ -33,6 +34,7 @@ class DaemonApi:
         self._daemon = daemon
         self._loop = asyncio.get_running_loop()
         self.settings = SettingsApi(daemon)
+        self.firmware = FirmwareApi(daemon)
 
     async def do(self, request: Json, progress: Callable[[Json], None]) -> Json:
         """Handle a request; `progress` is called with each step. ControlError, StoreError or ValueError on failure."""
@@ -53,6 +55,8 @@ class DaemonApi:
                 return await self.restore(whole_number(request, "number", 0, MOST), progress)
             case str(name) if name in SETTINGS_REQUESTS:
                 return await self.settings.do(request, progress)
+            case str(name) if name in FIRMWARE_REQUESTS:
+                return await self.firmware.do(request, progress)
             case other:
                 raise ControlError(f"{other!r} is not a request")
 
@@ -126,8 +130,6 @@ class DaemonApi:
             "store_trouble": daemon.store_trouble,
             "mission_records": None if mission is None else mission.count,
             "mission_checksum": None if mission is None else mission.checksum,
-            "mission_state": None if mission is None else mission.state,
-            "mission_item": None if mission is None else mission.item,
             "settings_seal": None if settings is None else str(settings.seal),
             "settings_changed": None if change is None else change.text(),
             "settings_changed_s": None if change is None else round(self._loop.time() - change.at, 1),

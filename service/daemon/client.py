@@ -11,6 +11,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from tempfile import gettempdir
+from typing import Any
 from zlib import crc32
 
 from payloads.mission_data import Json, printable, to_json
@@ -36,7 +37,7 @@ class NoDaemonError(ControlError):
     """No daemon answers."""
 
 
-def ask_daemon(state_dir: Path | None, request: Json, progress: Callable[[int], None] = lambda _: None) -> Json:
+def ask_daemon(state_dir: Path | None, request: Json, progress: Callable[[Any], None] = lambda _: None) -> Json:
     """Ask the daemon that runs on `state_dir` (None: see find_socket); ControlError if there is none or it refuses."""
     path = find_socket(state_dir)
     line = to_json(request).encode() + b"\n"  # before connecting: the daemon waits only 5 s for the request

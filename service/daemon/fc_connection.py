@@ -2,21 +2,23 @@
 """The bridge's connection to the flight controller: its port is found, opened, counted and, on request, recorded."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager, closing
 
+import serial
 import structlog
 
 from bridge.bridge import Bridge, FcOutput
 from bridge.model.events import BridgeEvent, FcFound, FcInCommandLine, FcLost, PortLost
 from protocols.uart_capture import UartAction
-from service.links.fc_device import device_opener
+from service.links.fc_device import PortError, device_opener, open_serial
 from service.links.fc_port import MOVED_ON, STOPPED, FcPort
 from service.links.port_finder import PortFinder
 from service.links.traffic import Traffic
 from service.machine.host import Host
 from service.recording.uart_recorder import UartRecorder
 from service.settings import Settings
-from service.settings.addresses import AutoFc
+from service.settings.addresses import AutoFc, SerialFc
 
 #: The interval of messages about an unsuccessful search: a silent log looks like a hang.
 _SEARCH_REPORT_S = 60.0
@@ -90,6 +92,20 @@ class FcConnection:
             except Exception:
                 _log.exception("daemon.fault", what="the flight controller's port")
                 await asyncio.sleep(_RESTART_S)
+
+    @asynccontextmanager
+    async def lend(self) -> AsyncIterator[serial.Serial]:
+        """Lend the serial port, at 115200 baud; afterwards the flight controller is searched again. PortError."""
+        if not isinstance(self._address, SerialFc | AutoFc):
+            raise PortError(f"{self._address} is not a serial port")
+        async with self._port.lend():
+            if isinstance(self._address, SerialFc):
+                path = self._address.path
+            else:
+                assert self._finder is not None
+                path = self._finder.port_of_silent_board()
+            with closing(open_serial(path)) as device:
+                yield device
 
     def close(self) -> None:
         """Stop the timers, and write the rest of the recording. The port closes with `run`."""

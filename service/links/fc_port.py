@@ -4,8 +4,8 @@
 import asyncio
 import os
 import socket
-from collections.abc import Awaitable, Callable
-from contextlib import closing, suppress
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager, closing, suppress
 
 import serial
 import structlog
@@ -17,6 +17,7 @@ from storage.os_error import reason
 #: The reason given to `on_close` at the end of the daemon.
 STOPPED = "the daemon stops"
 MOVED_ON = "searching for the flight controller on another port"
+LENT = "the port is used for new firmware"
 
 _READ_SIZE = 4096
 _RETRY_S = 0.25
@@ -61,6 +62,9 @@ class FcPort:
         self._speed: int | None = None
         self._unsent = bytearray()
         self._closed = asyncio.Event()
+        # Held by `run` while the port is open, or by a borrower.
+        self._use = asyncio.Lock()
+        self._is_wanted = False
         #: Why the port cannot be opened; empty once it is open.
         self.trouble = ""
         #: Bytes dropped because the line was too slow.
@@ -77,27 +81,44 @@ class FcPort:
         """Open the port and keep reopening it; cancel to end."""
         try:
             while True:
-                pause_s = _RETRY_S
-                try:
-                    self._device = await self._open()
-                except (PortError, OSError) as error:
-                    level = _log.debug if str(error) == self.trouble else _log.warning
-                    level("fc.port_unavailable", why=str(error))
-                    self.trouble = str(error)
-                    if isinstance(error, PortInUseError):
-                        pause_s = _IN_USE_RETRY_S
-                else:
-                    self._descriptor = self._device.fileno()
-                    self._is_tcp = isinstance(self._device, socket.socket) and self._device.family != socket.AF_UNIX
-                    self.trouble = ""
-                    self._closed.clear()
-                    self._loop.add_reader(self._descriptor, self._readable)
-                    self._on_open()
-                    await self._closed.wait()
+                async with self._use:
+                    pause_s = await self._open_once()
+                    if self._is_wanted:
+                        self._shut(LENT)
+                    if self._device is not None:
+                        await self._closed.wait()
                 # Also after a loss: a TCP adapter in use accepts each connection and closes it at once.
                 await asyncio.sleep(pause_s)
         finally:
             self._shut(STOPPED)
+
+    async def _open_once(self) -> float:
+        """Try to open the port; the pause before the next attempt, s."""
+        try:
+            self._device = await self._open()
+        except (PortError, OSError) as error:
+            level = _log.debug if str(error) == self.trouble else _log.warning
+            level("fc.port_unavailable", why=str(error))
+            self.trouble = str(error)
+            return _IN_USE_RETRY_S if isinstance(error, PortInUseError) else _RETRY_S
+        self._descriptor = self._device.fileno()
+        self._is_tcp = isinstance(self._device, socket.socket) and self._device.family != socket.AF_UNIX
+        self.trouble = ""
+        self._closed.clear()
+        self._loop.add_reader(self._descriptor, self._readable)
+        self._on_open()
+        return _RETRY_S
+
+    @asynccontextmanager
+    async def lend(self) -> AsyncIterator[None]:
+        """Keep the port closed, so that the caller may open it; afterwards it is opened again."""
+        self._is_wanted = True
+        try:
+            self._shut(LENT)
+            async with self._use:
+                yield
+        finally:
+            self._is_wanted = False
 
     def move_on(self) -> None:
         """Close the port. It is reopened, and `open_device` may choose another one."""

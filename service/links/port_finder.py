@@ -77,6 +77,18 @@ class PortFinder:
             raise PortError("; ".join(self.status()["ports_passed_over"]))
         raise PortError("there is no serial port: plug the flight controller in, or enable the UART on the header")
 
+    def port_of_silent_board(self) -> str:
+        """The port of a flight controller that need not answer: its last one, or the only one. PortError."""
+        ports = serial_ports(self._host)
+        for port in ports:
+            if port.key == self._memory.flight_controller:
+                return port.path
+        found = [port.path for port in ports if port.key not in self._memory.others]
+        if len(found) != 1:
+            which = f"one of {', '.join(found)}" if found else "none was found"
+            raise PortError(f"it is not known which port the flight controller is on ({which}): name it (fc)")
+        return found[0]
+
     def received(self, data: bytes) -> None:
         """Examine bytes while the port is unidentified: a GPS receiver may just have been switched on."""
         if self._watch is not None:

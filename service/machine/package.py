@@ -14,6 +14,11 @@ def page(name: str) -> str:
     return str(_INSTALLED / name) if _IN_PACKAGE else name
 
 
+def shipped(name: str) -> Path:
+    """The file that is `name` in the repository, a path; it may be missing."""
+    return (_INSTALLED if _IN_PACKAGE else Path(__file__).parents[2]) / name
+
+
 def address(label: str) -> str | None:
     """The project's "Repository" or "Issues" address, from pyproject.toml; None if it is not published."""
     try:

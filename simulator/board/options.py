@@ -4,7 +4,6 @@
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 
-from protocols.msp.mission_flight import FlightProgress
 from simulator.board.flight import LEVEL_ACC
 
 
@@ -64,6 +63,7 @@ class BoardFaults:
     The rates are probabilities per bit and per byte, in both directions. `hang`: the CPU stops. `armed` is the
     pilot's request, which the firmware may refuse. The power fails during the given flash operation from now on (page
     erases and 16-byte programs, or half-words on the emulated Naze, from 1; 0: never), or a number of operations fail.
+    `boot_pads`: bridged on a Naze, so that it starts the chip's own boot loader.
     """
 
     bit_error_rate: float = 0.0
@@ -72,6 +72,7 @@ class BoardFaults:
     armed: bool = False
     power_cut_at_flash_operation: int = 0
     flash_failures: int = 0
+    boot_pads: bool = False
 
 
 @dataclass(slots=True, kw_only=True)
@@ -81,8 +82,7 @@ class Faults(BoardFaults):
     `boxes`: the pilot's switches except ARM, one bit for each of BOXNAMES. `busy`: a configuration write is scheduled.
     `extension` takes effect at the next boot. Without `msp` only MAVLink is answered.
     `arming_blockers`: INAV's arming flags (runtime_config.h). `stick_loads`: the number of times the pilot has loaded
-    the saved missions with the sticks. `selected_mission`: the pilot's selection; 0: none. `flight`: the report of a
-    Harakiri with mission flight.
+    the saved missions with the sticks. `selected_mission`: the pilot's selection; 0: none.
     """
 
     boxes: int = 1
@@ -93,7 +93,6 @@ class Faults(BoardFaults):
     arming_blockers: int = 0
     stick_loads: int = 0
     selected_mission: int = 0
-    flight: FlightProgress | None = None
 
 
 @dataclass(slots=True, kw_only=True)

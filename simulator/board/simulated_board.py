@@ -15,7 +15,7 @@ from simulator.board.traps import HazardWatch
 
 
 class Power(Enum):
-    """The state of the CPU. CRASHED and BOOTLOADER end only by the reset line or a power cycle."""
+    """The state of the CPU. CRASHED ends only by the reset line or a power cycle, BOOTLOADER also by its host."""
 
     OFF = auto()
     BOOTING = auto()

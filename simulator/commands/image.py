@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from protocols.firmware_image import FLASH_SIZE, Image, ImageError, parse_image
 from simulator.board.memory_file import open_memory
 from simulator.board.options import Faults
 from simulator.commands.run_board import Running, run_board
-from simulator.emulated_naze.image import FLASH_SIZE, Image, ImageError, load_image
 from simulator.emulated_naze.switches import EmulatedFaults
 from simulator.sky.sky import Weather
 
@@ -35,7 +35,7 @@ def read_image(path: Path) -> Image:
     except NativeChipError as error:
         raise click.ClickException(str(error)) from error
     try:
-        return load_image(path)
+        return parse_image(path.read_bytes(), str(path))
     except (ImageError, OSError) as error:
         raise click.ClickException(f"the image cannot be run: {error}") from error
 

@@ -8,10 +8,13 @@ import logging
 from collections.abc import Callable
 from math import inf
 
+from protocols.firmware_image import FLASH_SIZE, PROGRAM_END, Image
+from simulator.board.boot_loader import BootLoader
+from simulator.board.flash import PowerCutError
 from simulator.board.simulated_board import Power, SimulatedBoard
 from simulator.emulated_naze.chip import Chip, CpuFaultError
+from simulator.emulated_naze.controlled_flash import ControlledFlash
 from simulator.emulated_naze.harakiri_memory import HarakiriMemory, SpokenProtocol
-from simulator.emulated_naze.image import FLASH_SIZE, Image
 from simulator.emulated_naze.switches import EmulatedCounters, EmulatedFaults
 
 #: From power on to the main loop, without a GPS module.
@@ -53,9 +56,13 @@ class EmulatedNaze(SimulatedBoard):
         flash[: len(image.program)] = image.program
         self.flash = flash
         self.counters = EmulatedCounters()
+        self._image = image
+        self._seed = seed
         self._chip = self._make_chip(len(image.program), seed)
         self._chip.flash_controller.on_power_cut = self._on_power_cut
         self._memory = HarakiriMemory(image, self._chip, flash)
+        self._boot_loader: BootLoader | None = None
+        self._last_words = b""
         self._longest_step_s = longest_step_s
         # The callers' time when the chip's clock was zero.
         self._offset_s = 0.0
@@ -110,7 +117,7 @@ class EmulatedNaze(SimulatedBoard):
             self.on_boot(1 - (now - begun) / self._boot_s)
 
     def next_wakeup(self, now: float) -> float:
-        return now + _STEP_S if self.power is Power.RUNNING else inf
+        return now + _STEP_S if self.power in (Power.RUNNING, Power.BOOTLOADER) else inf
 
     # -- time ------------------------------------------------------------------------------------------------
 
@@ -136,9 +143,10 @@ class EmulatedNaze(SimulatedBoard):
             elif chip.wants_reset:
                 self._reset(now)
             elif chip.is_in_boot_loader:
-                self.counters.bootloader_entered = True
-                self.power = Power.BOOTLOADER
-        if self.power is not Power.OFF:
+                self._enter_boot_loader()
+        if self._boot_loader:
+            self._run_boot_loader(self._boot_loader, now)
+        elif self.power is not Power.OFF:
             chip.advance(end_ns)
 
     def _chip_ns(self, now: float) -> int:
@@ -155,23 +163,69 @@ class EmulatedNaze(SimulatedBoard):
     def _boot(self, now: float) -> None:
         self._offset_s = now - self._chip.now_ns / 1e9
         self._chip.power_on()
-        self.power = Power.RUNNING
+        self._begin()
 
-    def _reset(self, _: float) -> None:
-        self.counters.resets += 1
-        self._chip.reset()
+    def _begin(self) -> None:
         self.power = Power.RUNNING
+        if self.faults.boot_pads:
+            self._enter_boot_loader()
+
+    def _reset(self, now: float) -> None:
+        self.counters.resets += 1
+        if self._boot_loader:
+            self._leave_boot_loader()
+            self._boot(now)
+            return
+        self._chip.reset()
+        self._begin()
 
     def _cut_power(self) -> None:
         self._lost_power = False
         self._chip.power_off()
         self.power = Power.OFF
+        if self._boot_loader:
+            self._leave_boot_loader()
 
     def _hear(self, data: bytes, now: float) -> None:
-        self._chip.receive(1, data)
+        if self._boot_loader:
+            self._boot_loader.receive(data, now)
+        else:
+            self._chip.receive(1, data)
 
     def _take_sent(self, now: float) -> bytes:
-        return self._chip.take_sent(1)
+        last_words, self._last_words = self._last_words, b""
+        return last_words + (self._boot_loader.sent(now) if self._boot_loader else self._chip.take_sent(1))
+
+    # -- the chip's own boot loader ---------------------------------------------------------------------------
+
+    def _enter_boot_loader(self) -> None:
+        self.counters.bootloader_entered = True
+        self.power = Power.BOOTLOADER
+        flash = ControlledFlash(self._chip, self._chip_ns, lambda: self._lost_power)
+        self._boot_loader = BootLoader(flash, self._start_program)
+
+    def _run_boot_loader(self, boot_loader: BootLoader, now: float) -> None:
+        try:
+            boot_loader.run_until(now)
+        except PowerCutError:
+            self._cut_power()
+
+    def _start_program(self, now: float) -> None:
+        assert self._boot_loader is not None
+        self._last_words = self._boot_loader.sent(now)
+        self._leave_boot_loader()
+        self._boot(now)
+
+    def _leave_boot_loader(self) -> None:
+        """Replace the chip: its core holds a copy of the program, whose end may have changed."""
+        self._boot_loader = None
+        now_ns = self._chip.now_ns
+        program = bytes(self.flash[:PROGRAM_END]).rstrip(b"\xff")
+        self._chip = self._make_chip(len(program), self._seed)
+        self._chip.advance(now_ns)
+        self._chip.flash_controller.on_power_cut = self._on_power_cut
+        image = self._image if program == self._image.program.rstrip(b"\xff") else Image(program)
+        self._memory = HarakiriMemory(image, self._chip, self.flash)
 
     def _move_sticks(self) -> None:
         faults = self.faults

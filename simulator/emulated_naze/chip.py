@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from typing import Protocol
 from weakref import finalize
 
+from protocols.firmware_image import FLASH_BASE, FLASH_SIZE
 from simulator.emulated_naze import hmc5883l, mpu6050, ms5611
 from simulator.emulated_naze.bus import Bus, Registers
 from simulator.emulated_naze.flash_controller import FlashController
-from simulator.emulated_naze.image import FLASH_BASE, FLASH_SIZE
 from simulator.emulated_naze.native_chip import Outside, load_native_chip
 from simulator.emulated_naze.rcc import Rcc
 from simulator.emulated_naze.switches import EmulatedCounters, EmulatedFaults

@@ -4,7 +4,7 @@
 import random
 from collections.abc import Callable
 
-from simulator.emulated_naze.image import FLASH_BASE, FLASH_SIZE
+from protocols.firmware_image import FLASH_BASE, FLASH_SIZE
 from simulator.emulated_naze.switches import EmulatedCounters, EmulatedFaults
 
 PAGE_SIZE = 1024

@@ -8,6 +8,7 @@ late call changes only the time at which bytes are collected.
 from math import inf
 
 from protocols.msp.mission import RECORD_SIZE
+from simulator.board.boot_loader import BootLoader
 from simulator.board.flash import ERASED, NorFlash, PowerCutError
 from simulator.board.flight import Craft
 from simulator.board.options import Counters, Faults, SimOptions
@@ -18,6 +19,7 @@ from simulator.naze.mission_commands import MissionCommands
 from simulator.naze.mission_slots import StoredConfig, flash_size
 from simulator.naze.missions import Board, BootMissions
 from simulator.naze.uart import Uart
+from simulator.naze.whole_flash import WholeFlash
 
 
 class SimulatedNaze(SimulatedBoard):
@@ -44,6 +46,9 @@ class SimulatedNaze(SimulatedBoard):
         if memory is None:
             memory = memoryview(bytearray((ERASED,)) * flash_size(self.options))
         self._flash = NorFlash(memory, self.faults)
+        self._whole_flash = WholeFlash(self._flash, self.faults)
+        self._boot_loader: BootLoader | None = None
+        self._last_words = b""
         self._boot_missions = boot_missions
         self._uart = Uart(self.options.baud, self.counters, self.options.tree.value)
         self._boots_at = 0.0
@@ -79,11 +84,18 @@ class SimulatedNaze(SimulatedBoard):
         return [stored[at : at + RECORD_SIZE] for at in range(0, len(stored), RECORD_SIZE)]
 
     @property
+    def flash_contents(self) -> bytes:
+        """The whole chip's flash, with a stand-in for the program."""
+        return self._whole_flash.contents
+
+    @property
     def flash_operations(self) -> int:
         """The number of erases and programs so far."""
         return self._flash.operations
 
     def next_wakeup(self, now: float) -> float:
+        if self._boot_loader:
+            return max(now, min(self._boot_loader.next_event(), self._uart.next_departure() or inf))
         # Late loops are computed at their nominal times, so close requests are handled in one call.
         work = self._next_event()
         if work is None:
@@ -94,11 +106,13 @@ class SimulatedNaze(SimulatedBoard):
 
     def _next_event(self) -> float | None:
         """The next time that the CPU has work to do."""
-        if self.faults.hang or self.power is Power.OFF:
+        if self.faults.hang or self.power in (Power.OFF, Power.CRASHED, Power.BOOTLOADER):
             return None
         return self._firmware.next_loop() if self._firmware else self._boots_at
 
     def _run_until(self, now: float) -> None:
+        if self._boot_loader:
+            self._run_boot_loader(self._boot_loader, now)
         while (at := self._next_event()) is not None and at <= now:
             if self._firmware:
                 self._run_loop(self._firmware, at)
@@ -126,23 +140,52 @@ class SimulatedNaze(SimulatedBoard):
                 self.power = Power.CLI
         except PowerCutError:
             self._cut_power()
-        except ResetError:
+        except ResetError as reset:
             self._reset(at)
+            if reset.to_boot_loader:
+                self._enter_boot_loader()
+
+    def _run_boot_loader(self, boot_loader: BootLoader, now: float) -> None:
+        try:
+            boot_loader.run_until(now)
+        except PowerCutError:
+            self._cut_power()
+
+    def _enter_boot_loader(self) -> None:
+        self.counters.bootloader_entered = True
+        self.power = Power.BOOTLOADER
+        self._boot_loader = BootLoader(self._whole_flash, self._start_program)
+
+    def _start_program(self, now: float) -> None:
+        assert self._boot_loader
+        self._last_words = self._boot_loader.sent(now)
+        self._boot(now)
 
     def _boot(self, now: float) -> None:
+        self._firmware = self._boot_loader = None
+        if self.faults.boot_pads:
+            self._enter_boot_loader()
+            return
+        if not self._whole_flash.start():
+            self.power = Power.CRASHED
+            self.counters.crashes += 1
+            return
         self.power = Power.BOOTING
-        self._firmware = None
         self._boots_at = now + self._boot_s
         self._uart.set_baud(self.options.baud, now)
 
     def _cut_power(self) -> None:
         self.power = Power.OFF
-        self._firmware = None
+        self._firmware = self._boot_loader = None
         self._flash.take_busy_seconds()
         self._uart.power_off()
 
     def _hear(self, data: bytes, now: float) -> None:
-        self._uart.receive(data, now)
+        if self._boot_loader:
+            self._boot_loader.receive(data, now)
+        else:
+            self._uart.receive(data, now)
 
     def _take_sent(self, now: float) -> bytes:
-        return self._uart.transmitted(now)
+        last_words, self._last_words = self._last_words, b""
+        return last_words + (self._boot_loader.sent(now) if self._boot_loader else self._uart.transmitted(now))

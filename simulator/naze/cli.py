@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The part of Harakiri's command line that a companion may reach (cli.c): status, wpflush, save and exit."""
+"""The part of Harakiri's command line that a companion may reach (cli.c)."""
 
 from collections.abc import Callable
 from enum import Enum, auto
 
+from protocols.msp.command_line import PROMPT
 from simulator.board.options import Tree
 from simulator.board.typed_line import TypedLine
 
-PROMPT = b"\r\n# "
 BANNER = b"\r\nEntering CLI Mode, type 'exit' or 'save' to return, or 'help' \r\n\r\n" + PROMPT
 
 
@@ -17,13 +17,19 @@ class CliRequest(Enum):
     FLUSH = auto()
     SAVE = auto()
     REBOOT = auto()
+    FLASH_FIRMWARE = auto()
+
+
+#: The board restarts after these.
+LAST_REQUESTS = frozenset((CliRequest.SAVE, CliRequest.REBOOT, CliRequest.FLASH_FIRMWARE))
 
 
 class CommandLine:
-    """Takes typed bytes. `status` returns the lines about the stored missions."""
+    """Takes typed bytes. `status` returns the lines about the stored missions, `dump` those about the settings."""
 
-    def __init__(self, tree: Tree, status: Callable[[], str]) -> None:
+    def __init__(self, tree: Tree, status: Callable[[], str], dump: Callable[[], str]) -> None:
         self._status = status
+        self._dump = dump
         self._line = TypedLine(48) if tree is Tree.TESTCODE3 else TypedLine(47, rubs_out=False)
 
     def type(self, byte: int) -> tuple[bytes, CliRequest | None]:
@@ -32,7 +38,7 @@ class CommandLine:
         if line is None:
             return echo, None
         text, asked = self._run(line)
-        return echo + text.encode() + (b"" if asked in _LAST_WORDS else PROMPT), asked
+        return echo + text.encode() + (b"" if asked in LAST_REQUESTS else PROMPT), asked
 
     def _run(self, line: str) -> tuple[str, CliRequest | None]:
         match line.split()[0].lower():
@@ -42,9 +48,10 @@ class CommandLine:
                 return f"{self._status()}Flushing.\r\n\r\n", CliRequest.FLUSH
             case "save":
                 return "Saving...\r\nRebooting...", CliRequest.SAVE
+            case "dump":
+                return self._dump(), None
+            case "flash":
+                return "Close terminal & flash\r\n", CliRequest.FLASH_FIRMWARE
             case "exit":
                 return "\r\nLeaving CLI mode without saving\r\n\r\nRebooting...", CliRequest.REBOOT
         return "That was Harakiri, try 'help'", None
-
-
-_LAST_WORDS = (CliRequest.SAVE, CliRequest.REBOOT)

@@ -10,6 +10,7 @@ from math import ceil
 
 from protocols.mavlink.codec import Packed
 from protocols.mavlink.frame import MavlinkSplitter
+from protocols.msp.command_line import PROMPT
 from protocols.msp.mission import RECORD_SIZE, MissionCommand
 from simulator.board.flash import FlashError, NorFlash
 from simulator.board.flight import Craft, FlightState, fly
@@ -19,10 +20,9 @@ from simulator.board.options import Counters, Faults, SimOptions, TelemetryProto
 from simulator.board.transmitter import switch_positions
 from simulator.board.traps import Trap, TrapCounters
 from simulator.naze import frsky
-from simulator.naze.cli import BANNER, PROMPT, CliRequest, CommandLine
+from simulator.naze.cli import BANNER, LAST_REQUESTS, CliRequest, CommandLine
 from simulator.naze.guard import accepts
 from simulator.naze.mavlink_port import MavlinkSchedule, MavlinkSender, Stream
-from simulator.naze.mission_flight import MissionFlight
 from simulator.naze.mission_slots import StoredConfig
 from simulator.naze.mission_store import Floppy
 from simulator.naze.missions import Board, BootMissions
@@ -47,7 +47,11 @@ _EPSILON = 1e-9
 
 
 class ResetError(Exception):
-    """The firmware has reset the board."""
+    """The firmware has reset the board, perhaps to start the chip's own boot loader."""
+
+    def __init__(self, *, to_boot_loader: bool = False) -> None:
+        super().__init__()
+        self.to_boot_loader = to_boot_loader
 
 
 class Protocol(Enum):
@@ -85,6 +89,7 @@ class Firmware:
         self._home: tuple[int, int] | None = None
         # A calibration, and leaving the CLI, block everything until the board restarts.
         self._resets_at: float | None = None
+        self._resets_to_boot_loader = False
 
         self._config = StoredConfig(flash, options)
         if faults.extension:
@@ -104,9 +109,8 @@ class Firmware:
         self._floppy = Floppy(flash, self._board, self._missions, self._send_message, self._parameters.reset)
         if not (self._missions or self._config.is_valid):
             self._floppy.clear()
-        self._cli = CommandLine(options.tree, self._cli_status)
-        self._flight_reports = MissionFlight(faults)
-        self._schedule = MavlinkSchedule(now, self._flight_reports.message)
+        self._cli = CommandLine(options.tree, self._cli_status, self._dump)
+        self._schedule = MavlinkSchedule(now)
         self._frsky_number, self._frsky_time = 0, now
         self._traps = TrapCounters()
         self._last_valid = self._last_byte = now
@@ -148,7 +152,7 @@ class Firmware:
         if self._resets_at is not None:
             if not self.in_cli:
                 self._write_config()
-            raise ResetError
+            raise ResetError(to_boot_loader=self._resets_to_boot_loader)
         if self.in_cli:
             self._serve_cli()
         else:
@@ -227,7 +231,7 @@ class Firmware:
                     self._enter_cli()
                     return
                 case Trap.RESET:
-                    raise ResetError
+                    raise ResetError(to_boot_loader=True)
             if self._completes_packet(byte):
                 self._last_valid = self._clock
 
@@ -276,9 +280,6 @@ class Firmware:
         for message in self._schedule.take_due(self._clock, is_sensing, self._parameters.is_listing):
             if message is Stream.PARAM_VALUE:
                 self._parameters.send_next()
-                continue
-            if isinstance(message, Packed):
-                self._send_message(message)
                 continue
             uptime = self._clock - self._booted_at
             frame = self._sender.telemetry(message, self.craft_at(self._clock), uptime)
@@ -330,8 +331,6 @@ class Firmware:
     def _extension_answer(self, command: int, payload: bytes) -> bytes | None:
         if self._missions is None:
             return None
-        if (report := self._flight_reports.answer(command, payload)) is not None:
-            return report
         answer = self._missions.answer(command, payload, self._clock)
         self._counters.flash_writes = self._missions.writes
         return self._settings.answer(command, payload, self._clock) if answer is None else answer
@@ -352,9 +351,14 @@ class Firmware:
             elif asked is CliRequest.SAVE:
                 self._write_config()
             self._uart.write(printed, self._clock)
-            if asked in (CliRequest.SAVE, CliRequest.REBOOT):
+            if asked in LAST_REQUESTS:
+                self._resets_to_boot_loader = asked is CliRequest.FLASH_FIRMWARE
                 self._resets_at = self._clock + _CLI_REBOOT_S
                 return
 
     def _cli_status(self) -> str:
         return f"Floppy: {_FLOPPY_SIZE} B, {self._floppy.count} Datasets of {self._options.capacity} possible\r\n\r\n"
+
+    def _dump(self) -> str:
+        """The setting that this model has with and without the extension."""
+        return f"Config:\r\nFW: simulated\r\nCurrent settings: \r\ngps_wp_radius = {self._board.wp_radius_cm}\r\n"

@@ -8,10 +8,10 @@ import pytest
 from bridge.fc.states.cli import Cli
 from bridge.fc.states.harakiri_mavlink import HarakiriMavlink
 from bridge.fc.states.msp import Identifying, Polling
+from protocols.firmware_image import Image
 from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import MissionItem, MissionResult
 from simulator.emulated_naze.board import EmulatedNaze
-from simulator.emulated_naze.image import Image
 from tests.support.conversations import Download, Upload, records_of, waypoints
 from tests.support.real_bench import Figure, RealBench
 from tests.support.world import GroundStation, World

@@ -3,6 +3,7 @@
 
 import random
 
+from protocols.firmware_image import Image
 from protocols.mission_record import identify, pack_records
 from protocols.msp.frame import MspFrame, request
 from protocols.msp.mission import (
@@ -17,7 +18,6 @@ from protocols.msp.mission import (
 )
 from simulator.board.msp_sensors import MspCommand as Msp
 from simulator.board.options import SimOptions, Tree
-from simulator.emulated_naze.image import Image
 from tests.support.naze_bench import Bench, WireBench, mission
 from tests.support.real_bench import Figure, RealBench
 

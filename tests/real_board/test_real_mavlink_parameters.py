@@ -7,11 +7,11 @@ from bridge.controllers.harakiri import profile as harakiri
 from bridge.controllers.harakiri.mavlink_settings import HarakiriMavlinkSettings
 from bridge.settings.board_setting import SettingTable
 from bridge.settings.fc_settings import SettingRefusal
+from protocols.firmware_image import Image
 from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkSplitter
 from simulator.emulated_naze.board import EmulatedNaze
-from simulator.emulated_naze.image import Image
 from tests.support import mavlink_parameters as page
 from tests.support.real_bench import Figure, RealBench
 from tests.support.settings_client import SettingsClient

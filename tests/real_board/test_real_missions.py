@@ -11,10 +11,10 @@ from itertools import count
 
 import pytest
 
+from protocols.firmware_image import Image
 from protocols.msp.mission import WpCommand, WpRecord
 from protocols.msp.mission_flight import FlightPhase, FlightProgress, FlightReason
 from simulator.emulated_naze.flying_naze import FlyingNaze
-from simulator.emulated_naze.image import Image
 from simulator.emulated_naze.prepared_flash import prepared_flash
 from simulator.flights.judgement import is_flown, judge
 from simulator.flights.mission_run import MissionRun, fly_mission

@@ -5,11 +5,11 @@ import pytest
 
 from bridge.settings.board_setting import BoardSetting, SettingTable, shown
 from bridge.settings.fc_settings import Cause, SettingRefusal
+from protocols.firmware_image import Image
 from protocols.mavlink.dialect import messages as m
 from protocols.msp.frame import Direction, MspParser
 from protocols.msp.setting_table import SettingCommand
 from simulator.emulated_naze.board import EmulatedNaze
-from simulator.emulated_naze.image import Image
 from tests.support.real_bench import Figure
 from tests.support.settings_client import SettingsClient
 from tests.support.world import GroundStation, World

@@ -3,11 +3,11 @@
 
 import pytest
 
+from protocols.firmware_image import Image
 from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import MissionResult
 from protocols.msp.frame import Direction
 from simulator.emulated_naze.board import EmulatedNaze
-from simulator.emulated_naze.image import Image
 from tests.support.conversations import Upload, waypoints
 from tests.support.real_bench import Figure
 from tests.support.share_program import ShareProgram

@@ -8,8 +8,8 @@ import os
 
 import pytest
 
+from protocols.firmware_image import Image
 from simulator.emulated_naze.flying_naze import FlyingNaze
-from simulator.emulated_naze.image import Image
 from simulator.emulated_naze.prepared_flash import prepare, prepared_flash
 from simulator.flights.pilot import HIGH, Pilot
 from simulator.sky.body import Airframe

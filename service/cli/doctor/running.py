@@ -20,7 +20,7 @@ _REFUSED = re.compile(r"(\d+) x (.*) \((.*)\)")
 def check_running(status: Json) -> Iterator[Checked]:
     """Yield a finding for each trouble in the daemon's status. It may be of doctor's own bridge."""
     if status["flight_controller"] == UNPATCHED.name:
-        remedy = f"telemetry works; for missions flash the patch: {page('firmware/README.md')}"
+        remedy = f"telemetry works; for missions flash the patch: {page('docs/howto/flash-the-patch.md')}"
         yield note("missions", "this Harakiri has no mission extension, so it stores none", remedy)
     yield from _line(status)
     yield from _refused(status)

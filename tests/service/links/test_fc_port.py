@@ -341,3 +341,28 @@ async def test_a_port_in_use_is_tried_less_often(line: Line, monkeypatch: pytest
         assert tried == 1
         running.cancel()
         await asyncio.wait([running])
+
+
+async def test_a_lent_port_is_closed_until_it_comes_back(line: Line) -> None:
+    port = line.start()
+    await until_async(lambda: line.opened == 1, "the port")
+    async with port.lend():
+        assert line.lost == ["the port is used for new firmware"]
+        device = open_serial(str(line.path))  # exclusive
+        await asyncio.sleep(0.4)
+        assert line.opened == 1
+        device.close()
+    await until_async(lambda: line.opened == 2, "the port again")
+    await line.stop()
+
+
+async def test_a_port_is_lent_while_it_cannot_be_opened_and_comes_back_after_an_error(line: Line) -> None:
+    device = open_serial(str(line.path))
+    port = line.start()
+    await until_async(lambda: bool(port.trouble), "the refusal")
+    with suppress(ZeroDivisionError):
+        async with asyncio.timeout(TIMEOUT_S), port.lend():
+            device.close()
+            raise ZeroDivisionError
+    await until_async(lambda: line.opened == 1, "the port")
+    await line.stop()

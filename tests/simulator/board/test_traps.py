@@ -90,7 +90,7 @@ def test_number_signs_enter_the_cli_in_autosense_only() -> None:
     assert bench.naze.counters.cli_entered
 
 
-def test_letters_r_reset_in_autosense_only() -> None:
+def test_letters_r_start_the_boot_loader_in_autosense_only() -> None:
     quiet = Bench()
     assert speaks_msp(quiet)
     quiet.send(b"RRR")
@@ -101,7 +101,7 @@ def test_letters_r_reset_in_autosense_only() -> None:
     bench.send(b"RRR")
     bench.run(0.01)
     assert bench.naze.counters.resets == 1
-    assert bench.naze.power is Power.BOOTING
+    assert bench.naze.power is Power.BOOTLOADER
 
 
 def test_a_reset_is_silent_for_two_seconds_and_loses_the_ram() -> None:
@@ -111,8 +111,7 @@ def test_a_reset_is_silent_for_two_seconds_and_loses_the_ram() -> None:
     bench.progress(encode_chunk(pack_records(records), 0, 15).frame)
     bench.run(4.1)
     assert bench.naze.protocol is Protocol.AUTOSENSE
-    bench.send(b"RRR")
-    bench.run(0.05)
+    bench.naze.reset(bench.now)
     bench.received.clear()
     assert bench.ask(IDENT, timeout=BOOT_SECONDS - 0.1) is None
     assert bench.received == b""

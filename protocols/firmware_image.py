@@ -1,17 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A firmware image from an ELF, Intel HEX or binary file: its bytes for the flash, and from an ELF its symbols."""
+"""Firmware images for a Naze32, as ELF, Intel HEX and binary files; how a Harakiri with our patch is recognised.
+
+An image is the flash's contents from its first byte; an ELF file has symbols, too.
+"""
 
 import struct
 from dataclasses import dataclass, field
-from pathlib import Path
 
 #: The address and size of an STM32F103CB's flash.
 FLASH_BASE = 0x0800_0000
 FLASH_SIZE = 0x2_0000
+#: A patched Harakiri keeps its missions and its configuration from this offset (firmware/README.md, Flash map).
+PROGRAM_END = 0x1_D800
 _MAGIC = b"\x7fELF\x01\x01"
 _ARM = 40
 _LOAD, _SYMBOLS = 1, 2
-_RAM = 0x2000_0000
+_RAM, _RAM_SIZE = 0x2000_0000, 0x5000
+_HARAKIRI = b"Harakiri"
+#: The patch's table for checksums (naze_slots.c): Harakiri itself computes no CRC-32.
+PATCH_MARK = struct.pack("<4I", 0x0000_0000, 0x1DB7_1064, 0x3B6E_20C8, 0x26D9_30AC)
 # Types of records; those that set a base have it shifted by so many bits.
 _HEX_DATA, _HEX_BASES = 0, {2: 4, 4: 16}
 _HEADER = struct.Struct("<16sHHIIIIIHHHHHH")
@@ -32,21 +39,51 @@ class Image:
     symbols: dict[str, int] = field(default_factory=dict)
 
 
-def load_image(path: Path) -> Image:
-    """Read a file by its name: .hex and .bin, anything else is an ELF file. ImageError, OSError."""
-    data = path.read_bytes()
+def parse_image(data: bytes, name: str) -> Image:
+    """Parse a file by its name: .hex and .bin, anything else is an ELF file. ImageError."""
     readers = {".hex": ("an Intel HEX file", _parse_hex), ".bin": ("a binary", _parse_binary)}
-    kind, parse = readers.get(path.suffix.lower(), ("an ELF file", _parse))
+    kind, parse = readers.get(name[-4:].lower(), ("an ELF file", _parse_elf))
     try:
         return Image(*parse(data))
     except (struct.error, IndexError, ValueError) as error:
-        raise ImageError(f"{path} is not {kind} of a 32-bit ARM program for flash at {FLASH_BASE:#010x}") from error
+        raise ImageError(f"{name} is not {kind} of a 32-bit ARM program for flash at {FLASH_BASE:#010x}") from error
+
+
+def is_patched(program: bytes) -> bool:
+    """True if it is a Harakiri with the mission patch."""
+    return _HARAKIRI in program and PATCH_MARK in program
+
+
+def check_backup(contents: bytes) -> None:
+    """ImageError if this is not the whole flash of a Naze32 with a Harakiri."""
+    check_harakiri(contents)
+    if len(contents) != FLASH_SIZE:
+        raise ImageError(f"a backup has {FLASH_SIZE} bytes, not {len(contents)}")
+
+
+def check_patched(program: bytes) -> None:
+    """ImageError if a Naze32 cannot run this as a Harakiri with the mission patch."""
+    check_harakiri(program)
+    if PATCH_MARK not in program:
+        raise ImageError("the image is a Harakiri without the mission patch: run firmware/apply on its sources first")
+    if len(program) > PROGRAM_END:
+        raise ImageError(f"the image is too large: {len(program)} bytes, {PROGRAM_END} fit below missions and settings")
+
+
+def check_harakiri(program: bytes) -> None:
+    """ImageError if a Naze32 cannot run this as a Harakiri."""
+    try:
+        _parse_binary(program)
+    except (struct.error, ValueError):
+        raise ImageError("the image does not begin with the vectors of a program for a Naze32") from None
+    if _HARAKIRI not in program:
+        raise ImageError("the image is not a Harakiri")
 
 
 def _parse_binary(data: bytes) -> tuple[bytes, dict[str, int]]:
-    """The flash from its first byte; it begins with the stack pointer and the entry."""
+    """The flash from its first byte; it begins with the stack pointer and the entry, in Thumb code."""
     stack, entry = struct.unpack_from("<II", data)
-    if len(data) > FLASH_SIZE or stack >> 20 != _RAM >> 20 or not 0 <= entry - FLASH_BASE < len(data):
+    if not 0 < stack - _RAM <= _RAM_SIZE or not entry & 1 or not 0 <= entry - FLASH_BASE < len(data) <= FLASH_SIZE:
         raise ValueError
     return data, {}
 
@@ -73,7 +110,7 @@ def _parse_hex(data: bytes) -> tuple[bytes, dict[str, int]]:
     return _parse_binary(bytes(program))
 
 
-def _parse(data: bytes) -> tuple[bytes, dict[str, int]]:
+def _parse_elf(data: bytes) -> tuple[bytes, dict[str, int]]:
     if not data.startswith(_MAGIC):
         raise ValueError
     _, _, machine, _, _, programs, sections, _, _, _, program_count, _, section_count, _ = _HEADER.unpack_from(data)

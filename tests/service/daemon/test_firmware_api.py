@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The requests for new firmware, as far as they are refused; tests/e2e/test_firmware.py carries them out."""
+
+import base64
+
+import pytest
+
+from protocols.firmware_image import FLASH_SIZE, PROGRAM_END
+from service.daemon.client import ControlError, ask_daemon
+from simulator.naze.whole_flash import stand_in
+from tests.support.programs import Daemon
+
+PATCHED = stand_in(patched=True)
+
+
+@pytest.mark.parametrize(
+    ("what", "image", "why"),
+    [
+        ("flash-firmware", b"", "does not begin with the vectors"),
+        ("flash-firmware", PATCHED[8:], "does not begin with the vectors"),
+        ("flash-firmware", stand_in(patched=False), "without the mission patch"),
+        ("flash-firmware", PATCHED.ljust(PROGRAM_END + 1, b"\0"), "too large"),
+        ("restore-firmware", PATCHED, f"a backup has {FLASH_SIZE} bytes"),
+        ("restore-firmware", bytes(FLASH_SIZE), "does not begin with the vectors"),
+    ],
+)
+def test_a_wrong_image_is_refused_first(daemon: Daemon, what: str, image: bytes, why: str) -> None:
+    request = {"do": what, "image": base64.b64encode(image).decode(), "battery": True}
+    with pytest.raises(ControlError, match=f"Nothing was changed: .*{why}"):
+        ask_daemon(daemon.state_dir, request)
+
+
+def test_a_board_on_no_serial_port_is_refused(daemon: Daemon) -> None:
+    request = {"do": "flash-firmware", "image": base64.b64encode(PATCHED).decode(), "battery": True}
+    with pytest.raises(ControlError, match="Nothing was changed: sim: is not a serial port"):
+        ask_daemon(daemon.state_dir, request)
+
+
+def test_what_is_no_base64_is_not_understood(daemon: Daemon) -> None:
+    with pytest.raises(ControlError, match="not base64"):
+        ask_daemon(daemon.state_dir, {"do": "flash-firmware", "image": "?"})
