@@ -16,7 +16,7 @@ typedef char settings_fill_gaps[offsetof(config_t, gps_ins_vel) == offsetof(conf
                                     ? 1
                                     : -1];
 
-enum { FLIGHT = 179, REPLY_SIZE = 24 };
+enum { FLIGHT = 179, REPLY_SIZE = 24, SETTLED_CM_S = 50 };
 enum { SET_RAW_RC = 200, SET_RAW_GPS = 201, SET_BOX = 203 };
 
 extern uint16_t batteryWarningVoltage;
@@ -97,8 +97,8 @@ static void get_input(nf_input_t *in, bool rtl, bool flying)
     in->stick = abs(rcCommand[ROLL]) > cfg.rc_dbgps || abs(rcCommand[PITCH]) > cfg.rc_dbgps;
     in->yaw_stick = abs(rcCommand[YAW]) >= 70; /* from there on Harakiri turns instead of holding the heading */
     in->throttle_middle = abs(rcData[THROTTLE] - cfg.rc_mid) <= cfg.rc_dbah;
-    in->settled = f.GPS_HOLD_MODE && ph_status == PH_STATUS_DONE;
     in->arrived = f.GPS_AUTO_MODE && nav_mode == NAV_MODE_POSHOLD;
+    in->settled = in->arrived && GPS_speed < SETTLED_CM_S;
     in->battery_low = battery_low();
 }
 
@@ -134,10 +134,11 @@ static void climb(int16_t rate_cm_s)
     rcData[THROTTLE] = (int16_t)constrain(stick, cfg.rc_minchk + 1, cfg.rc_maxchk);
 }
 
-static void leave(void)
+/* A return home that has ended the flight keeps its gains: with the firmware's own it may not arrive against the wind. */
+static void leave(bool returns)
 {
     f.GPS_AUTO_MODE = 0; /* which a lost fix has cleared before */
-    if (own_gains) {
+    if (own_gains && !returns) {
         GPS_set_pids();
         own_gains = false;
     }
@@ -152,11 +153,11 @@ static void act(void)
     rcOptions[BOXPASSTHRU] = 0;
     rcOptions[BOXHEADFREE] = 0;
     rcOptions[BOXGPSHOME] = 0;
-    rcOptions[BOXGPSHOLD] = out.mode == NF_GROUND || out.mode == NF_HOLD || out.mode == NF_LAND;
-    if (out.mode == NF_GO || out.mode == NF_TAKEOFF)
+    rcOptions[BOXGPSHOLD] = out.mode == NF_GROUND || out.mode == NF_HOLD;
+    if (out.mode == NF_GO || out.mode == NF_TAKEOFF || out.mode == NF_LAND)
         go();
     else
-        leave();
+        leave(false);
     if (out.mode == NF_LAND)
         rcData[THROTTLE] = (int16_t)(cfg.rc_minchk - 10); /* starts and continues Autoland */
     else if (!out.pilots_throttle)
@@ -178,7 +179,7 @@ bool FlightRun(bool rtl, bool flying)
         magHold = heading;
     nosed = out.nose;
     if (out.mode == NF_PASS)
-        leave();
+        leave(rtl && in.armed);
     else
         act();
     return out.mode != NF_PASS;

@@ -36,7 +36,7 @@ const nf_row_t nf_states[NF_STATES] = {
     [NF_LOITER] = {"loiter", NF_GO, NF_PER_RECORD, 0, NF_NEXT, NF_OK},
     [NF_TURN] = {"turn", NF_GO, NF_PER_TURN, 20000, NF_HELD, NF_TURN_SLOW},
     [NF_STAY] = {"stay", NF_GO, NF_FOREVER, 0, NF_STAY, NF_OK},
-    [NF_SETTLE] = {"settle", NF_HOLD, NF_FIXED, 15000, NF_DESCENT, NF_OK},
+    [NF_SETTLE] = {"settle", NF_GO, NF_FIXED, 15000, NF_DESCENT, NF_OK},
     [NF_DESCENT] = {"descent", NF_LAND, NF_PER_CLIMB, 60000, NF_SINK, NF_LAND_SLOW},
     [NF_SINK] = {"sink", NF_LAND, NF_FOREVER, 0, NF_SINK, NF_OK},
     [NF_DONE] = {"done", NF_GO, NF_FOREVER, 0, NF_DONE, NF_OK},
@@ -201,6 +201,14 @@ static void begin_leg(nf_t *f, const nf_input_t *in, const nf_place_t *place)
     enter(f, in, NF_LEG);
 }
 
+/* Land here: at the last place if it was reached, so that the craft goes on holding it; else where the craft is now. */
+static void begin_landing(nf_t *f, const nf_input_t *in)
+{
+    if (nf_distance(&in->place, &f->target, NULL) > f->settings.radius_cm)
+        set_target(f, in, &in->place);
+    enter(f, in, NF_SETTLE);
+}
+
 static void next_record(nf_t *f, const nf_input_t *in);
 
 /* The mission's TAKEOFF, engaged in the air, leads to the mission's home point at the present height. */
@@ -265,7 +273,7 @@ static void begin_record(nf_t *f, const nf_input_t *in)
         begin_takeoff(f, in);
         break;
     case LAND:
-        enter(f, in, NF_SETTLE);
+        begin_landing(f, in);
         break;
     default:
         set_height(f, in, f->now.height_m * 100);
@@ -551,7 +559,7 @@ static void fly(nf_t *f, const nf_input_t *in)
         turn(f, in);
         break;
     case NF_SETTLE:
-        if (in->settled) {
+        if (in->settled && f->distance_cm <= f->settings.radius_cm) {
             f->height_error_cm = -in->height_cm;
             enter(f, in, NF_DESCENT);
         }
@@ -571,6 +579,12 @@ static nf_mode_t mode_of(const nf_t *f, const nf_input_t *in)
 {
     const nf_mode_t mode = nf_states[f->state].mode;
     return mode == NF_HOLD && (!in->flying || f->grounded) ? NF_GROUND : mode;
+}
+
+/* These modes fly to f->target, or hold it. */
+static bool steers(nf_mode_t mode)
+{
+    return mode == NF_GO || mode == NF_TAKEOFF || mode == NF_LAND;
 }
 
 /* In these states f->height_cm is flown to. */
@@ -642,7 +656,7 @@ static void command(nf_t *f, const nf_input_t *in, nf_output_t *out)
         out->climb_cm_s = climb_rate(f, in);
     if (out->mode == NF_TAKEOFF)
         out->takeoff_cm = f->now.height_m * 100;
-    if (out->mode == NF_GO || out->mode == NF_TAKEOFF) {
+    if (steers(out->mode)) {
         out->target = f->target;
         out->issue = f->issue;
         out->brake = f->state != NF_LEG || f->now.command > WAYPOINT || f->now.seconds != 0;
@@ -654,8 +668,7 @@ static void command(nf_t *f, const nf_input_t *in, nf_output_t *out)
 
 static void measure(nf_t *f, const nf_input_t *in)
 {
-    const nf_mode_t mode = nf_states[f->state].mode;
-    if (mode == NF_GO || mode == NF_TAKEOFF)
+    if (steers(nf_states[f->state].mode))
         f->distance_cm = nf_distance(&in->place, &f->target, &f->bearing_cd);
     else
         f->distance_cm = 0;

@@ -60,7 +60,7 @@ typedef enum {
     NF_GO,       /* fly to `target` and stay there: `brake`, `issue` */
     NF_HOLD,     /* the firmware's own position hold, at the place where the craft comes to a stop */
     NF_LEVEL,    /* no fix: level, height held; the sticks steer */
-    NF_LAND      /* land where the craft is, then disarm */
+    NF_LAND      /* land at the place `target`, then disarm */
 } nf_mode_t;
 
 typedef enum {
@@ -172,16 +172,16 @@ typedef struct {
     bool stick;               /* roll or pitch beyond the deadband */
     bool yaw_stick;
     bool throttle_middle;     /* throttle stick in its middle zone */
-    bool settled;             /* NF_HOLD, NF_GO: the firmware holds a place, at rest */
     bool arrived;             /* NF_GO: the firmware takes the target as reached */
+    bool settled;             /* NF_GO: ... and the craft is at rest */
     bool battery_low;
 } nf_input_t;
 
 typedef struct {
     nf_mode_t mode;
-    nf_place_t target;        /* NF_GO, NF_TAKEOFF */
-    bool issue;               /* NF_GO, NF_TAKEOFF: give the target to the navigation (again) */
-    bool brake;               /* NF_GO: slow down towards the target */
+    nf_place_t target;        /* NF_GO, NF_TAKEOFF, NF_LAND */
+    bool issue;               /* with a target: give the target to the navigation (again) */
+    bool brake;               /* with a target: slow down towards the target */
     bool pilots_throttle;     /* NF_HOLD, NF_LEVEL: the stick climbs and descends; else climb_cm_s holds the height */
     bool nose;                /* turn to heading_cd; else the yaw stick turns it, or the firmware holds the heading */
     int16_t climb_cm_s;       /* 0: hold the height */

@@ -198,7 +198,7 @@ static void steer(const nf_output_t *out, double *north, double *east)
 {
     int32_t bearing;
     *north = *east = 0;
-    if (out->mode != NF_GO && out->mode != NF_TAKEOFF)
+    if (out->mode != NF_GO && out->mode != NF_TAKEOFF && out->mode != NF_LAND)
         return;
     const double distance = nf_distance(&craft.measured[0], &out->target, &bearing);
     double speed = distance * 0.4;
@@ -293,6 +293,7 @@ typedef struct {
     uint32_t entered_ms;
     double turned, heading_before, low, high;
     uint16_t record;
+    nf_place_t landing;
     bool touched; /* since the state was entered */
     bool toggled;
 } flight_t;
@@ -358,6 +359,12 @@ static void check_step(flight_t *flight)
     CHECK(out->mode != NF_TAKEOFF || list.record[1].command == TAKEOFF);
     if (out->mode == NF_GO && core->record > 0 && core->state == NF_LEG)
         CHECK(is_known_place(&out->target, in));
+    if (core->state == NF_SETTLE && before != NF_SETTLE) {
+        CHECK(nf_distance(&in->place, &out->target, NULL) <= RADIUS_CM + 1);
+        flight->landing = out->target;
+    }
+    if (core->state == NF_DESCENT || core->state == NF_SINK)
+        CHECK(out->mode == NF_LAND && !memcmp(&out->target, &flight->landing, sizeof out->target));
     if (in->stick && before != NF_OFF)
         CHECK(core->state == NF_OFF || core->state == NF_HELD || core->state == NF_NO_FIX || core->state == NF_HANDS);
     if (!in->fix)
@@ -425,8 +432,8 @@ static void sense(flight_t *flight)
     in->heading_cd = (int32_t)lround(remainder(craft.heading, 360) * 100);
     in->flying = craft.flying;
     in->armed = craft.armed;
-    in->settled = fabs(craft.v_north) + fabs(craft.v_east) < 30;
     in->arrived = craft.holds;
+    in->settled = craft.holds && fabs(craft.v_north) + fabs(craft.v_east) < 30;
 }
 
 static void step(flight_t *flight)
@@ -485,7 +492,7 @@ static void fly_undisturbed(void)
     if (flight.core.state == NF_HELD)
         CHECK(flight.core.reason == NF_ON_GROUND ? !takes_off : flight.core.reason == NF_BAD_ORDER && list.count == 2);
     else if (last == LAND)
-        CHECK(!craft.armed);
+        CHECK(!craft.armed && nf_distance(&craft.measured[0], &flight.landing, NULL) <= RADIUS_CM);
     else
         CHECK(flight.core.state == (last == LOITER_UNLIM ? NF_STAY : NF_DONE));
     flight.in.switch_on = false;

@@ -15,7 +15,8 @@ volatile uint8_t GPS_numSat;
 volatile bool GPS_FIX;
 bool GroundAltInitialized, WP_Fastcorner;
 float EstAlt, vario, heading, magHold, waypoint_speed_gov;
-int8_t nav_mode, wp_status, ph_status;
+int8_t nav_mode, wp_status;
+uint16_t GPS_speed;
 uint32_t currentTimeMS;
 uint16_t batteryWarningVoltage;
 
@@ -99,6 +100,8 @@ static void make_list(void)
     }
 }
 
+static bool returns_home;
+
 /* One 50 Hz loop of the firmware, with the pilot's sticks in the middle. */
 static bool loop_once(bool switch_on)
 {
@@ -106,7 +109,7 @@ static bool loop_once(bool switch_on)
     memset(rcOptions, 0, sizeof rcOptions);
     rcOptions[BOXGPSAUTO] = switch_on;
     rcData[THROTTLE] = 1510;
-    return FlightRun(false, f.ARMED != 0);
+    return FlightRun(returns_home, f.ARMED != 0);
 }
 
 static void loops(int count)
@@ -236,11 +239,15 @@ static void test_landing_and_announcements(void)
     Real_GPS_coord[LAT] = 450006000;
     loops(2);
     CHECK(FlightReached(&record) && record == 2 && !FlightReached(&record));
-    CHECK(asked(3) == NF_SETTLE && rcOptions[BOXGPSHOLD]);
-    f.GPS_HOLD_MODE = 1;
-    ph_status = PH_STATUS_DONE;
+    targets = 0;
+    nav_mode = NAV_MODE_POSHOLD; /* there */
+    GPS_speed = 80;
+    loops(2);
+    CHECK(asked(3) == NF_SETTLE && f.GPS_AUTO_MODE && own_gains);
+    GPS_speed = 20;
     loops(2);
     CHECK(asked(3) == NF_DESCENT && rcData[THROTTLE] < cfg.rc_minchk);
+    CHECK(f.GPS_AUTO_MODE && !rcOptions[BOXGPSHOLD] && targets == 0); /* goes on holding the last place */
     f.ARMED = 0;
     CHECK(!loop_once(true) && !FlightCurrent(&record));
 }
@@ -253,9 +260,12 @@ static void test_failsafe_and_the_port(void)
     CHECK(FlightRefuses(200) && FlightRefuses(201) && FlightRefuses(203) && !FlightRefuses(101));
     CHECK(FlightRequest(178, buffer, 0) == -1 && FlightRequest(179, buffer, 1) == 24 && buffer[0] == NM_BAD_REQUEST);
     FlightFailsafe();
-    CHECK(!loop_once(true) && !own_gains && asked(4) == NF_FAILSAFE);
+    returns_home = true;
+    CHECK(!loop_once(true) && !f.GPS_AUTO_MODE && asked(4) == NF_FAILSAFE);
     loops(10);
-    CHECK(asked(3) == NF_OFF);
+    CHECK(asked(3) == NF_OFF && own_gains); /* on the way home */
+    returns_home = false;
+    CHECK(!loop_once(true) && !own_gains && asked(3) == NF_OFF);
     f.ARMED = 0;
     CHECK(!FlightRefuses(203));
 }

@@ -48,7 +48,8 @@ extern volatile uint8_t GPS_numSat;
 extern volatile bool GPS_FIX;
 extern bool GroundAltInitialized, WP_Fastcorner;
 extern float EstAlt, vario, heading, magHold, waypoint_speed_gov;
-extern int8_t nav_mode, wp_status, ph_status;
+extern int8_t nav_mode, wp_status;
+extern uint16_t GPS_speed;
 extern uint32_t currentTimeMS;
 
 bool feature(uint32_t mask);
