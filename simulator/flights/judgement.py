@@ -37,6 +37,8 @@ class ItemResult:
     height_m: float | None = None
     planned_height_m: float | None = None
     held_s: float | None = None
+    #: The greatest distance while it stayed.
+    farthest_m: float | None = None
     turned_deg: float | None = None
     problems: list[str] = field(default_factory=list)
 
@@ -131,9 +133,9 @@ def _judge_stay(
     result.height_m = stayed.last.height
     if state is not FlightPhase.TURN and result.held_s > 5 and abs(result.height_m - record.height_m) > _HOLD_HEIGHT_M:
         result.problems.append(f"{result.height_m:.1f} m high instead of {record.height_m} m")
-    _, farthest = stayed.distances(target)
-    if farthest > max(record.radius_m, _LEAST_RADIUS_M) + _HELD_M:
-        result.problems.append(f"up to {farthest:.1f} m away while it stayed")
+    _, result.farthest_m = stayed.distances(target)
+    if result.farthest_m > max(record.radius_m, _LEAST_RADIUS_M) + _HELD_M:
+        result.problems.append(f"up to {result.farthest_m:.1f} m away while it stayed")
 
 
 def _judge_landing(run: MissionRun, number: int, result: ItemResult) -> None:

@@ -34,6 +34,13 @@ class Sample:
         """Horizontal, to a place north and west of the launch."""
         return hypot(self.position[0] - place[0], self.position[1] - place[1])
 
+    def distance_to_leg(self, begin: tuple[float, float], end: tuple[float, float]) -> float:
+        """Horizontal, to the nearest point of the line between two places."""
+        north, west = end[0] - begin[0], end[1] - begin[1]
+        along = (self.position[0] - begin[0]) * north + (self.position[1] - begin[1]) * west
+        part = min(max(along / (north**2 + west**2 or 1.0), 0.0), 1.0)
+        return self.distance_to((begin[0] + part * north, begin[1] + part * west))
+
 
 @dataclass(slots=True)
 class Track:
