@@ -13,14 +13,15 @@ from bridge.controllers.table import PROFILES
 from bridge.fc.profile import RuleSettings
 from bridge.missions.list_check import check_list
 from bridge.model.verdict import Result
-from protocols.firmware_image import Image
+from protocols.file_error import FileError
+from protocols.firmware_image import FLASH_SIZE, Image
 from protocols.mission_file import MissionFileError
 from protocols.msp.mission import WpRecord
 from service.settings import SettingsError, takeoff_limit_m
 from simulator.commands.image import read_image
 from simulator.sky.earth import Place
 from simulator.sky.sky import Weather
-from terminal.files import shown_path
+from terminal.files import read_file, shown_path, write_file
 from terminal.mission_source import load_mission
 from terminal.options import PATH
 from terminal.printing import print_json, print_table
@@ -77,7 +78,10 @@ def fly(
     Exit code 0: the list was flown as it says, 1: it was not, 2: the file or the image cannot be used.
     """
     records = _records(file)
-    firmware = read_image(image)
+    try:
+        firmware = read_image(image)
+    except click.ClickException as error:
+        _refuse(error.message)
     weather = Weather(wind=wind, wind_from=wind_from, seed=seed)
     place = Place(lat=records[0].lat_e7 / 1e7, lon=records[0].lon_e7 / 1e7)
     try:
@@ -85,12 +89,8 @@ def fly(
     except _unfit() as error:
         _refuse(str(error))
     from simulator.flights.judgement import is_flown
+    from simulator.flights.track_picture import track_svg
 
-    if svg:
-        from simulator.flights.track_picture import track_svg
-
-        title = f"{shown_path(file)}, wind {wind:g} m/s, seed {seed}"
-        svg.write_text(track_svg(run.track, records, place, title))
     flown = is_flown(results)
     if as_json:
         items = [asdict(result) for result in results]
@@ -101,6 +101,12 @@ def fly(
     else:
         print_table(_table(results))
         say(f"{'Flown' if flown else 'Not flown'} in {_seconds(run):.0f} s.")
+    if svg:
+        try:
+            title = f"{shown_path(file)}, wind {wind:g} m/s, seed {seed}"
+            write_file(svg, track_svg(run.track, records, place, title), FileError)
+        except FileError as error:
+            _refuse(str(error))
     ctx.exit(FlyStatus.FLOWN if flown else FlyStatus.NOT_FLOWN)
 
 
@@ -132,6 +138,18 @@ def _records(file: Path) -> tuple[WpRecord, ...]:
     return verdict.records
 
 
+def _flash(path: Path) -> bytes:
+    try:
+        contents = read_file(path, FileError)
+    except FileError as error:
+        _refuse(str(error))
+    if len(contents) != FLASH_SIZE:
+        _refuse(
+            f"{shown_path(path)} has {len(contents)} bytes instead of {FLASH_SIZE}: make it with sim --image --flash"
+        )
+    return contents
+
+
 def _fly(
     firmware: Image,
     name: str,
@@ -153,8 +171,8 @@ def _fly(
         if not quiet:
             say(text)
 
-    contents = bytearray(flash_file.read_bytes() if flash_file else prepared_flash(firmware, tell, _SETTINGS))
-    naze = FlyingNaze(firmware, memoryview(contents), weather=weather, place=place)
+    contents = _flash(flash_file) if flash_file else prepared_flash(firmware, tell, _SETTINGS)
+    naze = FlyingNaze(firmware, memoryview(bytearray(contents)), weather=weather, place=place)
     pilot = Pilot(naze)
     tell(f"{name} boots.")
     pilot.power_on()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`naze-bridge fly` with what it cannot fly: one sentence, exit code 2 (or click's own for the options)."""
+"""`naze-bridge fly` with what it cannot fly: one sentence, exit code 2."""
 
 import struct
 from pathlib import Path
@@ -36,8 +36,16 @@ def test_a_file_that_is_no_image_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "x.elf"
     path.write_bytes(b"no program")
     code, output = run(FIELD, "--image", str(path))
-    assert code == 1
+    assert code == FlyStatus.UNUSABLE
     assert "is not an ELF file" in output
+
+
+def test_a_flash_of_another_size_is_refused(tmp_path: Path, image: str) -> None:
+    path = tmp_path / "flash.img"
+    path.write_bytes(bytes(1000))
+    code, output = run(FIELD, "--image", image, "--flash", str(path))
+    assert code == FlyStatus.UNUSABLE
+    assert "1000 bytes" in output
 
 
 def test_a_mission_that_would_be_rejected_is_refused(tmp_path: Path, image: str) -> None:
