@@ -41,12 +41,18 @@ def read_image(path: Path) -> Image:
 
 
 def run_image(
-    path: Path, faults: Faults, running: Running, state: Path | None, seed: int, weather: Weather | None = None
+    path: Path,
+    faults: Faults,
+    running: Running,
+    state: Path | None,
+    seed: int,
+    weather: Weather | None = None,
+    tempo: float = 1.0,
 ) -> None:
-    """Run a firmware until Ctrl-C; with `weather` in a craft that flies. click.ClickException."""
+    """Run a firmware until Ctrl-C; with `weather` in a craft that flies, at `tempo`. click.ClickException."""
     image = read_image(path)
     flash = open_memory(state, b"\xff" * FLASH_SIZE, "name another file") if state else None
-    board = _flying(image, flash, weather) if weather else _on_bench(image, flash, faults, seed)
+    board = _flying(image, flash, weather, tempo) if weather else _on_bench(image, flash, faults, seed)
     board.faults.armed = faults.armed
     begun = time.monotonic()
 
@@ -65,7 +71,7 @@ def _on_bench(image: Image, flash: memoryview | None, faults: Faults, seed: int)
     return EmulatedNaze(image, switches, flash, seed=seed, longest_step_s=_LONGEST_STEP_S)
 
 
-def _flying(image: Image, flash: memoryview | None, weather: Weather) -> "EmulatedNaze":
+def _flying(image: Image, flash: memoryview | None, weather: Weather, tempo: float) -> "EmulatedNaze":
     """A flash without settings is prepared first."""
     from simulator.emulated_naze.console import ConsoleError
     from simulator.emulated_naze.flying_naze import FlyingNaze
@@ -78,4 +84,4 @@ def _flying(image: Image, flash: memoryview | None, weather: Weather) -> "Emulat
             raise click.ClickException(f"this image does not fly: {error}") from error
         flash = memoryview(bytearray(FLASH_SIZE)) if flash is None else flash
         flash[:] = prepared
-    return FlyingNaze(image, flash, weather=weather, longest_step_s=_LONGEST_STEP_S)
+    return FlyingNaze(image, flash, weather=weather, longest_step_s=_LONGEST_STEP_S, tempo=tempo)

@@ -44,7 +44,7 @@ def _load_core(path: Path, capacity: int) -> BootMissions:
 #: The options that --image and --play allow: the rest depends on the firmware, or is recorded.
 _WITH_IMAGE = {
     "image", "link", "tcp", "armed", "bit_errors", "lost_bytes", "seed", "hang_after", "power_cut_after", "state",
-    "control", "fly", "wind", "script",
+    "control", "fly", "wind", "script", "speed",
 }  # fmt: skip
 #: Options of a flight.
 _WITH_FLY = {"wind", "script"}
@@ -133,7 +133,12 @@ def _address(_: click.Context, __: click.Parameter, value: str | None) -> tuple[
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     help="Play this UART capture (run --record-uart) instead.",
 )
-@click.option("--speed", type=click.FloatRange(0.01, 100), default=1.0, help="Playback speed: 10 is ten times as fast.")
+@click.option(
+    "--speed",
+    type=click.FloatRange(0.01, 100),
+    default=1.0,
+    help="With --play or --fly: 10 is ten times as fast, or as fast as the computer can.",
+)
 def sim(
     kind: str,
     inav_version: str,
@@ -168,14 +173,16 @@ def sim(
     if (link is None) == (tcp is None):
         raise click.UsageError("specify the connection: --link PATH or --tcp HOST:PORT")
     faults = Faults(armed=armed, extension=not no_extension, bit_error_rate=bit_errors, lost_byte_rate=lost_bytes)
-    running = Running(link, tcp, control, hang_after, power_cut_after, read_script(script) if script else ())
+    moves = tuple((at_s / speed, line) for at_s, line in read_script(script)) if script else ()
+    running = Running(link, tcp, control, hang_after, power_cut_after, moves)
     if fly and image is None:
         raise click.UsageError("--fly needs a firmware: add --image FILE")
     if not fly:
-        _refuse_options("a board that does not fly", lambda name: name in _WITH_FLY)
+        in_flight_only = _WITH_FLY | (set() if play else {"speed"})
+        _refuse_options("a board that does not fly", lambda name: name in in_flight_only)
     if image is not None:
         _refuse_options("--image", lambda name: name not in _WITH_IMAGE)
-        run_image(image, faults, running, state, seed, Weather(wind=wind, seed=seed) if fly else None)
+        run_image(image, faults, running, state, seed, Weather(wind=wind, seed=seed) if fly else None, speed)
         return
     if kind != "naze":
         _refuse_options(f"--kind {kind}", lambda name: name in _OF_THE_NAZE)

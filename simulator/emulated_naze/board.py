@@ -33,8 +33,8 @@ class EmulatedNaze(SimulatedBoard):
     """A Naze32 that runs `image`, without a simulated flight: it lies on a bench.
 
     `flash` is the chip of 128 KB: the image replaces its program, and the rest is kept; without it the rest is blank.
-    Between two calls the board's time advances by `longest_step_s` at most: a computer that is too slow gets a slow
-    board.
+    The board's time passes `tempo` times as fast as its callers', who get `longest_step_s` at most between two calls: a
+    computer that is too slow gets a slow board.
     """
 
     faults: EmulatedFaults
@@ -48,8 +48,9 @@ class EmulatedNaze(SimulatedBoard):
         *,
         seed: int = 0,
         longest_step_s: float = inf,
+        tempo: float = 1.0,
     ) -> None:
-        super().__init__(BOOT_S, seed)
+        super().__init__(BOOT_S / tempo, seed)
         self.faults = faults or EmulatedFaults()
         if flash is None:
             flash = memoryview(bytearray(b"\xff" * FLASH_SIZE))
@@ -64,6 +65,7 @@ class EmulatedNaze(SimulatedBoard):
         self._boot_loader: BootLoader | None = None
         self._last_words = b""
         self._longest_step_s = longest_step_s
+        self._ns_per_s = 1e9 * tempo
         # The callers' time when the chip's clock was zero.
         self._offset_s = 0.0
         self._lost_power = False
@@ -122,7 +124,7 @@ class EmulatedNaze(SimulatedBoard):
     # -- time ------------------------------------------------------------------------------------------------
 
     def _run_until(self, now: float) -> None:
-        late_s = now - self._offset_s - self._chip.now_ns / 1e9 - self._longest_step_s
+        late_s = now - self._seconds(self._chip.now_ns) - self._longest_step_s
         if late_s > 0:
             self._offset_s += late_s
         self._run_chip_until(now)
@@ -151,17 +153,17 @@ class EmulatedNaze(SimulatedBoard):
 
     def _chip_ns(self, now: float) -> int:
         """The chip's time at a caller's time, and back."""
-        return round((now - self._offset_s) * 1e9)
+        return round((now - self._offset_s) * self._ns_per_s)
 
     def _seconds(self, chip_ns: int) -> float:
-        return chip_ns / 1e9 + self._offset_s
+        return chip_ns / self._ns_per_s + self._offset_s
 
     def _on_power_cut(self) -> None:
         self._lost_power = True
         self._chip.pause()
 
     def _boot(self, now: float) -> None:
-        self._offset_s = now - self._chip.now_ns / 1e9
+        self._offset_s = now - self._chip.now_ns / self._ns_per_s
         self._chip.power_on()
         self._begin()
 

@@ -57,12 +57,15 @@ class FlyingNaze(EmulatedNaze):
         heading: float = 0.0,
         place: Place | None = None,
         longest_step_s: float = inf,
+        tempo: float = 1.0,
     ) -> None:
         self._weather = weather or Weather()
         self.sky = Sky(self._weather, lambda: self._chip.motors_us(), frame, heading, place)
         self.gps = GpsModule(self.sky.place, self._weather.seed)
-        super().__init__(image, FlyingSwitches(), flash, seed=self._weather.seed, longest_step_s=longest_step_s)
-        self._boot_s = FLYING_BOOT_S
+        super().__init__(
+            image, FlyingSwitches(), flash, seed=self._weather.seed, longest_step_s=longest_step_s, tempo=tempo
+        )
+        self._boot_s = FLYING_BOOT_S / tempo
         self._requested = self._is_pending = False
 
     def truth(self, now: float) -> Craft | None:

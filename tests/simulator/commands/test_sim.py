@@ -163,6 +163,7 @@ def test_truth_reports_the_flight(start: Callable[..., Simulator]) -> None:
         (("--kind", "inav"), "--link PATH or --tcp HOST:PORT"),
         (("--tcp", "5760"), "'5760' is not HOST:PORT"),
         (("--kind", "inav", "--tcp", "127.0.0.1:1", "--tele-prot", "1"), "--tele-prot has no effect with --kind inav"),
+        (("--tcp", "127.0.0.1:1", "--speed", "4"), "--speed has no effect with a board that does not fly"),
         (("--kind", "inav", "--tcp", "192.0.2.1:5760"), "192.0.2.1:5760 cannot be opened for listening"),
         (("--kind", "inav", "--tcp", "127.0.0.1:5760", "--state", "pyproject.toml"), "name another file"),
     ],
