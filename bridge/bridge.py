@@ -400,7 +400,7 @@ class Bridge:
                 if Health in news or Readiness in news:
                     self._parameters.follow()
             if MissionLeg in news and (leg := self.vehicle.last(MissionLeg)) is not None:
-                self._missions.follow(leg.status)
+                self._missions.follow(leg.report)
             if FlightState in news:
                 self._follow_arming(now)
                 self._remember_flight(now)

@@ -29,7 +29,7 @@ class Overview:
     heading_deg: Annotated[int | None, "0 up to 360, clockwise from north"]
     speed_dm_s: Annotated[int | None, "over ground, m/s * 10"]
     fix: Annotated[int | None, "of the GPS: 0 none, 2 or 3 dimensions"]
-    mission_state: Annotated[int | None, "MAVLink's MISSION_STATE: 2 not started, 3 active, 5 complete"]
+    mission_state: Annotated[int | None, "MAVLink's MISSION_STATE: 2 not started, 3 active, 4 paused, 5 complete"]
 
     @property
     def marks(self) -> object:

@@ -6,10 +6,11 @@ kept as bytes until `settle`.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 from bridge.fc.msp_telemetry import velocity
-from bridge.model.flight_mode import FlightMode, active_boxes, flight_mode, names_of_active
+from bridge.model.flight_mode import MISSION_BOXES, FlightMode, active_boxes, flight_mode, names_of_active
+from bridge.model.mission_progress import FlightReport, Progress
 from bridge.model.vehicle import (
     Charge,
     Fix,
@@ -18,6 +19,7 @@ from bridge.model.vehicle import (
     GpsFix,
     Health,
     Height,
+    MissionLeg,
     Mode,
     Orientation,
     Power,
@@ -66,7 +68,7 @@ class MavlinkTelemetry:
         self._is_level: tuple[bool, float] | None = None
         self._decoder = MavlinkDecoder()
         self._unread: dict[int, tuple[MavlinkFrame, float]] = {}
-        self._readers: Mapping[int, Callable[[Message, float], None]] = {
+        self._readers: dict[int, Callable[[Message, float], None]] = {
             _HEARTBEAT: self._heartbeat,
             m.MAVLINK_MSG_ID_SYS_STATUS: self._sys_status,
             m.MAVLINK_MSG_ID_BATTERY_STATUS: self._battery_status,
@@ -80,6 +82,11 @@ class MavlinkTelemetry:
             m.MAVLINK_MSG_ID_RC_CHANNELS_RAW: self._rc_channels,
             m.MAVLINK_MSG_ID_SYSTEM_TIME: self._system_time,
         }
+        if is_harakiri:
+            self._readers |= {
+                m.MAVLINK_MSG_ID_MISSION_CURRENT: self._mission_current,
+                m.MAVLINK_MSG_ID_MISSION_ITEM_REACHED: self._mission_item_reached,
+            }
         #: Message id by the bytes of a frame's header that hold sender and message id.
         self._known: dict[bytes, int] = {}
         self._compid: int | None = None
@@ -153,10 +160,28 @@ class MavlinkTelemetry:
         if switches is not None and sticks is not None:
             heard_at = min(heard_at, sticks.heard_at)
             flags = active_boxes(switches.activation, sticks.channels_us[_STICKS:])
-            by_switches = flight_mode(names_of_active(flags, switches.boxes))
+            # The switch alone flies no mission.
+            by_switches = flight_mode(names_of_active(flags, switches.boxes) - MISSION_BOXES)
             if by_switches not in (FlightMode.STABILIZE, FlightMode.ACRO):
                 mode = by_switches
         self._vehicle.hear(Mode(heard_at, Source.MAVLINK, mode))
+
+    def _mission_current(self, message: Message, now: float) -> None:
+        """A Harakiri sends it while it flies the mission, each second; the last record reached is older."""
+        self._hear_flight(message.seq, self._reached(message.seq - 1, now), now)
+
+    def _mission_item_reached(self, message: Message, now: float) -> None:
+        flight = self._vehicle.mission_flight(now)
+        self._hear_flight(message.seq if flight is None else flight.number, message.seq, now)
+
+    def _reached(self, otherwise: int, now: float) -> int:
+        """The last record that this flight has reached; `otherwise` if it has just begun."""
+        leg, flight = self._vehicle.last(MissionLeg), self._vehicle.mission_flight(now)
+        return otherwise if flight is None or leg is None or leg.source is not Source.MAVLINK else flight.reached
+
+    def _hear_flight(self, number: int, reached: int, now: float) -> None:
+        report = FlightReport(number, reached, Progress.ACTIVE, is_flown=True)
+        self._vehicle.hear(MissionLeg(now, Source.MAVLINK, report))
 
     def _attitude(self, message: Message, now: float) -> None:
         roll, pitch, yaw = map(math.degrees, (message.roll, message.pitch, message.yaw))

@@ -25,6 +25,7 @@ from bridge.missions.fc_mission_store import (
 from bridge.missions.list_check import check_list
 from bridge.missions.mission_texts import summary
 from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission, RecalledMission
+from bridge.model.mission_progress import FlightReport
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.vehicle import Vehicle
 from bridge.model.verdict import Result, SentSeqs, Verdict, is_renumbered
@@ -180,21 +181,26 @@ class MissionService:
         return self._former if armed_at <= self._former_until else None
 
     @property
+    def on_board(self) -> HeldMission | None:
+        """The flight controller's list, if it is known; also while it is armed and cannot be read."""
+        return None if isinstance(self.fc_store, Refusal) else self._verified_before_arming()
+
+    @property
     def watch_s(self) -> float:
         """How often MissionWatch asks `is_current`, s; infinity without a store."""
         return inf if isinstance(self.fc_store, Refusal) else self.fc_store.watch_s
 
     def seq_of(self, number: int) -> int:
         """The seq of the item for the flight controller's record `number`; 0: none is known."""
-        if isinstance(self.fc_store, Refusal) or self.held is None:
+        if isinstance(self.fc_store, Refusal) or (known := self.on_board) is None:
             return 0
-        return self.fc_store.seq_of(self.held.records, number)
+        return self.fc_store.seq_of(known.records, number)
 
-    def follow(self, status: NavStatus) -> None:
+    def follow(self, report: NavStatus | FlightReport) -> None:
         """Forget a list that the craft does not fly: another client has changed it."""
         if isinstance(self.fc_store, Refusal) or self.held is None:
             return
-        if self.fc_store.is_contradicted(self.held.records, status):
+        if isinstance(report, NavStatus) and self.fc_store.is_contradicted(self.held.records, report):
             self.held, self._former, self.is_settled = None, None, False
 
     def occupied(self) -> Refusal | None:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mission progress from NAV_STATUS: the record that the craft flies to, and the last one reached."""
+"""Mission progress: the record that the craft flies to, and the ones reached."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import Enum
+from enum import Enum, IntEnum
 
 from bridge.model.verdict import SentSeqs
 from protocols.mission_item import MissionItem
@@ -20,11 +21,48 @@ class Progress(Enum):
     NO_MISSION = 1
     NOT_STARTED = 2
     ACTIVE = 3
+    PAUSED = 4
     COMPLETE = 5
 
     @property
     def text(self) -> str:
         return self.name.lower().replace("_", " ")
+
+
+class Stage(IntEnum):
+    """MAVLink's MAV_LANDED_STATE."""
+
+    ON_GROUND = 1
+    IN_AIR = 2
+    TAKEOFF = 3
+    LANDING = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """The way to the target: metres, degrees clockwise from north, metres up."""
+
+    distance_m: float
+    bearing_deg: float
+    climb_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class FlightReport:
+    """A report of a board that counts the records it has reached (Harakiri).
+
+    number: the record in flight, or at which the flight has stopped, from 1; 0: none. reached: the last one reached, in
+    this flight or the one before. is_flown: the mission flies the craft. way, stage: None if not reported. why: the
+    reason for a stop or a delay, for the pilot.
+    """
+
+    number: int
+    reached: int
+    progress: Progress
+    is_flown: bool
+    way: Way | None = None
+    stage: Stage | None = None
+    why: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,16 +83,32 @@ class FlownMission:
 
 
 class MissionProgress:
-    """Feed it every NAV_STATUS. Records count from 1; `number` is 0 while no mission is flown."""
+    """Feed it every report. Records count from 1; `number` is 0 while no mission is flown."""
 
     def __init__(self) -> None:
         self.number = 0
         self.progress = Progress.NOT_STARTED
         self._action = 0
-        self._reached = 0
+        self._reached: int | None = None
 
-    def take(self, status: NavStatus) -> int | None:
-        """Take one reply; returns the record reached since the last one. Of several only the last is known."""
+    def take(self, report: NavStatus | FlightReport) -> Sequence[int]:
+        """Take one report; returns the records reached since the one before."""
+        if isinstance(report, FlightReport):
+            return self._take_flight(report)
+        reached = self._take_status(report)
+        return () if reached is None else (reached,)
+
+    def _take_flight(self, report: FlightReport) -> Sequence[int]:
+        number, reached = self.number, self._reached
+        self.number, self.progress, self._reached = report.number, report.progress, report.reached
+        if reached is None or not (number or report.number):
+            return ()
+        if report.reached < reached:  # another flight has begun
+            reached = max(report.reached - 1, 0)
+        return range(reached + 1, report.reached + 1)
+
+    def _take_status(self, status: NavStatus) -> int | None:
+        """Of several records reached since the last reply only the last is known."""
         before, action = self.number, self._action
         # The return home at the end of a mission is flown in the mode RTH.
         goes_home = status.mode == NavMode.RTH and status.action == NavAction.RTH and before > 0

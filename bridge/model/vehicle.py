@@ -16,6 +16,7 @@ from bridge.model.battery import LEAST_V, least_cells, remaining_percent
 from bridge.model.flight_memory import FlightMemory, Home
 from bridge.model.flight_mode import FlightMode
 from bridge.model.ground_track import GroundTrack, distance_m
+from bridge.model.mission_progress import FlightReport
 from protocols.mission_item import is_on_earth
 from protocols.msp.nav import NavStatus
 from protocols.msp.telemetry import Sensor
@@ -219,7 +220,7 @@ class ImuSample(Reading):
 class MissionLeg(Reading):
     """Progress through the mission, from flight controllers that report it."""
 
-    status: NavStatus
+    report: NavStatus | FlightReport
 
 
 @dataclass(slots=True)
@@ -317,6 +318,9 @@ class Vehicle:
             self._follow_arming(reading.armed, reading.heard_at)
         if isinstance(reading, Power):
             reading = self._estimated(reading)
+        if kind is Mode and MissionLeg in self._readings and self.mission_flight(reading.heard_at) is not None:
+            # The boxes that are active meanwhile are those of the functions that the flight uses.
+            reading = Mode(reading.heard_at, reading.source, FlightMode.AUTO)
         self._readings[kind] = reading
         self.news.add(kind)
         if self.heard_at is None or reading.heard_at > self.heard_at:
@@ -368,6 +372,11 @@ class Vehicle:
         reading = self.last(kind)
         limit_s = self.stale_s.get(kind, STALE_S) if stale_s is None else stale_s
         return reading if reading is not None and now <= reading.heard_at + limit_s else None
+
+    def mission_flight(self, now: float) -> FlightReport | None:
+        """The report of a board that flies its mission now and reports more than the record (Harakiri)."""
+        leg = self.fresh(MissionLeg, now)
+        return leg.report if leg is not None and isinstance(leg.report, FlightReport) and leg.report.is_flown else None
 
     def home_or_position(self) -> Home | None:
         """Home; before it is known, the current position, at the altitude of the launch."""

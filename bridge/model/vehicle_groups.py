@@ -125,8 +125,11 @@ class MissionIdentity:
     count: Annotated[int, "records, home included; 0: none"]
     checksum: Annotated[str, "CRC-32 over the records, 8 hexadecimal digits"]
     state: Annotated[
-        str | None, "not started, active or complete; null: the flight controller (a Harakiri) does not report it"
+        str | None,
+        "not started, active, paused or complete; null: the flight controller does not report it (a Harakiri without "
+        "mission flight)",
     ] = None
+    item: Annotated[int | None, "the item that is flown, as read back; null: none, or not reported"] = None
 
 
 @dataclass(frozen=True, slots=True)

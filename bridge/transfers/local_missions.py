@@ -36,7 +36,7 @@ class LocalMissions:
     @property
     def held(self) -> HeldMission | None:
         """The flight controller's mission, as last read."""
-        return self._missions.held
+        return self._missions.on_board
 
     @property
     def others(self) -> tuple[HeldMission, ...]:

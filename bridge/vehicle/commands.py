@@ -15,15 +15,19 @@ from bridge.fc.actions import (
     FcAction,
     FcActions,
 )
+from bridge.fc.profile import Spoken
 from bridge.fc.session import FcSession
 from bridge.gcs.flash_budget import TOO_MANY_WRITES
 from bridge.gcs.ground import Ground
 from bridge.gcs.station import Severity, Station
+from bridge.model.flight_mode import MISSION_BOXES
+from bridge.model.vehicle import MissionLeg, Switches
 from bridge.settings.fc_settings import Cause, SettingRefusal
 from bridge.vehicle.board_settings import BoardSettings
 from bridge.vehicle.calibration import Calibration
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.parameters import Parameters
+from bridge.vehicle.vehicle_messages import auto_mode
 from protocols.mavlink.command import CommandResult
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.metadata_message import COMPONENT_METADATA
@@ -73,6 +77,9 @@ _REFUSED = {
     messages.MAV_CMD_DO_JUMP_TAG: "The current waypoint cannot be set",
     messages.MAV_CMD_DO_FENCE_ENABLE: "There is no fence",
 }
+#: Those that would start or move a mission flight.
+_OF_A_MISSION = frozenset((messages.MAV_CMD_MISSION_START, messages.MAV_CMD_DO_SET_MISSION_CURRENT))
+_FLIES_NONE = "This flight controller flies no missions"
 #: param1 of MAV_CMD_PREFLIGHT_STORAGE.
 _SAVE = 1
 _NOT_STORED = {
@@ -137,9 +144,22 @@ class CommandService:
         else:
             self._actions.start(action, lambda outcome: self._acted(station, command, action, outcome, now), now)
 
-    def refuse(self, station: Station, command: int) -> None:
-        """Give the reason for refusing a message that does the same as `command` but is not acknowledged."""
-        self._ground.say(Severity.ERROR, _REFUSED[command], station)
+    def refuse(self, station: Station, command: int, custom_mode: float = -1) -> None:
+        """Give the reason for refusing a command, or a message that does the same but is not acknowledged."""
+        is_auto = command == messages.MAV_CMD_DO_SET_MODE and custom_mode == auto_mode(self._session.vehicle)
+        of_mission = self._mission_refusal() if is_auto or command in _OF_A_MISSION else None
+        self._ground.say(Severity.ERROR, of_mission or _REFUSED[command], station)
+
+    def _mission_refusal(self) -> str | None:
+        """The switch that flies the mission, or that none does; None if that is not known."""
+        controller, vehicle = self._session.state.controller, self._session.vehicle
+        if vehicle.last(MissionLeg) is None:
+            is_asked = controller is not None and controller.profile.spoken is Spoken.MSP
+            return _FLIES_NONE if is_asked else None
+        switches = vehicle.last(Switches)
+        boxes = controller.boxes if controller is not None and controller.boxes else switches.boxes if switches else ()
+        switch = next((box for box in boxes if box in MISSION_BOXES), None)
+        return None if switch is None else f"Only the switch {switch} flies the mission"
 
     def _acknowledge(self, station: Station, command: int, result: CommandResult) -> None:
         ack = messages.MAVLink_command_ack_message(command, result, 0, 0, station.sysid, station.compid)
@@ -200,7 +220,7 @@ class CommandService:
         if command in _ASKS_FOR:
             return self._send_once(station, _ASKS_FOR[command], now)
         if command in _REFUSED:
-            self.refuse(station, command)
+            self.refuse(station, command, params[1])
             return CommandResult.DENIED
         return CommandResult.UNSUPPORTED
 

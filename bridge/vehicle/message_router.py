@@ -89,7 +89,7 @@ class MessageRouter:
                 s, msg.command, (msg.param1, msg.param2, msg.param3, msg.param4, msg.x, msg.y, msg.z), now
             ),
             m.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: self._data_stream,
-            m.MAVLINK_MSG_ID_SET_MODE: lambda s, _msg, _now: commands.refuse(s, m.MAV_CMD_DO_SET_MODE),
+            m.MAVLINK_MSG_ID_SET_MODE: lambda s, msg, _: commands.refuse(s, m.MAV_CMD_DO_SET_MODE, msg.custom_mode),
             m.MAVLINK_MSG_ID_AUTOPILOT_VERSION_REQUEST: lambda s, _msg, now: vehicle.send_once(
                 s, m.MAVLINK_MSG_ID_AUTOPILOT_VERSION, now
             ),

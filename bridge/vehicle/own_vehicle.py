@@ -19,7 +19,7 @@ from bridge.gcs.station import Peer, Severity, Station
 from bridge.missions.mission_service import MissionService
 from bridge.model.flight_memory import Home
 from bridge.model.flight_mode import FlightMode
-from bridge.model.mission_progress import FlownMission, MissionProgress, Progress
+from bridge.model.mission_progress import FlightReport, FlownMission, MissionProgress, Progress
 from bridge.model.vehicle import STALE_S, FlightState, Health, MissionLeg, Mode, Readiness, Reading
 from bridge.model.verdict import SentSeqs
 from bridge.vehicle import vehicle_messages as make
@@ -82,6 +82,8 @@ class OwnVehicle:
         self._polls_set_at, self._polls_due = -inf, inf
         #: Armed, mode, failsafe and lost as last announced.
         self._announced: tuple[bool | None, FlightMode | str | None, bool, bool] | None = None
+        #: The last reason for the stop of a mission flight.
+        self._said_why = ""
 
     def newcomer(self, station: GroundStation, now: float) -> None:
         """Send a new ground station more heartbeats, so that it connects sooner, then home and why it cannot arm."""
@@ -273,7 +275,7 @@ class OwnVehicle:
         )
 
     def _flown_mission(self, now: float) -> FlownMission:
-        held = self._missions.held
+        held = self._missions.on_board
         if held is None:
             return FlownMission()
         if not held.items:
@@ -304,18 +306,24 @@ class OwnVehicle:
         return make.heartbeat(self._moment(now))
 
     def _follow_mission(self, now: float) -> None:
-        """Report a reached waypoint and the next one at once."""
+        """Report reached waypoints and the next one at once, and why a flight has stopped."""
         leg = self._session.vehicle.last(MissionLeg)
+        if leg is None:
+            return
         before = self.progress.number, self.progress.progress
-        reached = None if leg is None else self.progress.take(leg.status)
+        reached = self.progress.take(leg.report)
         everyone = self._ground.everyone()
         if before != (self.progress.number, self.progress.progress):
             self._send_current(everyone, now)
-        seq = self._missions.seq_of(reached or 0)
-        if seq:
+        for seq in filter(None, map(self._missions.seq_of, reached)):
             for sent_seqs, stations in self._by_item_numbers(everyone):
                 number = (sent_seqs[seq] or 0) if sent_seqs else seq
                 self._ground.multicast(pack(make.mission_item_reached(number)), stations)
+        if isinstance(leg.report, FlightReport) and leg.report.why != self._said_why:
+            self._said_why = leg.report.why
+            if self._said_why:
+                is_flown = self.progress.progress is Progress.COMPLETE
+                self._ground.say(Severity.NOTICE if is_flown else Severity.WARNING, self._said_why)
 
     def _send_current(self, receivers: Sequence[GroundStation], now: float) -> None:
         for sent_seqs, stations in self._by_item_numbers(receivers):
@@ -323,7 +331,7 @@ class OwnVehicle:
 
     def _by_item_numbers(self, stations: Sequence[GroundStation]) -> Iterable[tuple[SentSeqs, Sequence[GroundStation]]]:
         """The stations that count the items alike; () stands for the numbers of the list as read back."""
-        held = self._missions.held
+        held = self._missions.on_board
         if held is None or not held.sent_seqs:
             return [((), stations)]
         alike: dict[SentSeqs, list[GroundStation]] = {}
@@ -333,7 +341,7 @@ class OwnVehicle:
 
     def _sent_seqs(self, station: GroundStation | None) -> SentSeqs:
         """The item numbers of a station that sent the list and has not read it since; else ()."""
-        held = self._missions.held
+        held = self._missions.on_board
         if station is None or held is None or not held.sent_seqs:
             return ()
         known = (held.sent_seqs.get(sender.identity) for sender in station.senders())
@@ -352,6 +360,7 @@ class OwnVehicle:
 def _stale_ages_s(line_interval_s: Callable[[Msp], float]) -> dict[type[Reading], float]:
     """The maximum ages of readings that the line is too slow to poll every second."""
     intervals = {reading: line_interval_s(poll) for reading, poll in POLL_FOR.items()}
+    intervals[MissionLeg] = max(intervals[MissionLeg], line_interval_s(Msp.FLIGHT))  # a Harakiri's
     return {reading: STALE_S * interval_s for reading, interval_s in intervals.items() if interval_s > 1.0}
 
 

@@ -13,7 +13,7 @@ from bridge.model.airframe import Airframe
 from bridge.model.flight_memory import Home
 from bridge.model.flight_mode import FlightMode
 from bridge.model.ground_track import bearing_deg, distance_m, north_east_m
-from bridge.model.mission_progress import FlownMission, Progress
+from bridge.model.mission_progress import FlownMission, Progress, Way
 from bridge.model.vehicle import (
     STALE_S,
     Airspeed,
@@ -26,6 +26,7 @@ from bridge.model.vehicle import (
     Height,
     ImuSample,
     Load,
+    MissionLeg,
     Mode,
     Motors,
     Orientation,
@@ -40,6 +41,7 @@ from bridge.model.verdict import SentSeqs
 from protocols.mavlink import mode_messages
 from protocols.mavlink.codec import pack_payload
 from protocols.mavlink.dialect import Message, messages
+from protocols.mission_item import Command
 from protocols.msp.telemetry import Sensor
 
 
@@ -218,6 +220,11 @@ def _custom_mode(vehicle: Vehicle, mode: FlightMode) -> int:
     if vehicle.airframe is Airframe.FIXED_WING:
         return numbers.plane
     return numbers.rover if vehicle.airframe in _ROVERS else numbers.copter
+
+
+def auto_mode(vehicle: Vehicle) -> int:
+    """custom_mode of AUTO."""
+    return _custom_mode(vehicle, FlightMode.AUTO)
 
 
 def _standard_mode(vehicle: Vehicle, mode: FlightMode) -> int:
@@ -465,25 +472,37 @@ def local_position_ned(at: Moment) -> Message:
 
 
 def nav_controller_output(at: Moment) -> Message:
-    """NAV_CONTROLLER_OUTPUT: the way to the waypoint, or home; degrees and metres. The set points are unknown."""
+    """NAV_CONTROLLER_OUTPUT: the way to the waypoint, or home; degrees and metres. The set points are unknown.
+
+    The way is the board's own, if it reports that.
+    """
     state, height = at.vehicle.last(FlightState), at.fresh(Height)
     position, now = at.need(GlobalPosition), at.need(Orientation)
     if state is None or not state.armed:
         raise Unknown
+    flight = at.vehicle.mission_flight(at.now)
+    if flight is not None and flight.way is not None:
+        return _nav_controller_output(now, flight.way)
     mission = at.mission()
     item = mission.items[mission.seq] if 0 < mission.seq < len(mission.items) else None
     climb_m = 0.0
     if item is not None and item.lat_e7 and item.lon_e7:
         target = Home(item.lat_e7, item.lon_e7)
         climb_m = 0.0 if height is None else item.alt_m - height.height_m
-    elif at.vehicle.flight_mode is FlightMode.RTL:
+    elif at.vehicle.flight_mode is FlightMode.RTL or (
+        item is not None and item.command == Command.NAV_RETURN_TO_LAUNCH
+    ):
         target = known(at.vehicle.home)
     else:
         raise Unknown
-    bearing = round((bearing_deg(position, target) + 180) % 360 - 180)
-    distance = min(round(distance_m(position, target)), _UNKNOWN_U16)
+    return _nav_controller_output(now, Way(distance_m(position, target), bearing_deg(position, target), climb_m))
+
+
+def _nav_controller_output(now: Orientation, way: Way) -> Message:
+    bearing = round((way.bearing_deg + 180) % 360 - 180)
+    distance = min(round(way.distance_m), _UNKNOWN_U16)
     return messages.MAVLink_nav_controller_output_message(
-        known(now.roll_deg), known(now.pitch_deg), bearing, bearing, distance, climb_m, 0.0, 0.0
+        known(now.roll_deg), known(now.pitch_deg), bearing, bearing, distance, way.climb_m, 0.0, 0.0
     )
 
 
@@ -493,7 +512,7 @@ def system_time(at: Moment) -> Message:
 
 
 def extended_sys_state(at: Moment) -> Message:
-    """EXTENDED_SYS_STATE: on the ground while disarmed; armed it depends on height, climb and speed."""
+    """EXTENDED_SYS_STATE: on the ground while disarmed; armed as a mission flight reports, or by height and speed."""
     known(at.need(FlightState).armed)
     return messages.MAVLink_extended_sys_state_message(messages.MAV_VTOL_STATE_UNDEFINED, _landed_state(at))
 
@@ -502,6 +521,9 @@ def _landed_state(at: Moment) -> int:
     """MAV_LANDED_STATE; undefined while armed without a height."""
     if not at.vehicle.armed:
         return int(messages.MAV_LANDED_STATE_ON_GROUND)
+    flight = at.vehicle.mission_flight(at.now) if at.vehicle.last(MissionLeg) else None  # most boards report none
+    if flight is not None and flight.stage is not None:
+        return flight.stage
     height, gps = at.fresh(Height), at.fresh(GpsFix)
     if height is None:
         return int(messages.MAV_LANDED_STATE_UNDEFINED)

@@ -144,11 +144,13 @@ class VehicleReporter:
         return self._makers[group](now)
 
     def whole(self, now: float) -> VehicleReport:
-        held = self._missions.held
+        held = self._missions.on_board
         mission = None
         if held is not None:
-            state = None if self._fresh(MissionLeg, now) is None else self._progress.progress.text
-            mission = MissionIdentity(held.identity.count, f"{held.identity.checksum:08x}", state)
+            state, item = None, None
+            if self._fresh(MissionLeg, now) is not None:
+                state, item = self._progress.progress.text, self._missions.seq_of(self._progress.number) or None
+            mission = MissionIdentity(held.identity.count, f"{held.identity.checksum:08x}", state, item)
         settings = None
         if (sealed := self._settings.state) is not None:
             settings = SettingsIdentity(str(sealed.seal), None if sealed.change is None else sealed.change.text())

@@ -36,6 +36,8 @@ class Msp(IntEnum):
     SENSOR_STATUS = 151
     UID = 160
     GPSSTATISTICS = 166
+    #: Of Harakiri's mission extension.
+    FLIGHT = 179
     RTC = 246
     DEBUG = 254
     INAV_STATUS = 0x2000

@@ -5,13 +5,15 @@ import struct
 from dataclasses import dataclass
 from enum import IntEnum
 
+from protocols.msp.commands import Msp
 from protocols.msp.frame import request
 
-FLIGHT = 179
+FLIGHT = Msp.FLIGHT
 FLIGHT_REQUEST = request(FLIGHT)
 _VERSION = 1
 _NO_RECORD = 0xFFFF
 _REPLY = struct.Struct("<6B3HIHhI")
+FLIGHT_SIZE = _REPLY.size
 _IN_COMMAND, _BATTERY_LOW, _SWITCH_ON, _ENABLED = 4, 8, 2, 1
 
 
@@ -76,19 +78,32 @@ class FlightReason(IntEnum):
 class FlightProgress:
     """Reply to FLIGHT. `record` is in flight, or was left or refused; metres and degrees; `height_error` is up."""
 
-    state: FlightPhase
-    reason: FlightReason
-    is_enabled: bool
-    switch_on: bool
-    in_command: bool
-    battery_low: bool
-    record: int | None
-    reached: int | None
-    count: int
-    distance: float
-    bearing: float
-    height_error: float
-    state_s: float
+    state: FlightPhase = FlightPhase.OFF
+    reason: FlightReason = FlightReason.NONE
+    is_enabled: bool = True
+    switch_on: bool = False
+    in_command: bool = False
+    battery_low: bool = False
+    record: int | None = None
+    reached: int | None = None
+    count: int = 0
+    distance: float = 0.0
+    bearing: float = 0.0
+    height_error: float = 0.0
+    state_s: float = 0.0
+
+    def encode(self) -> bytes:
+        """The reply's payload."""
+        flags = (
+            self.is_enabled * _ENABLED
+            | self.switch_on * _SWITCH_ON
+            | self.in_command * _IN_COMMAND
+            | self.battery_low * _BATTERY_LOW
+        )
+        records = (_NO_RECORD if record is None else record for record in (self.record, self.reached))
+        target = (round(self.distance * 100), round(self.bearing * 100), round(self.height_error * 100))
+        state_ms = round(self.state_s * 1000)
+        return _REPLY.pack(0, _VERSION, flags, self.state, self.reason, 0, *records, self.count, *target, state_ms)
 
 
 def decode_flight(payload: bytes) -> FlightProgress | None:

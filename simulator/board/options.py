@@ -4,6 +4,7 @@
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 
+from protocols.msp.mission_flight import FlightProgress
 from simulator.board.flight import LEVEL_ACC
 
 
@@ -82,7 +83,8 @@ class Faults(BoardFaults):
     `boxes`: the pilot's switches except ARM, one bit for each of BOXNAMES. `busy`: a configuration write is scheduled.
     `extension` takes effect at the next boot. Without `msp` only MAVLink is answered.
     `arming_blockers`: INAV's arming flags (runtime_config.h). `stick_loads`: the number of times the pilot has loaded
-    the saved missions with the sticks. `selected_mission`: the pilot's selection; 0: none.
+    the saved missions with the sticks. `selected_mission`: the pilot's selection; 0: none. `flight`: the report of a
+    Harakiri with mission flight.
     """
 
     boxes: int = 1
@@ -93,6 +95,7 @@ class Faults(BoardFaults):
     arming_blockers: int = 0
     stick_loads: int = 0
     selected_mission: int = 0
+    flight: FlightProgress | None = None
 
 
 @dataclass(slots=True, kw_only=True)

@@ -23,6 +23,7 @@ from simulator.naze import frsky
 from simulator.naze.cli import BANNER, LAST_REQUESTS, CliRequest, CommandLine
 from simulator.naze.guard import accepts
 from simulator.naze.mavlink_port import MavlinkSchedule, MavlinkSender, Stream
+from simulator.naze.mission_flight import MissionFlight
 from simulator.naze.mission_slots import StoredConfig
 from simulator.naze.mission_store import Floppy
 from simulator.naze.missions import Board, BootMissions
@@ -110,7 +111,8 @@ class Firmware:
         if not (self._missions or self._config.is_valid):
             self._floppy.clear()
         self._cli = CommandLine(options.tree, self._cli_status, self._dump)
-        self._schedule = MavlinkSchedule(now)
+        self._flight_reports = MissionFlight(faults)
+        self._schedule = MavlinkSchedule(now, self._flight_reports.message)
         self._frsky_number, self._frsky_time = 0, now
         self._traps = TrapCounters()
         self._last_valid = self._last_byte = now
@@ -281,6 +283,9 @@ class Firmware:
             if message is Stream.PARAM_VALUE:
                 self._parameters.send_next()
                 continue
+            if isinstance(message, Packed):
+                self._send_message(message)
+                continue
             uptime = self._clock - self._booted_at
             frame = self._sender.telemetry(message, self.craft_at(self._clock), uptime)
             self._uart.write(frame, self._clock)
@@ -331,6 +336,8 @@ class Firmware:
     def _extension_answer(self, command: int, payload: bytes) -> bytes | None:
         if self._missions is None:
             return None
+        if (report := self._flight_reports.answer(command, payload)) is not None:
+            return report
         answer = self._missions.answer(command, payload, self._clock)
         self._counters.flash_writes = self._missions.writes
         return self._settings.answer(command, payload, self._clock) if answer is None else answer

@@ -6,6 +6,7 @@ Payloads are packed here and not by pymavlink, because the firmware sends them w
 
 import math
 import struct
+from collections.abc import Callable
 from enum import Enum
 
 from protocols.mavlink.codec import FrameWriter, Packed
@@ -49,9 +50,10 @@ class Stream(Enum):
 
 
 class MavlinkSchedule:
-    """The schedule of messages. `only_heartbeat`: the firmware is in AUTOSENSE."""
+    """The schedule of messages. `only_heartbeat`: the firmware is in AUTOSENSE. `of_flight`: a slot's own message."""
 
-    def __init__(self, now: float) -> None:
+    def __init__(self, now: float, of_flight: Callable[[int], Packed | None]) -> None:
+        self._of_flight = of_flight
         self._slot = 0
         self._time = now
 
@@ -64,8 +66,8 @@ class MavlinkSchedule:
         divisors = [message.value[0] for message in ((Stream.HEARTBEAT,) if only_heartbeat else Stream)]
         return self._time + SLOT_SECONDS * min(divisor - self._slot % divisor for divisor in divisors)
 
-    def take_due(self, now: float, only_heartbeat: bool, is_listing: bool) -> list[Stream]:
-        due = []
+    def take_due(self, now: float, only_heartbeat: bool, is_listing: bool) -> list[Stream | Packed]:
+        due: list[Stream | Packed] = []
         while self._time + SLOT_SECONDS <= now + 1e-9:
             self._time += SLOT_SECONDS
             self._slot = (self._slot + 1) & 0xFFFF
@@ -73,12 +75,13 @@ class MavlinkSchedule:
                 due.append(message)
         return due
 
-    @staticmethod
-    def _message(slot: int, only_heartbeat: bool, is_listing: bool) -> Stream | None:
+    def _message(self, slot: int, only_heartbeat: bool, is_listing: bool) -> Stream | Packed | None:
         if only_heartbeat:
             return None if slot % Stream.HEARTBEAT.value[0] else Stream.HEARTBEAT
         possible = (message for message in Stream if is_listing or message is not Stream.PARAM_VALUE)
-        return next((message for message in possible if slot % message.value[0] == 0), None)
+        first = next((message for message in possible if slot % message.value[0] == 0), None)
+        of_flight = None if first in (Stream.SCALED_PRESSURE, Stream.HEARTBEAT) else self._of_flight(slot)
+        return of_flight or first
 
 
 class MavlinkSender:

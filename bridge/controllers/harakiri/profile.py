@@ -14,6 +14,7 @@ from bridge.controllers.harakiri.mission_store import HarakiriMissions
 from bridge.controllers.harakiri.settings import HarakiriFcSettings
 from bridge.controllers.msp_settings import part_settings
 from bridge.fc.interview import Interview
+from bridge.fc.mission_flight import FLIGHT_DECODERS, FLIGHT_POLL
 from bridge.fc.profile import FlightController, Profile, Spoken
 from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import BOX_POLL, POLLS
@@ -63,7 +64,8 @@ PATCHED = Profile(
     recognise=_recognise_patched,
     missions=HarakiriMissions,
     settings=HarakiriFcSettings,
-    polls=(*POLLS, BOX_POLL),
+    polls=(*POLLS, BOX_POLL, FLIGHT_POLL),
+    decoders=FLIGHT_DECODERS,
     acc_axes=_ACC_AXES,
     check_kind="harakiri",
     rules=harakiri_rules,

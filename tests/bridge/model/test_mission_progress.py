@@ -14,27 +14,27 @@ def status(number: int, action: int = NavAction.WAYPOINT, *, mode: int = NavMode
 
 def test_a_record_is_reached_once_when_the_next_one_is_flown_to() -> None:
     progress = MissionProgress()
-    assert [progress.take(status(number)) for number in (1, 1, 2, 2, 4)] == [None, None, 1, None, 2]
+    assert [progress.take(status(number)) for number in (1, 1, 2, 2, 4)] == [(), (), (1,), (), (2,)]
     assert (progress.number, progress.progress) == (4, Progress.ACTIVE)
 
 
 def test_a_record_without_a_place_is_never_reached() -> None:
     progress = MissionProgress()
     taken = [progress.take(status(*each)) for each in ((1,), (2, NavAction.JUMP), (3,))]
-    assert taken == [None, 1, None]
+    assert taken == [(), (1,), ()]
 
 
 def test_a_craft_that_waits_at_a_record_has_reached_it() -> None:
     progress = MissionProgress()
     holds = status(2, NavAction.POSHOLD_TIME, state=NavState.HOLD_TIMED)
-    assert [progress.take(each) for each in (status(2, NavAction.POSHOLD_TIME), holds, holds)] == [None, 2, None]
+    assert [progress.take(each) for each in (status(2, NavAction.POSHOLD_TIME), holds, holds)] == [(), (2,), ()]
 
 
 def test_the_return_home_at_the_end_completes_the_mission_and_another_one_ends_it() -> None:
     progress = MissionProgress()
     progress.take(status(3, NavAction.RTH))
     home = status(3, NavAction.RTH, mode=NavMode.RTH, state=NavState.HOVER_ABOVE_HOME)
-    assert (progress.take(home), progress.progress) == (3, Progress.COMPLETE)
+    assert (progress.take(home), progress.progress) == ((3,), Progress.COMPLETE)
     progress.take(status(0, 0, mode=0))
     assert (progress.number, progress.progress) == (0, Progress.NOT_STARTED)
     progress.take(home)
@@ -43,7 +43,7 @@ def test_the_return_home_at_the_end_completes_the_mission_and_another_one_ends_i
 
 def test_a_finished_mission_is_complete() -> None:
     progress = MissionProgress()
-    assert progress.take(status(4, error=FINISHED)) == 4
+    assert progress.take(status(4, error=FINISHED)) == (4,)
     assert progress.progress is Progress.COMPLETE
 
 

@@ -3,6 +3,7 @@
 
 import re
 import struct
+from dataclasses import replace
 from enum import IntEnum
 
 import pytest
@@ -26,6 +27,13 @@ def test_a_reply_is_read() -> None:
     assert progress.battery_low
     assert (progress.record, progress.reached, progress.count) == (4, 3, 9)
     assert (progress.distance, progress.bearing, progress.height_error, progress.state_s) == (12.5, 270, -1.5, 61.5)
+
+
+def test_a_reply_is_written_as_it_was_read() -> None:
+    progress = decode_flight(REPLY)
+    assert progress is not None
+    assert decode_flight(progress.encode()) == progress
+    assert decode_flight(replace(progress, record=None).encode()) == replace(progress, record=None)
 
 
 def test_no_record_is_none() -> None:

@@ -24,6 +24,7 @@ from protocols.msp.mission import (
     encode_radius,
     encode_read,
 )
+from protocols.msp.mission_flight import FLIGHT_REQUEST
 from protocols.msp.nav import (
     LOAD_REQUEST,
     SAVE_REQUEST,
@@ -69,6 +70,7 @@ READS: list[tuple[Iterable[Firmware], bytes]] = [
     (NAV, encode_read_wp(0)),
     (HARAKIRI, INFO_REQUEST),
     (MISSIONS, encode_read(0, 15)),
+    (MISSIONS, FLIGHT_REQUEST),
     *(((firmware,), request(wanted.command, wanted.body)) for firmware, parts in SETTINGS.items() for wanted in parts),
     (INAV, request(Msp.INAV_EZ_TUNE)),
     (EVERY, request(Msp.PIDNAMES)),

@@ -9,7 +9,7 @@ import pytest
 from bridge.model.vehicle import Charge, GpsTime, Load, MissionLeg, Power
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionItem, MissionResult
-from protocols.msp.nav import NavMode
+from protocols.msp.nav import NavMode, NavStatus
 from simulator.board.msp_board import MspBoard
 from simulator.board.msp_options import MspOptions
 from simulator.board.options import Faults
@@ -139,7 +139,8 @@ def test_the_current_item_is_reported_together_with_nav_status() -> None:
         assert world.now < 100
         world.run(0.1)
         leg = world.bridge.vehicle.last(MissionLeg)
-        if leg is not None and leg.status.mode == NavMode.MISSION:
-            seen.add(leg.status.number)
-            assert station.messages("MISSION_CURRENT")[-1].seq == leg.status.number
+        status = None if leg is None else leg.report
+        if isinstance(status, NavStatus) and status.mode == NavMode.MISSION:
+            seen.add(status.number)
+            assert station.messages("MISSION_CURRENT")[-1].seq == status.number
     assert seen == {1, 2, 3}

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Harakiri's reports on a mission that it flies (docs/mission-flight.md), from FLIGHT."""
+
+from collections.abc import Mapping
+
+from bridge.fc.profile import Decoder, FlightController
+from bridge.line.poll_schedule import Poll
+from bridge.model.mission_progress import FlightReport, Progress, Stage, Way
+from bridge.model.vehicle import MissionLeg, Source, Vehicle
+from protocols.msp.commands import Msp
+from protocols.msp.mission_flight import (
+    FLIGHT_REQUEST,
+    FLIGHT_SIZE,
+    FlightPhase,
+    FlightProgress,
+    FlightReason,
+    decode_flight,
+)
+
+#: A build without mission flight refuses it, and is not asked again.
+FLIGHT_POLL = Poll(Msp.FLIGHT, FLIGHT_REQUEST, FLIGHT_SIZE, 0.5)
+_PAUSED = frozenset((FlightPhase.HELD, FlightPhase.NO_FIX, FlightPhase.HANDS))
+#: In the other phases the height tells.
+_STAGES: Mapping[FlightPhase, Stage] = {
+    FlightPhase.WAIT: Stage.ON_GROUND,
+    FlightPhase.LIFT: Stage.TAKEOFF,
+    FlightPhase.RISE: Stage.TAKEOFF,
+    FlightPhase.CLIMB: Stage.IN_AIR,
+    FlightPhase.LEG: Stage.IN_AIR,
+    FlightPhase.LOITER: Stage.IN_AIR,
+    FlightPhase.TURN: Stage.IN_AIR,
+    FlightPhase.STAY: Stage.IN_AIR,
+    FlightPhase.SETTLE: Stage.IN_AIR,
+    FlightPhase.DESCENT: Stage.LANDING,
+    FlightPhase.SINK: Stage.LANDING,
+    FlightPhase.DONE: Stage.IN_AIR,
+}
+_FLOWN = "Mission flown"
+_LOW_BATTERY = "Battery low: land, or switch GPS HOME on"
+#: Nothing is said about the pilot's own switch and disarming.
+_WHY: Mapping[FlightReason, str] = {
+    FlightReason.DISABLED: "Mission not started: mission_fly is 0",
+    FlightReason.NOT_ARMED: "Mission not started: switch was on at arming",
+    FlightReason.FIX_MISSING: "Mission not started: no GPS fix",
+    FlightReason.HOME_MISSING: "Mission not started: no home position",
+    FlightReason.NOT_READY: "Mission not started: calibrate compass and baro",
+    FlightReason.LIST_EMPTY: "Mission refused: the list is empty",
+    FlightReason.LIST_DAMAGED: "Mission refused: the list is damaged",
+    FlightReason.LIST_CHANGED: "Mission refused: list changed since arming",
+    FlightReason.BAD_ORDER: "Mission refused: wrong command or order",
+    FlightReason.BAD_PLACE: "Mission refused: a place is missing",
+    FlightReason.FIRST_FAR: "Mission refused: the first place is too far",
+    FlightReason.LEG_LONG: "Mission refused: a leg is too long",
+    FlightReason.TOO_HIGH: "Mission refused: an altitude is too high",
+    FlightReason.ON_GROUND: "Mission refused: below 1 m it needs TAKEOFF first",
+    FlightReason.THROTTLE_LOW: "Mission stopped: throttle not in the middle",
+    FlightReason.NO_LIFT: "Mission stopped: the craft did not lift off",
+    FlightReason.CLIMB_SLOW: "Mission stopped: the climb took too long",
+    FlightReason.STALLED: "Mission stopped: too slow against the wind",
+    FlightReason.TURN_SLOW: "Mission stopped: the craft did not turn",
+    FlightReason.LAND_SLOW: "Landing takes too long",
+    FlightReason.STICKS: "Mission stopped: roll or pitch stick",
+    FlightReason.THROTTLE: "Mission stopped: throttle stick",
+    FlightReason.FIX_LOST: "Mission stopped: GPS fix lost, fly by hand",
+    FlightReason.RTL: "Mission ended: return to launch",
+    FlightReason.FAILSAFE: "Mission ended: failsafe",
+    FlightReason.FLOWN: _FLOWN,
+}
+
+
+def _flight(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
+    progress = decode_flight(payload)
+    if progress is not None:
+        last = vehicle.last(MissionLeg)
+        before = last.report if last is not None and isinstance(last.report, FlightReport) else None
+        vehicle.hear(MissionLeg(now, Source.MSP, flight_report(progress, before)))
+
+
+FLIGHT_DECODERS: Mapping[int, Decoder] = {Msp.FLIGHT: _flight}
+
+
+def flight_report(progress: FlightProgress, before: FlightReport | None) -> FlightReport:
+    """`before`: the last report. Only from it a list that ended with LAND is known as flown: the board has disarmed."""
+    record, reached = progress.record or 0, progress.reached or 0
+    if progress.state is FlightPhase.OFF:
+        if before is not None and progress.reason is FlightReason.DISARMED and _has_landed(before):
+            return FlightReport(record, record, Progress.COMPLETE, is_flown=False, why=_FLOWN)
+        why = _WHY.get(progress.reason, "") if progress.switch_on else ""
+        return FlightReport(0, reached, Progress.NOT_STARTED, is_flown=False, why=why)
+    why = _WHY.get(progress.reason) or (_LOW_BATTERY if progress.battery_low else "")
+    if progress.state in _PAUSED:
+        return FlightReport(record, reached, Progress.PAUSED, is_flown=False, why=why)
+    way = Way(progress.distance, progress.bearing if progress.distance else 0.0, progress.height_error)
+    state = Progress.COMPLETE if progress.state is FlightPhase.DONE else Progress.ACTIVE
+    return FlightReport(record, reached, state, is_flown=True, way=way, stage=_STAGES.get(progress.state), why=why)
+
+
+def _has_landed(before: FlightReport) -> bool:
+    return before.stage is Stage.LANDING or (before.progress is Progress.COMPLETE and not before.is_flown)
