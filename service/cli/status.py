@@ -101,7 +101,10 @@ def _mission(facts: Json) -> str:
     count = facts["mission_records"]
     if count is None:
         return "not read yet"
-    return f"{count} records, checksum {facts['mission_checksum']}" if count else "none stored"
+    if not count:
+        return "none stored"
+    stored = f"{count} records, checksum {facts['mission_checksum']}"
+    return f"{stored}, {facts['mission_state']} at item {item}" if (item := facts["mission_item"]) else stored
 
 
 def _settings(facts: Json) -> str:

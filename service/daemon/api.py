@@ -130,6 +130,8 @@ class DaemonApi:
             "store_trouble": daemon.store_trouble,
             "mission_records": None if mission is None else mission.count,
             "mission_checksum": None if mission is None else mission.checksum,
+            "mission_state": None if mission is None else mission.state,
+            "mission_item": None if mission is None else mission.item,
             "settings_seal": None if settings is None else str(settings.seal),
             "settings_changed": None if change is None else change.text(),
             "settings_changed_s": None if change is None else round(self._loop.time() - change.at, 1),

@@ -4,6 +4,7 @@
 GET  /api/state                          the current state, requested once a second by an open page
 GET  /api/held                           the mission that the flight controller holds
 GET  /api/link                           the serial line over the last minutes
+GET  /api/track?first=N                  the track of this flight or the last one, from place N on
 GET  /api/connect                        where ground stations and other browsers connect
 GET  /connect.svg                        the page's address as a QR code
 GET  /api/missions                       the latest missions received, newest first
@@ -44,6 +45,7 @@ from service.recording.tlog_recorder import TLOG_FOLDER
 from service.settings.web import WebSettings
 from service.web.access import MAX_FILE, check_token, guarded
 from service.web.connect_help import connect_help, page_urls, qr_code
+from service.web.flown_track import FlownTrack
 from service.web.link_history import LinkHistory
 from service.web.metrics import CONTENT_TYPE, Metrics
 from service.web.mission_files import MissionFiles, MissionWriter
@@ -73,15 +75,18 @@ class Api:
         self._files = MissionFiles(self._api, self._writer)
         self._settings = SettingsHistory(self._api.settings, self._writer, self._cache, token)
         self._history = LinkHistory(daemon)
+        self._track = FlownTrack(daemon)
         state_dir = daemon.settings.state_dir
         self._logs = TelemetryLogs(None if state_dir is None else state_dir / TLOG_FOLDER)
         self._host = Host()
 
     def start(self) -> None:
         self._history.start()
+        self._track.start()
 
     async def close(self) -> None:
         self._history.close()
+        self._track.close()
         await self._writer.close()
         self._logs.close()
 
@@ -91,6 +96,7 @@ class Api:
             "/api/state": self._state,
             "/api/held": self._held,
             "/api/link": self._link,
+            "/api/track": self._flown_track,
             "/api/connect": self._connect,
             "/connect.svg": self._connect_code,
             "/api/missions": self._missions,
@@ -127,6 +133,7 @@ class Api:
                 "port": {"address": daemon.fc.where, "trouble": daemon.fc.trouble},
                 "refused": [f"{count} x {why} ({link})" for (link, why), count in refused.items()],
                 "recording": daemon.recording,
+                "track": self._track.state,
                 "newest_mission": newest,
                 "newest_backup": newest_backup,
                 "store_trouble": store,
@@ -147,6 +154,9 @@ class Api:
 
     async def _link(self, _request: Request) -> Response:
         return json_reply(self._history.to_json())
+
+    async def _flown_track(self, request: Request) -> Response:
+        return json_reply(self._track.to_json(whole(request.query_params.get("first", "0"))))
 
     async def _connect(self, _request: Request) -> Response:
         return json_reply(connect_help(self._listen, self._daemon.settings.gcs, self._host.ipv4_addresses()))

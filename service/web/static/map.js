@@ -10,9 +10,10 @@ const MARGIN = 40, LEAST_SPAN_M = 40, FARTHEST_M = 50000;
 export const isPlaced = (item) => Boolean(item.lat_e7 && item.lon_e7);
 export const placeOf = (item) => ({ lat: item.lat_e7 / 1e7, lon: item.lon_e7 / 1e7 });
 
-// items: of /api/held. position, attitude: of /api/state. trail: the craft's earlier positions, [{lat, lon}].
+// items: of /api/held; flown: the seq of the one that is flown, or null. position, attitude: of /api/state.
+// trail: the track that was flown, [{lat, lon}].
 // camera: zoom (1: everything fits) and dx, dy in pixels.
-export function drawMap(items, position, attitude, trail, width, camera) {
+export function drawMap({ items, flown, position, attitude, trail }, width, camera) {
   const placed = items.filter(isPlaced);
   const craft = position.lat_deg === null ? null : { lat: position.lat_deg, lon: position.lon_deg };
   const home = craftHome(position) ?? (items.length && isPlaced(items[0]) ? placeOf(items[0]) : null);
@@ -21,11 +22,11 @@ export function drawMap(items, position, attitude, trail, width, camera) {
   const height = Math.round(Math.min(Math.max(width * 0.6, 260), 520));
   const near = (place) => place !== null && distance(middle, place) < FARTHEST_M;
   const view = projection([...placed.map(placeOf), home, craft].filter(near), middle, width, height, camera);
-  const svg = draw("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": inWords(items, home, craft) });
+  const svg = draw("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": inWords(items, flown, home, craft) });
   svg.append(...tracks(items, home, view));
   if (trail.length > 1) svg.append(draw("polyline", { class: "trail", points: line(trail, view) }));
   if (home) svg.append(homeMark(view(home)));
-  for (const item of placed.filter((each) => each.seq > 0)) svg.append(itemMark(item, view(placeOf(item))));
+  for (const item of placed.filter((each) => each.seq > 0)) svg.append(itemMark(item, view(placeOf(item)), item.seq === flown));
   if (craft) svg.append(craftMark(view(craft), attitude.heading_deg, position.height_m));
   svg.append(...scaleBar(view.pixelsPerMetre, width, height), ...northArrow(width));
   return svg;
@@ -80,8 +81,9 @@ function tracks(items, home, view) {
   return lines;
 }
 
-function itemMark(item, [x, y]) {
-  const group = draw("g", { class: "touched" }, draw("title", {}, `${item.seq} ${item.name}, ${item.alt_m} m`));
+function itemMark(item, [x, y], isFlown) {
+  const title = `${item.seq} ${item.name}, ${item.alt_m} m${isFlown ? ", flown now" : ""}`;
+  const group = draw("g", { class: isFlown ? "touched flown" : "touched" }, draw("title", {}, title));
   if (ROIS.includes(item.command)) group.append(draw("path", { class: "roi", d: `M${x} ${y - 13}l13 13-13 13-13-13z` }));
   else group.append(draw("circle", { class: "point", cx: x, cy: y, r: 10 }));
   if (LOITERS.includes(item.command)) group.append(draw("circle", { class: "loiter", cx: x, cy: y, r: 15 }));
@@ -119,8 +121,9 @@ function northArrow(width) {
   return [draw("path", { class: "north", d: `M${x} 10l6 18-6-4-6 4z` }), draw("text", { x: x - 4.5, y: 42 }, "N")];
 }
 
-function inWords(items, home, craft) {
+function inWords(items, flown, home, craft) {
   const told = [`Map with ${items.filter((item) => item.seq > 0 && isPlaced(item)).length} positions of the mission`];
+  if (flown !== null) told.push(`item ${flown} is flown now`);
   if (home && craft) told.push(`the craft is ${Math.round(distance(home, craft))} m from home`);
   return told.join("; ");
 }

@@ -29,7 +29,7 @@ export class MapView {
     new ResizeObserver(() => this.#draw()).observe(container);
   }
 
-  // contents: items, position and attitude as in /api/held and /api/state; trail: [{lat, lon}].
+  // contents: as for drawMap.
   show(contents) {
     this.#contents = contents;
     this.#draw();
@@ -41,8 +41,7 @@ export class MapView {
     const wanted = JSON.stringify([this.#contents, this.#camera, width]);
     if (wanted === this.#drawn) return;
     this.#drawn = wanted;
-    const { items, position, attitude, trail } = this.#contents;
-    const svg = drawMap(items, position, attitude, trail, width, this.#camera);
+    const svg = drawMap(this.#contents, width, this.#camera);
     this.#tools.hidden = svg === null;
     this.#canvas.replaceChildren(svg ?? "Neither a mission nor a position is known yet.");
     // Until it is zoomed, one finger scrolls the page.

@@ -29,7 +29,7 @@ function over(event, isOver) {
 
 // The craft moves on the preview's map, too.
 export function followFile({ position, attitude }) {
-  if (preview !== null) preview.map.show({ items: preview.items, position, attitude, trail: [] });
+  if (preview !== null) preview.map.show({ items: preview.items, flown: null, position, attitude, trail: [] });
 }
 
 async function check(file) {

@@ -35,7 +35,7 @@ export function showOverview(state) {
     ["Round trip", known(state.link.round_trip_ms, " ms", 1)],
     ["Unanswered", known(state.link.requests_lost)],
     ["Damaged", known(state.link.bad_checksums)],
-    ["Mission", state.mission === null ? "not read yet" : state.mission.count ? `${state.mission.count} records, ${state.mission.checksum}` : "none"],
+    ["Mission", mission(state.mission)],
     ["Settings", state.settings === null ? "not read yet" : state.settings.changed ?? `seal ${state.settings.seal}`, state.settings?.changed ? "bad" : ""],
   ]);
   const refused = state.refused.map((text) => `refused: ${text}`);
@@ -43,6 +43,12 @@ export function showOverview(state) {
   list("ground", [...state.link.ground_stations, ...refused], "None connected.");
   list("links", links, "Nothing sent yet.");
   list("recording", state.recording, "Off.");
+}
+
+function mission(held) {
+  if (held === null) return "not read yet";
+  if (!held.count) return "none";
+  return `${held.count} records, ${held.checksum}${held.item === null ? "" : `, ${held.state} at item ${held.item}`}`;
 }
 
 function battery({ voltage_v: volts, current_a: amperes, drawn_mah: drawn, remaining_percent: percent }) {

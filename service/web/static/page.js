@@ -3,6 +3,7 @@
 import { showConnect } from "./connect.js";
 import { ask } from "./daemon.js";
 import { byId, setText } from "./dom.js";
+import { FlownTrack } from "./flown_track.js";
 import { showLinkPlot } from "./link_plot.js";
 import "./logs.js";
 import { MapView } from "./map_view.js";
@@ -12,14 +13,14 @@ import { showOverview } from "./overview.js";
 import { showProfile } from "./profile.js";
 import { showSettings } from "./settings.js";
 import { showStateBar } from "./state_bar.js";
-import { listTable } from "./tables.js";
+import { listTable, markFlown } from "./tables.js";
 import { followWrites } from "./write_form.js";
 
-const INTERVAL_MS = 800, TRANSFER_INTERVAL_MS = 250, TRAIL_LENGTH = 600;
+const INTERVAL_MS = 800, TRANSFER_INTERVAL_MS = 250;
 const STALE_MS = 1500, WATCH_MS = 100;
 const map = new MapView(byId("map"));
 const shown = { mission: undefined, newest: undefined, backup: undefined };
-const trail = [];
+const track = new FlownTrack();
 let held = { count: null, items: [] };
 let last = null, lastAt = performance.now();
 
@@ -69,7 +70,7 @@ function onceVisible() {
 }
 
 async function showHeld(state) {
-  const isLost = state.lost_s !== null, mission = JSON.stringify([state.mission, isLost]);
+  const isLost = state.lost_s !== null, mission = JSON.stringify([state.mission?.count, state.mission?.checksum, isLost]);
   if (mission !== shown.mission) {
     const now = await ask("/api/held");
     shown.mission = mission;
@@ -80,9 +81,10 @@ async function showHeld(state) {
     byId("held-list").replaceChildren(listTable(held.items));
     showProfile(byId("profile"), held.items);
   }
-  follow(state.position);
+  const flown = state.mission?.item ?? null, trail = await track.follow(state);
+  markFlown(byId("held-list"), flown);
   const { lat_deg, lon_deg } = state.last_heard; // the map also shows where the craft was lost
-  map.show({ items: held.items, position: { ...state.position, lat_deg, lon_deg }, attitude: state.attitude, trail });
+  map.show({ items: held.items, flown, position: { ...state.position, lat_deg, lon_deg }, attitude: state.attitude, trail });
 }
 
 async function showNewest(state) {
@@ -96,14 +98,6 @@ async function showBackups(state) {
   if (state.newest_backup === shown.backup || state.store_trouble) return;
   await showSettings();
   shown.backup = state.newest_backup;
-}
-
-function follow(position) {
-  if (position.lat_deg === null) return;
-  const latest = trail[trail.length - 1];
-  if (latest && latest.lat === position.lat_deg && latest.lon === position.lon_deg) return;
-  trail.push({ lat: position.lat_deg, lon: position.lon_deg });
-  if (trail.length > TRAIL_LENGTH) trail.shift();
 }
 
 function showTrouble(text) {
