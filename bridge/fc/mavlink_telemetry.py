@@ -162,7 +162,7 @@ class MavlinkTelemetry:
             flags = active_boxes(switches.activation, sticks.channels_us[_STICKS:])
             # The switch alone flies no mission.
             by_switches = flight_mode(names_of_active(flags, switches.boxes) - MISSION_BOXES)
-            if by_switches not in (FlightMode.STABILIZE, FlightMode.ACRO):
+            if by_switches not in (FlightMode.STABILIZE, FlightMode.HORIZON, FlightMode.ACRO):
                 mode = by_switches
         self._vehicle.hear(Mode(heard_at, Source.MAVLINK, mode))
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The flight mode that follows from the active boxes, as an ArduCopter mode, which ground stations can name."""
+"""The flight mode that follows from the active boxes, as an ArduPilot mode, which ground stations can name."""
 
 from collections.abc import Sequence, Set
 from enum import Enum, auto
@@ -9,9 +9,18 @@ class FlightMode(Enum):
     """The flight mode selected by the pilot's switches."""
 
     ACRO = auto()
+    #: The sticks move the servos.
+    MANUAL = auto()
+    #: The sticks are angles.
     STABILIZE = auto()
+    #: Level with released sticks.
+    HORIZON = auto()
     ALT_HOLD = auto()
     LOITER = auto()
+    #: The course over ground is held, and mostly the altitude.
+    CRUISE = auto()
+    #: An aeroplane thrown by hand or from a catapult.
+    LAUNCH = auto()
     RTL = auto()
     AUTO = auto()
 
@@ -29,11 +38,15 @@ MISSION_BOXES = frozenset({"GPS AUTO", "MISSION", "NAV WP"})
 #: The first mode with an active box wins. Harakiri's, baseflight's and Cleanflight's names, then those of MultiWii NAV,
 #: INAV and Betaflight.
 _BOXES: tuple[tuple[FlightMode, frozenset[str]], ...] = (
+    (FlightMode.MANUAL, frozenset({"MANUAL"})),
+    (FlightMode.LAUNCH, frozenset({"NAV LAUNCH"})),
     (FlightMode.AUTO, MISSION_BOXES),
     (FlightMode.RTL, frozenset({"GPS HOME", "NAV RTH", "GPS RESCUE"})),
     (FlightMode.LOITER, frozenset({"GPS HOLD", "NAV POSHOLD", "POS HOLD"})),
+    (FlightMode.CRUISE, frozenset({"NAV COURSE HOLD", "NAV CRUISE"})),
     (FlightMode.ALT_HOLD, frozenset({"BARO", "NAV ALTHOLD", "ALT HOLD"})),
-    (FlightMode.STABILIZE, frozenset({"ANGLE", "HORIZON"})),
+    (FlightMode.STABILIZE, frozenset({"ANGLE"})),
+    (FlightMode.HORIZON, frozenset({"HORIZON", "ANGLE HOLD"})),
 )
 
 

@@ -98,7 +98,10 @@ class Status:
     """The flight controller's status."""
 
     armed: bool | None = None
-    mode: Annotated[str | None, "ACRO, STABILIZE, ALT_HOLD, LOITER, RTL or AUTO; an autopilot's own: its number"] = None
+    mode: Annotated[
+        str | None,
+        "MANUAL, ACRO, STABILIZE, HORIZON, ALT_HOLD, LOITER, CRUISE, RTL, AUTO, LAUNCH; an autopilot's own: its number",
+    ] = None
     sensors: Annotated[tuple[str, ...] | None, "sensors on board that respond"] = None
     cycle_time_us: Annotated[int | None, "main loop time"] = None
     i2c_errors: Annotated[int | None, "I2C errors since its start"] = None

@@ -54,15 +54,26 @@ class _ModeNumbers(NamedTuple):
     standard: int = messages.MAV_STANDARD_MODE_NON_STANDARD
 
 
-#: ArduPlane has no mode that only holds the altitude. Unless it navigates, a rover is steered by hand: MANUAL, 0.
+#: An aeroplane's are those of INAV's own MAVLink (telemetry/mavlink.c), except for NAV COURSE HOLD, where INAV has no
+#: number. Unless it navigates, a rover is steered by hand: MANUAL, 0; ArduRover's ACRO, 1, holds the course. Of modes
+#: with the same number, the first gives its name.
 _MODES = {
-    FlightMode.STABILIZE: _ModeNumbers(0, 2, 0),
+    FlightMode.STABILIZE: _ModeNumbers(0, 5, 0),
+    FlightMode.HORIZON: _ModeNumbers(0, 2, 0),
     FlightMode.ACRO: _ModeNumbers(1, 4, 0),
+    FlightMode.MANUAL: _ModeNumbers(1, 0, 0),
     FlightMode.ALT_HOLD: _ModeNumbers(2, 6, 0, messages.MAV_STANDARD_MODE_ALTITUDE_HOLD),
     FlightMode.AUTO: _ModeNumbers(3, 10, 10, messages.MAV_STANDARD_MODE_MISSION),
     FlightMode.LOITER: _ModeNumbers(5, 12, 5, messages.MAV_STANDARD_MODE_POSITION_HOLD),
+    FlightMode.CRUISE: _ModeNumbers(5, 7, 1, messages.MAV_STANDARD_MODE_CRUISE),
     FlightMode.RTL: _ModeNumbers(6, 11, 11, messages.MAV_STANDARD_MODE_SAFE_RECOVERY),
+    FlightMode.LAUNCH: _ModeNumbers(0, 13, 0, messages.MAV_STANDARD_MODE_TAKEOFF),
 }
+#: ArduPilot's names, where they are not ours.
+_PLANE_NAMES = {2: "STABILIZE", 5: "FBWA", 6: "FBWB", 13: "TAKEOFF"}
+_ROVER_NAMES = {0: "MANUAL", 1: "ACRO"}
+#: Modes in which the craft steers itself.
+_GUIDED = (FlightMode.LOITER, FlightMode.CRUISE, FlightMode.RTL, FlightMode.AUTO, FlightMode.LAUNCH)
 _ROVERS = (Airframe.ROVER, Airframe.BOAT)
 _SENSORS = {
     Sensor.ACCELEROMETER: messages.MAV_SYS_STATUS_SENSOR_3D_ACCEL,
@@ -177,9 +188,9 @@ def heartbeat(at: Moment) -> Message:
     last = vehicle.last(Mode)
     mode = last.mode if last is not None and isinstance(last.mode, FlightMode) else FlightMode.STABILIZE
     base_mode = messages.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED | messages.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
-    if mode is not FlightMode.ACRO:
+    if mode not in (FlightMode.ACRO, FlightMode.MANUAL):
         base_mode |= messages.MAV_MODE_FLAG_STABILIZE_ENABLED
-    if mode in (FlightMode.LOITER, FlightMode.RTL, FlightMode.AUTO):
+    if mode in _GUIDED:
         base_mode |= messages.MAV_MODE_FLAG_GUIDED_ENABLED
     if vehicle.armed:
         base_mode |= messages.MAV_MODE_FLAG_SAFETY_ARMED
@@ -204,12 +215,13 @@ def current_mode(at: Moment) -> Message:
 
 def available_modes(vehicle: Vehicle) -> list[Message]:
     """AVAILABLE_MODES, one message per mode."""
-    # A rover has one custom mode for several of ours.
-    modes = {_custom_mode(vehicle, mode): mode for mode in _MODES}
-    manual = {0: "MANUAL"} if vehicle.airframe in _ROVERS else {}
+    modes: dict[int, FlightMode] = {}
+    for mode in _MODES:
+        modes.setdefault(_custom_mode(vehicle, mode), mode)
+    names = {Airframe.FIXED_WING: _PLANE_NAMES, **dict.fromkeys(_ROVERS, _ROVER_NAMES)}.get(vehicle.airframe, {})
     return [
         mode_messages.available_mode(
-            index, len(modes), custom_mode, _standard_mode(vehicle, mode), manual.get(custom_mode, mode.name)
+            index, len(modes), custom_mode, _standard_mode(vehicle, mode), names.get(custom_mode, mode.name)
         )
         for index, (custom_mode, mode) in enumerate(modes.items(), 1)
     ]
@@ -228,10 +240,16 @@ def auto_mode(vehicle: Vehicle) -> int:
 
 
 def _standard_mode(vehicle: Vehicle, mode: FlightMode) -> int:
-    """MAV_STANDARD_MODE; only copters hold an altitude or a position."""
+    """MAV_STANDARD_MODE; only copters hold an altitude or a position, only aeroplanes cruise and are launched."""
     is_copter = vehicle.airframe not in (Airframe.FIXED_WING, *_ROVERS)
-    is_for_all = mode in (FlightMode.AUTO, FlightMode.RTL)
-    return _MODES[mode].standard if is_copter or is_for_all else messages.MAV_STANDARD_MODE_NON_STANDARD
+    is_plane = vehicle.airframe is Airframe.FIXED_WING
+    of_one_kind = {
+        FlightMode.ALT_HOLD: is_copter,
+        FlightMode.LOITER: is_copter,
+        FlightMode.CRUISE: is_plane,
+        FlightMode.LAUNCH: is_plane,
+    }
+    return _MODES[mode].standard if of_one_kind.get(mode, True) else messages.MAV_STANDARD_MODE_NON_STANDARD
 
 
 def autopilot_version(vehicle: Vehicle) -> Message:

@@ -33,8 +33,8 @@ _AIRFRAMES = (
 )
 #: Permanent box ids (docs/inav.md) of the modes that make a flight mode.
 _BOXES = {
-    0: "ARM", 1: "ANGLE", 2: "HORIZON", 3: "NAV ALTHOLD", 10: "NAV RTH", 11: "NAV POSHOLD", 27: FAILSAFE_BOX,
-    28: "NAV WP",
+    0: "ARM", 1: "ANGLE", 2: "HORIZON", 3: "NAV ALTHOLD", 10: "NAV RTH", 11: "NAV POSHOLD", 12: "MANUAL",
+    27: FAILSAFE_BOX, 28: "NAV WP", 36: "NAV LAUNCH", 45: "NAV COURSE HOLD", 53: "NAV CRUISE", 64: "ANGLE HOLD",
 }  # fmt: skip
 
 

@@ -246,8 +246,9 @@ def status_is_true(receivers: Receivers) -> None:
     group, sent = receivers.group(Group.STATUS), receivers.message(make.heartbeat)
     assert group["armed"] in (None, bool(sent.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED))
     if group["mode"] is not None:
-        mode = {"STABILIZE": 0, "ACRO": 1, "ALT_HOLD": 2, "AUTO": 3, "LOITER": 5, "RTL": 6}[group["mode"]]
-        assert sent.custom_mode == mode
+        modes = {"STABILIZE": 0, "ACRO": 1, "ALT_HOLD": 2, "AUTO": 3, "LOITER": 5, "RTL": 6}
+        modes |= {"HORIZON": 0, "MANUAL": 1, "CRUISE": 5, "LAUNCH": 0}
+        assert sent.custom_mode == modes[group["mode"]]
     health = receivers.message(make.sys_status)
     if group["sensors"] is not None:
         bits = {"accelerometer": 2, "barometer": 8, "compass": 4, "gps": 32, "sonar": 256}

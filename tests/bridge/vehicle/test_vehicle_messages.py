@@ -26,7 +26,23 @@ from protocols.msp.frame import Direction, MspFrame
 HARAKIRI_BOXES = ("ANGLE", "HORIZON", "BARO", "MAG", "CAMSTAB", "ARM", "GPS HOME", "GPS HOLD", "GPS AUTO")
 HARAKIRI = FlightController(harakiri.UNPATCHED, "Harakiri", Airframe.QUADROTOR, HARAKIRI_BOXES)
 INAV = FlightController(
-    inav.PROFILE, "INAV", None, ("ARM", "ANGLE", "HORIZON", "NAV ALTHOLD", "NAV POSHOLD", "NAV RTH", "NAV WP")
+    inav.PROFILE,
+    "INAV",
+    None,
+    (
+        "ARM",
+        "ANGLE",
+        "HORIZON",
+        "NAV ALTHOLD",
+        "NAV POSHOLD",
+        "NAV RTH",
+        "NAV WP",
+        "MANUAL",
+        "NAV LAUNCH",
+        "NAV COURSE HOLD",
+        "NAV CRUISE",
+        "ANGLE HOLD",
+    ),
 )
 BETAFLIGHT = FlightController(other.OTHER_MSP, "BTFL", None, ("ARM", "ANGLE", "HORIZON", "ALT HOLD", "GPS RESCUE"))
 ALL_SENSORS = 0b1111

@@ -54,6 +54,15 @@ def test_the_platform_determines_the_vehicle_type(platform: int, kind: int, by_h
     assert (last.type, last.custom_mode) == (kind, by_hand)
 
 
+@pytest.mark.parametrize(
+    ("box", "mode"),
+    [(12, messages.PLANE_MODE_MANUAL), (45, messages.PLANE_MODE_CRUISE), (64, messages.PLANE_MODE_STABILIZE)],
+)
+def test_an_aeroplanes_own_boxes_are_modes(box: int, mode: int) -> None:
+    _, _, station = introduced(platform=1, faults=Faults(boxes=1 << PLANE_BOXES.index(box)))
+    assert station.messages("HEARTBEAT")[-1].custom_mode == mode
+
+
 @pytest.mark.parametrize(("platform", "pitot"), [(1, True), (1, False), (0, True), (0, False)])
 def test_airspeed_is_measured_or_unknown(platform: int, pitot: bool) -> None:
     """Ground speed stands in for airspeed on a copter, as in ArduCopter, but not on a plane."""
