@@ -6,6 +6,7 @@ import json
 import re
 from pathlib import Path
 
+import pytest
 import zenoh
 from prometheus_client.parser import text_string_to_metric_families
 
@@ -18,13 +19,16 @@ from service.web.metrics import Metrics
 from tests.support.programs import until_async
 from tests.support.zenoh_router import EXAMPLES
 
+DASHBOARDS = EXAMPLES / "fleet" / "grafana" / "dashboards"
+SCHEMAS = EXAMPLES.parent / "payloads" / "schemas"
 _NAME = re.compile(r"\b(?:naze_bridge|process)_[a-z_]+")
 #: Metrics that exist only after an event, or only with a session.
 _LATER = {"naze_bridge_missions_total", "naze_bridge_refused_frames_total", "naze_bridge_zenoh_dropped_total"}
 
 
-def test_the_storages_keep_what_they_should_and_no_telemetry() -> None:
-    compose = (EXAMPLES / "fleet" / "docker-compose.yml").read_text()
+@pytest.mark.parametrize("file", ["docker-compose.yml", "docker-compose.history.yml"])
+def test_the_storages_keep_what_they_should_and_no_telemetry(file: str) -> None:
+    compose = (EXAMPLES / "fleet" / file).read_text()
     stored = [zenoh.KeyExpr(found) for found in re.findall(r'key_expr:"([^"]+)"', compose)]
 
     def is_stored(key: ZenohKey) -> bool:
@@ -34,9 +38,25 @@ def test_the_storages_keep_what_they_should_and_no_telemetry() -> None:
     assert {key for key in published if is_stored(key)} == {STATE, OVERVIEW, EVENT, MISSION_CURRENT, MISSION_REPORT}
 
 
+def test_the_history_dashboard_shows_fields_that_the_stored_payloads_have() -> None:
+    compose = (EXAMPLES / "fleet" / "docker-compose.history.yml").read_text()
+    in_influxdb = set(re.findall(r'key_expr:"fleet/\*/v1/(\w+)",strip_prefix:"fleet",volume:\{id:"influxdb"', compose))
+    assert in_influxdb == {"state", "event"}
+    schemas = {name: json.loads((SCHEMAS / f"{name}.json").read_text()) for name in in_influxdb}
+    panels = json.loads((DASHBOARDS / "history.json").read_text())["panels"]
+    for panel in panels:
+        (name,) = re.findall(r"\\/v1\\/(\w+)\$/ ", panel["targets"][0]["query"])
+        for each in panel["transformations"][0]["options"]["jsonPaths"]:
+            schema = schemas[name]
+            for part in each["path"].split("."):
+                schema = schema["properties"][part]
+    assert len(panels) >= 5
+
+
 def wanted() -> set[str]:
-    dashboards = [json.loads(path.read_text()) for path in (EXAMPLES / "fleet" / "grafana" / "dashboards").iterdir()]
-    expressions = [target["expr"] for each in dashboards for panel in each["panels"] for target in panel["targets"]]
+    dashboards = [json.loads(path.read_text()) for path in DASHBOARDS.iterdir()]
+    targets = [target for each in dashboards for panel in each["panels"] for target in panel["targets"]]
+    expressions = [target["expr"] for target in targets if target["datasource"]["type"] == "prometheus"]
     assert len(expressions) > 10
     alerts = (EXAMPLES / "fleet" / "alerts.yml").read_text()
     return set(_NAME.findall(" ".join([*expressions, alerts])))
