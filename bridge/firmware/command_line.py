@@ -5,6 +5,8 @@
 for a disarmed Harakiri.
 """
 
+from contextlib import suppress
+
 from protocols.msp.command_line import PROMPT
 from protocols.stm32_boot_loader import Dialogue, Exchange
 
@@ -30,6 +32,17 @@ def read_dump() -> Dialogue[str]:
         raise CommandLineError("its command line does not print the settings: it was restarted, try again")
     lines = printed.removesuffix(PROMPT).decode("ascii", "replace").splitlines()
     return "\n".join(line.rstrip() for line in lines[1:]).strip() + "\n"
+
+
+def settings_in(dump: str) -> dict[str, float]:
+    """The settings of `set` in a dump, by name; they are rounded to three decimals."""
+    found = {}
+    for line in dump.splitlines():
+        name, is_setting, value = line.partition(" = ")
+        with suppress(ValueError):
+            if is_setting:
+                found[name] = float(value)
+    return found
 
 
 def start_boot_loader() -> Dialogue[None]:

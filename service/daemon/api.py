@@ -34,7 +34,7 @@ class DaemonApi:
         self._daemon = daemon
         self._loop = asyncio.get_running_loop()
         self.settings = SettingsApi(daemon)
-        self.firmware = FirmwareApi(daemon)
+        self.firmware = FirmwareApi(daemon, self.settings)
 
     async def do(self, request: Json, progress: Callable[[Json], None]) -> Json:
         """Handle a request; `progress` is called with each step. ControlError, StoreError or ValueError on failure."""

@@ -93,6 +93,11 @@ class FcConnection:
                 _log.exception("daemon.fault", what="the flight controller's port")
                 await asyncio.sleep(_RESTART_S)
 
+    @property
+    def is_lent(self) -> bool:
+        """True while new firmware is flashed."""
+        return self._port.is_lent
+
     @asynccontextmanager
     async def lend(self) -> AsyncIterator[serial.Serial]:
         """Lend the serial port, at 115200 baud; afterwards the flight controller is searched again. PortError."""

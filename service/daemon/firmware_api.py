@@ -16,13 +16,14 @@ import serial
 import structlog
 
 from bridge.controllers.harakiri.profile import PATCHED, UNPATCHED
-from bridge.firmware.command_line import CommandLineError, read_dump, start_boot_loader
+from bridge.firmware.command_line import CommandLineError, read_dump, settings_in, start_boot_loader
 from bridge.firmware.reflash import FlashingError, find_chip, read_flash, rewrite_flash
 from payloads.mission_data import Json
 from protocols.firmware_image import FLASH_SIZE, PROGRAM_END, ImageError, check_backup, check_patched
 from protocols.stm32_boot_loader import BootLoaderError, start_program
 from service.daemon.client import ControlError
 from service.daemon.daemon import Daemon
+from service.daemon.settings_api import SettingsApi
 from service.links.fc_device import PortError
 from service.links.serial_dialogue import carry_out, use_parity
 from service.settings import SettingsError, default_state_dir
@@ -43,6 +44,8 @@ _LONGEST_S = 600.0
 #: A Harakiri that looks for its GPS boots for 25 s; then it is identified.
 _PROOF_S = 45.0
 _LOOK_S = 0.1
+#: A dump has three decimals.
+_ROUNDED = 0.001
 #: States of the line (Link.state) without an answer.
 _SEARCHES = ("no port", "searching", "identifying")
 _AGAIN = (
@@ -58,10 +61,10 @@ _log = structlog.get_logger()
 class FirmwareApi:
     """The requests, as coroutines with plain data; ControlError if one fails."""
 
-    def __init__(self, daemon: Daemon) -> None:
+    def __init__(self, daemon: Daemon, settings: SettingsApi) -> None:
         self._daemon = daemon
+        self._settings = settings
         self._loop = asyncio.get_running_loop()
-        self._use = asyncio.Lock()
 
     async def do(self, request: Json, progress: Progress) -> Json:
         try:
@@ -79,14 +82,14 @@ class FirmwareApi:
             (check_backup if is_backup else check_patched)(image)
         except ImageError as error:
             raise ControlError(f"Nothing was changed: {error}") from error
-        if self._use.locked():
-            raise ControlError("Nothing was changed: new firmware is being written already")
-        async with self._use:
-            is_running = self._check_board(with_battery)
-            began = self._loop.time()
-            backup = await self._flash(image, is_running, progress)
-            proof = await self._proof(None if is_backup else PATCHED.name)
-        text = f"{proof}; the flash was verified. Backup of the former flash: {backup}"
+        if self._daemon.fc.is_lent:
+            raise ControlError("Nothing was changed: new firmware is being flashed already")
+        is_running = self._check_board(with_battery)
+        began = self._loop.time()
+        backup = await self._flash(image, is_running, progress)
+        proof = await self._proof(None if is_backup else PATCHED.name)
+        restored = "" if is_backup else await self._restore_settings(backup.with_suffix(".txt"))
+        text = f"{proof}; the flash was verified. {restored}Backup of the former flash: {backup}"
         return {"text": text, "backup": str(backup), "seconds": round(self._loop.time() - began, 1)}
 
     def _check_board(self, with_battery: bool) -> bool:
@@ -172,6 +175,30 @@ class FirmwareApi:
             why = reason(error) if isinstance(error, OSError) else error
             raise ControlError(f"Nothing was changed: the backup cannot be stored: {why}") from error
         return path
+
+    async def _restore_settings(self, path: Path) -> str:
+        """Restore what the board printed before, if the new firmware has begun with its defaults."""
+        try:
+            before = settings_in(await asyncio.to_thread(path.read_text))
+            plan = await self._settings.plan(before, "")
+            changed = {
+                each["name"]: each["becomes"]
+                for each in plan["changes"]
+                if abs(each["was"] - each["becomes"]) > _ROUNDED
+            }
+            if not changed:
+                return ""
+            result = await self._settings.restore(changed, "", "new firmware", lambda _: None)
+        except FileNotFoundError:
+            return ""
+        except (OSError, ControlError) as error:
+            return f"Its settings could not be compared ({error}): they were {path}. "
+        left_out = ", ".join(each["name"] for each in (*plan["left_out"], *result["left_out"]))
+        kept = f" Not restored: {left_out}." if left_out else ""
+        return (
+            f"It began with its default settings. {result['text']}.{kept} Features, switches and mixer are not restored"
+            f" (see {path}), nor the calibrations. "
+        )
 
     async def _proof(self, wanted: str | None) -> str:
         """What runs now; ControlError if it is not `wanted`, or nothing answers."""

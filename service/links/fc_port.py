@@ -120,6 +120,10 @@ class FcPort:
         finally:
             self._is_wanted = False
 
+    @property
+    def is_lent(self) -> bool:
+        return self._is_wanted
+
     def move_on(self) -> None:
         """Close the port. It is reopened, and `open_device` may choose another one."""
         self._shut(MOVED_ON)

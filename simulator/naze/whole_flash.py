@@ -12,11 +12,14 @@ from simulator.board.options import Faults
 _ERASE_S = 0.025
 _HALF_WORD_S = 52.5e-6
 _TEXT = b"Harakiri, simulated"
+_VERSION_AT = 8
+_CONFIG_SIZE = 2 * PAGE_SIZE
 
 
-def stand_in(*, patched: bool) -> bytes:
-    """An image that has everything by which a Harakiri is recognised, and no code."""
-    return struct.pack("<II", 0x2000_5000, FLASH_BASE + 9) + _TEXT + (PATCH_MARK if patched else b"")
+def stand_in(*, patched: bool, version: int = 1) -> bytes:
+    """An image that has everything by which a Harakiri is recognised, and no code. version: of its configuration."""
+    vectors = struct.pack("<II", 0x2000_5000, FLASH_BASE + 9)
+    return vectors + bytes((version,)) + _TEXT + (PATCH_MARK if patched else b"")
 
 
 class WholeFlash:
@@ -25,6 +28,7 @@ class WholeFlash:
     def __init__(self, rest: NorFlash, faults: Faults) -> None:
         self._faults = faults
         self._is_rewritten = False
+        self._version = 1
         self._rest = rest
         self._rest_at = FLASH_SIZE - len(rest.memory)
         self._program = NorFlash(memoryview(bytearray((ERASED,)) * self._rest_at), faults)
@@ -52,7 +56,10 @@ class WholeFlash:
         return bytes(self._program.memory) + bytes(self._rest.memory)
 
     def start(self) -> bool:
-        """True if there is a Harakiri that can start. One that was written here has the extension, or not."""
+        """True if there is a Harakiri that can start. One that was written here has the extension, or not.
+
+        It forgets a configuration of another version.
+        """
         if not self._is_rewritten:
             return True
         program = bytes(self._program.memory)
@@ -61,6 +68,9 @@ class WholeFlash:
         except ImageError:
             return False
         self._faults.extension = is_patched(program)
+        if program[_VERSION_AT] != self._version:
+            self._version = program[_VERSION_AT]
+            self._rest.memory[-_CONFIG_SIZE:] = bytes((ERASED,)) * _CONFIG_SIZE
         return True
 
     def _place(self, at: int) -> tuple[NorFlash, int]:

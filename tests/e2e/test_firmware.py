@@ -8,7 +8,7 @@ import pytest
 from protocols.firmware_image import FLASH_SIZE
 from simulator.naze.whole_flash import stand_in
 from tests.support.benches import Starter
-from tests.support.programs import Program, happens, until
+from tests.support.programs import Program, happens, run_naze_bridge, until
 
 _BOARD = ("--no-extension", "--boot", "300")
 #: Reading the whole flash takes 15 s on the wire.
@@ -18,9 +18,9 @@ _LONGEST_S = 180.0
 class FlashingBench:
     """A daemon on a Harakiri without the patch, and an image with it."""
 
-    def __init__(self, start: Starter) -> None:
+    def __init__(self, start: Starter, *board: str) -> None:
         self._start = start
-        self.bench = start.bench(*_BOARD)
+        self.bench = start.bench(*(board or _BOARD))
         self.state_dir = self.bench.daemon.state_dir
         self.image = start.directory / "patched.bin"
         self.image.write_bytes(stand_in(patched=True).ljust(3000, b"\x5a"))
@@ -59,6 +59,18 @@ def test_the_patch_is_flashed_after_a_backup_and_must_answer(flashing: FlashingB
     assert str(backup) in said
     assert len(backup.read_bytes()) == FLASH_SIZE
     assert backup.with_suffix(".txt").read_text().startswith("Config:\nFW: simulated\n")
+
+
+def test_settings_that_the_new_firmware_has_forgotten_are_restored(start: Starter) -> None:
+    flashing = FlashingBench(start, "--boot", "300")
+    daemon = ("--state-dir", flashing.state_dir)
+    run_naze_bridge("settings", "set", "gps_wp_radius", "345", *daemon)
+    assert run_naze_bridge("settings", "save", *daemon).returncode == 0
+    flashing.image.write_bytes(stand_in(patched=True, version=2))
+    status, said = flashing.flash("flash", str(flashing.image), "--battery")
+    assert status == 0, said
+    assert "It began with its default settings. 1 setting restored, saved and verified." in said
+    assert run_naze_bridge("settings", "get", "gps_wp_radius", *daemon).stdout == "345\n"
 
 
 def test_after_an_unplugged_cable_the_board_waits_and_the_backup_leads_back(flashing: FlashingBench) -> None:

@@ -5,7 +5,9 @@ NAZE_PLAIN_IMAGE is a build of the same tree without the patch.
 """
 
 import os
+import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -16,11 +18,14 @@ from protocols.firmware_image import PROGRAM_END, Image, parse_image
 from protocols.msp.mission import INFO_REQUEST, decode_info
 from protocols.stm32_boot_loader import Dialogue, start_program
 from simulator.board.simulated_board import Power
+from tests.support.benches import Starter
 from tests.support.boot_loader_bench import BrokenOffError, DialogueBench
+from tests.support.programs import happens
 from tests.support.real_bench import Figure, RealBench
 
 #: A setting that both trees have, and a value that is not the default.
 _CHANGED, _VALUE = "fs_delay", 33
+_TIMEOUT_S = 400.0
 
 
 @pytest.fixture(scope="module")
@@ -131,3 +136,22 @@ def test_a_flash_with_a_power_cut_is_resumed_by_the_boot_pads(bench: RealBench, 
     line.run(flash(image.program))
     assert_runs(bench, line.now, patched=True)
     assert settings(enter(bench)[1]) == settings(dump)
+
+
+def test_the_daemon_flashes_the_patch_in_real_time(plain: Image, image: Image, tmp_path: Path, figure: Figure) -> None:
+    link = tmp_path / "naze"
+    with ExitStack() as stack:
+        start = Starter(tmp_path, stack)
+        board = start.program("board.log", "sim", "--image", os.environ["NAZE_PLAIN_IMAGE"], "--link", str(link))
+        assert happens(lambda: "Simulated " in board.printed or not board.is_alive, _TIMEOUT_S), board.printed
+        daemon = start.daemon(str(link))
+        assert happens(lambda: (daemon.status() or {}).get("armed") is False, _TIMEOUT_S), daemon.printed
+        arguments = ("firmware", "flash", os.environ["NAZE_IMAGE"], "--state-dir", str(daemon.state_dir))
+        began = time.monotonic()
+        flashing = start.program("flash.log", *arguments)
+        assert happens(lambda: not flashing.is_alive, _TIMEOUT_S), flashing.printed
+        assert flashing.end() == 0, flashing.printed
+        figure("naze-bridge firmware flash over a pty", f"{time.monotonic() - began:.0f} s")
+        assert (daemon.status() or {})["flight_controller"] == "Harakiri with the mission extension"
+        (backup,) = (daemon.state_dir / "firmware").glob("*.bin")
+        assert backup.read_bytes().startswith(plain.program)

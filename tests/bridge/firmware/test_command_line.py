@@ -3,7 +3,7 @@
 
 import pytest
 
-from bridge.firmware.command_line import CommandLineError, read_dump, start_boot_loader
+from bridge.firmware.command_line import CommandLineError, read_dump, settings_in, start_boot_loader
 from simulator.board.options import SimOptions
 from simulator.board.simulated_board import Power
 from simulator.naze.board import SimulatedNaze
@@ -36,3 +36,8 @@ def test_an_armed_board_opens_no_command_line() -> None:
         bench.run(read_dump())
     assert bench.board.power is Power.RUNNING
     assert bench.board.armed
+
+
+def test_the_settings_in_a_dump_are_its_numbers() -> None:
+    dump = "Config:\nFW: x = 3 y\n00|ANGLE   : ---\nrc_db = 20\nrc_trm_rll =  -0.500\nEnabled features: PPM\n"
+    assert settings_in(dump) == {"rc_db": 20.0, "rc_trm_rll": -0.5}

@@ -13,6 +13,9 @@ import pytest
 
 from service.daemon.api import DaemonApi
 from service.daemon.daemon import Daemon
+from service.links.fc_device import PortError
+from service.links.port_finder import PortFinder
+from service.links.port_memory import PORTS_FILE
 from service.settings import Settings
 from service.settings.addresses import AutoFc
 from simulator.links.pty_link import PtyLink
@@ -104,3 +107,18 @@ async def test_a_port_used_by_another_program_is_not_opened(pi: Pi, tmp_path: Pa
         assert "gpsd (pid 77) uses it" in daemon.fc.trouble
         assert "mavproxy.py (pid 78) uses it" in daemon.fc.trouble
         assert jobs.status()["port"] is None
+
+
+async def test_a_board_that_need_not_answer_is_on_its_last_port_or_on_the_only_one(pi: Pi, tmp_path: Path) -> None:
+    finder = PortFinder(pi, None)
+    with pytest.raises(PortError, match="none was found"):
+        finder.port_of_silent_board()
+    pi.usb("ttyUSB0", "1-1")
+    pi.terminal("ttyUSB0")
+    assert finder.port_of_silent_board() == "/dev/ttyUSB0"
+    pi.usb("ttyUSB1", "1-2")
+    pi.terminal("ttyUSB1")
+    with pytest.raises(PortError, match="one of /dev/ttyUSB0, /dev/ttyUSB1"):
+        finder.port_of_silent_board()
+    (tmp_path / PORTS_FILE).write_text('{"flight_controller": "usb 1-2 10c4:ea60", "others": {}}')
+    assert PortFinder(pi, tmp_path).port_of_silent_board() == "/dev/ttyUSB1"
