@@ -49,6 +49,7 @@ _FASTEST_S = 0.01
 _ALL_STREAMS = messages.MAV_DATA_STREAM_ALL
 _ROWS = {row.msgid: row for row in TELEMETRY}
 _DEFAULTS_S = {row.msgid: row.interval_s for row in TELEMETRY}
+_HOME = (make.home_position, make.gps_global_origin)
 _SYS_STATUS = _ROWS[messages.MAVLINK_MSG_ID_SYS_STATUS]
 
 
@@ -127,7 +128,7 @@ class OwnVehicle:
     def _inform_newcomers(self, everyone: Sequence[GroundStation], now: float) -> None:
         """Tell home and the reasons not to arm: to a crowd, each second to some."""
         newcomers = [station for station in everyone if not station.is_informed][:SEATS]
-        for message in self._moment(now).made((make.home_position,)) if newcomers else ():
+        for message in self._moment(now).made(_HOME) if newcomers else ():
             self._ground.multicast(pack(message), newcomers)
         for station in newcomers:
             station.is_informed = True
@@ -348,11 +349,11 @@ class OwnVehicle:
         return next(filter(None, known), ())
 
     def _announce_home(self, now: float) -> None:
-        """Broadcast HOME_POSITION whenever it changes; it can also be requested at any time."""
+        """Broadcast home whenever it changes; it can also be requested at any time."""
         home = self._session.vehicle.home
         if home == self._announced_home:
             return
-        for message in self._moment(now).made((make.home_position,)):
+        for message in self._moment(now).made(_HOME):
             self._announced_home = home
             self._ground.broadcast(message)
 

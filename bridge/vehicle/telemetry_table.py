@@ -67,6 +67,7 @@ TELEMETRY = (
     Row(m.MAVLINK_MSG_ID_RC_CHANNELS_RAW, Sticks, 0.5, RC_CHANNELS, (make.rc_channels_raw,)),
     Row(m.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT, GlobalPosition, 0.5, EXTRA3, (make.home_distance, make.home_direction)),
     Row(m.MAVLINK_MSG_ID_HOME_POSITION, GlobalPosition, inf, NO_STREAM, (make.home_position,)),
+    Row(m.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, None, inf, NO_STREAM, (make.gps_global_origin,)),
     Row(m.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW, Motors, 0.5, RC_CHANNELS, (make.servo_output_raw,)),
     Row(m.MAVLINK_MSG_ID_SCALED_PRESSURE, Pressure, 0.5, RAW_SENSORS, (make.scaled_pressure,)),
     Row(m.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, Orientation, inf, NO_STREAM, (make.attitude_quaternion,)),

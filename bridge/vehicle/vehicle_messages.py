@@ -102,6 +102,8 @@ _OFFICIAL = 255
 _UNKNOWN_U16 = 0xFFFF
 _UNKNOWN_U8 = 0xFF
 _RAW_CHANNELS, _CHANNELS = 8, 18
+#: Cells in BATTERY_STATUS.
+_MOST_CELLS = 10
 _MAX_RSSI = 254
 #: ATTITUDE is sent most often, and pymavlink's object would cost as much as the frame itself.
 _ATTITUDE = messages.MAVLink_attitude_message.unpacker
@@ -404,12 +406,16 @@ def sys_status(at: Moment) -> Message:
 
 
 def battery_status(at: Moment) -> Message:
-    """BATTERY_STATUS: mV (Mission Planner reads the voltage only from here), cA and mAh."""
+    """BATTERY_STATUS: mV, the same for each cell (Mission Planner adds them up), cA and mAh."""
     charge = at.fresh(Charge)
     voltage, current, remaining = _battery(at)
     if voltage == _UNKNOWN_U16:
         raise Unknown
-    voltages = [voltage, *[_UNKNOWN_U16] * 9]
+    power = at.need(Power)
+    cells = power.cells if power.cells and power.cells <= _MOST_CELLS else 1
+    least, more = divmod(voltage, cells)
+    voltages = [least + (cell < more) for cell in range(cells)]
+    voltages += [_UNKNOWN_U16] * (_MOST_CELLS - cells)
     return messages.MAVLink_battery_status_message(
         0, 0, 0, 32767, voltages, current, -1 if charge is None else charge.drawn_mah, -1, remaining
     )
@@ -581,6 +587,13 @@ def home_position(at: Moment) -> Message:
     return messages.MAVLink_home_position_message(
         home.lat_e7, home.lon_e7, altitude_mm, 0.0, 0.0, 0.0, unknown_attitude, *unknown_approach
     )
+
+
+def gps_global_origin(at: Moment) -> Message:
+    """GPS_GLOBAL_ORIGIN: where the local frame begins, at home."""
+    home = known(at.vehicle.home)
+    altitude_mm = _fit(round(known(home.altitude_m) * 1000), 32)
+    return messages.MAVLink_gps_global_origin_message(home.lat_e7, home.lon_e7, altitude_mm, at.boot_ms * 1000)
 
 
 def _rates(now: Orientation) -> Iterable[float]:

@@ -16,6 +16,7 @@ from simulator.commands.fc_kinds import make_board
 from simulator.inav.boxes import ANGLE as INAV_ANGLE
 from simulator.inav.boxes import BOXES as INAV_BOXES
 from simulator.inav.boxes import NAV_POSHOLD, NAV_WP
+from tests.bridge.vehicle.test_vehicle_messages import battery_mv
 from tests.support.conversations import Upload
 from tests.support.fake_controllers import DeafWhileArmed
 from tests.support.world import GroundStation, World
@@ -88,7 +89,7 @@ SCREEN = {
     "speed": Shown("GPS_RAW_INT", lambda msg: msg.vel, lambda c: c.flight.speed_ms * 100, 1),
     "ground speed": Shown("VFR_HUD", lambda msg: msg.groundspeed, lambda c: c.flight.speed_ms, 0.01),
     "HUD altitude": Shown("VFR_HUD", lambda msg: msg.alt, lambda c: c.flight.altitude_m, 0.011),
-    "volts": Shown("BATTERY_STATUS", lambda msg: msg.voltages[0], lambda c: c.flight.volts * 1e3, 51),
+    "volts": Shown("BATTERY_STATUS", battery_mv, lambda c: c.flight.volts * 1e3, 51),
     "volts too": Shown("SYS_STATUS", known_volts, lambda c: c.flight.volts * 1e3, 51),
     "home distance": Shown("NAMED_VALUE_FLOAT", named("home_m"), of_home, 0.2),
     "speed north": Shown("GLOBAL_POSITION_INT", lambda msg: msg.vx, lambda c: velocity_cm_s(c, 0), 30),

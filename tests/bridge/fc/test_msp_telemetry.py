@@ -13,6 +13,7 @@ from protocols.msp.commands import Msp
 from protocols.msp.frame import MspParser
 from simulator.board.flight import FlightState
 from simulator.board.options import Faults, SimOptions
+from tests.bridge.vehicle.test_vehicle_messages import battery_mv
 from tests.support.conversations import waypoints
 from tests.support.world import GroundStation, World
 
@@ -97,7 +98,7 @@ def check_against(message: Message, truth: FlightState) -> None:
             assert angle_between(message.heading, truth.heading) <= 2
             assert message.throttle == 45
         case "SYS_STATUS" | "BATTERY_STATUS":
-            millivolts = message.voltages[0] if message.get_type() == "BATTERY_STATUS" else message.voltage_battery
+            millivolts = battery_mv(message) if message.get_type() == "BATTERY_STATUS" else message.voltage_battery
             assert millivolts == pytest.approx(truth.volts * 1000, abs=60)
             assert message.current_battery == -1
             assert 60 <= message.battery_remaining <= 100

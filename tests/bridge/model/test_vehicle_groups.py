@@ -40,6 +40,7 @@ from payloads.keys import TELEMETRY, PayloadEncoding
 from payloads.payload import Payloads, decoded, plain
 from protocols.mavlink.codec import FrameWriter, pack
 from protocols.msp.telemetry import Sensor
+from tests.bridge.vehicle.test_vehicle_messages import battery_mv
 from tests.support.world import World
 
 NOW = 100.0
@@ -225,7 +226,7 @@ def battery_is_true(receivers: Receivers) -> None:
     assert (sent is not None) == (group["voltage_v"] is not None)
     if sent is None:
         return
-    assert near(group["voltage_v"], sent.voltages[0] / 1000, 0.0005)
+    assert near(group["voltage_v"], battery_mv(sent) / 1000, 0.0005)
     assert (group["current_a"] is None) == (sent.current_battery == -1)
     assert group["current_a"] is None or near(group["current_a"], sent.current_battery / 100, 0.005)
     assert group["drawn_mah"] == (None if sent.current_consumed == -1 else sent.current_consumed)

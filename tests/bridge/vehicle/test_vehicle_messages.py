@@ -237,11 +237,27 @@ def test_an_unmeasured_battery_is_unknown() -> None:
         assert at(state).made((make.battery_status,)) == []
 
 
+def battery_mv(message: Any) -> int:
+    """The voltage of BATTERY_STATUS, as ground stations add it up."""
+    return sum(cell for cell in message.voltages if cell != U16)
+
+
+@pytest.mark.parametrize(("cells", "voltage_v"), [(None, 12.61), (3, 12.61), (1, 4.2), (10, 41.99), (12, 50.4)])
+def test_the_cells_add_up_to_the_battery(cells: int | None, voltage_v: float) -> None:
+    state = with_replies(Vehicle(), INAV, STATUS=status())
+    state.hear(Power(0.0, Source.MSP, voltage_v, cells=cells))
+    battery = make.battery_status(at(state))
+    assert battery_mv(battery) == round(voltage_v * 1000)
+    shown = [cell for cell in battery.voltages if cell != U16]
+    assert len(shown) == {None: 3, 12: 1}.get(cells, cells)
+    assert max(shown) - min(shown) <= 1
+
+
 def test_a_current_of_0_without_consumption_is_unknown() -> None:
     state = with_replies(Vehicle(), BETAFLIGHT, STATUS=status(), ANALOG=struct.pack("<BHHh", 124, 350, 0, 1234))
     battery = fields(make.battery_status(at(state)))
     assert (battery["voltages"], battery["current_battery"], battery["current_consumed"]) == (
-        [12400, *[U16] * 9],
+        [4134, 4133, 4133, *[U16] * 7],
         1234,
         350,
     )
