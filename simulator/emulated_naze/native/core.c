@@ -154,16 +154,8 @@ static void make_usarts(Chip *chip) {
     second->arrival = ALARM_RECEIVE2, second->departure = ALARM_TRANSMIT2;
 }
 
-/* The core's default memory map (ARMv7-M manual, B3.1) lets programs run in RAM. Not here: Unicorn takes the slow path for
- * each store to memory that can be executed. */
-static bool fill_tlb(uc_engine *uc, uint64_t address, uc_mem_type type, uc_tlb_entry *entry, void *user) {
-    (void)uc, (void)type, (void)user;
-    entry->paddr = address;
-    entry->perms = (uint32_t)address - RAM_BASE < RAM_SIZE ? UC_PROT_READ | UC_PROT_WRITE : UC_PROT_ALL;
-    return true;
-}
-
-/* The program's pages can be executed, the rest of the flash can be written. */
+/* The program's pages can be executed, the rest of the flash can be written. RAM that could be executed would make each
+ * store to it slow. */
 static bool map(Chip *chip) {
     uc_engine *uc = chip->uc;
     static const uint16_t endless_loop = 0xE7FE;
@@ -179,8 +171,6 @@ static bool map(Chip *chip) {
              uc_mem_write(uc, BOOT_LOADER_BASE + 0x20, &endless_loop, sizeof endless_loop) ||
              uc_mmio_map(uc, BUS_BASE, BUS_SIZE, bus_read, chip, bus_write, chip) ||
              uc_mmio_map(uc, 0xE000E000, 0x1000, system_read, chip, system_write, chip) ||
-             uc_ctl_tlb_mode(uc, UC_TLB_VIRTUAL) ||
-             uc_hook_add(uc, &hook, UC_HOOK_TLB_FILL, (void *)fill_tlb, chip, 1, 0) ||
              uc_hook_add(uc, &hook, UC_HOOK_BLOCK, (void *)on_block, chip, 1, 0) ||
              uc_hook_add(uc, &hook, UC_HOOK_INTR, (void *)on_exception, chip, 1, 0));
 }
