@@ -18,6 +18,8 @@ from simulator.sky.earth import Place
 _PLACE_M, _OVERSHOOT_M, _HELD_M, _LANDED_M = 2.0, 3.0, 4.0, 6.0
 _SECONDS, _TURN_DEG, _TAKEOFF_M, _HOLD_HEIGHT_M = 1.5, 15.0, 1.0, 1.5
 _OVERSHOOT_S = 10.0
+#: The board is asked this often, so a turn began up to this long before it was seen.
+_REPORT_S = 0.3
 _MOVING = {*WpCommand} - {WpCommand.LAND, WpCommand.TAKEOFF, WpCommand.SETROI}
 #: The least radius: the firmware's default gps_wp_radius.
 _LEAST_RADIUS_M = 2.0
@@ -46,11 +48,13 @@ class ItemResult:
 def judge(run: MissionRun, place: Place) -> list[ItemResult]:
     """A result for each record after the home point."""
     results = []
+    targets = [_target(record, place) for record in run.records]
     before = (0.0, 0.0)
     for number, record in enumerate(run.records):
         if number:
-            target = _target(record, place)
-            results.append(_judge(run, number, record, target, before))
+            target = targets[number]
+            after = next(filter(None, targets[number + 1 :]), None)
+            results.append(_judge(run, number, record, target, before, after))
             before = target or before
     if results and (problem := _ending(run)):
         results[-1].problems.append(problem)
@@ -70,7 +74,12 @@ def _target(record: WpRecord, place: Place) -> tuple[float, float] | None:
 
 
 def _judge(
-    run: MissionRun, number: int, record: WpRecord, target: tuple[float, float] | None, before: tuple[float, float]
+    run: MissionRun,
+    number: int,
+    record: WpRecord,
+    target: tuple[float, float] | None,
+    before: tuple[float, float],
+    after: tuple[float, float] | None,
 ) -> ItemResult:
     command = WpCommand(record.command)
     result = ItemResult(number, command.name)
@@ -100,7 +109,8 @@ def _judge(
     if result.distance_m > max(record.radius_m, _LEAST_RADIUS_M) + _PLACE_M:
         result.problems.append(f"{result.distance_m:.1f} m away when it counted as reached")
     if command is not WpCommand.WAYPOINT or record.time:
-        result.overshoot_m = _overshoot(run.track.between(reached_s, reached_s + _OVERSHOOT_S), target, before)
+        flown = run.track.between(reached_s, reached_s + _OVERSHOOT_S)
+        result.overshoot_m = _overshoot(flown, target, before, after or target)
         if result.overshoot_m > _OVERSHOOT_M:
             result.problems.append(f"overshoot {result.overshoot_m:.1f} m")
     _judge_stay(run, number, record, target, result)
@@ -127,7 +137,7 @@ def _judge_stay(
     if state is FlightPhase.LOITER and abs(result.held_s - record.time) > _SECONDS:
         result.problems.append(f"stayed {result.held_s:.1f} s instead of {record.time} s")
     if state is FlightPhase.TURN:
-        result.turned_deg = _turned(run.track.between(times[0], times[1] + 0.5))
+        result.turned_deg = _turned(run.track.between(times[0] - _REPORT_S, times[1] + 0.5))
         if abs(result.turned_deg - 360 * record.turns) > _TURN_DEG:
             result.problems.append(f"turned {result.turned_deg:.0f} degrees instead of {360 * record.turns}")
     result.height_m = stayed.last.height
@@ -160,14 +170,17 @@ def _ending(run: MissionRun) -> str:
     return ""
 
 
-def _overshoot(flown: Track, target: tuple[float, float], before: tuple[float, float]) -> float:
-    """How far it went beyond the place in the direction of the leg."""
+def _overshoot(
+    flown: Track, target: tuple[float, float], before: tuple[float, float], after: tuple[float, float]
+) -> float:
+    """How far it went beyond the place in the direction of the leg, and farther than the next leg leads there."""
     north, west = target[0] - before[0], target[1] - before[1]
     length = hypot(north, west)
     if length < 1.0:
         return 0.0
     beyond = (((s.position[0] - target[0]) * north + (s.position[1] - target[1]) * west) / length for s in flown)
-    return max(0.0, max(beyond, default=0.0))
+    onward = ((after[0] - target[0]) * north + (after[1] - target[1]) * west) / length
+    return max(0.0, max(beyond, default=0.0) - max(0.0, onward))
 
 
 def _turned(flown: Track) -> float:

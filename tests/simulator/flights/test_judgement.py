@@ -72,6 +72,13 @@ def test_a_waypoint_is_flown() -> None:
     assert result.overshoot_m == pytest.approx(0.0, abs=0.01)
 
 
+@pytest.mark.parametrize(("onward", "overshoot"), [(80.0, 0.0), (54.0, 8.0), (20.0, 12.0)])
+def test_the_way_to_the_next_place_is_no_overshoot(onward: float, overshoot: float) -> None:
+    flight = Flight().go(20, north=50).say(reached=1, record=2).go(9, north=12).go(9, north=onward - 62).say(reached=2)
+    first, _ = flight.go(1).judged(*(record(WpCommand.WAYPOINT, north, time=1) for north in (50.0, onward)))
+    assert first.overshoot_m == pytest.approx(overshoot, abs=0.1)
+
+
 @pytest.mark.parametrize(
     ("flight", "records", "problem"),
     [
