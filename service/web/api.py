@@ -16,6 +16,7 @@ POST /api/write?name=NAME                the body is a mission file: write it (t
 GET  /api/logs                           the telemetry logs (token)
 GET  /api/logs/NAME?start=N              one piece of a log (token)
 GET  /api/settings...                    see service.web.settings_history
+POST /api/firmware?name=NAME             see service.web.firmware_upload
 GET  /metrics                            for Prometheus
 """
 
@@ -45,6 +46,7 @@ from service.recording.tlog_recorder import TLOG_FOLDER
 from service.settings.web import WebSettings
 from service.web.access import MAX_FILE, check_token, guarded
 from service.web.connect_help import connect_help, page_urls, qr_code
+from service.web.firmware_upload import FirmwareUpload
 from service.web.flown_track import FlownTrack
 from service.web.link_history import LinkHistory
 from service.web.metrics import CONTENT_TYPE, Metrics
@@ -74,6 +76,7 @@ class Api:
         self._writer = MissionWriter()
         self._files = MissionFiles(self._api, self._writer)
         self._settings = SettingsHistory(self._api.settings, self._writer, self._cache, token)
+        self._firmware = FirmwareUpload(self._api.firmware, self._writer, token)
         self._history = LinkHistory(daemon)
         self._track = FlownTrack(daemon)
         state_dir = daemon.settings.state_dir
@@ -110,6 +113,7 @@ class Api:
             *(Route(path, guarded(handler), methods=["GET"]) for path, handler in get.items()),
             Route("/api/missions/{number}/restore", guarded(self._restore), methods=["POST"]),
             *self._settings.routes(),
+            *self._firmware.routes(),
             Route("/api/check", guarded(self._check_file, MAX_FILE), methods=["POST"]),
             Route("/api/write", guarded(self._write_file, MAX_FILE), methods=["POST"]),
         ]

@@ -60,7 +60,7 @@ class MissionWriter:
 
     async def _run(self, write: Callable[[Progress], Awaitable[Json]], state: Json) -> None:
         def progress(message: Json) -> None:
-            state["records"] = message["progress"]
+            state.update(records=message["progress"], text=message.get("text", ""))
 
         try:
             answer = await write(progress)
@@ -84,7 +84,7 @@ class MissionFiles:
 
     async def check(self, request: Request) -> Json:
         """The mission as the flight controller would hold it."""
-        name, body = await _received(request)
+        name, body = await received(request)
         async with self._turn:
             items = await _parsed(name, body)
             try:
@@ -97,12 +97,12 @@ class MissionFiles:
 
     async def write(self, request: Request) -> str:
         """Start writing; returns the write's id. The caller has checked the token."""
-        name, body = await _received(request)
+        name, body = await received(request)
         items = await _parsed(name, body)
         return self._writer.begin(name, partial(self._api.push, items, f"{name}, from the page"))
 
 
-async def _received(request: Request) -> tuple[str, bytes]:
+async def received(request: Request) -> tuple[str, bytes]:
     """The file's name and contents. A slow phone takes seconds to send them."""
     name = request.query_params.get("name", "")[-_MAX_NAME:] or "mission file"
     if request.headers.get("content-type") != _CONTENT_TYPE:

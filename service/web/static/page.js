@@ -3,6 +3,7 @@
 import { showConnect } from "./connect.js";
 import { ask } from "./daemon.js";
 import { byId, setText } from "./dom.js";
+import "./firmware.js";
 import { FlownTrack } from "./flown_track.js";
 import { showLinkPlot } from "./link_plot.js";
 import "./logs.js";

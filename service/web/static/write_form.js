@@ -49,7 +49,7 @@ function follow(form, { write, transfer }) {
   const isOurs = write?.id === form.id;
   if (isOurs && !write.done) {
     if (transfer) Object.assign(form.bar, { hidden: false, max: transfer.total, value: write.records });
-    say(form, "", `${write.records} ${write.unit} written …`);
+    say(form, "", write.text || `${write.records} ${write.unit} written …`);
     return;
   }
   form.id = null;
