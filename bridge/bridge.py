@@ -31,6 +31,7 @@ from bridge.gcs.station import Peer, Severity
 from bridge.line.conversation import StoreEffect
 from bridge.line.runner import Runner
 from bridge.missions.mission_service import NO_LINK, EndingListener, MissionService
+from bridge.missions.place_lists import PlaceLists
 from bridge.model.events import Armed, Disarmed, Emit
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.vehicle import FlightState, Health, MissionLeg, Readiness
@@ -47,13 +48,14 @@ from bridge.vehicle.commands import CommandService
 from bridge.vehicle.incoming import Incoming
 from bridge.vehicle.link_announcer import LinkAnnouncer
 from bridge.vehicle.local_settings import LocalSettings
-from bridge.vehicle.message_router import MessageRouter
+from bridge.vehicle.message_router import MessageRouter, Transfers
 from bridge.vehicle.own_parameters import OwnParameters
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.parameters import Parameters
 from bridge.vehicle.settings_backups import BackupTaker, OnBackup
 from bridge.vehicle.settings_seal import SettingsSeal
 from bridge.vehicle.vehicle_report import VehicleReporter
+from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.mission_item import MissionResult
 
@@ -163,7 +165,16 @@ class Bridge:
         #: Missions, for the same.
         self.missions = LocalMissions(missions, self._uploads, ground, emit, incidents)
         self._watch = MissionWatch(missions, ground, emit)
-        downloads = MissionDownloads(missions, ground)
+        self._fences = PlaceLists(messages.MAV_MISSION_TYPE_FENCE, "Fence", self.vehicle, runner)
+        self._rally = PlaceLists(messages.MAV_MISSION_TYPE_RALLY, "Rally points", self.vehicle, runner)
+        transfers = {messages.MAV_MISSION_TYPE_MISSION: Transfers(self._uploads, MissionDownloads(missions, ground))}
+        for places in (self._fences, self._rally):
+            uploads = MissionUploads(places, ground, emit, incidents, own.let_read)
+            uploads.answers.are_only_missions_stored = lambda: False
+            transfers[places.mission_type] = Transfers(uploads, MissionDownloads(places, ground))
+        self._all_uploads = tuple(each.uploads for each in transfers.values())
+        own.capabilities = self._capabilities
+        self._uploads.answers.are_only_missions_stored = lambda: not self._capabilities()
         own_parameters = OwnParameters(missions, ground, owner.sysid)
         own_parameters.on_radius_set = self._board_settings.saved_with_mission
         parameters = self._parameters = Parameters(own_parameters, self._board_settings, ground)
@@ -172,7 +183,7 @@ class Bridge:
         commands = CommandService(
             ground, own, actions, session, self._calibration, self._board_settings, parameters, config.version
         )
-        router = MessageRouter(ground, self._uploads, downloads, parameters, commands, own)
+        router = MessageRouter(ground, transfers, parameters, commands, own, self._stores)
         self._incoming = Incoming(
             self._guard,
             ground,
@@ -186,7 +197,7 @@ class Bridge:
         self._parts: tuple[TimedPart, ...] = (
             runner,
             self._sharing,
-            self._uploads,
+            *self._all_uploads,
             self._watch,
             self._seal,
             self._board_settings,
@@ -248,13 +259,15 @@ class Bridge:
     # The ground stations' side.
 
     def gcs_gone(self, peer: Peer, now: float) -> None:
-        self._uploads.peer_gone(peer, now)
+        for uploads in self._all_uploads:
+            uploads.peer_gone(peer, now)
         self._ground.gone(peer)
 
     def link_closed(self, name: str, now: float) -> None:
         """A link is closed, and all ground stations on it are gone."""
         for peer in self._ground.remove_link(name):
-            self._uploads.peer_gone(peer, now)
+            for uploads in self._all_uploads:
+                uploads.peer_gone(peer, now)
 
     def notify(self, text: str) -> None:
         """Show a text to each ground station that connects from now on."""
@@ -268,9 +281,10 @@ class Bridge:
 
     def stop_missions(self, now: float) -> None:
         """Accept no more transfers. An upload that still receives items ends; a running push continues."""
-        self._missions.close()
+        for lists in (self._missions, self._fences, self._rally):
+            lists.close()
         self._sharing.stop()
-        self._uploads.end(STOPPED, now)
+        self._end_uploads(STOPPED, now)
 
     # For metrics, the status and other followers.
 
@@ -341,6 +355,19 @@ class Bridge:
         """A program's request was refused. In flight a warning would cover what concerns the craft."""
         self._ground.say(Severity.NOTICE if self.vehicle.armed else Severity.WARNING, text)
 
+    def _end_uploads(self, refusal: Refusal, now: float) -> None:
+        for uploads in self._all_uploads:
+            uploads.end(refusal, now)
+
+    def _stores(self, mission_type: int) -> bool:
+        """True if the flight controller stores lists of this MAV_MISSION_TYPE; missions are always answered."""
+        places = next((each for each in (self._fences, self._rally) if each.mission_type == mission_type), None)
+        return mission_type == messages.MAV_MISSION_TYPE_MISSION if places is None else places.are_stored
+
+    def _capabilities(self) -> int:
+        fence = self._fences.are_stored and messages.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+        return fence | (self._rally.are_stored and messages.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY)
+
     def _changed_settings(self, now: float) -> None:
         self._seal.changed_here(now)
         self._missions.settings_changed()
@@ -367,15 +394,20 @@ class Bridge:
         self._board_settings.found(controller, now)
         if controller is None:
             trouble = self._session.state.trouble
-            self._missions.use(Refusal(MissionResult.DENIED, trouble) if trouble else NO_LINK, now, is_same_board=True)
-            self._uploads.end(FC_LOST, now)
+            refusal = Refusal(MissionResult.DENIED, trouble) if trouble else NO_LINK
+            for lists in (self._missions, self._fences, self._rally):
+                lists.use(refusal, now, is_same_board=True)
+            self._end_uploads(FC_LOST, now)
             self._announcer.lost(now if self.vehicle.heard_at is None else self.vehicle.heard_at)
             return
         missions = controller.profile.missions
         rules = RuleSettings(self._config.settings.takeoff_max_m)
         store = missions if isinstance(missions, Refusal) else missions(controller, self.vehicle, rules)
         # On a port that was opened since, an armed board may be another one.
-        self._missions.use(store, now, is_same_board=self._session.met_family == controller.profile.family)
+        is_same_board = self._session.met_family == controller.profile.family
+        self._missions.use(store, now, is_same_board=is_same_board)
+        for places, opened in ((self._fences, controller.profile.fences), (self._rally, controller.profile.rally)):
+            places.use(opened(controller, self.vehicle), now, is_same_board=is_same_board)
         self._announcer.found(controller, now)
         self._calibration.controller_found(now)
         if not isinstance(store, Refusal):
@@ -420,8 +452,8 @@ class Bridge:
             # Unknown is not a change: a Harakiri that arms may fall silent first.
             return
         self._was_armed = armed
-        if armed and self._uploads.due < inf:
-            self._uploads.end(ARMED, now)
+        if armed:
+            self._end_uploads(ARMED, now)
         if armed:
             self._seal.armed()
         self._ground.record_flight(on=armed and not self.is_passing_through)

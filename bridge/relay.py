@@ -303,6 +303,7 @@ class _AnyRules:
     """Accepts every list: the vehicle checks it by its own rules."""
 
     max_items = _MOST_ITEMS
+    has_home = True
 
     def begin(self, count: int, _fallback_home: tuple[int, int] | None) -> ListCheck:
         return _Unchecked(count)

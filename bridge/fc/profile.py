@@ -14,6 +14,7 @@ from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import POLLS, Poll
 from bridge.missions.fc_mission_store import AnyFcMissionStore
 from bridge.missions.list_check import MissionRules
+from bridge.missions.place_lists import NO_PLACES
 from bridge.model.airframe import Airframe
 from bridge.model.flight_mode import ARM_BOX
 from bridge.model.refusal import Refusal
@@ -59,8 +60,15 @@ class RuleSettings:
 #: Opens the mission store of a board.
 OpenStore = Callable[["FlightController", Vehicle, RuleSettings], AnyFcMissionStore]
 
+#: Opens a board's store of fences or of rally points, or says that it has none.
+OpenPlaces = Callable[["FlightController", Vehicle], AnyFcMissionStore | Refusal]
+
 #: Opens the settings of a board.
 OpenSettings = Callable[["FlightController"], FcSettings]
+
+
+def _no_places(_board: "FlightController", _vehicle: Vehicle) -> Refusal:
+    return NO_PLACES
 
 
 def _none_known(_vehicle: Vehicle, _now: float) -> tuple[str, ...]:
@@ -82,6 +90,7 @@ class Profile:
     accepts_any_byte: its parser acts on no byte runs inside a frame. turn_s: it serves one request in this time.
     silence_s: after this long without a reply it is gone: unplugged, reset, or switched to another protocol.
     missions: how they are written to it, or the reply to any attempt.
+    fences, rally: its stores of fences and of rally points.
     settings: how its own settings are read and changed; None: not over this protocol.
     check_kind, rules: how `naze-bridge check --kind` calls it, and the rules it applies.
     mavlink_sender: MAVLink version, sysid and compid it sends with; None matches any.
@@ -105,6 +114,8 @@ class Profile:
     turn_s: float = 0.0
     silence_s: float = MSP_SILENCE_S
     missions: OpenStore | Refusal = NO_MISSIONS
+    fences: OpenPlaces = _no_places
+    rally: OpenPlaces = _no_places
     settings: OpenSettings | None = None
     check_kind: str | None = None
     rules: Callable[[RuleSettings], MissionRules] | None = None

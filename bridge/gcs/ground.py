@@ -321,10 +321,10 @@ class Ground:
         """Send a MISSION_ACK."""
         self.to(station, messages.MAVLink_mission_ack_message(station.sysid, station.compid, result, mission_type))
 
-    def refuse(self, station: Station, refusal: Refusal) -> None:
+    def refuse(self, station: Station, refusal: Refusal, mission_type: int = 0) -> None:
         """Refuse a mission transfer: send the reason as a text, and a MISSION_ACK."""
         self.say(Severity.ERROR, refusal.text, station)
-        self.mission_ack(station, refusal.ack)
+        self.mission_ack(station, refusal.ack, mission_type)
 
     def to_as(self, ids: tuple[int, int], receiver: GroundStation, message: Message) -> None:
         """Send a message to one ground station under the ids that it addressed."""

@@ -11,7 +11,7 @@ from bridge.gcs.message_rates import MessageRates
 from bridge.gcs.recent_texts import RecentTexts
 from bridge.gcs.rights import FrameRefusal, LinkAccess, Standing
 from bridge.gcs.station import RECORDER, Peer, Station
-from bridge.model.transfer_memory import Download, FinalAck
+from bridge.model.transfer_memory import TransferMemory
 from protocols.mavlink.codec import FrameWriter
 from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame, MavlinkSplitter
 from protocols.mavlink.signing import Check
@@ -49,8 +49,7 @@ class Speaker:
     __slots__ = (
         "_missing",
         "_newest",
-        "download",
-        "final_ack",
+        "_transfers",
         "frames",
         "heard_at",
         "is_copy",
@@ -70,9 +69,12 @@ class Speaker:
         self.last_lost = -1
         #: The last frame was sent before one that arrived earlier. It was the same frame again, doubled by the network.
         self.is_late = self.is_copy = False
-        self.download: Download | None = None
-        #: Of its last upload.
-        self.final_ack: FinalAck | None = None
+        #: By MAV_MISSION_TYPE.
+        self._transfers: dict[int, TransferMemory] = {}
+
+    def transfer(self, mission_type: int) -> TransferMemory:
+        """What its last transfers of this type left behind."""
+        return self._transfers.setdefault(mission_type, TransferMemory())
 
     def heard(self, frame: MavlinkFrame, now: float) -> None:
         raw = frame.raw

@@ -61,6 +61,9 @@ class PushFailure(Enum):
     UNCERTAIN = "Link lost while writing: checked when it is back"
     INCOMPLETE = "interrupted: the flight controller has no mission to fly; write it again"
     ARMED_WHILE_WRITING = "armed during the write: the flight controller has no mission to fly; disarm, write it again"
+    PLACES_KEPT = "not written: the old ones are kept; write them again"
+    PLACES_PARTLY = "written only in part and not saved: write them again"
+    PLACES_NOT_SAVED = "written but not saved, and lost at power-off: write them again"
     NOT_SAVED = "the mission is there but not saved: it is lost at power-off; write it again"
 
 

@@ -165,6 +165,10 @@ class MissionRules(Protocol):
     def max_items(self) -> int:
         """The longest list that may fit, home included."""
 
+    @property
+    def has_home(self) -> bool:
+        """True if item 0 is home."""
+
     def begin(self, count: int, fallback_home: tuple[int, int] | None) -> ListCheck:
         """Begin the check of `count` items; `fallback_home` (lat_e7, lon_e7) replaces a home without coordinates."""
 
@@ -178,7 +182,7 @@ def check_count(count: int, rules: MissionRules) -> RejectingFinding | None:
 
 def begin_check(count: int, rules: MissionRules, fallback_home: tuple[int, int] | None) -> ListCheck:
     """Begin the check of a list of `count` items, 1 or more."""
-    return HomeOnly(count) if count == 1 else rules.begin(count, fallback_home)
+    return HomeOnly(count) if count == 1 and rules.has_home else rules.begin(count, fallback_home)
 
 
 def check_list(

@@ -107,6 +107,9 @@ EndingListener = Callable[[ArrivedMission, DeliveryResult], None]
 class MissionService:
     """Holds the transfer lock, the current flight controller's mission store, and its list."""
 
+    #: MAV_MISSION_TYPE of its lists.
+    mission_type: int = 0
+
     def __init__(self, vehicle: Vehicle, runner: Runner, on_ending: EndingListener) -> None:
         self.vehicle = vehicle
         self.runner = runner

@@ -24,6 +24,8 @@ _PARAMS: Mapping[int, tuple[str, ...]] = {
     Command.DO_JUMP: ("WP #", "Repeat#", "", ""),
     Command.DO_CHANGE_SPEED: ("Type", "speed m/s", "", ""),
 }
+#: Items of fences and rally points, of which the first is not home.
+_PLACES = frozenset(command for command in Command if command >= Command.FENCE_RETURN_POINT)
 _METRES = ("alt_m", "Hit Rad")
 
 #: Makes a finding of an item: field, value as sent, value as stored, reason.
@@ -60,7 +62,9 @@ class Finding:
         """One line with the reason; `count` items have the same finding."""
         if self.seq is None:
             return _OF_THE_LIST.get(self.becomes, "") + self.why
-        subject = f"{count} items" if count > 1 else f"WP {self.seq}" if self.seq else "Home"
+        is_place = self.command in _PLACES
+        subject = f"WP {self.seq}" if self.seq and not is_place else f"Item {self.seq}" if is_place else "Home"
+        subject = f"{count} items" if count > 1 else subject
         if self.becomes == REJECTED:
             return f"Rejected, {subject}: {self.why}"
         if self.becomes == DROPPED:

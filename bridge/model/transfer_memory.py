@@ -30,3 +30,11 @@ class Download:
     items: tuple[MissionItem, ...]
     until: float
     fc_store: object
+
+
+@dataclass(slots=True)
+class TransferMemory:
+    """Of one station and mission type: its running download, and the answer to its last upload."""
+
+    download: Download | None = None
+    final_ack: FinalAck | None = None

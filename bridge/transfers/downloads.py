@@ -9,7 +9,7 @@ from bridge.gcs.station import Station
 from bridge.missions.mission_service import HeldMission, MissionService
 from bridge.model.flight_memory import Home
 from bridge.model.refusal import Refusal
-from bridge.model.transfer_memory import Download
+from bridge.model.transfer_memory import Download, TransferMemory
 from protocols.mavlink.codec import item_message
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
@@ -39,6 +39,8 @@ class MissionDownloads:
         self._missions = missions
         self._ground = ground
         self._vehicle = missions.vehicle
+        #: Item 0 of a mission.
+        self._has_home = missions.mission_type == messages.MAV_MISSION_TYPE_MISSION
         self._questions: dict[_Question, None] = {}
         #: While home is unknown: the mission store of the flight controller, and when item 0 was first requested.
         self._homeless: tuple[object, float] = None, 0.0
@@ -50,18 +52,21 @@ class MissionDownloads:
     def request(self, station: Station, seq: int, now: float, *, as_int: bool) -> None:
         """MISSION_REQUEST or MISSION_REQUEST_INT; item 0 is served at any time (Mission Planner asks on arming)."""
         question = _Question(station, seq, as_int)
-        download = self._ground.speaker(station).download
+        download = self._memory(station).download
         if download is not None and now < download.until and download.fc_store is self._missions.fc_store:
             download.until = now + _READING_S
             self._answer(question, download.items, now)
-        elif self._vehicle.armed and seq == 0:
+        elif self._vehicle.armed and seq == 0 and self._has_home:
             self._send_home(question, now)
         else:
             self._ask(question, now)
 
     def forget(self, station: Station) -> None:
         """The ground station has read the list, or writes a new one."""
-        self._ground.speaker(station).download = None
+        self._memory(station).download = None
+
+    def _memory(self, station: Station) -> TransferMemory:
+        return self._ground.speaker(station).transfer(self._missions.mission_type)
 
     def _ask(self, question: _Question, now: float) -> None:
         """Read the list once for all waiting requests, so that a flood of them cannot fill the queue."""
@@ -82,34 +87,38 @@ class MissionDownloads:
         for question in questions:
             if isinstance(held, Refusal):
                 # Mission Planner requests item 0 on arming, which may have just changed the protocol.
-                if question.seq == 0 and (self._vehicle.armed or self._vehicle.home_or_position() is not None):
+                if not self._has_home:
+                    self._ground.refuse(question.station, held, self._missions.mission_type)
+                elif question.seq == 0 and (self._vehicle.armed or self._vehicle.home_or_position() is not None):
                     self._send_home(question, now)
                 elif question.seq != 0 or self._vehicle.armed is not None:
                     self._ground.refuse(question.station, held)
                 # Otherwise the craft may be armed: Mission Planner repeats the request until that is known.
                 continue
             download = Download(held.items, now + _READING_S, self._missions.fc_store)
-            self._ground.speaker(question.station).download = download
+            self._memory(question.station).download = download
             self._answer(question, held.items, now)
 
     def _answer(self, question: _Question, items: tuple[MissionItem, ...], now: float) -> None:
         station = question.station
         if question.seq is None:
             # DroneKit takes home from a download, and waits forever without one: so an empty list has home if known.
-            count = len(items) or int(self._vehicle.home_or_position() is not None)
-            self._ground.to(station, messages.MAVLink_mission_count_message(station.sysid, station.compid, count))
+            count = len(items) or int(self._has_home and self._vehicle.home_or_position() is not None)
+            kind = self._missions.mission_type
+            self._ground.to(station, messages.MAVLink_mission_count_message(station.sysid, station.compid, count, kind))
         elif question.seq < len(items):
             self._send_item(question, items[question.seq])
             if question.seq == len(items) - 1:
                 self._missions.note_reader(station.identity, now)
-        elif question.seq == 0:
+        elif question.seq == 0 and self._has_home:
             self._send_item(question, self._home_item())
         else:
-            self._ground.mission_ack(station, MissionResult.INVALID_SEQUENCE)
+            self._ground.mission_ack(station, MissionResult.INVALID_SEQUENCE, self._missions.mission_type)
 
     def _send_item(self, question: _Question, item: MissionItem) -> None:
         station = question.station
-        self._ground.to(station, item_message(item, station.sysid, station.compid, as_int=question.as_int))
+        kind = self._missions.mission_type
+        self._ground.to(station, item_message(item, station.sysid, station.compid, kind, as_int=question.as_int))
 
     def _send_home(self, question: _Question, now: float) -> None:
         """Item 0 while armed, at the altitude of HOME_POSITION: Mission Planner takes its ground level from it.

@@ -11,7 +11,7 @@ from bridge.missions.mission_service import DeliveryResult
 from bridge.missions.mission_texts import finding_lines
 from bridge.model.finding import News
 from bridge.model.refusal import Refusal
-from bridge.model.transfer_memory import FinalAck
+from bridge.model.transfer_memory import FinalAck, TransferMemory
 from bridge.model.verdict import Result, Verdict
 from protocols.mission_item import MissionResult
 
@@ -34,9 +34,12 @@ class UploadAnswers:
     `let_read` is called after a text that the pilot must read.
     """
 
-    def __init__(self, ground: Ground, let_read: Callable[[Peer, float], None]) -> None:
+    def __init__(self, ground: Ground, let_read: Callable[[Peer, float], None], mission_type: int = 0) -> None:
         self._ground = ground
+        self._mission_type = mission_type
         self._let_read = let_read
+        #: True if the flight controller stores neither fences nor rally points.
+        self.are_only_missions_stored: Callable[[], bool] = lambda: True
         #: The answers that are to be sent again.
         self._again: list[tuple[Station, FinalAck]] = []
         #: The time of the next `tick`; infinity if nothing is to be sent later.
@@ -50,7 +53,7 @@ class UploadAnswers:
         ack: MissionResult,
         count: int,
         now: float,
-        mission_type: int = 0,
+        mission_type: int | None = None,
         *,
         is_cancelled: bool = False,
         is_repeated: bool = False,
@@ -64,8 +67,8 @@ class UploadAnswers:
         answer = FinalAck(ack, count, now + _MEMORY_S, now + cancel_s)
         if is_repeated and count:
             self._repeat(station, answer, _ACK_AGAIN_S, None, now)
-        self._ground.speaker(station).final_ack = answer
-        self._ground.mission_ack(station, ack, mission_type)
+        self._memory(station).final_ack = answer
+        self._ground.mission_ack(station, ack, self._mission_type if mission_type is None else mission_type)
 
     def report(self, station: Station, verdict: Verdict[Any], delivery: DeliveryResult, now: float) -> None:
         """Report everything to the sender, and the change on the aircraft to other ground stations.
@@ -76,11 +79,12 @@ class UploadAnswers:
         sender = self._ground.station(station.peer)
         if verdict.result is Result.ACCEPTED and sender is not None and not sender.has_written:
             sender.has_written = True
-            self._ground.say(Severity.INFO, _ONLY_MISSIONS, station)
+            if self.are_only_missions_stored():
+                self._ground.say(Severity.INFO, _ONLY_MISSIONS, station)
         for news, line in finding_lines(verdict.findings) if accepted else ():
             if line != delivery.text:
                 self._ground.say(Severity.NOTICE if news is News.WARNING else Severity.INFO, line, station)
-        if delivery.number is None:
+        if delivery.number is None and not self._mission_type:  # the Pi stores no others
             self._ground.say(Severity.WARNING, "The mission could not be stored on the Pi", station)
         severity = Severity.INFO if accepted else Severity.ERROR
         if accepted and delivery.is_lossy:
@@ -94,7 +98,7 @@ class UploadAnswers:
 
     def remind(self, station: Station, text: str, now: float) -> None:
         """Repeat the reason for a refusal that the station may not have noticed."""
-        if (answer := self._ground.speaker(station).final_ack) is not None:
+        if (answer := self._memory(station).final_ack) is not None:
             self._repeat(station, answer, _REMINDERS_S, text, now)
 
     def _repeat(
@@ -106,7 +110,7 @@ class UploadAnswers:
 
     def went_on(self, station: Station) -> None:
         """The station has sent another mission message: it has the final ack, or does not wait for it."""
-        if (answer := self._ground.speaker(station).final_ack) is not None:
+        if (answer := self._memory(station).final_ack) is not None:
             answer.again = [again for again in answer.again if again[1] is not None]
 
     def tick(self, now: float) -> None:
@@ -114,7 +118,7 @@ class UploadAnswers:
         if now < self.due:
             return
         # A station may have left, or begun another upload.
-        self._again = [each for each in self._again if self._ground.speaker(each[0]).final_ack is each[1]]
+        self._again = [each for each in self._again if self._memory(each[0]).final_ack is each[1]]
         for station, answer in self._again:
             for due, text in answer.again:
                 if now < due:
@@ -122,7 +126,7 @@ class UploadAnswers:
                 if text is not None:
                     self._ground.say(Severity.ERROR, text, station, is_reminder=True)
                 else:
-                    self._ground.mission_ack(station, answer.ack)
+                    self._ground.mission_ack(station, answer.ack, self._mission_type)
             answer.again = [again for again in answer.again if now < again[0]]
         self._again = [each for each in self._again if each[1].again]
         self.due = min((due for _, answer in self._again for due, _ in answer.again), default=inf)
@@ -134,7 +138,7 @@ class UploadAnswers:
         answer = self._to(station, now)
         if answer is None or now >= answer.cancelled_until:
             return False
-        self._ground.mission_ack(station, answer.ack)
+        self._ground.mission_ack(station, answer.ack, self._mission_type)
         return True
 
     def late_item(self, station: Station, seq: int, now: float, *, is_lost: bool) -> None:
@@ -145,7 +149,7 @@ class UploadAnswers:
         answer = self._to(station, now)
         if answer is not None:
             if answer.is_refusal or seq == answer.count - 1:
-                self._ground.mission_ack(station, answer.ack)
+                self._ground.mission_ack(station, answer.ack, self._mission_type)
         elif is_lost and not any(self._at(where, now) for where in self._ground.elsewhere(station)):
             self._ground.say(Severity.ERROR, _UNKNOWN_UPLOAD.text, station)
             self.end(station, _UNKNOWN_UPLOAD.ack, 0, now)
@@ -154,21 +158,24 @@ class UploadAnswers:
         """MISSION_WRITE_PARTIAL_LIST: Mission Planner's answer to a refusal that it did not understand."""
         answer = self._to(station, now)
         if answer is not None and answer.is_refusal:
-            self._ground.mission_ack(station, answer.ack)
+            self._ground.mission_ack(station, answer.ack, self._mission_type)
         else:
-            self._ground.refuse(station, _NOT_WHOLE)
+            self._ground.refuse(station, _NOT_WHOLE, self._mission_type)
 
     def forget(self, station: Station) -> None:
         """The ground station has begun a new upload."""
-        self._ground.speaker(station).final_ack = None
+        self._memory(station).final_ack = None
 
     def was_said_to(self, station: Station, now: float) -> bool:
         """True if the station was answered at this address."""
         return self._at(station, now) is not None
 
+    def _memory(self, station: Station) -> TransferMemory:
+        return self._ground.speaker(station).transfer(self._mission_type)
+
     def _at(self, station: Station, now: float) -> FinalAck | None:
         """The last answer to a ground station at its present address."""
-        answer = self._ground.speaker(station).final_ack
+        answer = self._memory(station).final_ack
         return answer if answer is not None and now <= answer.until else None
 
     def _to(self, station: Station, now: float) -> FinalAck | None:

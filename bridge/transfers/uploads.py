@@ -53,7 +53,6 @@ from bridge.transfers.upload_states import (
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionItem, MissionResult
 
-_MISSION = int(messages.MAV_MISSION_TYPE_MISSION)
 _TOO_MANY_UPLOADS = Refusal(MissionResult.DENIED, "Too many uploads: wait a few seconds")
 #: The maximum number of simultaneous uploads: one for each peer of a link.
 _MOST_UPLOADS = MAX_PEERS
@@ -79,7 +78,7 @@ class MissionUploads:
         self._incidents = incidents
         self._let_read = let_read
         self._queue = UploadQueue()
-        self.answers = UploadAnswers(ground, let_read)
+        self.answers = UploadAnswers(ground, let_read, missions.mission_type)
         #: The time of the next `tick`; infinity if there is no upload, and no answer to repeat.
         self.due = inf
         missions.on_released = self._wake
@@ -143,7 +142,7 @@ class MissionUploads:
             state.item_repeated(now)
         elif item.seq >= upload.count:
             text = f"WP {item.seq} is beyond the {upload.count} items announced"
-            self._ground.refuse(station, Refusal(MissionResult.INVALID_SEQUENCE, text))
+            self._ground.refuse(station, Refusal(MissionResult.INVALID_SEQUENCE, text), self._missions.mission_type)
         else:
             taken = state.list.take(item, speaker, now)
             if isinstance(taken, int):
@@ -212,7 +211,8 @@ class MissionUploads:
 
     # State changes of an upload.
 
-    def _begin(self, station: Station, count: int, now: float, mission_type: int = _MISSION) -> None:
+    def _begin(self, station: Station, count: int, now: float, mission_type: int | None = None) -> None:
+        mission_type = self._missions.mission_type if mission_type is None else mission_type
         self.answers.forget(station)
         if not self._ground.allows(station, Cost.UPLOAD):
             # A flood must cost less than the lists that it announces: no incident, no log entry.
@@ -302,8 +302,8 @@ class MissionUploads:
                 stations += self._elsewhere(upload, now)
         for to in stations:
             # By id 40: the only one that Mission Planner understands in both modes.
-            request_message = partial(messages.MAVLink_mission_request_message, to.sysid, to.compid)
-            self._ground.to(to, *map(request_message, seqs))
+            make, kind = messages.MAVLink_mission_request_message, self._missions.mission_type
+            self._ground.to(to, *(make(to.sysid, to.compid, seq, kind) for seq in seqs))
 
     def _delivery(self, upload: Upload, whole: WholeList) -> Conversation[DeliveryResult]:
         """Store the list and write it; a rejected one is only stored, unless its sender sent too many of them."""

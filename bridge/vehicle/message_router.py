@@ -4,11 +4,13 @@
 from collections.abc import Callable, Mapping
 from functools import partial
 from math import inf
+from typing import NamedTuple
 
 from bridge.gcs.cost import Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import GroundStation
 from bridge.gcs.station import Severity, Station
+from bridge.missions.place_lists import NO_PLACES
 from bridge.transfers.downloads import MissionDownloads
 from bridge.transfers.uploads import MissionUploads
 from bridge.vehicle.commands import CommandService
@@ -50,34 +52,38 @@ _READS = frozenset(
 _Handler = Callable[[Station, Message, float], object]
 
 
+class Transfers(NamedTuple):
+    """The transfers of one mission type."""
+
+    uploads: MissionUploads
+    downloads: MissionDownloads
+
+
 class MessageRouter:
-    """Passes each known message to the part that answers it."""
+    """Passes each known message to the part that answers it.
+
+    transfers: by MAV_MISSION_TYPE. stores: True if the flight controller stores lists of a type.
+    """
 
     def __init__(
         self,
         ground: Ground,
-        uploads: MissionUploads,
-        downloads: MissionDownloads,
+        transfers: Mapping[int, Transfers],
         parameters: Parameters,
         commands: CommandService,
         vehicle: OwnVehicle,
+        stores: Callable[[int], bool],
     ) -> None:
+        self.stores = stores
         self._ground = ground
         self._vehicle = vehicle
         self._commands = commands
-        self._uploads = uploads
-        self._downloads = downloads
+        self._transfers = transfers
         self._decoder = MavlinkDecoder()
+        #: Of mission messages, by the type of their lists.
+        self._of_type = {kind: self._mission_handlers(*each) for kind, each in transfers.items()}
         self.handlers: Mapping[int, _Handler] = {
-            m.MAVLINK_MSG_ID_MISSION_COUNT: lambda s, msg, now: uploads.count(s, msg.count, now),
-            m.MAVLINK_MSG_ID_MISSION_ITEM: partial(self._item, item_from_float_message),
-            m.MAVLINK_MSG_ID_MISSION_ITEM_INT: partial(self._item, item_from_int_message),
-            m.MAVLINK_MSG_ID_MISSION_ACK: lambda s, msg, now: uploads.ack(s, msg.type, now),
-            m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL: lambda s, msg, now: uploads.clear_all(s, msg.mission_type, now),
-            m.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST: lambda s, _, now: uploads.answers.partial_list(s, now),
-            m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST: lambda s, _, now: downloads.request_list(s, now),
-            m.MAVLINK_MSG_ID_MISSION_REQUEST: lambda s, msg, now: downloads.request(s, msg.seq, now, as_int=False),
-            m.MAVLINK_MSG_ID_MISSION_REQUEST_INT: lambda s, msg, now: downloads.request(s, msg.seq, now, as_int=True),
+            **self._of_type[m.MAV_MISSION_TYPE_MISSION],
             m.MAVLINK_MSG_ID_MISSION_SET_CURRENT: self._set_current,
             m.MAVLINK_MSG_ID_COMMAND_LONG: lambda s, msg, now: commands.take(
                 s,
@@ -107,6 +113,19 @@ class MessageRouter:
             m.MAVLINK_MSG_ID_TIMESYNC: self._timesync,
         }
 
+    def _mission_handlers(self, uploads: MissionUploads, downloads: MissionDownloads) -> Mapping[int, _Handler]:
+        return {
+            m.MAVLINK_MSG_ID_MISSION_COUNT: lambda s, msg, now: uploads.count(s, msg.count, now),
+            m.MAVLINK_MSG_ID_MISSION_ITEM: partial(self._item, uploads, item_from_float_message),
+            m.MAVLINK_MSG_ID_MISSION_ITEM_INT: partial(self._item, uploads, item_from_int_message),
+            m.MAVLINK_MSG_ID_MISSION_ACK: lambda s, msg, now: uploads.ack(s, msg.type, now),
+            m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL: lambda s, msg, now: uploads.clear_all(s, msg.mission_type, now),
+            m.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST: lambda s, _, now: uploads.answers.partial_list(s, now),
+            m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST: lambda s, _, now: downloads.request_list(s, now),
+            m.MAVLINK_MSG_ID_MISSION_REQUEST: lambda s, msg, now: downloads.request(s, msg.seq, now, as_int=False),
+            m.MAVLINK_MSG_ID_MISSION_REQUEST_INT: lambda s, msg, now: downloads.request(s, msg.seq, now, as_int=True),
+        }
+
     def take(self, sender: GroundStation, station: Station, frame: MavlinkFrame, msgid: int, now: float) -> None:
         """Handle a frame for the bridge's vehicle, if it is understood and its sender has not sent too many."""
         handler = self.handlers.get(msgid)
@@ -117,24 +136,43 @@ class MessageRouter:
         mission_type = getattr(message, "mission_type", m.MAV_MISSION_TYPE_MISSION)
         clears_all = msgid == m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL and mission_type == m.MAV_MISSION_TYPE_ALL
         if msgid in _READS or msgid in _ENDS_DOWNLOAD:
-            self._uploads.answers.went_on(station)
-        if mission_type == m.MAV_MISSION_TYPE_MISSION or clears_all:
-            if msgid in _READS:
-                self._uploads.reads(station, now)
-            if msgid in _ENDS_DOWNLOAD:
-                self._downloads.forget(station)
-            handler(station, message, now)
+            for uploads, _ in self._transfers.values():
+                uploads.answers.went_on(station)
+        if clears_all:
+            # The one answer is the missions'.
+            self._follow(m.MAV_MISSION_TYPE_MISSION, msgid, station, message, now)
+            for kind in (m.MAV_MISSION_TYPE_FENCE, m.MAV_MISSION_TYPE_RALLY):
+                if self.stores(kind):
+                    self._transfers[kind].uploads.clear_all(station, kind, now)
+        elif self.stores(mission_type):
+            self._follow(mission_type, msgid, station, message, now)
         elif msgid != m.MAVLINK_MSG_ID_MISSION_ACK:
             if msgid == m.MAVLINK_MSG_ID_MISSION_COUNT:
-                self._ground.say(Severity.ERROR, "No fences or rally points: only missions are stored", station)
+                self._ground.say(Severity.ERROR, NO_PLACES.text, station)
             self._ground.mission_ack(station, MissionResult.UNSUPPORTED, mission_type)
 
-    def _item(self, convert: Callable[[Message], MissionItem], station: Station, message: Message, now: float) -> None:
-        if message.current in _GUIDED and not self._uploads.is_writing(station):
+    def _follow(self, mission_type: int, msgid: int, station: Station, message: Message, now: float) -> None:
+        """Pass on a message; those about no list have the type of missions."""
+        uploads, downloads = self._transfers[mission_type]
+        if msgid in _READS:
+            uploads.reads(station, now)
+        if msgid in _ENDS_DOWNLOAD:
+            downloads.forget(station)
+        (self._of_type[mission_type].get(msgid) or self.handlers[msgid])(station, message, now)
+
+    def _item(
+        self,
+        uploads: MissionUploads,
+        convert: Callable[[Message], MissionItem],
+        station: Station,
+        message: Message,
+        now: float,
+    ) -> None:
+        if message.current in _GUIDED and not uploads.is_writing(station):
             self._commands.refuse(station, m.MAV_CMD_NAV_WAYPOINT)
             self._ground.mission_ack(station, MissionResult.DENIED)
         else:
-            self._uploads.item(station, convert(message), self._ground.speaker(station), now)
+            uploads.item(station, convert(message), self._ground.speaker(station), now)
 
     def _set_current(self, station: Station, _message: Message, now: float) -> None:
         self._commands.refuse(station, m.MAV_CMD_DO_SET_MISSION_CURRENT)

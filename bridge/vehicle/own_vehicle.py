@@ -77,6 +77,8 @@ class OwnVehicle:
         #: The messages that any ground station wants, by the reading that triggers them.
         self._rows: dict[type[Reading] | None, list[Row]] = {}
         self.progress = MissionProgress()
+        #: The capability bits of this flight controller, besides the bridge's own.
+        self.capabilities: Callable[[], int] = lambda: 0
         self._announced_home: Home | None = None
         self._also_wanted: Mapping[type[Reading], float] = {}
         self._newcomers_due = inf
@@ -180,7 +182,8 @@ class OwnVehicle:
                 return None
         elif msgid == messages.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
             # A restarted station would otherwise show home at 0, 0.
-            made = [make.autopilot_version(self._session.vehicle), *self._moment(now).made((make.home_position,))]
+            version = make.autopilot_version(self._session.vehicle, self.capabilities())
+            made = [version, *self._moment(now).made((make.home_position,))]
         elif (row := _ROWS.get(msgid)) is not None:
             made = self._moment(now, self._sent_seqs(self._ground.station(station.peer))).made(row.makers)
         else:

@@ -254,12 +254,12 @@ def _standard_mode(vehicle: Vehicle, mode: FlightMode) -> int:
     return _MODES[mode].standard if of_one_kind.get(mode, True) else messages.MAV_STANDARD_MODE_NON_STANDARD
 
 
-def autopilot_version(vehicle: Vehicle) -> Message:
-    """AUTOPILOT_VERSION: the firmware's version."""
+def autopilot_version(vehicle: Vehicle, capabilities: int = 0) -> Message:
+    """AUTOPILOT_VERSION: the firmware's version. `capabilities`: of this flight controller, besides the bridge's."""
     version = int.from_bytes(bytes((*(vehicle.version or _UNKNOWN_VERSION), _OFFICIAL)), "big")
     no_hash = [0] * 8
     return messages.MAVLink_autopilot_version_message(
-        _CAPABILITIES, version, 0, 0, 0, no_hash, no_hash, no_hash, 0, 0, 0
+        _CAPABILITIES | capabilities, version, 0, 0, 0, no_hash, no_hash, no_hash, 0, 0, 0
     )
 
 

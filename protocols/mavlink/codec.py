@@ -125,10 +125,10 @@ def item_from_int_message(message: Message) -> MissionItem:
     return MissionItem(message.seq, message.command, message.frame, *params, message.x, message.y, message.z)
 
 
-def item_message(item: MissionItem, sysid: int, compid: int, *, as_int: bool) -> Message:
+def item_message(item: MissionItem, sysid: int, compid: int, mission_type: int = 0, *, as_int: bool) -> Message:
     """Make the message for one item, addressed to a ground station."""
     lat_e7, lon_e7 = item.lat_e7 or 0, item.lon_e7 or 0
     make = messages.MAVLink_mission_item_int_message if as_int else messages.MAVLink_mission_item_message
     x, y = (lat_e7, lon_e7) if as_int else (lat_e7 / 1e7, lon_e7 / 1e7)
     params = (item.p1, item.p2, item.p3, item.p4)
-    return make(sysid, compid, item.seq, item.frame, item.command, 0, 1, *params, x, y, item.alt_m, 0)
+    return make(sysid, compid, item.seq, item.frame, item.command, 0, 1, *params, x, y, item.alt_m, mission_type)

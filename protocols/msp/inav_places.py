@@ -1,16 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""INAV's safehomes over MSP v2, both directions (src/main/fc/fc_msp.c)."""
+"""INAV's safehomes and geozones over MSP v2 (src/main/fc/fc_msp.c; geozones from 8.0 on)."""
 
 import struct
+from dataclasses import dataclass, field
+from enum import IntEnum
 from typing import NamedTuple
 
 from protocols.msp.frame import request
 
+FEATURE = 36
+FEATURE_SIZE = 4
+GEOZONE_FEATURE = 1 << 4
 SAFEHOME, SET_SAFEHOME = 0x2038, 0x2039
-#: MAX_SAFE_HOMES.
-SAFEHOMES = 8
+GEOZONE, SET_GEOZONE, GEOZONE_VERTEX, SET_GEOZONE_VERTEX = 0x2210, 0x2211, 0x2212, 0x2213
+#: MAX_SAFE_HOMES, MAX_GEOZONES_IN_CONFIG, MAX_VERTICES_IN_CONFIG; a circle takes two vertices.
+SAFEHOMES, GEOZONES, VERTICES = 8, 63, 126
 _SAFEHOME = struct.Struct("<BBii")
-SAFEHOME_SIZE = _SAFEHOME.size
+_GEOZONE = struct.Struct("<BBBiiBBB")
+_VERTEX = struct.Struct("<BBii")
+_RADIUS = struct.Struct("<i")
+SAFEHOME_SIZE, GEOZONE_SIZE, VERTEX_SIZE = _SAFEHOME.size, _GEOZONE.size, _VERTEX.size + _RADIUS.size
 
 
 class Safehome(NamedTuple):
@@ -21,9 +30,93 @@ class Safehome(NamedTuple):
     lat_e7: int
     lon_e7: int
 
+    def pack(self) -> bytes:
+        return _SAFEHOME.pack(*self)
+
+
+class FenceAction(IntEnum):
+    """The action of a geozone at its border (navigation.h); a copter holds its position instead of avoiding it."""
+
+    NONE = 0
+    AVOID = 1
+    POS_HOLD = 2
+    RTH = 3
+
+
+class Corner(NamedTuple):
+    """Degrees * 1e7."""
+
+    lat_e7: int
+    lon_e7: int
+
+
+@dataclass(frozen=True, slots=True)
+class Geozone:
+    """number: from 0. corners: of a polygon, or a circle's centre. radius_cm: 0 for a polygon.
+
+    lowest_cm, highest_cm: 0 is the ground, and no limit; above sea level if is_above_sea, else above home.
+    """
+
+    number: int
+    is_inclusive: bool
+    corners: tuple[Corner, ...]
+    radius_cm: int = 0
+    lowest_cm: int = 0
+    highest_cm: int = 0
+    is_above_sea: bool = False
+    action: int = field(default=FenceAction.NONE)
+
+    @property
+    def is_circle(self) -> bool:
+        return self.radius_cm > 0
+
+    @property
+    def vertices(self) -> int:
+        """As INAV counts: the second one of a circle is its radius."""
+        return 2 if self.is_circle else len(self.corners)
+
+    def pack(self) -> bytes:
+        """The payload of SET_GEOZONE, and behind it of each SET_GEOZONE_VERTEX."""
+        return self.head() + b"".join(self.vertex(number) for number in range(len(self.corners)))
+
+    def head(self) -> bytes:
+        heights = self.lowest_cm, self.highest_cm
+        kind = self.number, self.is_inclusive, not self.is_circle
+        return _GEOZONE.pack(*kind, *heights, self.is_above_sea, self.action, self.vertices)
+
+    def vertex(self, number: int) -> bytes:
+        place = _VERTEX.pack(self.number, number, *self.corners[number])
+        return place + _RADIUS.pack(self.radius_cm) if self.is_circle else place
+
+
+class GeozoneHead(NamedTuple):
+    """A reply to GEOZONE: a zone without its corners. is_polygon: else a circle."""
+
+    number: int
+    is_inclusive: bool
+    is_polygon: bool
+    lowest_cm: int
+    highest_cm: int
+    is_above_sea: bool
+    action: int
+    vertices: int
+
 
 def encode_read_safehome(number: int) -> bytes:
     return request(SAFEHOME, bytes((number,)))
+
+
+def encode_read_geozone(number: int) -> bytes:
+    return request(GEOZONE, bytes((number,)))
+
+
+def encode_read_vertex(zone: int, number: int) -> bytes:
+    return request(GEOZONE_VERTEX, bytes((zone, number)))
+
+
+def empty_geozone(number: int) -> bytes:
+    """The payload of SET_GEOZONE that frees the zone's vertices."""
+    return _GEOZONE.pack(number, 0, 0, 0, 0, 0, 0, 0)
 
 
 def decode_safehome(payload: bytes) -> Safehome | None:
@@ -32,3 +125,20 @@ def decode_safehome(payload: bytes) -> Safehome | None:
         return None
     number, enabled, lat_e7, lon_e7 = _SAFEHOME.unpack_from(payload)
     return Safehome(number, bool(enabled), lat_e7, lon_e7)
+
+
+def decode_geozone(payload: bytes) -> GeozoneHead | None:
+    """Read a reply; None if it is cut."""
+    if len(payload) < GEOZONE_SIZE:
+        return None
+    number, kind, shape, lowest, highest, above_sea, action, vertices = _GEOZONE.unpack_from(payload)
+    return GeozoneHead(number, bool(kind), bool(shape), lowest, highest, bool(above_sea), action, vertices)
+
+
+def decode_vertex(payload: bytes) -> tuple[Corner, int] | None:
+    """Read a reply: the place and, of a circle, its radius in cm; None if it is cut."""
+    if len(payload) < _VERTEX.size:
+        return None
+    _, _, lat_e7, lon_e7 = _VERTEX.unpack_from(payload)
+    radius = _RADIUS.unpack_from(payload, _VERTEX.size)[0] if len(payload) >= VERTEX_SIZE else 0
+    return Corner(lat_e7, lon_e7), radius

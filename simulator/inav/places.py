@@ -70,7 +70,7 @@ class InavPlaces:
             case _ if command == FW_APPROACH and self._has_approaches:
                 return bytes((index,)) + self._approaches[index] if index < _APPROACHES else None
             case _ if command == SET_FW_APPROACH and len(payload) == 1 + _APPROACH_SIZE and index < _APPROACHES:
-                self._approaches[index] = payload[1:]
+                self._approaches[index] = payload[1:-1] + bytes((payload[-1] > 0,))
                 return b"" if self._has_approaches else None
         return self._about_zone(command, index, payload) if self._has_zones and index < _ZONES else None
 
@@ -109,7 +109,7 @@ class InavPlaces:
         return next((vertex for vertex in unpacked if vertex[:2] == (zone, number)), None)
 
     def _add(self, zone: int, number: int, lat: int, lon: int = 0) -> bool:
-        if _FREE not in self._vertices:
+        if _FREE not in self._vertices or number >= _VERTICES:
             return False
         self._vertices[self._vertices.index(_FREE)] = _VERTEX.pack(zone, number, lat, lon)
         return True

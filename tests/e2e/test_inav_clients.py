@@ -88,6 +88,24 @@ async def test_mavsdk_writes_and_reads_120_records(inav: Bench) -> None:
     assert [mission["finding_count"] for mission in newest[1:3]] == [0, 0]
 
 
+async def test_mavsdk_writes_and_reads_a_fence_and_rally_points(inav: Bench) -> None:
+    corners = ((45.380, 8.470), (45.380, 8.480), (45.390, 8.480), (45.390, 8.470))
+    fence = [PlanRow(5001, *corner, 0.0, p1=4.0) for corner in corners] + [PlanRow(5004, 45.385, 8.475, 0.0, p1=75.5)]
+    rally = [PlanRow(5100, 45.381 + place / 1000, 8.471, 0.0) for place in range(3)]
+    async with vehicle_at(inav.daemon.port) as vehicle:
+        missions = MissionRawAsync(vehicle)
+        lists = [raw_items(plan) for plan in (fence, rally)]
+        for kind, items in enumerate(lists, 1):
+            for item in items:
+                item.mission_type = kind
+        await missions.upload_geofence(lists[0])
+        await missions.upload_rally_points(lists[1])
+        read = await missions.download_geofence(), await missions.download_rallypoints()
+    assert [[fields(item) for item in items] for items in read] == [
+        [stored_fields(i) for i in as_items(p)] for p in (fence, rally)
+    ]
+
+
 def test_mavproxy_loads_lists_and_clears_120_records(inav: Bench, tmp_path: Path) -> None:
     plan = [*nav_plan(120)[:-2], waypoint(200, p2=0.0), waypoint(201, p2=0.0)]
     with MavProxy(tmp_path, inav.daemon.port) as mavproxy:

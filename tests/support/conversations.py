@@ -91,7 +91,9 @@ class Upload:
         as_int: bool = True,
         repeat_s: float = 0.45,
         tries: int = 11,
+        mission_type: int = MISSION,
     ) -> None:
+        self._type = mission_type
         self.station, self.items, self.as_int = station, list(items), as_int
         self.result: MissionResult | None = None
         self.requested: list[int] = []
@@ -117,20 +119,20 @@ class Upload:
         self.gave_up = True
 
     def _count(self) -> None:
-        self.station.send(count_message(len(self.items)))
+        self.station.send(count_message(len(self.items), self._type))
 
     def _item(self, seq: int) -> None:
-        self.station.send(item_message(seq, self.items[seq], as_int=self.as_int))
+        self.station.send(item_message(seq, self.items[seq], as_int=self.as_int, mission_type=self._type))
 
     def _react(self, message: Message) -> None:
         if self.is_over or not self.station.is_target_of(message):
             return
         match message.get_type():
-            case "MISSION_REQUEST" | "MISSION_REQUEST_INT":
+            case "MISSION_REQUEST" | "MISSION_REQUEST_INT" if message.mission_type == self._type:
                 self.requested.append(message.seq)
                 self._silent = 0
                 self._send(lambda seq=message.seq: self._item(seq))  # type: ignore[misc]
-            case "MISSION_ACK" if message.mission_type == MISSION:
+            case "MISSION_ACK" if message.mission_type == self._type:
                 self.result = MissionResult(message.type)
 
     def _send(self, what: Callable[[], None]) -> None:
@@ -156,7 +158,16 @@ class Upload:
 class Download:
     """A ground station that downloads the mission."""
 
-    def __init__(self, station: GroundStation, *, as_int: bool = True, repeat_s: float = 0.7, tries: int = 7) -> None:
+    def __init__(
+        self,
+        station: GroundStation,
+        *,
+        as_int: bool = True,
+        repeat_s: float = 0.7,
+        tries: int = 7,
+        mission_type: int = MISSION,
+    ) -> None:
+        self._type = mission_type
         self.station, self.as_int = station, as_int
         self.count: int | None = None
         self.items: list[MissionItem] = []
@@ -186,13 +197,13 @@ class Download:
             self.gave_up = True
             return
         if self.count is None:
-            self.station.send(list_message())
+            self.station.send(list_message(self._type))
         else:
-            self.station.send(request_message(len(self.items), as_int=self.as_int))
+            self.station.send(request_message(len(self.items), as_int=self.as_int, mission_type=self._type))
         self.station.world.after(self._repeat_s, lambda: self._repeat(turn, silent + 1))
 
     def _react(self, message: Message) -> None:
-        if self.is_over or not self.station.is_target_of(message):
+        if self.is_over or not self.station.is_target_of(message) or getattr(message, "mission_type", 0) != self._type:
             return
         match message.get_type():
             case "MISSION_COUNT" if self.count is None:
@@ -211,4 +222,4 @@ class Download:
         if not self.is_over:
             self._ask()
         elif self.result is None:
-            self.station.send(ack_message(MissionResult.ACCEPTED))
+            self.station.send(ack_message(MissionResult.ACCEPTED, self._type))

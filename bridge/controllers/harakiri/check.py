@@ -50,6 +50,10 @@ class HarakiriRules:
     is_single_precision: bool = False
 
     @property
+    def has_home(self) -> bool:
+        return True
+
+    @property
     def max_items(self) -> int:
         """The longest list, home included: every item may become a record."""
         return self.capacity

@@ -10,11 +10,12 @@ from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from typing import Any
 
+from bridge.controllers.inav.zone_check import judge_zones
 from bridge.controllers.nav.judgement import Departure, Judgement
 from bridge.model.finding import News
 from bridge.model.ground_track import distance_m
 from protocols.inav_dump import SavedSettings
-from protocols.msp.inav_places import Safehome
+from protocols.msp.inav_places import Geozone, Safehome
 from protocols.msp.nav import FLY_HOME, LEGS, NavAction, NavRecord
 
 _ABOVE_SEA = 1
@@ -51,8 +52,8 @@ class InavLimits:
     """Fields with a name of INAV's are settings, in INAV's units: distances and altitudes in cm, but the first in m.
 
     Their defaults are INAV's; 0 turns the first, nav_max_altitude and nav_wp_enforce_altitude off.
-    vbat_warning_cell_voltage: 0.01 V. cell_voltage: of the battery, as last heard. selected: the mission that was
-    selected, from 1, if there are several.
+    vbat_warning_cell_voltage: 0.01 V. zones: those in force; none without the feature GEOZONE. cell_voltage: of the
+    battery, as last heard. selected: the mission that was selected, from 1, if there are several.
     """
 
     nav_wp_max_safe_distance: int = 100
@@ -66,6 +67,7 @@ class InavLimits:
     safehome_max_distance: int = 20000
     vbat_warning_cell_voltage: int = 350
     safehomes: tuple[Safehome, ...] = ()
+    zones: tuple[Geozone, ...] = ()
     cell_voltage: float | None = None
     selected: int = 1
 
@@ -94,6 +96,8 @@ class InavLimits:
                 why = f"{metres:.1f} m from the waypoint before, {within}: it may count as reached at once"
                 yield Judgement(place, "lat_e7", why, News.NOTICE)
             before = record
+        heights_cm = [_above_home_cm(record, departure) for record in records]
+        yield from judge_zones(self.zones, records, heights_cm, departure)
         yield from self._of_the_board()
 
     def _first(self, first: NavRecord, departure: Departure) -> Iterable[Judgement]:
@@ -139,7 +143,7 @@ _CHOICES: Mapping[str, type[IntEnum]] = {
     "nav_rth_allow_landing": RthAllowLanding,
     "safehome_usage_mode": SafehomeUsageMode,
 }
-_OTHER_FIELDS = ("safehomes", "cell_voltage", "selected")
+_OTHER_FIELDS = ("safehomes", "zones", "cell_voltage", "selected")
 SETTING_NAMES = tuple(field.name for field in fields(InavLimits) if field.name not in _OTHER_FIELDS)
 
 

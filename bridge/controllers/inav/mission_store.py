@@ -10,11 +10,15 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import chain
 
+from bridge.controllers.inav.geozones import has_zones, read_zones_in_force
 from bridge.controllers.inav.limits import SETTING_NAMES, InavLimits
+from bridge.controllers.inav.safehomes import read_safehomes
 from bridge.controllers.inav.settings import read_values
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.mission_store import NOTHING, NavMissions
+from bridge.controllers.nav.rules import NavProfile
 from bridge.controllers.nav.stored_missions import Mission, erased, flown, split_missions
+from bridge.fc.profile import FlightController
 from bridge.line.conversation import Conversation, LinkLost, Pause, ask
 from bridge.missions.fc_mission_store import (
     Loading,
@@ -24,17 +28,9 @@ from bridge.missions.fc_mission_store import (
     PushResult,
     StoreReport,
 )
-from bridge.model.vehicle import Power
+from bridge.model.vehicle import Power, Vehicle
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, request
-from protocols.msp.inav_places import (
-    SAFEHOME,
-    SAFEHOME_SIZE,
-    SAFEHOMES,
-    Safehome,
-    decode_safehome,
-    encode_read_safehome,
-)
 from protocols.msp.nav import (
     INFO_SIZE,
     LOAD_REQUEST,
@@ -78,6 +74,10 @@ class InavMissions(NavMissions):
     _are_limits_doubtful = True
     #: A board that does not answer about them is asked again only at the next upload.
     _are_limits_silent = False
+
+    def __init__(self, profile: NavProfile, controller: FlightController, vehicle: Vehicle) -> None:
+        super().__init__(profile, controller, vehicle)
+        self._has_zones = has_zones(controller)
 
     def report(self) -> Conversation[StoreReport | None]:
         """Also read the settings that the rules depend on, if they may have changed."""
@@ -187,17 +187,13 @@ class InavMissions(NavMissions):
         if not self._are_limits_doubtful or self._vehicle.armed:
             return
         self._are_limits_doubtful = False
-        safehomes: list[Safehome] = []
         values = yield from read_values(SETTING_NAMES)
-        for index in range(SAFEHOMES if values else 0):
-            reply = yield from ask(encode_read_safehome(index), SAFEHOME, SAFEHOME_SIZE)
-            safehome = None if reply is None else decode_safehome(reply.payload)
-            if safehome is not None:
-                safehomes.append(safehome)
-        if values is None:
+        safehomes = (yield from read_safehomes()) if values else ()
+        zones = (yield from read_zones_in_force()) if values and self._has_zones else ()
+        if values is None or safehomes is None or zones is None:
             self._are_limits_doubtful = self._are_limits_silent = True
         elif values:
-            self._limits = InavLimits(safehomes=tuple(safehomes)).with_settings(values)
+            self._limits = InavLimits(safehomes=safehomes, zones=zones).with_settings(values)
 
     def _store_content(self, records: Mission) -> Mission:
         """SAVE selects the first mission, so the new one goes there."""

@@ -3,8 +3,10 @@
 
 from dataclasses import replace
 
+from bridge.controllers.inav.geozones import InavGeozones, has_zones
 from bridge.controllers.inav.limits import saved_limits
 from bridge.controllers.inav.mission_store import InavMissions
+from bridge.controllers.inav.safehomes import InavSafehomes
 from bridge.controllers.inav.settings import InavFcSettings
 from bridge.controllers.inav.telemetry import INAV_DECODERS, INAV_POLLS, arming_blockers
 from bridge.controllers.nav.check import NavRules
@@ -13,6 +15,7 @@ from bridge.fc.interview import Interview
 from bridge.fc.profile import SILENCE_WITH_H7_S, FlightController, Profile
 from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import NAV_POLL, POLLS
+from bridge.missions.place_lists import NO_PLACES
 from bridge.model.airframe import Airframe
 from bridge.model.flight_mode import FAILSAFE_BOX
 from protocols.msp.inav import MIXER, MIXER_SIZE, decode_platform
@@ -69,6 +72,8 @@ PROFILE = Profile(
     turn_s=0.01,
     silence_s=SILENCE_WITH_H7_S,
     missions=lambda board, vehicle, _: InavMissions(inav_profile(board.capacity), board, vehicle),
+    fences=lambda board, _vehicle: InavGeozones(board) if has_zones(board) else NO_PLACES,
+    rally=lambda board, _vehicle: InavSafehomes(board),
     settings=InavFcSettings,
     check_kind="inav",
     rules=lambda settings: NavRules(inav_profile(settings.capacity or INAV_CAPACITY, saved_limits(settings.saved))),

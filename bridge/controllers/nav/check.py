@@ -58,6 +58,10 @@ class NavRules:
     others: tuple[Mission, ...] = ()
 
     @property
+    def has_home(self) -> bool:
+        return True
+
+    @property
     def max_items(self) -> int:
         return self.profile.max_items
 
@@ -277,6 +281,8 @@ class NavCheck(ListCheck):
 
     def _apply(self, judgement: Judgement) -> RejectingFinding | None:
         place, field, why, news = judgement
+        if place is None and news is None:
+            return reject_list(MissionResult.INVALID, self._count, why)
         if place is None:
             self._findings.append(Finding(None, "count", None, None, why, news=news or News.WARNING))
         elif news is None:

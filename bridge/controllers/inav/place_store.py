@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""INAV's safehomes and geozones, as rally points and fences: in RAM until its configuration is written.
+
+The old ones stay in its flash until the new ones are read back equal; if they are not, the old ones are written again.
+"""
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+
+from bridge.fc.profile import FlightController
+from bridge.line.conversation import Conversation, LinkLost, ask, ask_status
+from bridge.missions.fc_mission_store import (
+    FcMissionStore,
+    PushFailure,
+    PushProgress,
+    PushResult,
+    StoreReport,
+    StoreState,
+)
+from bridge.missions.list_check import MissionRules
+from bridge.model.verdict import RecordT
+from bridge.settings.eeprom_write import write_eeprom
+from protocols.mission_item import MissionItem
+from protocols.msp.frame import Direction, request
+
+_ACK_SIZE = 0
+
+
+class InavPlaceStore(FcMissionStore[RecordT]):
+    """Lists that INAV's configuration holds."""
+
+    reads_armed = True
+
+    def __init__(self, controller: FlightController) -> None:
+        assert controller.arm_bit is not None
+        self._arm_mask = 1 << controller.arm_bit
+        #: As last read; None: unknown.
+        self._known: tuple[RecordT, ...] | None = None
+        #: True if what the board holds in RAM may not be in its flash.
+        self._is_unsaved = False
+
+    def report(self) -> Conversation[StoreReport | None]:
+        armed = yield from self._ask_armed()
+        if armed is None or (yield from self.pull()) is None:
+            return None
+        return StoreReport(StoreState.ARMED if armed else StoreState.READY, self._rules(), None)
+
+    def push(self, records: tuple[RecordT, ...], progress: PushProgress) -> Conversation[PushResult]:
+        """Write what differs, read all of it back, and save it."""
+        try:
+            wanted = self._whole(records)
+            before = self._known if self._known is not None else (yield from self.pull())
+            if before is None or (yield from self._ask_armed()) is not False:
+                return PushResult(PushFailure.PLACES_KEPT)
+            if before == wanted and not self._is_unsaved:
+                return PushResult(None, unchanged=True)
+            self._is_unsaved = True
+            is_written = yield from self._write(wanted, before)
+            self._known = None
+            held = yield from self._read_back(wanted, before)
+            if not is_written or held != wanted:
+                yield from self._write(before, held or wanted)
+                self._is_unsaved = (yield from self.pull()) != before
+                return PushResult(PushFailure.PLACES_PARTLY if self._is_unsaved else PushFailure.PLACES_KEPT)
+            if (yield from write_eeprom()) is not None:
+                return PushResult(PushFailure.PLACES_NOT_SAVED)
+            self._is_unsaved, self._known = False, wanted
+            return PushResult(None)
+        except LinkLost:
+            return PushResult(PushFailure.PLACES_PARTLY if self._is_unsaved else PushFailure.PLACES_KEPT)
+
+    def seq_of(self, records: Sequence[RecordT], number: int) -> int:
+        return 0
+
+    @abstractmethod
+    def items(self, records: Sequence[RecordT], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
+        """The list as a ground station reads it."""
+
+    @abstractmethod
+    def _rules(self) -> MissionRules:
+        """The rules for a new list."""
+
+    @abstractmethod
+    def _whole(self, records: tuple[RecordT, ...]) -> tuple[RecordT, ...]:
+        """The list as it is read back; of an empty one, what clears it."""
+
+    @abstractmethod
+    def _write(self, wanted: tuple[RecordT, ...], held: tuple[RecordT, ...]) -> Conversation[bool]:
+        """Set what differs from `held`; False if the board refuses or does not answer."""
+
+    def _read_back(
+        self, wanted: tuple[RecordT, ...], before: tuple[RecordT, ...]
+    ) -> Conversation[tuple[RecordT, ...] | None]:
+        """Read what may have changed."""
+        return (yield from self.pull())
+
+    def _ask_armed(self) -> Conversation[bool | None]:
+        status = yield from ask_status()
+        return None if status is None else bool(status.box_flags & self._arm_mask)
+
+
+def take(command: int, payload: bytes, *, tries: int = 3) -> Conversation[bool]:
+    """Send a setter; True if it was acknowledged."""
+    reply = yield from ask(request(command, payload), command, _ACK_SIZE, tries=tries)
+    return reply is not None and reply.direction is Direction.REPLY

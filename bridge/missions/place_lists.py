@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Fences and rally points: lists like missions, but the board's configuration holds them, and the Pi stores no copy."""
+
+from typing import Any
+
+from bridge.line.conversation import Conversation
+from bridge.line.runner import Runner
+from bridge.missions.fc_mission_store import AnyFcMissionStore, PushProgress
+from bridge.missions.mission_service import NO_LINK, DeliveryResult, HeldMission, MissionService
+from bridge.model.finding import News
+from bridge.model.mission_log import ArrivedMission
+from bridge.model.refusal import Refusal
+from bridge.model.vehicle import Vehicle
+from bridge.model.verdict import Result
+from protocols.mission_item import MissionResult
+from protocols.mission_record import identify
+
+NO_PLACES = Refusal(MissionResult.UNSUPPORTED, "No fences or rally points: only missions are stored")
+
+
+class PlaceLists(MissionService):
+    """The lists of one type; name: for texts."""
+
+    def __init__(self, mission_type: int, name: str, vehicle: Vehicle, runner: Runner) -> None:
+        super().__init__(vehicle, runner, lambda _mission, _delivery: None)
+        self.mission_type = mission_type
+        self._name = name
+        self.fc_store = NO_PLACES
+
+    @property
+    def are_stored(self) -> bool:
+        """True if the current flight controller stores such lists, or did until it was lost."""
+        return self.fc_store is not NO_PLACES
+
+    def use(self, store: AnyFcMissionStore | Refusal, now: float, *, is_same_board: bool) -> None:
+        """Switch to another flight controller; one that stores no such lists is not one that is lost."""
+        if isinstance(store, Refusal) and store is not NO_PLACES and not self.are_stored:
+            store = NO_PLACES
+        super().use(store, now, is_same_board=is_same_board)
+
+    def deliver(
+        self, arrived: ArrivedMission, progress: PushProgress = lambda _records: None, *, is_kept: bool = True
+    ) -> Conversation[DeliveryResult]:
+        """Write the list and verify it."""
+        verdict, fc_store = arrived.verdict, self.fc_store
+        if verdict.result is Result.REJECTED:
+            return DeliveryResult(verdict.ack, verdict.findings[-1].text(), None)
+        if isinstance(fc_store, Refusal):
+            return DeliveryResult(fc_store.ack, fc_store.text, None)
+        result = yield from fc_store.push(verdict.records, progress)
+        if result.failure is not None:
+            return DeliveryResult(MissionResult.DENIED, f"{self._name}: {result.failure.value}", None)
+        self.held = HeldMission(identify(verdict.records), verdict.records, verdict.items)
+        warnings = sum(finding.news is News.WARNING for finding in verdict.findings)
+        done = f"{self._name} " + (f"verified: {len(verdict.items)} items" if verdict.items else "cleared")
+        more = [", unchanged"] if result.unchanged else []
+        more += [f", warnings: {warnings}"] if warnings else []
+        change = "" if result.unchanged else done
+        return DeliveryResult(MissionResult.ACCEPTED, done + "".join(more), None, bool(warnings), change)
+
+    def read_back(self) -> Conversation[HeldMission | Refusal]:
+        """The flight controller's list, read now."""
+        fc_store = self.fc_store
+        if isinstance(fc_store, Refusal):
+            return fc_store
+        records: tuple[Any, ...] | None = yield from fc_store.pull()
+        if records is None:
+            return NO_LINK
+        self.held = held = HeldMission(identify(records), records, fc_store.items(records, {}))
+        return held

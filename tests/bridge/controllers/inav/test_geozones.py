@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The rules for a fence on INAV."""
+
+from dataclasses import replace
+
+import pytest
+
+from bridge.controllers.inav.geozones import FenceRules
+from bridge.missions.list_check import check_list
+from bridge.model.verdict import Verdict
+from protocols.mission_item import Command, MissionItem, MissionResult
+from protocols.msp.inav_places import Corner, Geozone
+from tests.bridge.controllers.inav.test_place_store import CIRCLE, FIELD, place, polygon
+
+A, B, C = (0, 0), (0, 100), (100, 100)
+
+
+def judged(*items: MissionItem, former: tuple[Geozone, ...] = ()) -> Verdict[Geozone]:
+    return check_list(items, FenceRules(former))
+
+
+def test_corners_are_stored_anticlockwise_from_the_first_one() -> None:
+    corners = [Corner(453838000 + 100 * north, 84733000 + 100 * east) for north, east in (A, B, C)]
+    for order in ((A, B, C), (A, C, B)):
+        (zone,) = judged(*polygon(Command.FENCE_POLYGON_EXCLUSION, *order)).records
+        assert zone == Geozone(0, False, tuple(corners))
+
+
+@pytest.mark.parametrize(
+    ("items", "ack"),
+    [
+        (FIELD[:3], MissionResult.INVALID_PARAM1),
+        ([*FIELD[:3], CIRCLE], MissionResult.INVALID_PARAM1),
+        (polygon(Command.FENCE_POLYGON_INCLUSION, A, B), MissionResult.INVALID_PARAM1),
+        ([replace(CIRCLE, p1=0.0)], MissionResult.INVALID_PARAM1),
+        ([replace(CIRCLE, p1=float("nan"))], MissionResult.INVALID_PARAM1),
+        ([replace(CIRCLE, lat_e7=0)], MissionResult.INVALID_PARAM5_X),
+        ([replace(CIRCLE, lat_e7=910_000_000)], MissionResult.INVALID_PARAM5_X),
+        ([replace(CIRCLE, command=16)], MissionResult.UNSUPPORTED),
+        ([replace(CIRCLE, lat_e7=453838000 + n) for n in range(64)], MissionResult.NO_SPACE),
+        (polygon(Command.FENCE_POLYGON_INCLUSION, *((n, n * n) for n in range(127))), MissionResult.NO_SPACE),
+        ([place(Command.FENCE_RETURN_POINT)], MissionResult.INVALID),
+    ],
+)
+def test_a_fence_that_does_not_fit_is_rejected(items: list[MissionItem], ack: MissionResult) -> None:
+    assert judged(*items).ack is ack
+
+
+def test_a_return_point_is_dropped_and_named() -> None:
+    verdict = judged(place(Command.FENCE_RETURN_POINT), CIRCLE)
+    assert len(verdict.records) == 1
+    assert "dropped, INAV returns to home or to a safehome" in verdict.findings[0].text()

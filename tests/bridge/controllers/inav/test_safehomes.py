@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The rules for rally points on INAV."""
+
+from dataclasses import replace
+
+from bridge.controllers.inav.safehomes import RallyRules
+from bridge.missions.list_check import check_list
+from protocols.mission_item import Command, MissionResult
+from protocols.msp.inav_places import Safehome
+from tests.bridge.controllers.inav.test_place_store import RALLY_ITEMS, place
+
+
+def test_points_with_a_height_or_without_a_place_are_named() -> None:
+    items = [replace(RALLY_ITEMS[0], alt_m=30.0), replace(RALLY_ITEMS[1], lon_e7=0)]
+    verdict = check_list(items, RallyRules())
+    assert [finding.text() for finding in verdict.findings] == [
+        "Item 0: Alt changed from 30 to 0 m (a safehome has no height: see nav_rth_altitude)",
+        "Item 1: RALLY_POINT dropped, no Lat/Long",
+    ]
+    assert [each.enabled for each in verdict.records] == [True] + 7 * [False]
+
+
+def test_more_than_eight_points_and_other_items_are_rejected() -> None:
+    assert check_list([place(Command.RALLY_POINT, n) for n in range(9)], RallyRules()).ack is MissionResult.NO_SPACE
+    assert check_list([place(16)], RallyRules()).ack is MissionResult.UNSUPPORTED
+
+
+def test_safehomes_that_are_off_are_named_when_they_are_erased() -> None:
+    verdict = check_list(RALLY_ITEMS, RallyRules((Safehome(0, False, 453838000, 84733000),)))
+    assert [finding.text() for finding in verdict.findings] == ["Safehomes that were off are erased: 1"]
