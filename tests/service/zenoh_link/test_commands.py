@@ -90,7 +90,7 @@ def test_the_state_and_the_list_of_missions_are_reported(commanded: tuple[Bench,
     bench, opened = commanded
     ask(opened, UPLOAD, mission_file(9))
     (state,) = ask(opened, "state")
-    assert state["mission"] == {"count": 9, "checksum": bench.daemon.pull()["checksum"], "state": None}
+    assert state["mission"] == {"count": 9, "checksum": bench.daemon.pull()["checksum"], "state": None, "item": None}
     assert (state["link"]["state"], state["status"]["armed"]) == ("MSP", False)
     (listed,) = ask(opened, "mission/list?limit=1")
     assert [each["number"] for each in listed["missions"]] == [bench.daemon.missions()[0]["number"]]
