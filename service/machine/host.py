@@ -3,6 +3,7 @@
 
 import fcntl
 import os
+import re
 import socket
 import struct
 from collections.abc import Iterator
@@ -11,6 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 _SIOCGIFADDR = 0x8915
+#: Not /dev/tty and /dev/tty1, the terminals of programs themselves.
+_SERIAL = re.compile(r"/dev/tty[A-Za-z].*")
 #: The programs of a login console.
 LOGIN_PROGRAMS = ("agetty", "getty", "login")
 
@@ -85,6 +88,13 @@ class Host:
                 if is_same or os.readlink(descriptor) == link:
                     return True
         return False
+
+    def ports_of(self, process: Process) -> set[str]:
+        """The serial ports that a program has open, as far as permissions show: "/dev/ttyS0"."""
+        with suppress(OSError):
+            descriptors = self.path(f"/proc/{process.pid}/fd").iterdir()
+            return {link for each in descriptors if _SERIAL.fullmatch(link := os.readlink(each))}
+        return set()
 
     def has_login(self, terminal: str) -> bool:
         """True if a login console runs on a terminal, such as ttyS0.

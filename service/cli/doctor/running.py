@@ -8,12 +8,13 @@ from bridge.controllers.harakiri.profile import UNPATCHED
 from payloads.mission_data import Json
 from protocols.mavlink.signing import Check
 from service.cli.doctor.checked import Checked, note, problem
-from service.machine.host import Host
+from service.machine.host import Host, Process
 from service.machine.package import page
 
 #: Damaged replies a minute. A good wire has none for hours.
 _MOST_DAMAGED = 6
 _LEAST_DAMAGED = 10
+_UNIT = "/naze-bridge.service"
 _REFUSED = re.compile(r"(\d+) x (.*) \((.*)\)")
 
 
@@ -52,10 +53,16 @@ def _refused(status: Json) -> Iterator[Checked]:
 
 
 def check_daemons(host: Host) -> Checked | None:
-    """Check that only one daemon runs: two take each other's replies from the port."""
+    """Check that no two daemons have the same port open: they take each other's replies from it."""
     daemons = [each for each in host.processes() if each.is_naze_bridge and "run" in each.arguments]
-    if len(daemons) < 2:
+    by_port: dict[str, list[Process]] = {}
+    for daemon in daemons:
+        for port in host.ports_of(daemon):
+            by_port.setdefault(port, []).append(daemon)
+    port, rivals = next(((port, found) for port, found in by_port.items() if len(found) > 1), ("", []))
+    if not rivals:
         return None
-    pids = [str(each.pid) for each in daemons]
-    remedy = f"stop all but one: sudo kill {' '.join(pids[1:])}; the service: sudo systemctl stop naze-bridge"
-    return problem("daemon", f"{len(daemons)} daemons run (pids {', '.join(pids)})", remedy)
+    rivals.sort(key=lambda each: _UNIT not in host.read(f"/proc/{each.pid}/cgroup"))  # the service first: it stays
+    pids = [str(each.pid) for each in rivals]
+    remedy = f"stop all but one: sudo kill {' '.join(pids[1:])}"
+    return problem("daemon", f"{len(pids)} daemons have {port} open (pids {', '.join(pids)})", remedy)

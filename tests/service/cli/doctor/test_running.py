@@ -41,11 +41,20 @@ def test_a_store_that_cannot_write() -> None:
     assert_problem(check_running(STATUS | {"store_trouble": "disk full"}), "disk full", "systemctl restart")
 
 
-def test_two_daemons_until_one_is_stopped(tmp_path: Path) -> None:
+def test_two_daemons_on_a_port_until_one_is_stopped(tmp_path: Path) -> None:
     pi = FaultyMachine(tmp_path / "root")
     for pid in (70, 71):
-        pi.runs(pid, "python3", "/usr/bin/naze-bridge", "run")
+        pi.runs(pid, "python3", "/usr/bin/naze-bridge", "run", has_open="/dev/ttyAMA0")
+    pi.write("/proc/71/cgroup", "0::/system.slice/naze-bridge.service\n")
     found = check_daemons(pi)
-    assert_problem(found, "2 daemons run (pids 70, 71)", "sudo kill 71;")
-    pi.path("/proc/71/cmdline").unlink()
+    assert_problem(found, "2 daemons have /dev/ttyAMA0 open (pids 71, 70)", "sudo kill 70")
+    pi.path("/proc/70/cmdline").unlink()
+    assert check_daemons(pi) is None
+
+
+@pytest.mark.parametrize("other", ["/dev/ttyUSB0", "/dev/tty1", ""])
+def test_daemons_on_different_ports(tmp_path: Path, other: str) -> None:
+    pi = FaultyMachine(tmp_path / "root")
+    pi.runs(70, "python3", "/usr/bin/naze-bridge", "run", has_open="/dev/ttyAMA0")
+    pi.runs(71, "python3", "/usr/bin/naze-bridge", "run", has_open=other)
     assert check_daemons(pi) is None
