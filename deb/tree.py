@@ -21,6 +21,7 @@ _PAGES = (
     *("systemd/naze-bridge.service", "systemd/60-naze-bridge.rules"),
 )
 _NOT_THE_PATCH = ("__pycache__", "build", "tests", "sim", "Makefile")
+_UNITS = ("naze-bridge.service", "naze-bridge-helper.socket", "naze-bridge-helper@.service")
 _SCHEMAS = "payloads/schemas"
 _SCRIPTS = ("postinst", "prerm", "postrm")
 #: Of pymavlink's 44 MB of dialects the bridge imports one, and pymavlink's own mavutil one; lxml is for its generator.
@@ -43,7 +44,8 @@ def lay_out(root: Path, libraries: Mapping[str, Path], project: Path, version: s
     _share(*sites)
     (root / "usr/bin").mkdir()
     (root / "usr/bin/naze-bridge").symlink_to("../lib/naze-bridge/bin/naze-bridge")
-    _copy(project / "systemd/naze-bridge.service", root / "usr/lib/systemd/system")
+    for unit in _UNITS:
+        _copy(project / "systemd" / unit, root / "usr/lib/systemd/system")
     _copy(project / "systemd/60-naze-bridge.rules", root / "usr/lib/udev/rules.d")
     _copy(project / "systemd/naze-bridge.sysusers", root / "usr/lib/sysusers.d", "naze-bridge.conf")
     (root / "etc/naze-bridge/conf.d").mkdir(parents=True)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The configuration files of one folder: setup's answers, the configuration file, and its `conf.d`; later ones win."""
+"""The configuration files of one folder: the status page's, setup's answers, the configuration file, `conf.d`.
+
+Later ones win.
+"""
 
 import difflib
 import tomllib
@@ -16,6 +19,8 @@ from storage.os_error import reason
 DROP_INS = "conf.d"
 #: The answers to `naze-bridge setup`: first, so that everything written by hand overrides them.
 SETUP_FILE = "setup.toml"
+#: Settings made on the status page: before setup's, so that a page cannot override an answer given on the Pi.
+PAGE_FILE = "page.toml"
 _MAX_BYTES = 1 << 20
 #: Reported per file, in case another program's file was named by mistake.
 _MOST_UNKNOWN = 20
@@ -40,8 +45,8 @@ class Given:
 def read_files(config: Path, problems: list[Problem]) -> dict[str, Given]:
     """Read a configuration file and those beside it: values by key name, and True for each table present."""
     found: dict[str, Given] = {}
-    answers = config.parent / SETUP_FILE
-    for path in (*([answers] if answers.exists() else []), config, *_drop_ins(config.parent / DROP_INS, problems)):
+    generated = [file for name in (PAGE_FILE, SETUP_FILE) if (file := config.parent / name).exists()]
+    for path in (*generated, config, *_drop_ins(config.parent / DROP_INS, problems)):
         found |= _read_file(path, problems)
     return found
 

@@ -49,6 +49,8 @@ cd /etc
 mkdir -p NetworkManager/system-connections avahi/services udev/rules.d
 touch NetworkManager/system-connections/naze-bridge-hotspot.nmconnection avahi/services/naze-bridge.service
 touch udev/rules.d/59-naze-bridge-others.rules naze-bridge/setup.toml naze-bridge/gcs.key naze-bridge/undo.json
+mkdir -p /var/lib/naze-bridge-helper /run/naze-bridge-helper
+touch naze-bridge/page.toml /var/lib/naze-bridge-helper/previous.deb
 """
 _FORMER_ANSWERS = (
     '# Written by `naze-bridge setup`, which can be run again.\nfc = "auto"\n'
@@ -122,7 +124,7 @@ def test_the_package_has_the_expected_files(package: Path) -> None:
     for expected in (
         *(f"/usr/lib/naze-bridge/lib/python{python}/site-packages/{_SCHEMA}" for python in _PYTHONS),
         "/usr/bin/naze-bridge",
-        "/usr/lib/systemd/system/naze-bridge.service",
+        *(f"/usr/lib/systemd/system/naze-bridge{name}" for name in (".service", "-helper.socket", "-helper@.service")),
         "/usr/lib/udev/rules.d/60-naze-bridge.rules",
         "/usr/lib/sysusers.d/naze-bridge.conf",
         "/usr/share/naze-bridge/config.toml",

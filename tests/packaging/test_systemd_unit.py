@@ -8,8 +8,12 @@ from pathlib import Path
 import pytest
 
 _UNIT = Path(__file__).resolve().parents[2] / "systemd" / "naze-bridge.service"
+_HELPER = _UNIT.with_name("naze-bridge-helper@.service")
+_HELPERS_SOCKET = _UNIT.with_name("naze-bridge-helper.socket")
 #: Maximum exposure found by `systemd-analyze security`, in tenths.
 _BAR = 15
+#: A root helper cannot be as closed as the daemon.
+_HELPERS_BAR = 40
 #: The settings needed for it, which are also checked without systemd-analyze.
 _SHUT = """DynamicUser=yes
 CapabilityBoundingSet=
@@ -80,3 +84,23 @@ def test_each_permission_has_its_reason() -> None:
 
 def test_readiness_and_watchdog_are_configured() -> None:
     assert {"Type=notify", "WatchdogSec=10", "Restart=always", "StartLimitIntervalSec=0"} <= set(settings())
+
+
+def test_the_helpers_exposure_is_bounded() -> None:
+    if shutil.which("systemd-analyze"):
+        command = ("systemd-analyze", "security", "--offline=true", f"--threshold={_HELPERS_BAR}", "--no-pager")
+        judged = subprocess.run([*command, _HELPER], capture_output=True, text=True, check=False)
+        assert judged.returncode == 0, judged.stdout + judged.stderr
+    lines = _HELPER.read_text().splitlines()
+    assert {"NoNewPrivileges=yes", "ProtectSystem=strict", "StandardOutput=journal"} <= {*lines}
+    (capabilities,) = [line for line in lines if line.startswith("CapabilityBoundingSet=")]
+    assert "CAP_SYS_ADMIN" not in capabilities
+    assert "CAP_SYS_MODULE" not in capabilities
+
+
+def test_only_the_daemon_may_ask_the_helper() -> None:
+    lines = {*_HELPERS_SOCKET.read_text().splitlines()}
+    assert {"SocketUser=naze-bridge", "SocketMode=0600", "Accept=yes"} <= lines
+    # Started with the service, never by itself.
+    assert "[Install]" not in lines
+    assert "Wants=naze-bridge-helper.socket" in settings()

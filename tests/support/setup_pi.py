@@ -25,7 +25,7 @@ class Pi:
         monkeypatch.setattr(command, "is_root", lambda: True)
         monkeypatch.setattr(command, "diagnose", lambda: True)
         monkeypatch.setattr(command, "_await_flight_controller", lambda: None)
-        monkeypatch.setattr(Machine, "run", lambda _, words: self.ran.append(" ".join(words)))
+        monkeypatch.setattr(Machine, "run", lambda _, words, *_args: self.ran.append(" ".join(words)))
 
     @property
     def key_file(self) -> Path:

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The result of a check."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
+
+from payloads.mission_data import Json
+from service.cli.doctor.fixes import Fix
 
 
 class Grade(Enum):
@@ -15,21 +18,25 @@ class Grade(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """One line: the subject, the finding, and a remedy if it is not OK."""
+    """One line: the subject, the finding, and a remedy if it is not OK. `fix`: the same as changes."""
 
     check: str
     grade: Grade
     found: str
     remedy: str = ""
+    fix: Fix | None = field(default=None, compare=False)
+
+    def to_json(self) -> Json:
+        return {"check": self.check, "grade": self.grade.value, "found": self.found, "remedy": self.remedy}
 
 
 def ok(check: str, found: str) -> Checked:
     return Checked(check, Grade.OK, found)
 
 
-def note(check: str, found: str, remedy: str) -> Checked:
-    return Checked(check, Grade.NOTE, found, remedy)
+def note(check: str, found: str, remedy: str, fix: Fix | None = None) -> Checked:
+    return Checked(check, Grade.NOTE, found, remedy, fix)
 
 
-def problem(check: str, found: str, remedy: str) -> Checked:
-    return Checked(check, Grade.PROBLEM, found, remedy)
+def problem(check: str, found: str, remedy: str, fix: Fix | None = None) -> Checked:
+    return Checked(check, Grade.PROBLEM, found, remedy, fix)

@@ -3,14 +3,13 @@
 
 import asyncio
 from collections.abc import Callable, Iterator
-from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
 import click
 
 from payloads.mission_data import Json
-from service.cli.doctor.checked import Checked, Grade
+from service.cli.doctor.checked import Checked, Grade, problem
 from service.daemon.client import STATUS, ControlError, ask_daemon
 from service.machine.host import Host
 from service.settings import Settings, SettingsError, load_settings
@@ -52,27 +51,33 @@ def diagnose(
         config = SERVICE_CONFIG
         state_dir = state_dir or (SERVICE_STATE if SERVICE_STATE.is_symlink() else None)
     is_well = True
-    for checked in _examine(config, fc, state_dir, asked):
+    for checked in examined(config, fc, state_dir, asked):
         _print(checked, as_json=as_json)
         if checked.grade is Grade.PROBLEM:
             is_well = False
     return is_well
 
 
-def _examine(
-    config: Path | None, fc: str | None, state_dir: Path | None, ask_running: Callable[[], Json]
+def examined(
+    config: Path | None,
+    fc: str | None,
+    state_dir: Path | None,
+    ask_running: Callable[[], Json],
+    host: Host | None = None,
+    ask_port: Callable[[], Json] | None = None,
 ) -> Iterator[Checked]:
+    """Yield the result of each check of the daemon with these options. `ask_port`: by default, listen on the port."""
     from service.cli.doctor.examination import examine  # half the daemon: --help does without
 
     try:
         settings = load_settings(config, fc, (), state_dir)
     except SettingsError as error:
         for wrong in error.problems:
-            yield Checked("configuration", Grade.PROBLEM, str(wrong), "correct this, and run doctor again")
+            yield problem("configuration", str(wrong), "correct this, and run doctor again")
         return
     if config is not None:
         yield Checked("configuration", Grade.OK, f"{config} can be used")
-    yield from examine(Host(), settings, ask_running, lambda: _listen(settings))
+    yield from examine(host or Host(), settings, ask_running, ask_port or (lambda: _listen(settings)))
 
 
 def _listen(settings: Settings) -> Json:
@@ -86,7 +91,7 @@ def _listen(settings: Settings) -> Json:
 
 def _print(checked: Checked, *, as_json: bool) -> None:
     if as_json:
-        print_json(asdict(checked) | {"grade": checked.grade.value})
+        print_json(checked.to_json())
         return
     grade = click.style(f"{checked.grade.value:7}", fg=_COLOURS[checked.grade], bold=checked.grade is Grade.PROBLEM)
     say(f"{checked.check}: {checked.found}", prefix=f"{grade}  ", indent=9)

@@ -7,6 +7,7 @@ from bridge.fc.states.base import Closed
 from bridge.fc.states.cli import Cli
 from payloads.mission_data import Json
 from service.cli.doctor.checked import Checked, note, ok, problem
+from service.cli.doctor.fixes import set_fc
 from service.cli.doctor.port import fc_remedy
 from service.daemon.client import ControlError
 from service.settings.addresses import FcAddress, SerialFc
@@ -56,6 +57,6 @@ def _silent(fc: FcAddress, status: Json, source: str) -> Checked:
     found = f"no reply on {fc}, but {heard} bytes were received that are no frames"
     if isinstance(fc, SerialFc) and fc.baud is not None:
         remedy = f"{fc.baud} baud is probably wrong; let the bridge find the speed: {fc_remedy(fc.path, source)}"
-        return problem("flight controller", found, remedy)
+        return problem("flight controller", found, remedy, set_fc(fc.path, source))
     remedy = "is MSP on at this UART, and nothing else (GPS, receiver)? Is TX on RX only, with GND at both ends?"
     return problem("flight controller", found, remedy)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from protocols.plain_text import plain_text
 from service.cli.doctor.checked import Checked, note, ok, problem
+from service.cli.doctor.fixes import restart_service
 from service.daemon.store_worker import DATABASE_NAME
 from service.machine.host import Host
 from service.machine.package import version
@@ -19,9 +20,11 @@ from storage.database import kept_aside, read_database
 from storage.store_error import StoreError
 
 _SYNCED = "/run/systemd/timesync/synchronized"
+#: Until the next start.
+SET_BY_HAND = "/run/naze-bridge-helper/clock"
 _TIME_PROGRAMS = ("chronyd", "ntpd", "gpsd")
 #: A Pi without a clock starts in 1970, or at its last shutdown; no release is older than this.
-_EPOCH = datetime(2026, 1, 1, tzinfo=UTC)
+EPOCH = datetime(2026, 1, 1, tzinfo=UTC)
 _LEAST_FREE = 64 << 20
 _LIBRARIES = ("pymavlink", "pyserial", "eclipse-zenoh")
 
@@ -41,12 +44,14 @@ def check_versions(host: Host) -> Checked:
 def check_clock(host: Host, now: datetime) -> Checked:
     """Check the clock, which logs and signatures depend on."""
     time_text = f"{now:%Y-%m-%d %H:%M} UTC"
-    if now < _EPOCH:
+    if now < EPOCH:
         return problem(
-            "clock", f"it is {time_text}, years in the past", f"set it: sudo date --set '{_EPOCH:%Y-%m-%d} 12:00'"
+            "clock", f"it is {time_text}, years in the past", f"set it: sudo date --set '{EPOCH:%Y-%m-%d} 12:00'"
         )
     if host.path(_SYNCED).exists():
         return ok("clock", f"{time_text}, set by the network")
+    if host.path(SET_BY_HAND).exists():
+        return ok("clock", f"{time_text}, set from the status page")
     keeper = next((process.name for process in host.processes() if process.name in _TIME_PROGRAMS), None)
     if keeper is not None:
         return ok("clock", f"{time_text}, kept by {keeper}")
@@ -113,4 +118,4 @@ def _look_into(path: Path) -> Checked:
     if finding == "ok":
         return ok("missions", f"{count} stored in {path}, intact")
     remedy = "restart the bridge: it sets the file aside and begins a new one (sudo systemctl restart naze-bridge)"
-    return problem("missions", f"{path} is damaged: {finding}", remedy)
+    return problem("missions", f"{path} is damaged: {finding}", remedy, restart_service)

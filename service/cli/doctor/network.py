@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 
 from service.cli.doctor.checked import Checked, note, ok, problem
+from service.cli.doctor.fixes import reboot, stop_programs, unblock_wifi
 from service.machine.host import Host
 from service.machine.package import page
 from service.settings.addresses import GcsAddress
@@ -24,7 +25,7 @@ def check_wifi(host: Host, gcs: Sequence[GcsAddress]) -> list[Checked]:
     ]
     if blocked:
         remedy = "set the country (sudo raspi-config nonint do_wifi_country DE), then: sudo rfkill unblock wlan"
-        return [problem("Wi-Fi", "is switched off (rfkill)", remedy)]
+        return [problem("Wi-Fi", "is switched off (rfkill)", remedy, unblock_wifi)]
     cards = [name for name in host.names("/sys/class/net") if host.path(f"/sys/class/net/{name}/wireless").exists()]
     if not cards:
         return [note("Wi-Fi", "there is no Wi-Fi card", "connect ground stations by cable, or plug a card in")]
@@ -63,7 +64,9 @@ def _check_port(host: Host, link: GcsAddress) -> Checked:
         hidden = "only root sees which: run doctor with sudo"
         return problem("port for ground stations", f"{what} is used by another program", hidden)
     remedy = f"stop it: sudo kill {holder.pid}; or give gcs another port" if holder else "restart the Pi"
-    return problem("port for ground stations", f"{what} is used by {holder or 'a program that is gone'}", remedy)
+    found = f"{what} is used by {holder or 'a program that is gone'}"
+    fix = stop_programs(holder.pid) if holder else reboot
+    return problem("port for ground stations", found, remedy, fix)
 
 
 def _inode(host: Host, transport: str, port: int) -> str | None:

@@ -7,12 +7,22 @@ import stat
 from pathlib import Path
 
 from service.cli.doctor.checked import Checked, note, ok, problem
+from service.cli.doctor.fixes import (
+    Fix,
+    enable_uart,
+    free_port,
+    open_to_group,
+    reboot,
+    set_fc,
+    stop_modem_manager,
+    stop_programs,
+)
 from service.links.serial_ports import serial_ports
 from service.machine.host import LOGIN_PROGRAMS, Host, Process
 from service.machine.package import page
 from service.machine.raspberry_pi import boot_file, pi_model
 from service.settings.addresses import FcAddress, SerialFc
-from service.settings.config_files import SETUP_FILE
+from service.settings.config_files import PAGE_FILE, SETUP_FILE
 
 _PORTS = ("serial0", "naze", "ttyUSB*", "ttyACM*")
 _GROUP = "dialout"
@@ -22,7 +32,7 @@ _RULE = "60-naze-bridge.rules"
 
 def fc_remedy(port: str, source: str) -> str:
     """The way to set `fc` so that it takes effect. `source`: where it is set now, "FILE:LINE"; empty: nowhere."""
-    if not source or SETUP_FILE in source:
+    if not source or SETUP_FILE in source or PAGE_FILE in source:
         return f"sudo naze-bridge setup --fc {port}"
     return f'write fc = "{port}" in {source} (the line decides), then: sudo systemctl restart naze-bridge'
 
@@ -35,19 +45,22 @@ def check_port(host: Host, fc: FcAddress, source: str = "") -> Checked:
     model = pi_model(host)
     if model is not None and fc.path == "/dev/serial0" and str(device) == "/dev/ttyAMA10":
         found = f"/dev/serial0 is the debug socket on a {model.name}: the header's pins are {model.header_uart}"
-        return problem("port", found, fc_remedy(model.header_uart, source))
+        remedy = fc_remedy(model.header_uart, source)
+        return problem("port", found, remedy, set_fc(model.header_uart, source))
     if host.path(device).exists():
         return ok("port", fc.path if str(device) == fc.path else f"{fc.path} is {device}")
+    fix: Fix | None
     there = [f"/dev/{name}" for pattern in _PORTS for name in host.names("/dev", pattern)]
     if not fc.path.startswith(("/dev/serial0", "/dev/ttyAMA", "/dev/ttyS")):
-        remedy = "plug the flight controller in"
+        remedy, fix = "plug the flight controller in", None
     elif model is None:
-        remedy = "enable this UART in the board's own boot settings"
+        remedy, fix = "enable this UART in the board's own boot settings", None
     else:
-        remedy = "enable the UART on the header: sudo naze-bridge setup"
+        remedy, fix = "enable the UART on the header: sudo naze-bridge setup", enable_uart
     if there:
         remedy += f"; or use {' or '.join(there)}: {fc_remedy(there[0], source)}"
-    return problem("port", f"{fc.path} is missing", remedy)
+        fix = fix or set_fc(there[0], source)
+    return problem("port", f"{fc.path} is missing", remedy, fix)
 
 
 def check_candidates(host: Host) -> list[SerialFc]:
@@ -77,7 +90,8 @@ def check_permission(host: Host, fc: FcAddress) -> Checked | None:
     mode = stat.filemode(found.st_mode)
     lasting = f"permanently, with a udev rule: {page('docs/install.md')}"
     remedy = f"sudo chgrp {_GROUP} {device} && sudo chmod g+rw {device}; {lasting}"
-    return problem("permission", f"{device} belongs to the group {group} with {mode}, and not to {_GROUP}", remedy)
+    found_text = f"{device} belongs to the group {group} with {mode}, and not to {_GROUP}"
+    return problem("permission", found_text, remedy, open_to_group(device, _GROUP))
 
 
 def check_console(host: Host, fc: FcAddress) -> Checked | None:
@@ -89,6 +103,7 @@ def check_console(host: Host, fc: FcAddress) -> Checked | None:
     # The firmware's name for the header's UART.
     names |= {"serial0"} if host.resolve("/dev/serial0") == device else set()
     found, remedies = [], []
+    fix: Fix = free_port(names)
     getty = f"serial-getty@{device.name}"
     is_running = host.has_login(device.name)
     if is_running or host.names("/etc/systemd/system/getty.target.wants", f"{getty}.service"):
@@ -102,10 +117,11 @@ def check_console(host: Host, fc: FcAddress) -> Checked | None:
     elif named := words.search(host.read("/proc/cmdline")):
         found.append(f"the kernel was started with {named[0]}")
         by_hand = "remove that word from the boot loader's command line, and reboot"
-        remedies.append(by_hand if file is None else "sudo naze-bridge setup && sudo reboot")
+        remedies.append(by_hand if file is None else "sudo reboot")
+        fix = fix if remedies[:-1] else reboot
     if not found:
         return ok("console", f"no login console on {device}")
-    return problem("console", f"a login console has {device}: {'; '.join(found)}", "; then ".join(remedies))
+    return problem("console", f"a login console has {device}: {'; '.join(found)}", "; then ".join(remedies), fix)
 
 
 def check_holder(host: Host, fc: FcAddress) -> Checked | None:
@@ -120,7 +136,8 @@ def check_holder(host: Host, fc: FcAddress) -> Checked | None:
         return None  # reported by the console's check
     if holder.is_naze_bridge:
         return ok("other programs", f"the daemon has {device} open, pid {holder.pid}")
-    return problem("other programs", f"{holder} has {device} open", f"stop it: sudo kill {holder.pid}")
+    remedy = f"stop it: sudo kill {holder.pid}"
+    return problem("other programs", f"{holder} has {device} open", remedy, stop_programs(holder.pid))
 
 
 def holder_of_port(host: Host, fc: FcAddress) -> Process | None:
@@ -141,7 +158,8 @@ def check_modem_manager(host: Host, fc: FcAddress) -> Checked:
     remedy = (
         f"install the package's udev rule ({page('docs/install.md')}), or: sudo systemctl disable --now ModemManager"
     )
-    return note("ModemManager", f"runs, and sends modem commands to {device} when it is plugged in", remedy)
+    found = f"runs, and sends modem commands to {device} when it is plugged in"
+    return note("ModemManager", found, remedy, stop_modem_manager)
 
 
 def _device(host: Host, fc: FcAddress) -> Path | None:

@@ -8,6 +8,7 @@ from bridge.controllers.harakiri.profile import UNPATCHED
 from payloads.mission_data import Json
 from protocols.mavlink.signing import Check
 from service.cli.doctor.checked import Checked, note, problem
+from service.cli.doctor.fixes import restart_service, stop_programs
 from service.machine.host import Host, Process
 from service.machine.package import page
 
@@ -27,7 +28,8 @@ def check_running(status: Json) -> Iterator[Checked]:
     yield from _refused(status)
     if status.get("store_trouble"):
         remedy = "see disk and missions below; then: sudo systemctl restart naze-bridge"
-        yield problem("store", f"the daemon cannot store missions: {status['store_trouble']}", remedy)
+        found = f"the daemon cannot store missions: {status['store_trouble']}"
+        yield problem("store", found, remedy, restart_service)
 
 
 def _line(status: Json) -> Iterator[Checked]:
@@ -65,4 +67,5 @@ def check_daemons(host: Host) -> Checked | None:
     rivals.sort(key=lambda each: _UNIT not in host.read(f"/proc/{each.pid}/cgroup"))  # the service first: it stays
     pids = [str(each.pid) for each in rivals]
     remedy = f"stop all but one: sudo kill {' '.join(pids[1:])}"
-    return problem("daemon", f"{len(pids)} daemons have {port} open (pids {', '.join(pids)})", remedy)
+    found = f"{len(pids)} daemons have {port} open (pids {', '.join(pids)})"
+    return problem("daemon", found, remedy, stop_programs(*(each.pid for each in rivals[1:])))

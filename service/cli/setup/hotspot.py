@@ -19,6 +19,9 @@ CONNECTION = "naze-bridge-hotspot"
 HOTSPOT_FILE = f"/etc/NetworkManager/system-connections/{CONNECTION}.nmconnection"
 ADDRESS = "10.42.0.1"
 JOIN_S = 180
+#: Time to join a known network after the hotspot is closed.
+_LEAVE_S = 60
+_CLOSE = "close"
 _CARD = "wlan0"
 #: A file for each device, which names its active connection.
 _NM_DEVICES = "/run/NetworkManager/devices"
@@ -34,7 +37,7 @@ def hotspot_steps(host: Host, hotspot: tuple[str, str] | None) -> Iterator[Step]
     if hotspot is None:
         return
     ssid, password = hotspot
-    identity = uuid.uuid5(uuid.NAMESPACE_DNS, ssid)
+    identity = _identity(ssid)
     text = (
         "# Written by `naze-bridge setup`.\n"
         f"[connection]\nid={CONNECTION}\nuuid={identity}\ntype=wifi\n"
@@ -48,15 +51,29 @@ def hotspot_steps(host: Host, hotspot: tuple[str, str] | None) -> Iterator[Step]
         if host.read(HOTSPOT_FILE) != text:
             yield Step(purpose, [WriteFile(HOTSPOT_FILE, text, secret=True)])
         return
-    devices = [host.read(f"{_NM_DEVICES}/{name}") for name in host.names(_NM_DEVICES)]
-    is_open = any(f"connection-uuid={identity}" in device for device in devices)
-    if host.read(HOTSPOT_FILE) == text and is_open:
+    if host.read(HOTSPOT_FILE) == text and hotspot_is_open(host):
         return
     # Not opened at boot before a device has joined it once.
     changes: list[Change] = [WriteFile(HOTSPOT_FILE, text.replace(_ON, _OFF), secret=True), Run(_RELOAD, undo=_RELOAD)]
+    yield Step(purpose, [*changes, *switch_step(is_on=True).changes], cuts_network=True)
+
+
+def switch_step(*, is_on: bool) -> Step:
+    """Open or close the hotspot of an earlier setup, in a process of its own."""
     unit = ("systemd-run", "--quiet", "--collect", f"--unit={CONNECTION}", f"--on-active={_DELAY_S}")
-    changes.append(Run((*unit, sys.executable, "-I", "-m", "service.cli.setup.hotspot")))
-    yield Step(purpose, changes, cuts_network=True)
+    command = (*unit, "--timer-property=AccuracySec=100ms", sys.executable, "-I", "-m", "service.cli.setup.hotspot")
+    purpose = f"{'open' if is_on else 'close'} the hotspot"
+    return Step(purpose, [Run(command if is_on else (*command, _CLOSE))], cuts_network=True)
+
+
+def hotspot_is_open(host: Host) -> bool:
+    identity = _identity(hotspot_name(host) or "")
+    devices = [host.read(f"{_NM_DEVICES}/{name}") for name in host.names(_NM_DEVICES)]
+    return any(f"connection-uuid={identity}" in device for device in devices)
+
+
+def _identity(ssid: str) -> uuid.UUID:
+    return uuid.uuid5(uuid.NAMESPACE_DNS, ssid)
 
 
 def hotspot_name(host: Host) -> str | None:
@@ -87,9 +104,28 @@ def open_hotspot(host: Host, machine: Machine, sleep: Callable[[float], None] = 
     else:
         if former is not None:
             return f"no device joined the hotspot within {JOIN_S} s; {_return_to(former, machine)}"
-    machine.carry_out(WriteFile(HOTSPOT_FILE, host.read(HOTSPOT_FILE).replace(_OFF, _ON), secret=True))
-    machine.run(_RELOAD)
+    _open_at_boot(host, machine, is_on=True)
     return "the hotspot is open"
+
+
+def close_hotspot(host: Host, machine: Machine, sleep: Callable[[float], None] = time.sleep) -> str:
+    """Close the hotspot until it is opened again; it stays open where the Pi has no other network."""
+    _open_at_boot(host, machine, is_on=False)
+    machine.run(("nmcli", "connection", "down", CONNECTION))
+    for _ in range(_LEAVE_S):
+        if set(host.ipv4_addresses()) - {ADDRESS}:
+            return "the hotspot is closed"
+        sleep(1)
+    machine.run(("nmcli", "connection", "up", CONNECTION))
+    _open_at_boot(host, machine, is_on=True)
+    return "the Pi has no other network in reach; the hotspot is open again"
+
+
+def _open_at_boot(host: Host, machine: Machine, *, is_on: bool) -> None:
+    text = host.read(HOTSPOT_FILE)
+    text = text.replace(_OFF, _ON) if is_on else text.replace(_ON, _OFF)
+    machine.carry_out(WriteFile(HOTSPOT_FILE, text, secret=True))
+    machine.run(_RELOAD)
 
 
 def _return_to(former: str | None, machine: Machine) -> str:
@@ -111,4 +147,5 @@ def _has_neighbour(host: Host) -> bool:
 
 if __name__ == "__main__":
     machine_itself = Host()
-    sys.stdout.write(f"{open_hotspot(machine_itself, Machine(machine_itself))}\n")
+    switch = close_hotspot if sys.argv[1:] == [_CLOSE] else open_hotspot
+    sys.stdout.write(f"{switch(machine_itself, Machine(machine_itself))}\n")

@@ -2,7 +2,7 @@
 """The setup of a Raspberry Pi for the bridge: each function yields the missing steps of one part."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from xml.sax.saxutils import escape
 
@@ -29,13 +29,17 @@ _WANTED_BY = "/etc/systemd/system/multi-user.target.wants/naze-bridge.service"
 
 def missing_steps(host: Host, answers: SetupChoices) -> list[Step]:
     """The remaining steps on this machine, in order."""
-    makers = (_console, _uart, _country, _name, _key, _settings, _others, _announcement, _service)
+    makers = (_console, uart_steps, _country, _name, _key, settings_steps, _others, _announcement, _service)
     steps = [step for make in makers for step in make(host, answers)]
     return [*steps, *hotspot_steps(host, answers.hotspot)]
 
 
 def _console(host: Host, answers: SetupChoices) -> Iterator[Step]:
-    consoles = _header_consoles(host)
+    return console_steps(host, _header_consoles(host))
+
+
+def console_steps(host: Host, consoles: Sequence[str]) -> Iterator[Step]:
+    """Remove the login console from a port, given by all its names ("ttyS0")."""
     file = boot_file(host, "cmdline.txt")
     changes: list[Change] = []
     if file is not None:
@@ -50,7 +54,7 @@ def _console(host: Host, answers: SetupChoices) -> Iterator[Step]:
             undo = ("systemctl", "enable", *_now(host), wanted)
             changes.append(Run(("systemctl", "disable", *_now(host), wanted), undo))
     if changes:
-        yield Step("free the UART on the header from the login console", changes, needs_reboot=in_cmdline)
+        yield Step("free the UART from the login console", changes, needs_reboot=in_cmdline)
 
 
 def _header_consoles(host: Host) -> list[str]:
@@ -67,7 +71,7 @@ def _header_consoles(host: Host) -> list[str]:
     return names if is_header else names[:1]
 
 
-def _uart(host: Host, answers: SetupChoices) -> Iterator[Step]:
+def uart_steps(host: Host, answers: SetupChoices) -> Iterator[Step]:
     file = boot_file(host, "config.txt")
     if file is None:
         return
@@ -122,17 +126,17 @@ def _key(host: Host, answers: SetupChoices) -> Iterator[Step]:
     own, is_new = ("chown", "naze-bridge:", KEY_FILE), not host.path(KEY_FILE).exists()
     changes: list[Change] = [WriteFile(KEY_FILE, f"{answers.key}\n", True), Run(own, undo=() if is_new else own)]
     if not is_new:
-        changes += _restart(host)  # the settings, which name it, do not change
+        changes += restart_changes(host)  # the settings, which name it, do not change
     yield Step("set the key that is required for writing", changes)
 
 
-def _settings(host: Host, answers: SetupChoices) -> Iterator[Step]:
+def settings_steps(host: Host, answers: SetupChoices) -> Iterator[Step]:
     text = settings_text(host, answers)
     changes: list[Change] = [] if host.read(SETTINGS_FILE) == text else [WriteFile(SETTINGS_FILE, text)]
     if host.path(FORMER_SETTINGS_FILE).exists():
         changes.append(RemoveFile(FORMER_SETTINGS_FILE))
     if changes:
-        yield Step("save the settings", [*changes, *_restart(host)])
+        yield Step("save the settings", [*changes, *restart_changes(host)])
 
 
 def _others(host: Host, answers: SetupChoices) -> Iterator[Step]:
@@ -172,7 +176,7 @@ def _service(host: Host, answers: SetupChoices) -> Iterator[Step]:
         yield Step("start the bridge with the machine", [Run(command, undo)])
 
 
-def _restart(host: Host) -> list[Change]:
+def restart_changes(host: Host) -> list[Change]:
     """Restart the service if it is in use."""
     is_in_use = _now(host) and host.path(_WANTED_BY).is_symlink()
     undo = ("systemctl", "try-restart", "naze-bridge.service")

@@ -51,7 +51,8 @@ class UndoLog:
             self._now["files"].append({"path": change.path, "before": before, "after": None, "secret": is_secret})
         for file in self._now["files"]:
             file["after"] = _text(self._host, file["path"])  # raspi-config changes cmdline.txt, too
-        _write(self._machine, [*self._earlier, self._now])
+        if self._now["files"] or self._now["commands"]:
+            _write(self._machine, [*self._earlier, self._now])
 
 
 def undo_steps(host: Host) -> tuple[list[Step], list[str]]:

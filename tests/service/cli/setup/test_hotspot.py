@@ -7,7 +7,15 @@ from pathlib import Path
 import pytest
 
 from service.cli.setup.change import Machine, SetupError
-from service.cli.setup.hotspot import CONNECTION, HOTSPOT_FILE, JOIN_S, hotspot_name, hotspot_steps, open_hotspot
+from service.cli.setup.hotspot import (
+    CONNECTION,
+    HOTSPOT_FILE,
+    JOIN_S,
+    close_hotspot,
+    hotspot_name,
+    hotspot_steps,
+    open_hotspot,
+)
 from service.machine.host import Host
 from tests.support.faulty_machine import FaultyMachine
 
@@ -23,12 +31,14 @@ class NetworkManager(Machine):
         self.active = former
         self._radio_works = radio_works
 
-    def run(self, command: Sequence[str]) -> str:
+    def run(self, command: Sequence[str], timeout_s: float = 60) -> str:
         match tuple(command):
             case ("nmcli", "connection", "up", name):
                 if name == CONNECTION and not self._radio_works:
                     raise SetupError("`nmcli connection up` failed: no radio")
                 self.active = name
+            case ("nmcli", "connection", "down", _):
+                self.active = None
             case ("nmcli", "--terse", *_):
                 return f"lo-uuid:lo\n{self.active}:wlan0\n" if self.active else "lo-uuid:lo\n"
         return ""
@@ -102,3 +112,23 @@ def test_without_a_former_network_it_waits_for_nobody(pi: FaultyMachine) -> None
 
 def test_its_name_is_read_back(pi: FaultyMachine) -> None:
     assert hotspot_name(pi) == " naze\\field"
+
+
+def test_it_is_closed_where_another_network_is_in_reach(pi: FaultyMachine) -> None:
+    manager = NetworkManager(pi)
+    open_hotspot(pi, manager, after(1, lambda: pi.write(_LEASES, "2 aa:bb 10.42.0.7 phone *\n")))
+    pi.addresses = {"wlan0": "10.42.0.1"}
+    joins = after(20, lambda: pi.addresses.update(wlan0="192.168.1.7"))
+    assert close_hotspot(pi, manager, joins) == "the hotspot is closed"
+    assert manager.active != CONNECTION
+    assert not opens_at_boot(pi)
+
+
+def test_it_stays_open_where_there_is_no_other_network(pi: FaultyMachine) -> None:
+    manager = NetworkManager(pi)
+    open_hotspot(pi, manager, after(1, lambda: pi.write(_LEASES, "2 aa:bb 10.42.0.7 phone *\n")))
+    pi.addresses = {}
+    told = close_hotspot(pi, manager, lambda _: None)
+    assert told == "the Pi has no other network in reach; the hotspot is open again"
+    assert manager.active == CONNECTION
+    assert opens_at_boot(pi)

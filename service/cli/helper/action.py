@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The form of an action: a dataclass whose fields are the arguments, checked by name and type."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, dataclass, fields
+from typing import Any, BinaryIO, Protocol, get_type_hints
+
+from payloads.mission_data import Json
+from service.cli.setup.change import Machine, Step
+from service.cli.setup.undo import UndoLog
+from service.machine.host import Host
+
+#: A timer's default accuracy is a minute. The reply must arrive at the page before what ends the connection.
+_LATER = ("systemd-run", "--quiet", "--collect", "--on-active=2", "--timer-property=AccuracySec=100ms")
+_UNIT = ("naze-bridge", "naze-bridge.service")
+_ENDING = ("restart", "try-restart", "disable", "stop")
+
+
+class HelperRefusal(Exception):
+    """A request that is not carried out; one sentence."""
+
+
+class PatientMachine(Machine):
+    """Restarts the bridge or the Pi only after the reply."""
+
+    def run(self, command: Sequence[str], timeout_s: float = 60) -> str:
+        ends_bridge = command[0] == "systemctl" and command[1] in _ENDING and command[-1] in _UNIT
+        ends_pi = tuple(command) == ("systemctl", "reboot")
+        return super().run((*_LATER, *command) if ends_bridge or ends_pi else command, timeout_s)
+
+
+@dataclass(frozen=True, slots=True)
+class ThisPi:
+    """The machine to change, and the rest of the connection: an action's body."""
+
+    host: Host
+    body: BinaryIO
+
+    def make(self, steps: Sequence[Step]) -> Json:
+        """Make the changes; setup's --undo and the page's revert them."""
+        return self._carry_out(steps, UndoLog(self.host, PatientMachine(self.host)))
+
+    def make_for_good(self, steps: Sequence[Step]) -> Json:
+        """Make changes that are no part of the setup."""
+        return self._carry_out(steps, PatientMachine(self.host))
+
+    def _carry_out(self, steps: Sequence[Step], machine: Machine | UndoLog) -> Json:
+        for step in steps:
+            for change in step.changes:
+                machine.carry_out(change)
+        return self.shown(steps)
+
+    def shown(self, steps: Sequence[Step]) -> Json:
+        """The steps as the page shows them."""
+        return {
+            "steps": [{"purpose": each.purpose, "changes": [one.describe() for one in each.changes]} for each in steps],
+            "needs_reboot": any(each.needs_reboot for each in steps),
+            "cuts_network": any(each.cuts_network for each in steps),
+        }
+
+
+class Action(Protocol):
+    """One of `actions.ACTIONS`."""
+
+    def carry_out(self, pi: ThisPi) -> Json: ...
+
+
+def parse_action(line: bytes, actions: Mapping[str, Any]) -> Action:
+    """Read a request; HelperRefusal if it is none, or has an argument that is missing, unknown or of another type."""
+    try:
+        request: Json = json.loads(line)
+        kind = actions[request.pop("action")]
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        raise HelperRefusal(f"This is not an action; known are {', '.join(actions)}") from None
+    hints = get_type_hints(kind)
+    required = {each.name for each in fields(kind) if each.default is MISSING}
+    if not required <= request.keys() <= hints.keys() or any(
+        type(value) is not hints[name] for name, value in request.items()
+    ):
+        shown = ", ".join(f"{name} ({hint.__name__})" for name, hint in hints.items()) or "none"
+        raise HelperRefusal(f"The arguments of this action are: {shown}")
+    action: Action = kind(**request)
+    return action

@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The actions of the helper. Each recomputes what it changes from this machine; a request can only choose."""
+
+import re
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from functools import partial
+
+from payloads.mission_data import Json
+from service.cli.doctor.command import examined
+from service.cli.doctor.fixes import REBOOT, RESTART
+from service.cli.doctor.machine import EPOCH, SET_BY_HAND
+from service.cli.helper.action import HelperRefusal, ThisPi
+from service.cli.helper.packages import MAX_PACKAGE, PREVIOUS, receive, start_update, update_outcome, version_of
+from service.cli.helper.page_settings import change_settings, settings_in_force
+from service.cli.setup.answers import SetupChoices, current_key, earlier_choices, shadowed
+from service.cli.setup.change import Change, Machine, Run, Step, WriteFile
+from service.cli.setup.command import check_answers
+from service.cli.setup.hotspot import hotspot_is_open, hotspot_name, switch_step
+from service.cli.setup.steps import missing_steps
+from service.cli.setup.undo import forget_last, undo_steps
+from service.daemon.client import STATUS, ask_daemon
+from service.machine.package import version
+from service.machine.raspberry_pi import boot_file, pi_model
+from service.settings.addresses import AddressError, parse_fc
+from service.settings.load import SERVICE_CONFIG, SERVICE_STATE
+from service.settings.passphrase import new_passphrase
+
+_LATEST = datetime(2100, 1, 1, tzinfo=UTC)
+
+
+@dataclass(frozen=True, slots=True)
+class Overview:
+    """The answers to setup so far, the settings, and what can be undone. Changes nothing."""
+
+    def carry_out(self, pi: ThisPi) -> Json:
+        host = pi.host
+        earlier = earlier_choices(host)
+        country = re.search(r"cfg80211\.ieee80211_regdom=([A-Z]{2})", host.read(boot_file(host, "cmdline.txt") or ""))
+        model = pi_model(host)
+        return {
+            "is_set_up": earlier is not None,
+            "fc": (earlier or SetupChoices()).fc,
+            "has_key": bool(current_key(host)),
+            "hotspot": hotspot_name(host),
+            "hotspot_is_open": hotspot_is_open(host),
+            "country": country and country[1],
+            "name": host.read("/etc/hostname").strip(),
+            "model": None if model is None else model.name,
+            "can_undo": bool(undo_steps(host)[0]),
+            "version": version(),
+            "previous": version_of(host.path(PREVIOUS), Machine(host)),
+            "update": update_outcome(host),
+            "settings": settings_in_force(host),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Doctor:
+    """Doctor's checks. Changes nothing. `fix` names a remedy for the action Fix."""
+
+    def carry_out(self, pi: ThisPi) -> Json:
+        return {"checks": [found for found, _ in _examine(pi)]}
+
+
+@dataclass(frozen=True, slots=True)
+class ApplyFix:
+    """One of doctor's remedies, by its purpose; doctor must find the problem again."""
+
+    fix: str
+
+    def carry_out(self, pi: ThisPi) -> Json:
+        step = next((step for _, step in _examine(pi) if step is not None and step.purpose == self.fix), None)
+        if step is None:
+            raise HelperRefusal("Doctor no longer finds this problem: check again.")
+        return pi.make([step])
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """The answers to setup's questions; what is not given stays. `is_trial`: only show the changes."""
+
+    is_trial: bool = False
+    fc: str = ""
+    hotspot: str = ""
+    password: str = ""
+    country: str = ""
+    name: str = ""
+    new_key: bool = False
+
+    def carry_out(self, pi: ThisPi) -> Json:
+        if bool(self.hotspot) != bool(self.password):
+            raise HelperRefusal("A hotspot needs a name and a password.")
+        check_answers(self.hotspot or None, self.password or None, self.country or None, self.name or None)
+        answers = earlier_choices(pi.host) or SetupChoices()
+        try:
+            fc = answers.fc if not self.fc else None if self.fc == "auto" else str(parse_fc(self.fc))
+        except AddressError as error:
+            raise HelperRefusal(str(error)) from error
+        answers = replace(
+            answers,
+            fc=fc,
+            hotspot=(self.hotspot, self.password) if self.hotspot else None,
+            country=self.country.upper() or None,
+            name=self.name or None,
+            key=new_passphrase() if self.new_key else None,
+        )
+        steps = missing_steps(pi.host, answers)
+        warnings = list(shadowed(pi.host, answers))
+        made = pi.shown(steps) if self.is_trial else pi.make(steps)
+        return made | {"warnings": warnings, "key": None if self.is_trial else answers.key}
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeSettings:
+    """Settings by name, each as in the configuration file; null: the default. The bridge takes them over."""
+
+    values: dict  # type: ignore[type-arg]  # checked as a whole by its type, and inside by change_settings
+
+    def carry_out(self, pi: ThisPi) -> Json:
+        return change_settings(pi, self.values)
+
+
+@dataclass(frozen=True, slots=True)
+class SwitchHotspot:
+    """Open or close the hotspot of the last setup."""
+
+    on: bool
+
+    def carry_out(self, pi: ThisPi) -> Json:
+        if hotspot_name(pi.host) is None:
+            raise HelperRefusal("No hotspot is set up: give it a name and a password first.")
+        return pi.make([switch_step(is_on=self.on)])
+
+
+@dataclass(frozen=True, slots=True)
+class Undo:
+    """Revert the last setup, fix, or change of settings. `is_trial`: only show the changes."""
+
+    is_trial: bool = False
+
+    def carry_out(self, pi: ThisPi) -> Json:
+        steps, kept = undo_steps(pi.host)
+        if self.is_trial:
+            return pi.shown(steps) | {"kept": kept}
+        forget_last(pi.host, Machine(pi.host))
+        return pi.make_for_good(steps) | {"kept": kept}
+
+
+@dataclass(frozen=True, slots=True)
+class Restart:
+    """Restart the bridge, or the Pi."""
+
+    machine: bool = False
+
+    def carry_out(self, pi: ThisPi) -> Json:
+        return pi.make([REBOOT if self.machine else RESTART])
+
+
+@dataclass(frozen=True, slots=True)
+class SetClock:
+    """Set the clock to the phone's: seconds since 1970, UTC."""
+
+    unix_s: int
+
+    def carry_out(self, pi: ThisPi) -> Json:
+        if not EPOCH.timestamp() <= self.unix_s < _LATEST.timestamp():
+            raise HelperRefusal("This time cannot be right: look at the clock of this phone.")
+        changes: list[Change] = [Run(("date", "--utc", "--set", f"@{self.unix_s}")), WriteFile(SET_BY_HAND, "")]
+        return pi.make_for_good([Step("set the clock", changes)])
+
+
+@dataclass(frozen=True, slots=True)
+class InstallPackage:
+    """The body is a package of this program: check it, and install it in a process of its own."""
+
+    size: int
+
+    def carry_out(self, pi: ThisPi) -> Json:
+        if not 0 < self.size <= MAX_PACKAGE:
+            raise HelperRefusal(f"A package has at most {MAX_PACKAGE >> 20} MB.")
+        return {"version": receive(pi, self.size)}
+
+
+@dataclass(frozen=True, slots=True)
+class Downgrade:
+    """Go back to the package before the last update."""
+
+    def carry_out(self, pi: ThisPi) -> Json:
+        if (known := version_of(pi.host.path(PREVIOUS), Machine(pi.host))) is None:
+            raise HelperRefusal("No earlier version is kept: this release was not installed from the page.")
+        start_update(pi, PREVIOUS)
+        return {"version": known}
+
+
+def _examine(pi: ThisPi) -> list[tuple[Json, Step | None]]:
+    host = pi.host
+    ask = partial(ask_daemon, None, STATUS)
+    # The port is the daemon's, which asks.
+    results = examined(host.path(SERVICE_CONFIG), None, host.path(SERVICE_STATE), ask, host, ask_port=ask)
+    found = []
+    for checked in results:
+        step = None if checked.fix is None else checked.fix(host)
+        found.append((checked.to_json() | {"fix": None if step is None else step.purpose}, step))
+    return found
+
+
+#: Everything that the helper does.
+ACTIONS = {
+    "overview": Overview,
+    "doctor": Doctor,
+    "fix": ApplyFix,
+    "answer": Answer,
+    "settings": ChangeSettings,
+    "hotspot": SwitchHotspot,
+    "undo": Undo,
+    "restart": Restart,
+    "clock": SetClock,
+    "install": InstallPackage,
+    "downgrade": Downgrade,
+}

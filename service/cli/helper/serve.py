@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The helper's program: answers the connection on its standard input (naze-bridge-helper@.service)."""
+
+import fcntl
+import os
+import pwd
+import socket
+import struct
+from collections.abc import Container, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import click
+
+from payloads.mission_data import Json, to_json
+from service.cli.helper.action import HelperRefusal, ThisPi, parse_action
+from service.cli.helper.actions import ACTIONS
+from service.cli.setup.change import SetupError
+from service.machine.host import Host
+from service.settings import SettingsError
+from storage.os_error import reason
+
+_USER = "naze-bridge"
+_LOCK = Path("/run/naze-bridge-helper/lock")
+_MAX_REQUEST = 1 << 16
+#: Between two pieces of an upload.
+_TIMEOUT_S = 30.0
+
+
+def answer(connection: socket.socket, pi: ThisPi, users: Container[int], lock: Path) -> None:
+    """Read the request, carry it out and reply; a request of another user is not even read."""
+    _, uid, _ = struct.unpack("3i", connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i")))
+    if uid not in users:
+        reply: Json = {"error": f"Only the user {_USER} may ask for this."}
+    else:
+        reply = _carry_out(pi, lock)
+    connection.sendall(to_json(reply).encode() + b"\n")
+
+
+def _carry_out(pi: ThisPi, lock: Path) -> Json:
+    try:
+        action = parse_action(pi.body.readline(_MAX_REQUEST), ACTIONS)
+        with _alone(lock):
+            return action.carry_out(pi)
+    except (HelperRefusal, SetupError, SettingsError) as error:
+        return {"error": str(error)}
+    except click.UsageError as error:
+        return {"error": error.format_message()}
+    except OSError as error:
+        return {"error": f"{error.filename or 'this'}: {reason(error)}"}
+
+
+@contextmanager
+def _alone(lock: Path) -> Iterator[None]:
+    with lock.open("w") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise HelperRefusal("Another change is being made: wait until it has finished.") from None
+        yield
+
+
+def main() -> None:
+    users = {pwd.getpwnam(_USER).pw_uid, os.geteuid()}
+    with socket.socket(fileno=os.dup(0)) as connection, connection.makefile("rb") as body:
+        connection.settimeout(_TIMEOUT_S)
+        answer(connection, ThisPi(Host(), body), users, _LOCK)
+
+
+if __name__ == "__main__":
+    main()

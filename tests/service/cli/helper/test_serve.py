@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A connection to the helper: one user, one request, one reply."""
+
+import fcntl
+import json
+import os
+import socket
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from service.cli.helper.action import ThisPi
+from service.cli.helper.serve import answer
+from tests.support.fixable_pi import FixablePi
+
+
+@pytest.fixture
+def lock(tmp_path: Path) -> Path:
+    return tmp_path / "lock"
+
+
+def served(pi: FixablePi, lock: Path, request: bytes, user: int | None = None) -> dict[str, Any]:
+    ours, theirs = socket.socketpair()
+    with ours, theirs, theirs.makefile("rb") as body:
+        ours.sendall(request + b"\n")
+        answer(theirs, ThisPi(pi, body), {os.geteuid() if user is None else user}, lock)
+        line = ours.recv(1 << 20)
+    assert line.endswith(b"\n")
+    reply: dict[str, Any] = json.loads(line)
+    return reply
+
+
+def test_a_request_is_answered(pi: FixablePi, lock: Path) -> None:
+    assert served(pi, lock, b'{"action": "overview"}')["name"] == "kite"
+
+
+def test_another_user_is_refused(pi: FixablePi, lock: Path) -> None:
+    reply = served(pi, lock, b'{"action": "restart"}', user=os.geteuid() + 1)
+    assert reply == {"error": "Only the user naze-bridge may ask for this."}
+    assert pi.ran == []
+
+
+@pytest.mark.parametrize(
+    ("request_line", "why"),
+    [
+        (b"GET / HTTP/1.1", "not an action"),
+        (b'{"action": "downgrade"}', "No earlier version"),
+        (b'{"action": "answer", "country": "Germany"}', "'Germany' is not a country code"),
+        (b'{"action": "settings", "values": {"sysid": "0"}}', "sysid is 0"),
+    ],
+)
+def test_every_refusal_is_a_sentence(pi: FixablePi, lock: Path, request_line: bytes, why: str) -> None:
+    assert why in served(pi, lock, request_line)["error"]
+
+
+def test_one_change_at_a_time(pi: FixablePi, lock: Path) -> None:
+    with lock.open("w") as held:
+        fcntl.flock(held, fcntl.LOCK_EX)
+        assert "Another change" in served(pi, lock, b'{"action": "restart"}')["error"]
+    assert pi.ran == []
+    assert "error" not in served(pi, lock, b'{"action": "restart"}')
