@@ -21,7 +21,10 @@ _PAGES = (
     *("systemd/naze-bridge.service", "systemd/60-naze-bridge.rules"),
 )
 _NOT_THE_PATCH = ("__pycache__", "build", "tests", "sim", "Makefile")
-_UNITS = ("naze-bridge.service", "naze-bridge-helper.socket", "naze-bridge-helper@.service")
+_UNITS = (
+    *("naze-bridge.service", "naze-bridge-helper.socket", "naze-bridge-helper@.service"),
+    *("naze-bridge-captive.socket", "naze-bridge-captive.service"),
+)
 _SCHEMAS = "payloads/schemas"
 _SCRIPTS = ("postinst", "prerm", "postrm")
 #: Of pymavlink's 44 MB of dialects the bridge imports one, and pymavlink's own mavutil one; lxml is for its generator.

@@ -46,8 +46,9 @@ cat /run/log; exit 1
 #: What setup leaves outside the package.
 _AS_AFTER_SETUP = """
 cd /etc
-mkdir -p NetworkManager/system-connections avahi/services udev/rules.d
+mkdir -p NetworkManager/dnsmasq-shared.d NetworkManager/system-connections avahi/services udev/rules.d
 touch NetworkManager/system-connections/naze-bridge-hotspot.nmconnection avahi/services/naze-bridge.service
+touch NetworkManager/dnsmasq-shared.d/naze-bridge-captive.conf
 touch udev/rules.d/59-naze-bridge-others.rules naze-bridge/setup.toml naze-bridge/gcs.key naze-bridge/undo.json
 mkdir -p /var/lib/naze-bridge-helper /run/naze-bridge-helper
 touch naze-bridge/page.toml /var/lib/naze-bridge-helper/previous.deb
@@ -56,6 +57,7 @@ _FORMER_ANSWERS = (
     '# Written by `naze-bridge setup`, which can be run again.\nfc = "auto"\n'
     'gcs = [{address = "udpin:0.0.0.0:14550", key_file = "/etc/naze-bridge/gcs.key"}]'
 )
+_UNITS = (".service", "-helper.socket", "-helper@.service", "-captive.socket", "-captive.service")
 _STOP = "kill $(cat /run/pid); while grep -q . /proc/$(cat /run/pid)/cmdline; do sleep 0.1; done"
 
 
@@ -124,7 +126,7 @@ def test_the_package_has_the_expected_files(package: Path) -> None:
     for expected in (
         *(f"/usr/lib/naze-bridge/lib/python{python}/site-packages/{_SCHEMA}" for python in _PYTHONS),
         "/usr/bin/naze-bridge",
-        *(f"/usr/lib/systemd/system/naze-bridge{name}" for name in (".service", "-helper.socket", "-helper@.service")),
+        *(f"/usr/lib/systemd/system/naze-bridge{name}" for name in _UNITS),
         "/usr/lib/udev/rules.d/60-naze-bridge.rules",
         "/usr/lib/sysusers.d/naze-bridge.conf",
         "/usr/share/naze-bridge/config.toml",

@@ -11,13 +11,18 @@ import sys
 import time
 import uuid
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 from service.cli.setup.change import Change, Machine, RemoveFile, Run, SetupError, Step, WriteFile
+from service.machine.captive_portal import dnsmasq_text
 from service.machine.host import Host
 
 CONNECTION = "naze-bridge-hotspot"
 HOTSPOT_FILE = f"/etc/NetworkManager/system-connections/{CONNECTION}.nmconnection"
 ADDRESS = "10.42.0.1"
+#: For the name server of connections that NetworkManager shares; read when the hotspot opens.
+CAPTIVE_FILE = "/etc/NetworkManager/dnsmasq-shared.d/naze-bridge-captive.conf"
+_CAPTIVE_SOCKET = "naze-bridge-captive.socket"
 JOIN_S = 180
 #: Time to join a known network after the hotspot is closed.
 _LEAVE_S = 60
@@ -74,6 +79,25 @@ def hotspot_is_open(host: Host) -> bool:
 
 def _identity(ssid: str) -> uuid.UUID:
     return uuid.uuid5(uuid.NAMESPACE_DNS, ssid)
+
+
+def captive_steps(host: Host, hotspot: tuple[str, str] | None, *, has_page: bool) -> Iterator[Step]:
+    """Offer the page to phones that join the hotspot, or no longer."""
+    is_wanted = has_page and (hotspot is not None or hotspot_name(host) is not None)
+    text = f"# Written by `naze-bridge setup`.\n{dnsmasq_text(ADDRESS)}"
+    now = ("--now", "--no-block") if host.path("/run/systemd/system").exists() else ()
+    on, off = ("systemctl", "enable", *now, _CAPTIVE_SOCKET), ("systemctl", "disable", *now, _CAPTIVE_SOCKET)
+    if is_wanted and host.read(CAPTIVE_FILE) != text and not _is_shared_elsewhere(host):
+        yield Step("offer the page to phones that join the hotspot", [WriteFile(CAPTIVE_FILE, text), Run(on, undo=off)])
+    elif not is_wanted and host.path(CAPTIVE_FILE).exists():
+        yield Step("no longer offer the page to phones that join", [RemoveFile(CAPTIVE_FILE), Run(off, undo=on)])
+
+
+def _is_shared_elsewhere(host: Host) -> bool:
+    """True if NetworkManager shares another connection: its name server reads the same folder as the hotspot's."""
+    folder = str(Path(HOTSPOT_FILE).parent)
+    others = [f"{folder}/{name}" for name in host.names(folder) if f"{folder}/{name}" != HOTSPOT_FILE]
+    return any(re.search("^method=shared", host.read(path), re.MULTILINE) for path in others)
 
 
 def hotspot_name(host: Host) -> str | None:

@@ -17,7 +17,7 @@ from service.cli.setup.answers import (
     settings_text,
 )
 from service.cli.setup.change import Change, RemoveFile, Run, Step, WriteFile
-from service.cli.setup.hotspot import hotspot_steps
+from service.cli.setup.hotspot import captive_steps, hotspot_steps
 from service.cli.setup.state_folder import other_devices
 from service.machine.host import Host
 from service.machine.raspberry_pi import boot_file, pi_model
@@ -31,6 +31,7 @@ def missing_steps(host: Host, answers: SetupChoices) -> list[Step]:
     """The remaining steps on this machine, in order."""
     makers = (_console, uart_steps, _country, _name, _key, settings_steps, _others, _announcement, _service)
     steps = [step for make in makers for step in make(host, answers)]
+    steps += captive_steps(host, answers.hotspot, has_page=answers.page)
     return [*steps, *hotspot_steps(host, answers.hotspot)]
 
 
@@ -112,9 +113,10 @@ def _name(host: Host, answers: SetupChoices) -> Iterator[Step]:
     if _now(host):
         undo = ("hostnamectl", "set-hostname", old) if old else ()
         changes.append(Run(("hostnamectl", "set-hostname", answers.name), undo))
-        # Avahi reads the name only when it starts.
-        restart = ("systemctl", "try-restart", "avahi-daemon")
-        changes.append(Run(restart, undo=restart))
+        if host.path("/etc/avahi").exists():
+            # Avahi reads the name only when it starts.
+            restart = ("systemctl", "try-restart", "avahi-daemon")
+            changes.append(Run(restart, undo=restart))
     else:
         changes.append(WriteFile("/etc/hostname", f"{answers.name}\n"))
     yield Step(f"name this machine {answers.name}.local", changes)

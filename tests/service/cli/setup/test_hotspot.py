@@ -8,9 +8,11 @@ import pytest
 
 from service.cli.setup.change import Machine, SetupError
 from service.cli.setup.hotspot import (
+    CAPTIVE_FILE,
     CONNECTION,
     HOTSPOT_FILE,
     JOIN_S,
+    captive_steps,
     close_hotspot,
     hotspot_name,
     hotspot_steps,
@@ -132,3 +134,25 @@ def test_it_stays_open_where_there_is_no_other_network(pi: FaultyMachine) -> Non
     assert told == "the Pi has no other network in reach; the hotspot is open again"
     assert manager.active == CONNECTION
     assert opens_at_boot(pi)
+
+
+def test_phones_that_join_are_offered_the_page(pi: FaultyMachine) -> None:
+    (step,) = captive_steps(pi, None, has_page=True)  # the hotspot of an earlier setup
+    assert [change.describe() for change in step.changes] == [
+        f"write {CAPTIVE_FILE}",
+        "run systemctl enable --now --no-block naze-bridge-captive.socket",
+    ]
+    Machine(pi).carry_out(step.changes[0])
+    assert list(captive_steps(pi, None, has_page=True)) == []
+    (step,) = captive_steps(pi, None, has_page=False)
+    assert step.changes[0].describe() == f"remove {CAPTIVE_FILE}"
+
+
+def test_without_a_hotspot_no_phone_is_offered_the_page(tmp_path: Path) -> None:
+    assert list(captive_steps(FaultyMachine(tmp_path / "other"), None, has_page=True)) == []
+
+
+def test_the_clients_of_another_shared_connection_are_left_alone(pi: FaultyMachine) -> None:
+    """Its name server reads the same settings as the hotspot's."""
+    pi.write("/etc/NetworkManager/system-connections/cable.nmconnection", "[ipv4]\nmethod=shared\n")
+    assert list(captive_steps(pi, None, has_page=True)) == []

@@ -148,7 +148,10 @@ def test_setup_of_an_image_for_every_model_starts_nothing(tmp_path: Path) -> Non
     pi.path("/run/systemd/system").rmdir()
     steps = missing_steps(pi, SetupChoices(name="naze", hotspot=("naze", "long-enough")))
     commands = [change.command for step in steps for change in step.changes if isinstance(change, Run)]
-    assert commands == [("systemctl", "enable", "naze-bridge")]
+    assert commands == [
+        ("systemctl", "enable", "naze-bridge"),
+        ("systemctl", "enable", "naze-bridge-captive.socket"),
+    ]
     (uart,) = [change for step in steps for change in step.changes if change.describe().endswith("config.txt")]
     assert isinstance(uart, WriteFile)
     assert uart.text.endswith("[all]\n# naze-bridge: the UART on GPIO 14 and 15\nenable_uart=1\ndtparam=uart0=on\n")
