@@ -9,7 +9,10 @@ import os
 import select
 import sys
 import time
+from collections import deque
 from contextlib import suppress
+from datetime import UTC, datetime
+from typing import NamedTuple
 
 import structlog
 from structlog.typing import EventDict, Processor
@@ -19,8 +22,18 @@ _PRIORITIES = {"debug": 7, "info": 6, "warning": 4, "error": 3}
 _WEIGHTS = {level: weight for weight, level in enumerate(_PRIORITIES)}
 #: Beyond this rate the same event is suppressed and counted.
 _MOST, _WITHIN_S = 20, 10.0
+#: Lines kept for the status page, and characters of one.
+_KEPT, _MOST_TEXT = 300, 1000
 
 _log = structlog.get_logger()
+
+
+class LogLine(NamedTuple):
+    """`at`: HH:MM:SS, UTC. `text`: the event as JSON, shortened."""
+
+    at: str
+    level: str
+    text: str
 
 
 class _StandardError:
@@ -78,6 +91,20 @@ class _RateLimit:
         return event
 
 
+class _Recent:
+    """Keeps the latest lines for the status page: the daemon may not read the journal."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.lines: deque[LogLine] = deque(maxlen=_KEPT)
+
+    def __call__(self, logger: object, method: str, event: EventDict) -> EventDict:
+        self.count += 1
+        at = datetime.fromtimestamp(time.time(), UTC).strftime("%H:%M:%S")
+        self.lines.append(LogLine(at, method, str(_render_json(logger, method, dict(event)))[:_MOST_TEXT]))
+        return event
+
+
 _render_json = structlog.processors.JSONRenderer()
 
 
@@ -87,6 +114,7 @@ def _journal_line(logger: object, method: str, event: EventDict) -> str:
 
 
 _least_level = _LeastLevel()
+_recent = _Recent()
 
 
 class _FromLibraries(logging.Handler):
@@ -109,6 +137,12 @@ def set_log_level(level: str) -> None:
     _least_level.level = level
 
 
+def recent_lines(after: int) -> tuple[int, list[LogLine]]:
+    """The number of lines logged so far, and the latest of those after the first `after` lines."""
+    count = min(max(_recent.count - after, 0), len(_recent.lines))
+    return _recent.count, [*_recent.lines][len(_recent.lines) - count :]
+
+
 def set_up_logging(level: str) -> None:
     set_log_level(level)
     output = _StandardError()
@@ -119,6 +153,7 @@ def set_up_logging(level: str) -> None:
             _RateLimit(),
             structlog.processors.add_log_level,
             structlog.processors.format_exc_info,
+            _recent,
             *_output(),
         ],
         wrapper_class=structlog.make_filtering_bound_logger(0),

@@ -17,6 +17,7 @@ GET  /api/logs                           the telemetry logs (token)
 GET  /api/logs/NAME?start=N              one piece of a log (token)
 GET  /api/settings...                    see service.web.settings_history
 POST /api/firmware?name=NAME             see service.web.firmware_upload
+     /api/pi..., /api/log                see service.web.pi_control
 GET  /metrics                            for Prometheus
 """
 
@@ -51,6 +52,7 @@ from service.web.flown_track import FlownTrack
 from service.web.link_history import LinkHistory
 from service.web.metrics import CONTENT_TYPE, Metrics
 from service.web.mission_files import MissionFiles, MissionWriter
+from service.web.pi_control import PiControl
 from service.web.replies import answered, begun, json_reply, path_number, text_reply, whole
 from service.web.response_cache import ResponseCache
 from service.web.settings_history import SettingsHistory
@@ -77,6 +79,7 @@ class Api:
         self._files = MissionFiles(self._api, self._writer)
         self._settings = SettingsHistory(self._api.settings, self._writer, self._cache, token)
         self._firmware = FirmwareUpload(self._api.firmware, self._writer, token)
+        self._pi = PiControl(daemon, token)
         self._history = LinkHistory(daemon)
         self._track = FlownTrack(daemon)
         state_dir = daemon.settings.state_dir
@@ -91,6 +94,7 @@ class Api:
         self._history.close()
         self._track.close()
         await self._writer.close()
+        await self._pi.close()
         self._logs.close()
 
     def routes(self) -> list[Route]:
@@ -114,6 +118,7 @@ class Api:
             Route("/api/missions/{number}/restore", guarded(self._restore), methods=["POST"]),
             *self._settings.routes(),
             *self._firmware.routes(),
+            *self._pi.routes(),
             Route("/api/check", guarded(self._check_file, MAX_FILE), methods=["POST"]),
             Route("/api/write", guarded(self._write_file, MAX_FILE), methods=["POST"]),
         ]

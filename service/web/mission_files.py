@@ -13,7 +13,7 @@ from http import HTTPStatus
 
 import structlog
 from starlette.exceptions import HTTPException
-from starlette.requests import ClientDisconnect, Request
+from starlette.requests import Request
 
 from payloads.comparison import MAX_ROWS, checked_mission
 from payloads.mission_data import ACCEPTED, Json
@@ -21,12 +21,11 @@ from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
 from service.daemon.api import DaemonApi
 from service.daemon.client import ControlError
+from service.web.replies import received_body
 from storage.store_error import StoreError
 
 _PAUSE_S = 0.25
 _MAX_NAME = 80
-#: A page of another site cannot send this type without a preflight request, which is refused.
-_CONTENT_TYPE = "application/octet-stream"
 _log = structlog.get_logger()
 
 Progress = Callable[[Json], None]
@@ -104,22 +103,4 @@ class MissionFiles:
 
 async def received(request: Request) -> tuple[str, bytes]:
     """The file's name and contents. A slow phone takes seconds to send them."""
-    name = request.query_params.get("name", "")[-_MAX_NAME:] or "mission file"
-    if request.headers.get("content-type") != _CONTENT_TYPE:
-        raise HTTPException(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, f"Send the file as {_CONTENT_TYPE}.")
-    try:
-        return name, await request.body()
-    except ClientDisconnect as error:
-        raise HTTPException(HTTPStatus.BAD_REQUEST, "The file was not received completely.") from error
-
-
-async def _parsed(name: str, body: bytes) -> list[MissionItem]:
-    try:
-        items = await asyncio.to_thread(read_mission_file, body, name)
-    except MissionFileError as error:
-        raise HTTPException(HTTPStatus.UNPROCESSABLE_ENTITY, str(error)) from error
-    if len(items) > MAX_ROWS:
-        raise HTTPException(HTTPStatus.UNPROCESSABLE_ENTITY, f"{name} has {len(items)} items; the limit is {MAX_ROWS}.")
-    if not items:
-        raise HTTPException(HTTPStatus.UNPROCESSABLE_ENTITY, f"{name} has no items: choose another file.")
-    return items
+    """The file's name and contents."""

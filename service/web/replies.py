@@ -1,16 +1,29 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Numbers in paths, JSON responses, and the store's errors as refusals."""
+"""Bodies of requests, numbers in paths, JSON responses, and the store's errors as refusals."""
 
 from collections.abc import Awaitable
 from http import HTTPStatus
 
 from starlette.exceptions import HTTPException
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
 
 from payloads.mission_data import MOST, Json, to_json
 from service.daemon.client import ControlError
 from storage.store_error import StoreError
+
+#: A page of another site cannot send this type without a preflight request, which is refused.
+_CONTENT_TYPE = "application/octet-stream"
+
+
+async def received_body(request: Request) -> bytes:
+    """The body. A slow phone takes seconds to send it."""
+    if request.headers.get("content-type") != _CONTENT_TYPE:
+        raise HTTPException(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, f"Send the data as {_CONTENT_TYPE}.")
+    try:
+        return await request.body()
+    except ClientDisconnect as error:
+        raise HTTPException(HTTPStatus.BAD_REQUEST, "The data was not received completely.") from error
 
 
 def path_number(request: Request, name: str) -> int:

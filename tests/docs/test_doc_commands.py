@@ -194,7 +194,8 @@ def test_a_command_of_another_program_names_what_exists(command: Command) -> Non
             extras = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]["optional-dependencies"]
             assert word.removeprefix("naze-bridge[").rstrip("]") in extras
         if program in {"systemctl", "journalctl", "apt"} and word.startswith("naze"):
-            assert (REPOSITORY / "systemd" / f"{word}.service").exists()
+            unit = word.replace("@*", "@")
+            assert (REPOSITORY / "systemd" / (unit if "." in unit else f"{unit}.service")).exists()
         if program == "nmcli" and word.startswith("naze"):
             assert word == CONNECTION
 

@@ -46,11 +46,17 @@ class WebBench:
         """Send a request until the server accepts it; tests send more than a page does."""
         return until(lambda: self.ask_once(path, method, **headers), "an answer")
 
+    def post(self, path: str, body: bytes, **headers: str) -> Answer:
+        return until(lambda: self._ask_once(path, "POST", body, headers), "an answer")
+
     def ask_once(self, path: str, method: str = "GET", **headers: str) -> Answer | None:
         """Send a request; None if the server is at its connection limit."""
+        return self._ask_once(path, method, None, headers)
+
+    def _ask_once(self, path: str, method: str, body: bytes | None, headers: dict[str, str]) -> Answer | None:
         connection = HTTPConnection("127.0.0.1", self.port, timeout=TIMEOUT_S)
         try:
-            connection.request(method, path, None, headers)
+            connection.request(method, path, body, headers)
             response = connection.getresponse()
             return Answer(response.status, response.headers, response.read())
         except ConnectionError:

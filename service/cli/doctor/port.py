@@ -117,7 +117,7 @@ def check_console(host: Host, fc: FcAddress) -> Checked | None:
     elif named := words.search(host.read("/proc/cmdline")):
         found.append(f"the kernel was started with {named[0]}")
         by_hand = "remove that word from the boot loader's command line, and reboot"
-        remedies.append(by_hand if file is None else "sudo reboot")
+        remedies.append(by_hand if file is None else "sudo naze-bridge setup && sudo reboot")
         fix = fix if remedies[:-1] else reboot
     if not found:
         return ok("console", f"no login console on {device}")

@@ -12,7 +12,7 @@ from service.cli.doctor.fixes import REBOOT, RESTART
 from service.cli.doctor.machine import EPOCH, SET_BY_HAND
 from service.cli.helper.action import HelperRefusal, ThisPi
 from service.cli.helper.packages import MAX_PACKAGE, PREVIOUS, receive, start_update, update_outcome, version_of
-from service.cli.helper.page_settings import change_settings, settings_in_force
+from service.cli.helper.page_settings import change_settings, known_settings, settings_in_force
 from service.cli.setup.answers import SetupChoices, current_key, earlier_choices, shadowed
 from service.cli.setup.change import Change, Machine, Run, Step, WriteFile
 from service.cli.setup.command import check_answers
@@ -52,6 +52,7 @@ class Overview:
             "previous": version_of(host.path(PREVIOUS), Machine(host)),
             "update": update_outcome(host),
             "settings": settings_in_force(host),
+            "keys": known_settings(),
         }
 
 

@@ -31,6 +31,12 @@ def settings_in_force(host: Host) -> Json:
     }
 
 
+def known_settings() -> list[Json]:
+    """The table of all settings, as the page shows it."""
+    shown = ("name", "meaning", "default", "example", "is_live")
+    return [{name: getattr(key, name) for name in shown} for key in KEYS]
+
+
 def change_settings(pi: ThisPi, values: Mapping[str, object]) -> Json:
     """Write the settings, if all files together can then be used. A value is text as in the file; None: the default."""
     host = pi.host

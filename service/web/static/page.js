@@ -11,6 +11,8 @@ import { MapView } from "./map_view.js";
 import { followFile } from "./mission_file.js";
 import { showMissions } from "./missions.js";
 import { showOverview } from "./overview.js";
+import "./pi.js";
+import { showWires } from "./pi_doctor.js";
 import { showProfile } from "./profile.js";
 import { showSettings } from "./settings.js";
 import { showStateBar } from "./state_bar.js";
@@ -35,6 +37,7 @@ async function look() {
     document.body.classList.remove("stale");
     showStateBar(state, null);
     showOverview(state);
+    showWires(state);
     followWrites(state, askedAt);
     followFile(state);
     await showHeld(state);

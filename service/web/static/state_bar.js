@@ -49,7 +49,7 @@ function headline(state) {
 }
 
 // What the wires tell while no frame arrives. Between two states the search listens at one or two speeds.
-function evidence({ bytes_received }) {
+export function evidence({ bytes_received }) {
   const arrives = heard !== null && bytes_received > heard.bytes;
   if (heard === null || bytes_received !== heard.bytes || performance.now() - heard.at > LISTEN_MS) heard = { bytes: bytes_received, at: performance.now(), arrives };
   return heard.arrives ? "bytes arrive, but no frames. Is the speed right, and MSP on at this UART?" : "silence. Check power, TX to RX, RX to TX, and GND.";

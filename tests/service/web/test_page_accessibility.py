@@ -1,36 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """axe-core's accessibility checks of the page in each state, on a laptop and a phone, light and dark."""
 
-import importlib.util
-from pathlib import Path
-
 import pytest
 
-from tests.support.chromium import LAPTOP, PHONE, Browser, Browsers
+from tests.support.axe import violations
+from tests.support.chromium import LAPTOP, PHONE, Browsers
 from tests.support.plan import plain_plan
 from tests.support.programs import until
 from tests.support.web_bench import EXAMPLE, WebBench
 
 pytest_plugins = ("tests.support.web_fixtures",)
-
-
-def axe_core() -> str:
-    found = importlib.util.find_spec("axe_playwright_python")
-    assert found is not None
-    assert found.origin is not None
-    return (Path(found.origin).parent / "axe.min.js").read_text()
-
-
-def violations(page: Browser) -> list[str]:
-    page.run(axe_core())
-    # Also the rules that are off by default: enhanced contrast, the size of targets, experimental ones.
-    run = """
-        const done = arguments[arguments.length - 1];
-        const rules = Object.fromEntries(axe.getRules().map((rule) => [rule.ruleId, { enabled: true }]));
-        axe.run({ rules }).then((result) => done(result.violations.flatMap(
-          (found) => found.nodes.map((node) => `${found.id}: ${node.html} ${node.failureSummary}`))));"""
-    found: list[str] = page.driver.execute_async_script(run)
-    return found
 
 
 @pytest.mark.parametrize(("size", "dark"), [(LAPTOP, False), (PHONE, True)])

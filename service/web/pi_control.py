@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The page's requests about the Pi itself: carried out by the root helper (service.cli.helper).
+
+GET  /api/pi                             the request begun last, and its reply
+POST /api/pi                             the body is a request to the helper: begin it
+POST /api/pi/package?start=N             the body is a piece of a package: kept for the request "install"
+GET  /api/log?after=N                    the daemon's log lines after the first N
+
+All need the token, and a browser on the Pi's own network. Every change is refused while the craft is armed.
+"""
+
+import asyncio
+import ipaddress
+import json
+import secrets
+from collections.abc import Iterator
+from http import HTTPStatus
+from pathlib import Path
+
+import structlog
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import Route
+
+from payloads.mission_data import Json
+from service.daemon.daemon import Daemon
+from service.machine.helper_socket import HelperError, ask_helper
+from service.machine.log_setup import recent_lines
+from service.web.access import MAX_FILE, check_token, guarded
+from service.web.replies import begun, json_reply, received_body, whole
+from service.web.token import Token, TokenError
+from storage.os_error import reason
+
+_MAX_REQUEST = 64 << 10
+#: As the helper's own limit; this one keeps the disk from filling up.
+_MAX_PACKAGE = 128 << 20
+_PACKAGE_FILE = "update.deb"
+_PIECE = 1 << 16
+_CHANGE_NOTHING = ("overview", "doctor")
+_ELSEWHERE = "The Pi can be changed only from its own network: its hotspot, or the network that it has joined."
+_NOT_NEXT = "This piece does not follow the one before, or the package is too long: begin again."
+_ARMED = "The craft is armed: disarm it first."
+_log = structlog.get_logger()
+
+
+def is_local(peer: str) -> bool:
+    """True for an address of a private network or of this machine."""
+    address = ipaddress.ip_address(peer.partition("%")[0])
+    if isinstance(address, ipaddress.IPv6Address) and address.ipv4_mapped is not None:
+        address = address.ipv4_mapped
+    return address.is_private or address.is_link_local or address.is_loopback
+
+
+class PiControl:
+    """One request at a time. Its reply is fetched later: it may take longer than a connection lasts."""
+
+    def __init__(self, daemon: Daemon, token: Token | TokenError) -> None:
+        self._daemon = daemon
+        self._token = token
+        self._task: asyncio.Task[None] | None = None
+        self._job: Json = {"id": None, "done": True}
+
+    def routes(self) -> list[Route]:
+        """The table above."""
+        return [
+            Route("/api/pi", guarded(self._show), methods=["GET"]),
+            Route("/api/pi", guarded(self._begin, _MAX_REQUEST), methods=["POST"]),
+            Route("/api/pi/package", guarded(self._keep, MAX_FILE), methods=["POST"]),
+            Route("/api/log", guarded(self._read_log), methods=["GET"]),
+        ]
+
+    async def close(self) -> None:
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.gather(self._task, return_exceptions=True)
+
+    async def _show(self, request: Request) -> Response:
+        self._check(request)
+        return json_reply(self._job)
+
+    async def _begin(self, request: Request) -> Response:
+        self._check(request)
+        try:
+            asked = json.loads(await received_body(request))
+            action = str(asked["action"])
+        except (ValueError, TypeError, KeyError, RecursionError) as error:
+            raise HTTPException(HTTPStatus.UNPROCESSABLE_ENTITY, "Send a request with an action as JSON.") from error
+        if action not in _CHANGE_NOTHING:
+            self._check_disarmed()
+        if self._task is not None and not self._task.done():
+            raise HTTPException(HTTPStatus.CONFLICT, "Another change is being made: wait until it has finished.")
+        job: Json = {"id": secrets.token_hex(8), "action": action, "done": False}
+        self._job = job
+        peer = None if request.client is None else request.client.host
+        _log.info("web.pi_request", action=action, peer=peer)
+        self._task = asyncio.get_running_loop().create_task(self._run(asked, job))
+        return begun(str(job["id"]))
+
+    async def _run(self, asked: Json, job: Json) -> None:
+        try:
+            if asked["action"] == "install":
+                job["reply"] = await self._install()
+            else:
+                job["reply"] = await ask_helper(asked)
+        except HelperError as error:
+            job["error"] = str(error)
+        except OSError as error:
+            job["error"] = f"The package cannot be read: {reason(error)}."
+        except Exception:
+            job["error"] = "The daemon failed; see its log."
+            _log.exception("web.failed", path="/api/pi")
+        finally:
+            job["done"] = True
+
+    async def _install(self) -> Json:
+        path = self._package()
+        size = path.stat().st_size
+        try:
+            return await ask_helper({"action": "install", "size": size}, _pieces(path))
+        finally:
+            path.unlink()
+
+    async def _keep(self, request: Request) -> Response:
+        self._check(request)
+        self._check_disarmed()
+        start, piece = whole(request.query_params.get("start", "0")), await received_body(request)
+        path = self._package()
+        try:
+            size = await asyncio.to_thread(_append, path, start, piece)
+        except FileNotFoundError as error:
+            raise HTTPException(HTTPStatus.CONFLICT, _NOT_NEXT) from error
+        except OSError as error:
+            raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, f"It cannot be stored: {reason(error)}.") from error
+        return json_reply({"size": size})
+
+    async def _read_log(self, request: Request) -> Response:
+        self._check(request)
+        count, lines = recent_lines(whole(request.query_params.get("after", "0")))
+        return json_reply({"count": count, "lines": [line._asdict() for line in lines]})
+
+    def _package(self) -> Path:
+        state_dir = self._daemon.settings.state_dir
+        if state_dir is None:
+            raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, "There is no state directory for the package.")
+        return state_dir / _PACKAGE_FILE
+
+    def _check(self, request: Request) -> None:
+        if request.client is None or not is_local(request.client.host):
+            raise HTTPException(HTTPStatus.FORBIDDEN, _ELSEWHERE)
+        check_token(request, self._token)
+
+    def _check_disarmed(self) -> None:
+        # A craft that was lost while armed may still fly.
+        if self._daemon.report().last_heard.armed:
+            raise HTTPException(HTTPStatus.CONFLICT, _ARMED)
+
+
+def _append(path: Path, start: int, piece: bytes) -> int:
+    """Append a piece that follows the ones before; FileNotFoundError if it does not. Returns the size so far."""
+    if start == 0:
+        path.write_bytes(b"")
+    if start != path.stat().st_size or start + len(piece) > _MAX_PACKAGE:
+        raise FileNotFoundError
+    with path.open("ab") as file:
+        file.write(piece)
+    return start + len(piece)
+
+
+def _pieces(path: Path) -> Iterator[bytes]:
+    with path.open("rb") as file:
+        while piece := file.read(_PIECE):
+            yield piece

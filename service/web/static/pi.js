@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The Pi itself: opened with the token, because the answers come from its root helper.
+import { byId, make } from "./dom.js";
+import { answersPanel } from "./pi_answers.js";
+import { doctorPanel } from "./pi_doctor.js";
+import { logPanel } from "./pi_log.js";
+import { aftermath, askPi, pressed, say, stepList } from "./pi_request.js";
+import { settingsPanel } from "./pi_settings.js";
+import { updatePanel } from "./pi_update.js";
+import { tokenField } from "./token.js";
+
+const result = make("p", { class: "result", role: "status" });
+const button = make("button", {}, "Open");
+const panels = make("div", { class: "panels" });
+
+byId("pi").append(make("form", { class: "row", onsubmit: (event) => {
+  event.preventDefault();
+  open();
+} }, tokenField(), button, result), panels);
+
+async function open() {
+  await pressed(button, result, async () => {
+    const pi = await askPi({ action: "overview" });
+    panels.replaceChildren(summary(pi), answersPanel(pi, open), doctorPanel(), settingsPanel(pi, open), logPanel(), updatePanel(pi), last(pi));
+    return "";
+  });
+}
+
+function summary(pi) {
+  const hotspot = pi.hotspot === null ? "no hotspot" : `hotspot ${pi.hotspot} ${pi.hotspot_is_open ? "open" : "closed"}`;
+  const key = pi.has_key ? "a key is required for changes" : "no key: anyone on the network can change missions";
+  const update = pi.update ? [make("p", {}, `Last update: ${pi.update}`)] : [];
+  return make("div", {}, make("p", {}, [pi.model ?? "Not a known Raspberry Pi", pi.name, hotspot, key].filter(Boolean).join(", ")), ...update);
+}
+
+// The buttons that interrupt something.
+function last({ hotspot, hotspot_is_open: isOpen, can_undo: canUndo }) {
+  const said = make("p", { class: "result", role: "status" });
+  const plan = make("div");
+  const act = (text, request, note) => {
+    const each = make("button", { type: "button", onclick: () => pressed(each, said, async () => aftermath(await askPi(request)) + note) }, text);
+    return each;
+  };
+  const undo = make("button", { type: "button", onclick: () => pressed(undo, said, () => showUndo(plan, said)) }, "Undo the last change …");
+  undo.disabled = !canUndo;
+  const note = isOpen ? " This phone must join the Pi's other network." : " Join the hotspot within 3 minutes, or the Pi returns to this network.";
+  const hotspots = hotspot === null ? [] : [act(isOpen ? "Close the hotspot" : "Open the hotspot", { action: "hotspot", on: !isOpen }, note)];
+  return make("div", {}, make("div", { class: "row" }, undo, ...hotspots, act("Restart the bridge", { action: "restart" }, " The page returns in a few seconds."),
+    act("Restart the Pi", { action: "restart", machine: true }, " The page returns in about a minute."), said), plan);
+}
+
+async function showUndo(plan, said) {
+  const trial = await askPi({ action: "undo", is_trial: true });
+  const confirm = make("button", { type: "button", onclick: () => pressed(confirm, said, async () => {
+    const text = aftermath(await askPi({ action: "undo" }));
+    plan.replaceChildren();
+    return text;
+  }) }, "Undo this");
+  const kept = trial.kept.map((file) => make("li", {}, `${file} was changed since, and is kept as it is`));
+  plan.replaceChildren(stepList(trial.steps), make("ul", {}, ...kept), confirm);
+  say(said, "", "");
+}

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// An update from a file. A connection to the Pi is short, so the package is sent in pieces.
+import { tell } from "./daemon.js";
+import { make } from "./dom.js";
+import { askPi, pressed, say } from "./pi_request.js";
+import { currentToken } from "./token.js";
+
+const PIECE = 256 * 1024, MOST_BYTES = 128 * 1024 * 1024;
+const LATER = "The bridge restarts during the installation, which takes some minutes. Then open this again to see the result.";
+
+export function updatePanel({ version, previous }) {
+  const result = make("p", { class: "result", role: "status" });
+  const bar = make("progress", { hidden: "", "aria-label": "Package sent" });
+  const file = make("input", { type: "file", accept: ".deb" });
+  const send = make("button", {}, "Install");
+  const form = make("form", { class: "row", onsubmit: (event) => {
+    event.preventDefault();
+    pressed(send, result, () => install(file.files[0], bar, result));
+  } }, make("label", {}, "Package (.deb) ", file), send, bar, result);
+  const back = make("button", { type: "button", onclick: () => pressed(back, result, async () => {
+    await askPi({ action: "downgrade" });
+    return LATER;
+  }) }, `Back to version ${previous}`);
+  return make("details", {}, make("summary", {}, "Update"), make("p", {}, `This is version ${version}. A version that does not run is replaced by this one again.`), form, ...(previous ? [back] : []));
+}
+
+async function install(file, bar, result) {
+  if (!file) throw new Error("Choose a package first.");
+  if (file.size > MOST_BYTES) throw new Error(`${file.name} is larger than ${MOST_BYTES >> 20} MB, so it is not the package of naze-bridge.`);
+  Object.assign(bar, { hidden: false, max: file.size, value: 0 });
+  try {
+    for (let start = 0; start < file.size; start += PIECE) {
+      await tell(`/api/pi/package?start=${start}`, currentToken(), file.slice(start, start + PIECE));
+      bar.value = start + PIECE;
+    }
+    say(result, "", "Checking the package …");
+    const { version } = await askPi({ action: "install" });
+    return `Installing version ${version}. ${LATER}`;
+  } finally {
+    bar.hidden = true;
+  }
+}

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the page does for the Pi itself: first questions, doctor's remedies, settings, log, update, undo."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from service.cli.setup.answers import KEY_FILE, SETTINGS_FILE
+from tests.service.cli.helper.test_actions import console
+from tests.service.cli.helper.test_packages import packed
+from tests.support.axe import violations
+from tests.support.chromium import PHONE, Browser, Browsers
+from tests.support.fixable_pi import FixablePi
+from tests.support.helper_bench import helper_bench
+from tests.support.programs import until
+from tests.support.web_bench import WebBench
+
+pytest_plugins = ("tests.support.web_fixtures",)
+
+
+@pytest.fixture
+def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[WebBench, FixablePi]]:
+    with helper_bench(tmp_path, monkeypatch) as both:
+        yield both
+
+
+def opened(page: Browser, web: WebBench) -> None:
+    """Open the part for the Pi with the token from the address."""
+    page.driver.get("about:blank")  # otherwise another token in the address loads nothing
+    page.driver.get(f"{page.url}#token={web.token}")
+    page.wait_for_updates(1)
+    page.press("#pi form button")
+    page.wait_text("#pi", "Raspberry Pi 4 Model B, kite")
+
+
+def press(page: Browser, text: str) -> None:
+    """Press the button with this text once it can be pressed."""
+    find = """
+        const button = [...document.querySelectorAll("#pi button")].find((each) => each.textContent === arguments[0]);
+        if (!button || button.disabled) return false;
+        button.scrollIntoView({ block: "center" });
+        button.click();
+        return true;"""
+    until(lambda: page.run(find, text), f"the button {text}")
+
+
+def unfold(page: Browser, title: str) -> None:
+    page.run(
+        "[...document.querySelectorAll('#pi summary')].find((each) => each.textContent === arguments[0]).click()", title
+    )
+
+
+def fill(page: Browser, name: str, text: str) -> None:
+    field = page.find(f"#pi [name='{name}']")
+    field.clear()
+    field.send_keys(text)
+
+
+def fits_a_phone(page: Browser) -> bool:
+    return bool(page.run("return document.documentElement.scrollWidth") <= PHONE[0])
+
+
+def test_first_questions_remedies_settings_log_and_undo(browsers: Browsers, bench: tuple[WebBench, FixablePi]) -> None:
+    web, pi = bench
+    with browsers.tab(web.port, PHONE) as page:
+        opened(page, web)
+        assert page.run("return document.querySelector('#pi details[open] summary').textContent") == "First questions"
+        fill(page, "fc", "sim")
+        fill(page, "hotspot", "field")
+        fill(page, "password", "long-enough")
+        fill(page, "country", "DE")
+        page.press("#pi [name='new_key']")
+        press(page, "Show the changes")
+        page.wait_text("#pi", "open the Wi-Fi hotspot 'field'")
+        page.wait_text("#pi", "Join it within 3 minutes")
+        assert not pi.path(SETTINGS_FILE).exists()
+        assert violations(page) == []
+        press(page, "Make these changes")
+        page.wait_text("#pi", "The key, for ground stations")
+        assert page.text("#pi .secret") == pi.read(KEY_FILE).strip()
+        assert 'fc = "sim:"' in pi.read(SETTINGS_FILE)
+
+        opened(page, web)
+        console(pi)
+        unfold(page, "Check")
+        page.wait_text("#wires", "answers at 115200 baud")
+        press(page, "Check now")
+        page.wait_text("#pi .findings", "problem console")
+        assert fits_a_phone(page)
+        assert violations(page) == []
+        press(page, "Fix it: free the UART from the login console")
+        page.wait_text("#pi", "Restart the Pi for this to take effect")
+        page.wait_text("#pi .findings", "ok console")
+        assert "console=serial0" not in pi.read("/boot/firmware/cmdline.txt")
+
+        unfold(page, "Settings of the bridge")
+        fill(page, "sysid", "900")
+        press(page, "Save the settings")
+        page.wait_text("#pi", "sysid is 900")
+        fill(page, "sysid", "9")
+        assert violations(page) == []
+        press(page, "Save the settings")
+        until(lambda: "sysid = 9" in pi.read("/etc/naze-bridge/page.toml"), "the saved setting")
+        until(lambda: page.run("return !document.querySelector('#pi details[open]')"), "the refreshed panels")
+        assert not page.find("#pi [name='fc'][autocomplete='off']").get_property("disabled")
+
+        unfold(page, "Log")
+        page.wait_text("#pi .log", "web.pi_request")
+        assert violations(page) == []
+        assert fits_a_phone(page)
+
+        press(page, "Undo the last change …")
+        page.wait_text("#pi", "remove /etc/naze-bridge/page.toml")
+        press(page, "Undo this")
+        until(lambda: not pi.path("/etc/naze-bridge/page.toml").exists(), "the undone setting")
+
+        web.board.set("unplug")  # type: ignore[union-attr]
+        page.wait_text("#badges", "LOST")
+        assert page.errors() == []
+
+
+def test_a_setting_of_another_file_is_shown_with_its_place(
+    browsers: Browsers, bench: tuple[WebBench, FixablePi]
+) -> None:
+    web, pi = bench
+    pi.write("/etc/naze-bridge/config.toml", "sysid = 3\n")
+    with browsers.tab(web.port, PHONE) as page:
+        opened(page, web)
+        unfold(page, "Settings of the bridge")
+        page.wait_text("#pi", "Set in /etc/naze-bridge/config.toml:1: change it there.")
+        assert page.find("#pi [name='sysid']").get_property("disabled")
+
+
+def test_an_update_from_a_file(
+    browsers: Browsers, bench: tuple[WebBench, FixablePi], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    web, _ = bench
+    received: list[int] = []
+
+    def receive(pi: object, size: int) -> str:
+        received.append(size)
+        return "9.9"
+
+    monkeypatch.setattr("service.cli.helper.actions.receive", receive)
+    package = packed(tmp_path)
+    with browsers.tab(web.port, PHONE) as page:
+        opened(page, web)
+        unfold(page, "Update")
+        press(page, "Install")
+        page.wait_text("#pi", "Choose a package first.")
+        page.find("#pi input[type='file']").send_keys(str(package))
+        press(page, "Install")
+        page.wait_text("#pi", "Installing version 9.9.")
+        assert received == [package.stat().st_size]
+        assert violations(page) == []
+
+
+def test_a_wrong_token(browsers: Browsers, bench: tuple[WebBench, FixablePi]) -> None:
+    web, _ = bench
+    with browsers.tab(web.port, PHONE) as page:
+        page.open()
+        page.find("#pi input").send_keys("wrong")
+        page.press("#pi form button")
+        page.wait_text("#pi", "Wrong token")
+        assert violations(page) == []
