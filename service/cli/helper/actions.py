@@ -30,7 +30,7 @@ _LATEST = datetime(2100, 1, 1, tzinfo=UTC)
 
 
 @dataclass(frozen=True, slots=True)
-class Overview:
+class PiOverview:
     """The answers to setup so far, the settings, and what can be undone. Changes nothing."""
 
     def carry_out(self, pi: ThisPi) -> Json:
@@ -208,7 +208,7 @@ def _examine(pi: ThisPi) -> list[tuple[Json, Step | None]]:
 
 #: Everything that the helper does.
 ACTIONS = {
-    "overview": Overview,
+    "overview": PiOverview,
     "doctor": Doctor,
     "fix": ApplyFix,
     "answer": Answer,

@@ -7,9 +7,10 @@ import { currentToken } from "./token.js";
 const PAUSE_MS = 2000, MOST_LINES = 300;
 
 export function logPanel() {
-  const lines = make("ol", { class: "scrolls log", tabindex: 0, role: "region", "aria-label": "Log of the bridge" });
+  const lines = make("ol");
+  const box = make("div", { class: "scrolls log", tabindex: 0, role: "region", "aria-label": "Log of the bridge" }, lines);
   let next = 0;
-  const panel = make("details", { ontoggle: () => panel.open && follow() }, make("summary", {}, "Log"), make("p", {}, "The latest events first; times in UTC."), lines);
+  const panel = make("details", { ontoggle: () => panel.open && follow() }, make("summary", {}, "Log"), make("p", {}, "The latest events first; times in UTC."), box);
 
   async function follow() {
     while (panel.open && panel.isConnected) {

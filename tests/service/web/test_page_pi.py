@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from service.cli.setup.answers import KEY_FILE, SETTINGS_FILE
-from tests.service.cli.helper.test_actions import console
+from tests.service.cli.doctor.test_fixes import console
 from tests.service.cli.helper.test_packages import packed
 from tests.support.axe import violations
 from tests.support.chromium import PHONE, Browser, Browsers
@@ -66,20 +66,17 @@ def test_first_questions_remedies_settings_log_and_undo(browsers: Browsers, benc
     with browsers.tab(web.port, PHONE) as page:
         opened(page, web)
         assert page.run("return document.querySelector('#pi details[open] summary').textContent") == "First questions"
-        fill(page, "fc", "sim")
         fill(page, "hotspot", "field")
         fill(page, "password", "long-enough")
         fill(page, "country", "DE")
-        page.press("#pi [name='new_key']")
         press(page, "Show the changes")
         page.wait_text("#pi", "open the Wi-Fi hotspot 'field'")
         page.wait_text("#pi", "Join it within 3 minutes")
         assert not pi.path(SETTINGS_FILE).exists()
         assert violations(page) == []
         press(page, "Make these changes")
-        page.wait_text("#pi", "The key, for ground stations")
-        assert page.text("#pi .secret") == pi.read(KEY_FILE).strip()
-        assert 'fc = "sim:"' in pi.read(SETTINGS_FILE)
+        page.wait_text("#pi", "The Wi-Fi changes in a few seconds.")
+        assert 'listen = "0.0.0.0:8080"' in pi.read(SETTINGS_FILE)
 
         opened(page, web)
         console(pi)
@@ -114,6 +111,14 @@ def test_first_questions_remedies_settings_log_and_undo(browsers: Browsers, benc
         page.wait_text("#pi", "remove /etc/naze-bridge/page.toml")
         press(page, "Undo this")
         until(lambda: not pi.path("/etc/naze-bridge/page.toml").exists(), "the undone setting")
+
+        unfold(page, "Setup")
+        page.press("#pi [name='new_key']")
+        press(page, "Show the changes")
+        press(page, "Make these changes")
+        page.wait_text("#pi", "The key, for ground stations")
+        assert page.text("#pi .secret") == pi.read(KEY_FILE).strip()
+        assert violations(page) == []
 
         web.board.set("unplug")  # type: ignore[union-attr]
         page.wait_text("#badges", "LOST")

@@ -4,7 +4,7 @@
 import pytest
 
 from service.cli.helper.action import HelperRefusal, parse_action
-from service.cli.helper.actions import ACTIONS, Answer, ApplyFix, Overview
+from service.cli.helper.actions import ACTIONS, Answer, ApplyFix, PiOverview
 
 
 @pytest.mark.parametrize(
@@ -40,6 +40,6 @@ def test_a_number_is_not_a_truth_value() -> None:
 
 
 def test_requests_that_fit() -> None:
-    assert parse_action(b'{"action": "overview"}', ACTIONS) == Overview()
+    assert parse_action(b'{"action": "overview"}', ACTIONS) == PiOverview()
     assert parse_action(b'{"action": "fix", "fix": "restart the Pi"}\n', ACTIONS) == ApplyFix("restart the Pi")
     assert parse_action(b'{"action": "answer", "fc": "sim"}', ACTIONS) == Answer(fc="sim")
