@@ -21,7 +21,7 @@ class HelperRefusal(Exception):
     """A request that is not carried out; one sentence."""
 
 
-class PatientMachine(Machine):
+class DeferredRestarts(Machine):
     """Restarts the bridge or the Pi only after the reply."""
 
     def run(self, command: Sequence[str], timeout_s: float = 60) -> str:
@@ -39,11 +39,11 @@ class ThisPi:
 
     def make(self, steps: Sequence[Step]) -> Json:
         """Make the changes; setup's --undo and the page's revert them."""
-        return self._carry_out(steps, UndoLog(self.host, PatientMachine(self.host)))
+        return self._carry_out(steps, UndoLog(self.host, DeferredRestarts(self.host)))
 
     def make_for_good(self, steps: Sequence[Step]) -> Json:
         """Make changes that are no part of the setup."""
-        return self._carry_out(steps, PatientMachine(self.host))
+        return self._carry_out(steps, DeferredRestarts(self.host))
 
     def _carry_out(self, steps: Sequence[Step], machine: Machine | UndoLog) -> Json:
         for step in steps:
