@@ -115,7 +115,7 @@ def update(package: Path, host: Host, machine: Machine, sleep: Callable[[float],
             return f"Version {version} was installed; before it was {former}."
         why = "the bridge did not start with it"
     except SetupError as error:
-        why = str(error)
+        why = f"apt failed: {str(error).rpartition(' failed: ')[2]}"  # without its long command
     finally:
         installing.unlink()
     machine.run((*_APT, str(kept)), _TIMEOUT_S)
