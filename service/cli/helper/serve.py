@@ -7,7 +7,7 @@ import pwd
 import socket
 import struct
 from collections.abc import Container, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import click
@@ -22,7 +22,7 @@ from storage.os_error import reason
 
 _USER = "naze-bridge"
 _LOCK = Path("/run/naze-bridge-helper/lock")
-_MAX_REQUEST = 1 << 16
+_MAX_REQUEST = _PIECE = 1 << 16
 #: Between two pieces of an upload.
 _TIMEOUT_S = 30.0
 
@@ -35,6 +35,10 @@ def answer(connection: socket.socket, pi: ThisPi, users: Container[int], lock: P
     else:
         reply = _carry_out(pi, lock)
     connection.sendall(to_json(reply).encode() + b"\n")
+    # Closed with a part of the body unread, the connection would be reset, and the reply lost.
+    with suppress(OSError):
+        while pi.body.read(_PIECE):
+            pass
 
 
 def _carry_out(pi: ThisPi, lock: Path) -> Json:

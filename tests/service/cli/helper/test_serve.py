@@ -24,6 +24,7 @@ def served(pi: FixablePi, lock: Path, request: bytes, user: int | None = None) -
     ours, theirs = socket.socketpair()
     with ours, theirs, theirs.makefile("rb") as body:
         ours.sendall(request + b"\n")
+        ours.shutdown(socket.SHUT_WR)
         answer(theirs, ThisPi(pi, body), {os.geteuid() if user is None else user}, lock)
         line = ours.recv(1 << 20)
     assert line.endswith(b"\n")
@@ -60,3 +61,8 @@ def test_one_change_at_a_time(pi: FixablePi, lock: Path) -> None:
         assert "Another change" in served(pi, lock, b'{"action": "restart"}')["error"]
     assert pi.ran == []
     assert "error" not in served(pi, lock, b'{"action": "restart"}')
+
+
+def test_a_refusal_arrives_although_the_body_was_not_read(pi: FixablePi, lock: Path) -> None:
+    request = b'{"action": "install", "size": 0}\n' + bytes(100_000)
+    assert "at most 128 MB" in served(pi, lock, request)["error"]
