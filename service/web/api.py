@@ -79,7 +79,7 @@ class Api:
         self._files = MissionFiles(self._api, self._writer)
         self._settings = SettingsHistory(self._api.settings, self._writer, self._cache, token)
         self._firmware = FirmwareUpload(self._api.firmware, self._writer, token)
-        self._pi = PiControl(daemon, token)
+        self._pi = PiControl(daemon, self._writer, token)
         self._history = LinkHistory(daemon)
         self._track = FlownTrack(daemon)
         state_dir = daemon.settings.state_dir

@@ -43,13 +43,16 @@ class MissionWriter:
 
         unit: what `write` counts as its progress.
         """
-        if self._task is not None and not self._task.done():
-            raise HTTPException(HTTPStatus.CONFLICT, "Something else is being written: wait until it has finished.")
+        self.check_idle()
         state: Json = {"id": secrets.token_hex(8), "what": what, "records": 0, "unit": unit}
         state |= {"done": False, "ok": False, "text": ""}
         self.state = state
         self._task = asyncio.get_running_loop().create_task(self._run(write, state))
         return str(state["id"])
+
+    def check_idle(self) -> None:
+        if self._task is not None and not self._task.done():
+            raise HTTPException(HTTPStatus.CONFLICT, "Something else is being written: wait until it has finished.")
 
     async def close(self) -> None:
         """Stop waiting for the result; the daemon itself has ended the transfer."""
@@ -102,5 +105,18 @@ class MissionFiles:
 
 
 async def received(request: Request) -> tuple[str, bytes]:
-    """The file's name and contents. A slow phone takes seconds to send them."""
     """The file's name and contents."""
+    name = request.query_params.get("name", "")[-_MAX_NAME:] or "mission file"
+    return name, await received_body(request)
+
+
+async def _parsed(name: str, body: bytes) -> list[MissionItem]:
+    try:
+        items = await asyncio.to_thread(read_mission_file, body, name)
+    except MissionFileError as error:
+        raise HTTPException(HTTPStatus.UNPROCESSABLE_ENTITY, str(error)) from error
+    if len(items) > MAX_ROWS:
+        raise HTTPException(HTTPStatus.UNPROCESSABLE_ENTITY, f"{name} has {len(items)} items; the limit is {MAX_ROWS}.")
+    if not items:
+        raise HTTPException(HTTPStatus.UNPROCESSABLE_ENTITY, f"{name} has no items: choose another file.")
+    return items

@@ -6,7 +6,8 @@ POST /api/pi                             the body is a request to the helper: be
 POST /api/pi/package?start=N             the body is a piece of a package: kept for the request "install"
 GET  /api/log?after=N                    the daemon's log lines after the first N
 
-All need the token, and a browser on the Pi's own network. Every change is refused while the craft is armed.
+All need the token, and a browser on the Pi's own network. Every change is refused while the craft is armed, and while
+the page writes something to the flight controller.
 """
 
 import asyncio
@@ -28,6 +29,7 @@ from service.daemon.daemon import Daemon
 from service.machine.helper_socket import HelperError, ask_helper
 from service.machine.log_setup import recent_lines
 from service.web.access import MAX_FILE, check_token, guarded
+from service.web.mission_files import MissionWriter
 from service.web.replies import begun, json_reply, received_body, whole
 from service.web.token import Token, TokenError
 from storage.os_error import reason
@@ -55,8 +57,9 @@ def is_local(peer: str) -> bool:
 class PiControl:
     """One request at a time. Its reply is fetched later: it may take longer than a connection lasts."""
 
-    def __init__(self, daemon: Daemon, token: Token | TokenError) -> None:
+    def __init__(self, daemon: Daemon, writer: MissionWriter, token: Token | TokenError) -> None:
         self._daemon = daemon
+        self._writer = writer
         self._token = token
         self._task: asyncio.Task[None] | None = None
         self._job: Json = {"id": None, "done": True}
@@ -88,6 +91,7 @@ class PiControl:
             raise HTTPException(HTTPStatus.UNPROCESSABLE_ENTITY, "Send a request with an action as JSON.") from error
         if action not in _CHANGE_NOTHING:
             self._check_disarmed()
+            self._writer.check_idle()  # a restart would break off the flash of a firmware
         if self._task is not None and not self._task.done():
             raise HTTPException(HTTPStatus.CONFLICT, "Another change is being made: wait until it has finished.")
         job: Json = {"id": secrets.token_hex(8), "action": action, "done": False}

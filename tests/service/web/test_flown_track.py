@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from simulator.inav.boxes import BOXES, NAV_WP
-from tests.service.web.test_page_accessibility import violations
+from tests.support.axe import violations
 from tests.support.benches import Starter
 from tests.support.chromium import Browsers
 from tests.support.plan import plain_plan
