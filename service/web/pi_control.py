@@ -7,7 +7,7 @@ POST /api/pi/package?start=N             the body is a piece of a package: kept 
 GET  /api/log?after=N                    the daemon's log lines after the first N
 
 All need the token, and a browser on the Pi's own network. Every change is refused while the craft is armed, and while
-the page writes something to the flight controller.
+the page writes something to the flight controller or new firmware is flashed.
 """
 
 import asyncio
@@ -43,6 +43,7 @@ _CHANGE_NOTHING = ("overview", "doctor")
 _ELSEWHERE = "The Pi can be changed only from its own network: its hotspot, or the network that it has joined."
 _NOT_NEXT = "This piece does not follow the one before, or the package is too long: begin again."
 _ARMED = "The craft is armed: disarm it first."
+_FLASHING = "New firmware is being flashed: wait until it has finished."
 _log = structlog.get_logger()
 
 
@@ -90,8 +91,8 @@ class PiControl:
         except (ValueError, TypeError, KeyError, RecursionError) as error:
             raise HTTPException(HTTPStatus.UNPROCESSABLE_ENTITY, "Send a request with an action as JSON.") from error
         if action not in _CHANGE_NOTHING:
-            self._check_disarmed()
-            self._writer.check_idle()  # a restart would break off the flash of a firmware
+            self._check_changeable()
+            self._writer.check_idle()
         if self._task is not None and not self._task.done():
             raise HTTPException(HTTPStatus.CONFLICT, "Another change is being made: wait until it has finished.")
         job: Json = {"id": secrets.token_hex(8), "action": action, "done": False}
@@ -127,7 +128,7 @@ class PiControl:
 
     async def _keep(self, request: Request) -> Response:
         self._check(request)
-        self._check_disarmed()
+        self._check_changeable()
         start, piece = whole(request.query_params.get("start", "0")), await received_body(request)
         path = self._package()
         try:
@@ -154,10 +155,13 @@ class PiControl:
             raise HTTPException(HTTPStatus.FORBIDDEN, _ELSEWHERE)
         check_token(request, self._token)
 
-    def _check_disarmed(self) -> None:
+    def _check_changeable(self) -> None:
         # A craft that was lost while armed may still fly.
         if self._daemon.report().last_heard.armed:
             raise HTTPException(HTTPStatus.CONFLICT, _ARMED)
+        # A restart would break off the flash.
+        if self._daemon.fc.is_lent:
+            raise HTTPException(HTTPStatus.CONFLICT, _FLASHING)
 
 
 def _append(path: Path, start: int, piece: bytes) -> int:

@@ -1,15 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The page's requests about the Pi: with the token, from the Pi's own network, disarmed."""
 
+import asyncio
 import json
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
 
 from service.cli.helper import packages
-from service.web.pi_control import is_local
+from service.web.mission_files import MissionWriter
+from service.web.pi_control import PiControl, is_local
+from service.web.token import Token
 from tests.support.fixable_pi import FixablePi
 from tests.support.helper_bench import helper_bench
 from tests.support.programs import until
@@ -108,6 +114,34 @@ def test_nothing_is_changed_while_the_craft_is_armed(web: WebBench) -> None:
     finally:
         web.board.set("armed 0")
         until(lambda: web.state()["last_heard"]["armed"] is False, "the disarmed craft")
+
+
+def test_nothing_is_changed_while_firmware_is_flashed(tmp_path: Path) -> None:
+    report = SimpleNamespace(last_heard=SimpleNamespace(armed=False))
+    daemon: Any = SimpleNamespace(report=lambda: report, fc=SimpleNamespace(is_lent=True))
+    token = Token(tmp_path / "token")
+    control = PiControl(daemon, MissionWriter(), token)
+    begin = next(
+        route.endpoint for route in control.routes() if route.path == "/api/pi" and "POST" in (route.methods or ())
+    )
+    body = b'{"action": "restart"}'
+    head = {"host": "10.42.0.1", "authorization": f"Bearer {token.path.read_text()}", "content-length": str(len(body))}
+    head["content-type"] = _TYPE["Content-Type"]
+    scope = {
+        "type": "http",
+        "method": "POST",
+        "path": "/api/pi",
+        "query_string": b"",
+        "headers": [(name.encode(), value.strip().encode()) for name, value in head.items()],
+        "client": ("10.42.0.7", 4711),
+        "app": SimpleNamespace(state=SimpleNamespace(hosts=())),
+    }
+
+    async def receive() -> dict[str, Any]:
+        return {"type": "http.request", "body": body}
+
+    with pytest.raises(HTTPException, match="New firmware is being flashed"):
+        asyncio.run(begin(Request(scope, receive)))
 
 
 def test_a_package_in_pieces(web: WebBench, monkeypatch: pytest.MonkeyPatch) -> None:
