@@ -234,6 +234,12 @@ static int16_t short_cm(int32_t value)
     return (int16_t)constrain(value, -32767, 32767);
 }
 
+static uint8_t flags(void)
+{
+    return (uint8_t)((cfg.mission_fly ? 1 : 0) | (flight.switch_on ? 2 : 0) | (out.mode != NF_PASS ? 4 : 0) |
+                     (flight.battery_low ? 8 : 0));
+}
+
 int FlightRequest(uint8_t command, uint8_t *buffer, uint8_t size)
 {
     if (command != FLIGHT)
@@ -244,8 +250,7 @@ int FlightRequest(uint8_t command, uint8_t *buffer, uint8_t size)
         return REPLY_SIZE;
     }
     buffer[1] = NF_VERSION;
-    buffer[2] = (uint8_t)((cfg.mission_fly ? 1 : 0) | (flight.switch_on ? 2 : 0) | (out.mode != NF_PASS ? 4 : 0) |
-                          (flight.battery_low ? 8 : 0));
+    buffer[2] = flags();
     buffer[3] = (uint8_t)flight.state;
     buffer[4] = (uint8_t)flight.reason;
     buffer[5] = (uint8_t)out.mode;
@@ -263,6 +268,13 @@ bool FlightCurrent(uint16_t *record)
 {
     *record = flight.record;
     return out.mode != NF_PASS && flight.record != NF_NO_RECORD;
+}
+
+bool FlightSummary(int32_t *summary)
+{
+    const uint32_t record = flight.record < 0xFFu ? flight.record : 0xFFu;
+    *summary = (int32_t)((uint32_t)flight.state | (uint32_t)flight.reason << 8 | (uint32_t)flags() << 16 | record << 24);
+    return cfg.mission_fly || flight.switch_on;
 }
 
 bool FlightReached(uint16_t *record)

@@ -55,6 +55,12 @@ int FlightRequest(uint8_t command, uint8_t *buffer, uint8_t size);
 /* For MAVLink. The record in flight; false if there is none. */
 bool FlightCurrent(uint16_t *record);
 
+/*
+ * State, reason and flags as in the reply to FLIGHT, and the record in flight or left (FF: none), from the lowest byte. False
+ * while mission flight is off and its switch, too.
+ */
+bool FlightSummary(int32_t *summary);
+
 /* A record whose place was reached and has not been announced yet; false if there is none. */
 bool FlightReached(uint16_t *record);
 

@@ -7,10 +7,12 @@ kept as bytes until `settle`.
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
+from bridge.fc.mission_flight import flight_report
 from bridge.fc.msp_telemetry import velocity
 from bridge.model.flight_mode import MISSION_BOXES, FlightMode, active_boxes, flight_mode, names_of_active
-from bridge.model.mission_progress import FlightReport, Progress
+from bridge.model.mission_progress import FlightReport
 from bridge.model.vehicle import (
     Charge,
     Fix,
@@ -34,6 +36,7 @@ from protocols.mavlink.codec import MavlinkDecoder
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame
+from protocols.msp.mission_flight import SUMMARY, decode_summary
 from protocols.msp.telemetry import Sensor
 
 _HEARTBEAT = m.MAVLINK_MSG_ID_HEARTBEAT
@@ -84,7 +87,7 @@ class MavlinkTelemetry:
         }
         if is_harakiri:
             self._readers |= {
-                m.MAVLINK_MSG_ID_MISSION_CURRENT: self._mission_current,
+                m.MAVLINK_MSG_ID_NAMED_VALUE_INT: self._named_value_int,
                 m.MAVLINK_MSG_ID_MISSION_ITEM_REACHED: self._mission_item_reached,
             }
         #: Message id by the bytes of a frame's header that hold sender and message id.
@@ -166,22 +169,24 @@ class MavlinkTelemetry:
                 mode = by_switches
         self._vehicle.hear(Mode(heard_at, Source.MAVLINK, mode))
 
-    def _mission_current(self, message: Message, now: float) -> None:
-        """A Harakiri sends it while it flies the mission, each second; the last record reached is older."""
-        self._hear_flight(message.seq, self._reached(message.seq - 1, now), now)
-
-    def _mission_item_reached(self, message: Message, now: float) -> None:
-        flight = self._vehicle.mission_flight(now)
-        self._hear_flight(message.seq if flight is None else flight.number, message.seq, now)
-
-    def _reached(self, otherwise: int, now: float) -> int:
-        """The last record that this flight has reached; `otherwise` if it has just begun."""
-        leg, flight = self._vehicle.last(MissionLeg), self._vehicle.mission_flight(now)
-        return otherwise if flight is None or leg is None or leg.source is not Source.MAVLINK else flight.reached
-
-    def _hear_flight(self, number: int, reached: int, now: float) -> None:
-        report = FlightReport(number, reached, Progress.ACTIVE, is_flown=True)
+    def _named_value_int(self, message: Message, now: float) -> None:
+        """A Harakiri's report on its mission flight; the records reached have messages of their own."""
+        progress = decode_summary(message.value) if message.name == SUMMARY else None
+        if progress is None:
+            return
+        before = self._flight()
+        reached = before.reached if before is not None and before.number else max((progress.record or 0) - 1, 0)
+        report = replace(flight_report(replace(progress, reached=reached), before), way=None)
         self._vehicle.hear(MissionLeg(now, Source.MAVLINK, report))
+
+    def _mission_item_reached(self, message: Message, _now: float) -> None:
+        leg, flight = self._vehicle.last(MissionLeg), self._flight()
+        if leg is not None and flight is not None and flight.number:
+            self._vehicle.hear(MissionLeg(leg.heard_at, leg.source, replace(flight, reached=message.seq)))
+
+    def _flight(self) -> FlightReport | None:
+        leg = self._vehicle.last(MissionLeg)
+        return leg.report if leg is not None and isinstance(leg.report, FlightReport) else None
 
     def _attitude(self, message: Message, now: float) -> None:
         roll, pitch, yaw = map(math.degrees, (message.roll, message.pitch, message.yaw))

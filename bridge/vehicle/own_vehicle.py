@@ -314,6 +314,14 @@ class OwnVehicle:
         leg = self._session.vehicle.last(MissionLeg)
         if leg is None:
             return
+        if isinstance(leg.report, FlightReport) and leg.report.why != self._said_why:
+            self._said_why = leg.report.why
+            if self._said_why:
+                is_flown = leg.report.progress is Progress.COMPLETE
+                self._ground.say(Severity.NOTICE if is_flown else Severity.WARNING, self._said_why)
+        if self._missions.on_board is None:
+            # Until the list is read, no record has an item.
+            return
         before = self.progress.number, self.progress.progress
         reached = self.progress.take(leg.report)
         everyone = self._ground.everyone()
@@ -323,11 +331,6 @@ class OwnVehicle:
             for sent_seqs, stations in self._by_item_numbers(everyone):
                 number = (sent_seqs[seq] or 0) if sent_seqs else seq
                 self._ground.multicast(pack(make.mission_item_reached(number)), stations)
-        if isinstance(leg.report, FlightReport) and leg.report.why != self._said_why:
-            self._said_why = leg.report.why
-            if self._said_why:
-                is_flown = self.progress.progress is Progress.COMPLETE
-                self._ground.say(Severity.NOTICE if is_flown else Severity.WARNING, self._said_why)
 
     def _send_current(self, receivers: Sequence[GroundStation], now: float) -> None:
         for sent_seqs, stations in self._by_item_numbers(receivers):

@@ -230,8 +230,13 @@ static void test_sticks_and_a_lost_fix(void)
 static void test_landing_and_announcements(void)
 {
     uint16_t record;
+    int32_t summary;
+    cfg.mission_fly = 0;
+    CHECK(!FlightSummary(&summary));
+    cfg.mission_fly = 1;
     take_off_by_hand();
     loops(3);
+    CHECK(FlightSummary(&summary) && summary == (NF_LEG | 7 << 16 | 1 << 24));
     CHECK(FlightCurrent(&record) && record == 1 && !FlightReached(&record));
     Real_GPS_coord[LAT] = 450003000;
     loops(2);

@@ -2,7 +2,7 @@
 """Progress of a mission that the board flies: FLIGHT of Harakiri's mission extension (docs/msp-mission.md)."""
 
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 from protocols.msp.commands import Msp
@@ -14,6 +14,9 @@ _VERSION = 1
 _NO_RECORD = 0xFFFF
 _REPLY = struct.Struct("<6B3HIHhI")
 FLIGHT_SIZE = _REPLY.size
+#: The name of a NAMED_VALUE_INT in Harakiri's own MAVLink, with state, reason, flags and record in its four bytes.
+SUMMARY = "flight"
+_SIGNED, _NO_SHORT_RECORD = struct.Struct("<i"), 0xFF
 _IN_COMMAND, _BATTERY_LOW, _SWITCH_ON, _ENABLED = 4, 8, 2, 1
 
 
@@ -92,18 +95,30 @@ class FlightProgress:
     height_error: float = 0.0
     state_s: float = 0.0
 
-    def encode(self) -> bytes:
-        """The reply's payload."""
-        flags = (
+    @property
+    def _flags(self) -> int:
+        return (
             self.is_enabled * _ENABLED
             | self.switch_on * _SWITCH_ON
             | self.in_command * _IN_COMMAND
             | self.battery_low * _BATTERY_LOW
         )
+
+    @property
+    def summary(self) -> int:
+        """The value of Harakiri's MAVLink message SUMMARY."""
+        record = _NO_SHORT_RECORD if self.record is None else self.record
+        (summary,) = _SIGNED.unpack(bytes((self.state, self.reason, self._flags, record)))
+        return int(summary)
+
+    def encode(self) -> bytes:
+        """The reply's payload."""
         records = (_NO_RECORD if record is None else record for record in (self.record, self.reached))
         target = (round(self.distance * 100), round(self.bearing * 100), round(self.height_error * 100))
         state_ms = round(self.state_s * 1000)
-        return _REPLY.pack(0, _VERSION, flags, self.state, self.reason, 0, *records, self.count, *target, state_ms)
+        return _REPLY.pack(
+            0, _VERSION, self._flags, self.state, self.reason, 0, *records, self.count, *target, state_ms
+        )
 
 
 def decode_flight(payload: bytes) -> FlightProgress | None:
@@ -113,7 +128,30 @@ def decode_flight(payload: bytes) -> FlightProgress | None:
     status, version, flags, state, reason, _, record, reached, count, distance, bearing, height_error, state_ms = (
         _REPLY.unpack_from(payload)
     )
-    if status or version != _VERSION or state > max(FlightPhase) or reason > max(FlightReason):
+    progress = None if status or version != _VERSION else _progress(state, reason, flags)
+    if progress is None:
+        return None
+    return replace(
+        progress,
+        record=None if record == _NO_RECORD else record,
+        reached=None if reached == _NO_RECORD else reached,
+        count=count,
+        distance=distance / 100,
+        bearing=bearing / 100,
+        height_error=height_error / 100,
+        state_s=state_ms / 1000,
+    )
+
+
+def decode_summary(summary: int) -> FlightProgress | None:
+    """Read SUMMARY: the rest is unknown, and left at its default; None if it is of another version."""
+    state, reason, flags, record = _SIGNED.pack(summary)
+    progress = _progress(state, reason, flags)
+    return None if progress is None else replace(progress, record=None if record == _NO_SHORT_RECORD else record)
+
+
+def _progress(state: int, reason: int, flags: int) -> FlightProgress | None:
+    if state > max(FlightPhase) or reason > max(FlightReason):
         return None
     return FlightProgress(
         state=FlightPhase(state),
@@ -122,11 +160,4 @@ def decode_flight(payload: bytes) -> FlightProgress | None:
         switch_on=bool(flags & _SWITCH_ON),
         in_command=bool(flags & _IN_COMMAND),
         battery_low=bool(flags & _BATTERY_LOW),
-        record=None if record == _NO_RECORD else record,
-        reached=None if reached == _NO_RECORD else reached,
-        count=count,
-        distance=distance / 100,
-        bearing=bearing / 100,
-        height_error=height_error / 100,
-        state_s=state_ms / 1000,
     )

@@ -3,11 +3,11 @@
 
 from protocols.mavlink.codec import Packed, pack
 from protocols.mavlink.dialect import messages
-from protocols.msp.mission_flight import FLIGHT
+from protocols.msp.mission_flight import FLIGHT, SUMMARY
 from simulator.board.options import Faults
 
 #: In slots of the MAVLink stream.
-_CURRENT_EVERY, _REACHED_EVERY = 97, 7
+_CURRENT_EVERY, _REACHED_EVERY, _SUMMARY_EVERY = 97, 7, 37
 
 
 class MissionFlight:
@@ -22,18 +22,24 @@ class MissionFlight:
         return None if command != FLIGHT or payload or flight is None else flight.encode()
 
     def message(self, slot: int) -> Packed | None:
-        """FlightCurrent() and FlightReached(): each record is announced once."""
+        """FlightCurrent(), FlightReached() and FlightSummary()."""
         flight = self._faults.flight
         if flight is None:
             return None
         if not slot % _CURRENT_EVERY and flight.in_command and flight.record is not None:
             return pack(messages.MAVLink_mission_current_message(flight.record))
-        if slot % _REACHED_EVERY:
+        if not slot % _REACHED_EVERY and (reached := self._reached(flight.reached)) is not None:
+            return pack(messages.MAVLink_mission_item_reached_message(reached))
+        if slot % _SUMMARY_EVERY or not (flight.is_enabled or flight.switch_on):
             return None
-        reached, announced = flight.reached, self._announced
+        return pack(messages.MAVLink_named_value_int_message(0, SUMMARY.encode(), flight.summary))
+
+    def _reached(self, reached: int | None) -> int | None:
+        """A record that was reached and not announced yet."""
+        announced = self._announced
         if reached is None or (announced is not None and reached < announced):
             announced = self._announced = None
         if reached == announced or reached is None:
             return None
         self._announced = reached if announced is None else announced + 1
-        return pack(messages.MAVLink_mission_item_reached_message(self._announced))
+        return self._announced

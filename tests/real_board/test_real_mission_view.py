@@ -16,6 +16,7 @@ from protocols.firmware_image import Image
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import Command, MissionItem, MissionResult
+from protocols.msp.mission_flight import FlightPhase
 from simulator.emulated_naze.console import Console
 from simulator.emulated_naze.flying_naze import FlyingNaze
 from simulator.emulated_naze.prepared_flash import prepared_flash
@@ -32,10 +33,11 @@ PLACE = Place()
 _CORE, _PROGRESS = "flight", struct.Struct("<BBHH")
 _NONE = 0xFFFF
 _LATE_S = 1.0
+_STEP_S = 0.02
 _FLIGHT_S = 240.0
 #: The board's own judgement of a place, by its GPS, is this much off the truth at most.
 _OFF_M = 5.0
-AUTO = 3
+AUTO, LOITER = 3, 5
 NORTH, WEST = (25.0, 0.0), (25.0, 20.0)
 
 
@@ -91,6 +93,7 @@ class Watch:
         return next((at, truth) for at, truth in self.truths if is_true(truth))
 
     def first_sent(self, name: str, since: float, is_wanted: Callable[[Message], bool]) -> float:
+        since -= _STEP_S  # of the truth
         return next(at for at, sent in self.sent if at >= since and sent.get_type() == name and is_wanted(sent))
 
 
@@ -104,7 +107,7 @@ class BridgedConsole(Console):
     def run(self, seconds: float) -> bytes:
         end = self.now + seconds
         while self.now < end - 1e-9:
-            self._world.run(min(0.02, end - self.now))
+            self._world.run(min(_STEP_S, end - self.now))
             self.now = self._world.now
             self._on_time(self.now)
         return b""
@@ -177,6 +180,11 @@ def test_a_flown_mission_is_seen_as_it_is(image: Image, figure: Figure, tele_pro
     in_air = (m.MAV_LANDED_STATE_IN_AIR, m.MAV_LANDED_STATE_TAKEOFF)
     shown = watch.first_sent("EXTENDED_SYS_STATE", since, lambda sent: sent.landed_state in in_air)
     late["landed state"] = shown - since
+    since, _ = watch.first(lambda truth: truth.phase in (FlightPhase.DESCENT, FlightPhase.SINK))
+    is_landing = watch.first_sent(
+        "EXTENDED_SYS_STATE", since, lambda sent: sent.landed_state == m.MAV_LANDED_STATE_LANDING
+    )
+    late["landing"] = is_landing - since
     figure(f"tele_prot {tele_prot}, later than the board's RAM", {name: f"{s:.2f} s" for name, s in late.items()})
     figure(
         f"tele_prot {tele_prot}, body off the place when reached", {n: f"{metres:.1f} m" for n, metres in off.items()}
@@ -184,7 +192,37 @@ def test_a_flown_mission_is_seen_as_it_is(image: Image, figure: Figure, tele_pro
     reached = [sent.seq for _, sent in watch.sent if sent.get_type() == "MISSION_ITEM_REACHED"]
     figure(f"tele_prot {tele_prot}, items reached", reached)
     figure(f"tele_prot {tele_prot}, texts", flight.station.texts())
-    assert reached[:4] == [1, 3, 4, 5]
-    assert len(reached) == len(set(reached))
+    current = next(sent for _, sent in reversed(watch.sent) if sent.get_type() == "MISSION_CURRENT")
+    assert reached == [1, 3, 4, 5, 6]
+    assert (current.seq, current.mission_state) == (6, m.MISSION_STATE_COMPLETE)
+    assert flight.station.texts().count("Mission flown") == 1
     assert max(off.values()) < _OFF_M
     assert max(late.values()) <= _LATE_S, late
+
+
+@pytest.mark.parametrize("tele_prot", [0, 2])
+def test_a_stop_is_seen_with_its_reason(image: Image, figure: Figure, tele_prot: int) -> None:
+    """The pilot moves the roll stick on the way to the second place."""
+    flight = Flight(image, tele_prot)
+    flight.take_off()
+    flight.fly(lambda truth: truth.phase == FlightPhase.LEG and truth.record == 3)
+    faults = flight.pilot.naze.faults
+    faults.roll, faults.throttle = 1700, MIDDLE
+    flight.pilot.wait(1.0)
+    faults.roll = MIDDLE
+    flight.pilot.wait(4.0)
+    watch = flight.watch
+    since, _ = watch.first(lambda truth: truth.phase == FlightPhase.HELD)
+    why = "Mission stopped: roll or pitch stick"
+    late = {
+        "text": watch.first_sent("STATUSTEXT", since, lambda sent: sent.text == why) - since,
+        "paused": watch.first_sent(
+            "MISSION_CURRENT", since, lambda sent: sent.mission_state == m.MISSION_STATE_PAUSED and sent.seq == 4
+        )
+        - since,
+        "mode": watch.first_sent("HEARTBEAT", since, lambda sent: sent.custom_mode == LOITER) - since,
+    }
+    figure(f"tele_prot {tele_prot}, a stop by stick, later", {name: f"{s:.2f} s" for name, s in late.items()})
+    assert flight.station.texts().count(why) == 1
+    assert max(late["text"], late["paused"]) <= _LATE_S
+    assert late["mode"] <= 2 * _LATE_S, "a heartbeat in MAVLink comes once a second"

@@ -123,8 +123,9 @@ def test_in_mavlink_the_way_follows_from_the_item() -> None:
     assert flight.last("NAV_CONTROLLER_OUTPUT").wp_dist > 0
 
 
-def test_take_off_and_landing_are_shown() -> None:
-    flight = Flight()
+@pytest.mark.parametrize("tele_prot", [MSP, MAVLINK])
+def test_take_off_and_landing_are_shown(tele_prot: TelemetryProtocol) -> None:
+    flight = Flight(tele_prot)
     for phase, landed_state in (
         (FlightPhase.WAIT, ON_GROUND),
         (FlightPhase.RISE, TAKING_OFF),
@@ -135,8 +136,9 @@ def test_take_off_and_landing_are_shown() -> None:
         assert flight.landed_state == landed_state
 
 
-def test_a_stopped_flight_is_paused_and_the_mode_is_that_of_its_boxes() -> None:
-    flight = Flight()
+@pytest.mark.parametrize("tele_prot", [MSP, MAVLINK])
+def test_a_stopped_flight_is_paused_and_the_mode_is_that_of_its_boxes(tele_prot: TelemetryProtocol) -> None:
+    flight = Flight(tele_prot)
     flight.reports(LEG)
     flight.faults.boxes = LEVEL | HOLD
     flight.reports(replace(LEG, state=FlightPhase.HELD, reason=FlightReason.STICKS))
@@ -148,8 +150,9 @@ def texts_of(flight: Flight) -> list[str]:
     return [text for text in flight.station.texts() if "ission" in text]
 
 
-def test_a_reason_is_told_once_and_again_after_another_start() -> None:
-    flight = Flight()
+@pytest.mark.parametrize("tele_prot", [MSP, MAVLINK_57600])
+def test_a_reason_is_told_once_and_again_after_another_start(tele_prot: TelemetryProtocol) -> None:
+    flight = Flight(tele_prot)
     stalled = replace(LEG, state=FlightPhase.HELD, reason=FlightReason.STALLED)
     for progress in (LEG, stalled, stalled, LEG, stalled):
         flight.reports(progress, 11.0)
@@ -168,8 +171,9 @@ def test_a_low_battery_is_told_while_the_mission_flies() -> None:
     assert "Battery low: land, or switch GPS HOME on" in flight.station.texts()
 
 
-def test_a_list_that_ends_with_the_landing_is_complete() -> None:
-    flight = Flight()
+@pytest.mark.parametrize("tele_prot", [MSP, MAVLINK])
+def test_a_list_that_ends_with_the_landing_is_complete(tele_prot: TelemetryProtocol) -> None:
+    flight = Flight(tele_prot)
     flight.reports(replace(LEG, record=4, reached=3, state=FlightPhase.SINK))
     flight.faults.armed = False
     flight.reports(FlightProgress(record=4, reached=3, reason=FlightReason.DISARMED), 4.0)

@@ -10,7 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocols.msp.mission_flight import FLIGHT_REQUEST, FlightPhase, FlightReason, decode_flight
+from protocols.msp.mission_flight import (
+    FLIGHT_REQUEST,
+    FlightPhase,
+    FlightProgress,
+    FlightReason,
+    decode_flight,
+    decode_summary,
+)
 from tests.support.programs import REPOSITORY
 
 _HEADER = (REPOSITORY / "firmware" / "naze_flight.h").read_text()
@@ -34,6 +41,13 @@ def test_a_reply_is_written_as_it_was_read() -> None:
     assert progress is not None
     assert decode_flight(progress.encode()) == progress
     assert decode_flight(replace(progress, record=None).encode()) == replace(progress, record=None)
+
+
+@pytest.mark.parametrize("record", [None, 0, 145])
+def test_the_summary_has_state_reason_flags_and_record(record: int | None) -> None:
+    told = FlightProgress(FlightPhase.HELD, FlightReason.STICKS, switch_on=True, battery_low=True, record=record)
+    assert decode_summary(told.summary) == told
+    assert decode_summary(0x00_00_00_12) is None, "a state that is unknown"
 
 
 def test_no_record_is_none() -> None:
