@@ -170,11 +170,10 @@ class Bridge:
         transfers = {messages.MAV_MISSION_TYPE_MISSION: Transfers(self._uploads, MissionDownloads(missions, ground))}
         for places in (self._fences, self._rally):
             uploads = MissionUploads(places, ground, emit, incidents, own.let_read)
-            uploads.answers.are_only_missions_stored = lambda: False
+            uploads.answers.are_only_missions_stored = False
             transfers[places.mission_type] = Transfers(uploads, MissionDownloads(places, ground))
         self._all_uploads = tuple(each.uploads for each in transfers.values())
         own.capabilities = self._capabilities
-        self._uploads.answers.are_only_missions_stored = lambda: not self._capabilities()
         own_parameters = OwnParameters(missions, ground, owner.sysid)
         own_parameters.on_radius_set = self._board_settings.saved_with_mission
         parameters = self._parameters = Parameters(own_parameters, self._board_settings, ground)
@@ -408,6 +407,7 @@ class Bridge:
         self._missions.use(store, now, is_same_board=is_same_board)
         for places, opened in ((self._fences, controller.profile.fences), (self._rally, controller.profile.rally)):
             places.use(opened(controller, self.vehicle), now, is_same_board=is_same_board)
+        self._uploads.answers.are_only_missions_stored = not self._capabilities()
         self._announcer.found(controller, now)
         self._calibration.controller_found(now)
         if not isinstance(store, Refusal):
@@ -452,8 +452,9 @@ class Bridge:
             # Unknown is not a change: a Harakiri that arms may fall silent first.
             return
         self._was_armed = armed
-        if armed:
-            self._end_uploads(ARMED, now)
+        for uploads in self._all_uploads if armed else ():
+            if uploads.due < inf:
+                uploads.end(ARMED, now)
         if armed:
             self._seal.armed()
         self._ground.record_flight(on=armed and not self.is_passing_through)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One ground station, from its arrival to its departure. Sans-IO."""
 
+from collections import defaultdict
 from collections.abc import Iterable
 from math import inf
 from typing import TYPE_CHECKING
@@ -49,13 +50,13 @@ class Speaker:
     __slots__ = (
         "_missing",
         "_newest",
-        "_transfers",
         "frames",
         "heard_at",
         "is_copy",
         "is_late",
         "last_lost",
         "number",
+        "transfers",
     )
 
     def __init__(self) -> None:
@@ -69,12 +70,8 @@ class Speaker:
         self.last_lost = -1
         #: The last frame was sent before one that arrived earlier. It was the same frame again, doubled by the network.
         self.is_late = self.is_copy = False
-        #: By MAV_MISSION_TYPE.
-        self._transfers: dict[int, TransferMemory] = {}
-
-    def transfer(self, mission_type: int) -> TransferMemory:
-        """What its last transfers of this type left behind."""
-        return self._transfers.setdefault(mission_type, TransferMemory())
+        #: What its last transfers left behind, by MAV_MISSION_TYPE.
+        self.transfers: dict[int, TransferMemory] = defaultdict(TransferMemory)
 
     def heard(self, frame: MavlinkFrame, now: float) -> None:
         raw = frame.raw

@@ -66,7 +66,7 @@ class MissionDownloads:
         self._memory(station).download = None
 
     def _memory(self, station: Station) -> TransferMemory:
-        return self._ground.speaker(station).transfer(self._missions.mission_type)
+        return self._ground.speaker(station).transfers[self._missions.mission_type]
 
     def _ask(self, question: _Question, now: float) -> None:
         """Read the list once for all waiting requests, so that a flood of them cannot fill the queue."""

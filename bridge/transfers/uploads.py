@@ -303,7 +303,7 @@ class MissionUploads:
         for to in stations:
             # By id 40: the only one that Mission Planner understands in both modes.
             make, kind = messages.MAVLink_mission_request_message, self._missions.mission_type
-            self._ground.to(to, *(make(to.sysid, to.compid, seq, kind) for seq in seqs))
+            self._ground.to(to, *map(partial(make, to.sysid, to.compid, mission_type=kind), seqs))
 
     def _delivery(self, upload: Upload, whole: WholeList) -> Conversation[DeliveryResult]:
         """Store the list and write it; a rejected one is only stored, unless its sender sent too many of them."""

@@ -135,10 +135,11 @@ class MessageRouter:
             return
         mission_type = getattr(message, "mission_type", m.MAV_MISSION_TYPE_MISSION)
         clears_all = msgid == m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL and mission_type == m.MAV_MISSION_TYPE_ALL
-        if msgid in _READS or msgid in _ENDS_DOWNLOAD:
-            for uploads, _ in self._transfers.values():
-                uploads.answers.went_on(station)
-        if clears_all:
+        if mission_type == m.MAV_MISSION_TYPE_MISSION:
+            if msgid in _READS or msgid in _ENDS_DOWNLOAD:
+                self._goes_on(mission_type, msgid, station, now)
+            handler(station, message, now)
+        elif clears_all:
             # The one answer is the missions'.
             self._follow(m.MAV_MISSION_TYPE_MISSION, msgid, station, message, now)
             for kind in (m.MAV_MISSION_TYPE_FENCE, m.MAV_MISSION_TYPE_RALLY):
@@ -152,13 +153,18 @@ class MessageRouter:
             self._ground.mission_ack(station, MissionResult.UNSUPPORTED, mission_type)
 
     def _follow(self, mission_type: int, msgid: int, station: Station, message: Message, now: float) -> None:
-        """Pass on a message; those about no list have the type of missions."""
+        """Pass on a message about a list."""
+        self._goes_on(mission_type, msgid, station, now)
+        self._of_type[mission_type][msgid](station, message, now)
+
+    def _goes_on(self, mission_type: int, msgid: int, station: Station, now: float) -> None:
         uploads, downloads = self._transfers[mission_type]
+        if msgid in _READS or msgid in _ENDS_DOWNLOAD:
+            uploads.answers.went_on(station)
         if msgid in _READS:
             uploads.reads(station, now)
         if msgid in _ENDS_DOWNLOAD:
             downloads.forget(station)
-        (self._of_type[mission_type].get(msgid) or self.handlers[msgid])(station, message, now)
 
     def _item(
         self,

@@ -96,7 +96,7 @@ def test_a_reply_belongs_to_the_index_that_was_asked_for() -> None:
 @pytest.mark.parametrize(
     ("may_write", "request_", "reason"),
     [
-        (False, (SET_SAFEHOME, b"\0"), "read-only"),
+        (False, (SET_SAFEHOME, bytes(10)), "read-only"),
         (False, (EEPROM_WRITE, b""), "read-only"),
         (True, (SET_MOTOR, bytes(16)), "never forwarded"),
         (True, (SET_WP, b"\2" + NavRecord(NavAction.JUMP, flag=LAST).pack()), "crashes INAV"),
@@ -181,11 +181,11 @@ def test_a_change_is_forwarded_after_a_look_at_the_arm_flag() -> None:
     board = FakeInav()
     board.answers = {**board.answers, SET_SAFEHOME: b""}
     world, program = ready(board, may_write=True)
-    assert program.wait_for(SET_SAFEHOME, b"\0").direction is Direction.REPLY
+    assert program.wait_for(SET_SAFEHOME, bytes(10)).direction is Direction.REPLY
     at = board.commands.index(SET_SAFEHOME)
     assert board.commands[at - 1] == 101  # STATUS
     board.armed = True  # and no poll has reported it yet
-    program.ask(SET_SAFEHOME, b"\0")
+    program.ask(SET_SAFEHOME, bytes(10))
     world.run(1)
     assert board.commands.count(SET_SAFEHOME) == 1
     assert program.closed_at is not None
@@ -197,7 +197,7 @@ def test_a_read_after_a_change_gets_the_new_value() -> None:
     board.answers = {**board.answers, SAFEHOME: b"\0old", SET_SAFEHOME: b""}
     _, program = ready(board, may_write=True)
     assert program.wait_for(SAFEHOME, b"\0").payload == b"\0old"
-    program.ask(SET_SAFEHOME, b"\0")
+    program.ask(SET_SAFEHOME, bytes(10))
     board.answers = {**board.answers, SAFEHOME: b"\0new"}
     program.ask(SAFEHOME, b"\0")
     program.world.wait_until(lambda _: len(program.replies) > 2, 4)
