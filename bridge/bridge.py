@@ -167,11 +167,13 @@ class Bridge:
         self._watch = MissionWatch(missions, ground, emit)
         self._fences = PlaceLists(messages.MAV_MISSION_TYPE_FENCE, "Fence", self.vehicle, runner)
         self._rally = PlaceLists(messages.MAV_MISSION_TYPE_RALLY, "Rally points", self.vehicle, runner)
-        transfers = {messages.MAV_MISSION_TYPE_MISSION: Transfers(self._uploads, MissionDownloads(missions, ground))}
+        transfers = {
+            messages.MAV_MISSION_TYPE_MISSION: Transfers(missions, self._uploads, MissionDownloads(missions, ground))
+        }
         for places in (self._fences, self._rally):
             uploads = MissionUploads(places, ground, emit, incidents, own.let_read)
             uploads.answers.are_only_missions_stored = False
-            transfers[places.mission_type] = Transfers(uploads, MissionDownloads(places, ground))
+            transfers[places.mission_type] = Transfers(places, uploads, MissionDownloads(places, ground))
         self._all_uploads = tuple(each.uploads for each in transfers.values())
         own.capabilities = self._capabilities
         own_parameters = OwnParameters(missions, ground, owner.sysid)
@@ -182,7 +184,7 @@ class Bridge:
         commands = CommandService(
             ground, own, actions, session, self._calibration, self._board_settings, parameters, config.version
         )
-        router = MessageRouter(ground, transfers, parameters, commands, own, self._stores)
+        router = MessageRouter(ground, transfers, parameters, commands, own)
         self._incoming = Incoming(
             self._guard,
             ground,
@@ -356,12 +358,8 @@ class Bridge:
 
     def _end_uploads(self, refusal: Refusal, now: float) -> None:
         for uploads in self._all_uploads:
-            uploads.end(refusal, now)
-
-    def _stores(self, mission_type: int) -> bool:
-        """True if the flight controller stores lists of this MAV_MISSION_TYPE; missions are always answered."""
-        places = next((each for each in (self._fences, self._rally) if each.mission_type == mission_type), None)
-        return mission_type == messages.MAV_MISSION_TYPE_MISSION if places is None else places.are_stored
+            if uploads.due < inf:
+                uploads.end(refusal, now)
 
     def _capabilities(self) -> int:
         fence = self._fences.are_stored and messages.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
@@ -452,10 +450,8 @@ class Bridge:
             # Unknown is not a change: a Harakiri that arms may fall silent first.
             return
         self._was_armed = armed
-        for uploads in self._all_uploads if armed else ():
-            if uploads.due < inf:
-                uploads.end(ARMED, now)
         if armed:
+            self._end_uploads(ARMED, now)
             self._seal.armed()
         self._ground.record_flight(on=armed and not self.is_passing_through)
         self._emit(Armed() if armed else Disarmed())

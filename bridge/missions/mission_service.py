@@ -109,6 +109,8 @@ class MissionService:
 
     #: MAV_MISSION_TYPE of its lists.
     mission_type: int = 0
+    #: The current flight controller stores such lists, or did until it was lost. Missions are always answered.
+    are_stored: bool = True
 
     def __init__(self, vehicle: Vehicle, runner: Runner, on_ending: EndingListener) -> None:
         self.vehicle = vehicle

@@ -25,17 +25,13 @@ class PlaceLists(MissionService):
         super().__init__(vehicle, runner, lambda _mission, _delivery: None)
         self.mission_type = mission_type
         self._name = name
-        self.fc_store = NO_PLACES
-
-    @property
-    def are_stored(self) -> bool:
-        """True if the current flight controller stores such lists, or did until it was lost."""
-        return self.fc_store is not NO_PLACES
+        self.fc_store, self.are_stored = NO_PLACES, False
 
     def use(self, store: AnyFcMissionStore | Refusal, now: float, *, is_same_board: bool) -> None:
         """Switch to another flight controller; one that stores no such lists is not one that is lost."""
         if isinstance(store, Refusal) and store is not NO_PLACES and not self.are_stored:
             store = NO_PLACES
+        self.are_stored = store is not NO_PLACES
         super().use(store, now, is_same_board=is_same_board)
 
     def deliver(

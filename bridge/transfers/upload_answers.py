@@ -11,7 +11,7 @@ from bridge.missions.mission_service import DeliveryResult
 from bridge.missions.mission_texts import finding_lines
 from bridge.model.finding import News
 from bridge.model.refusal import Refusal
-from bridge.model.transfer_memory import FinalAck
+from bridge.model.transfer_memory import FinalAck, TransferMemory
 from bridge.model.verdict import Result, Verdict
 from protocols.mission_item import MissionResult
 
@@ -67,7 +67,7 @@ class UploadAnswers:
         answer = FinalAck(ack, count, now + _MEMORY_S, now + cancel_s)
         if is_repeated and count:
             self._repeat(station, answer, _ACK_AGAIN_S, None, now)
-        self._ground.speaker(station).transfers[self._mission_type].final_ack = answer
+        self._memory(station).final_ack = answer
         self._ground.mission_ack(station, ack, self._mission_type if mission_type is None else mission_type)
 
     def report(self, station: Station, verdict: Verdict[Any], delivery: DeliveryResult, now: float) -> None:
@@ -98,7 +98,7 @@ class UploadAnswers:
 
     def remind(self, station: Station, text: str, now: float) -> None:
         """Repeat the reason for a refusal that the station may not have noticed."""
-        if (answer := self._ground.speaker(station).transfers[self._mission_type].final_ack) is not None:
+        if (answer := self._memory(station).final_ack) is not None:
             self._repeat(station, answer, _REMINDERS_S, text, now)
 
     def _repeat(
@@ -110,7 +110,7 @@ class UploadAnswers:
 
     def went_on(self, station: Station) -> None:
         """The station has sent another mission message: it has the final ack, or does not wait for it."""
-        if (answer := self._ground.speaker(station).transfers[self._mission_type].final_ack) is not None:
+        if (answer := self._memory(station).final_ack) is not None:
             answer.again = [again for again in answer.again if again[1] is not None]
 
     def tick(self, now: float) -> None:
@@ -118,11 +118,7 @@ class UploadAnswers:
         if now < self.due:
             return
         # A station may have left, or begun another upload.
-        self._again = [
-            each
-            for each in self._again
-            if self._ground.speaker(each[0]).transfers[self._mission_type].final_ack is each[1]
-        ]
+        self._again = [each for each in self._again if self._memory(each[0]).final_ack is each[1]]
         for station, answer in self._again:
             for due, text in answer.again:
                 if now < due:
@@ -168,15 +164,18 @@ class UploadAnswers:
 
     def forget(self, station: Station) -> None:
         """The ground station has begun a new upload."""
-        self._ground.speaker(station).transfers[self._mission_type].final_ack = None
+        self._memory(station).final_ack = None
 
     def was_said_to(self, station: Station, now: float) -> bool:
         """True if the station was answered at this address."""
         return self._at(station, now) is not None
 
+    def _memory(self, station: Station) -> TransferMemory:
+        return self._ground.speaker(station).transfers[self._mission_type]
+
     def _at(self, station: Station, now: float) -> FinalAck | None:
         """The last answer to a ground station at its present address."""
-        answer = self._ground.speaker(station).transfers[self._mission_type].final_ack
+        answer = self._memory(station).final_ack
         return answer if answer is not None and now <= answer.until else None
 
     def _to(self, station: Station, now: float) -> FinalAck | None:

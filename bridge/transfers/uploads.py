@@ -302,8 +302,9 @@ class MissionUploads:
                 stations += self._elsewhere(upload, now)
         for to in stations:
             # By id 40: the only one that Mission Planner understands in both modes.
-            make, kind = messages.MAVLink_mission_request_message, self._missions.mission_type
-            self._ground.to(to, *map(partial(make, to.sysid, to.compid, mission_type=kind), seqs))
+            ids, kind = (to.sysid, to.compid), self._missions.mission_type
+            make = partial(messages.MAVLink_mission_request_message, *ids, mission_type=kind)
+            self._ground.to(to, *map(make, seqs))
 
     def _delivery(self, upload: Upload, whole: WholeList) -> Conversation[DeliveryResult]:
         """Store the list and write it; a rejected one is only stored, unless its sender sent too many of them."""

@@ -10,6 +10,7 @@ from bridge.gcs.cost import Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import GroundStation
 from bridge.gcs.station import Severity, Station
+from bridge.missions.mission_service import MissionService
 from bridge.missions.place_lists import NO_PLACES
 from bridge.transfers.downloads import MissionDownloads
 from bridge.transfers.uploads import MissionUploads
@@ -53,8 +54,9 @@ _Handler = Callable[[Station, Message, float], object]
 
 
 class Transfers(NamedTuple):
-    """The transfers of one mission type."""
+    """The lists of one mission type, and their transfers."""
 
+    lists: MissionService
     uploads: MissionUploads
     downloads: MissionDownloads
 
@@ -62,7 +64,7 @@ class Transfers(NamedTuple):
 class MessageRouter:
     """Passes each known message to the part that answers it.
 
-    transfers: by MAV_MISSION_TYPE. stores: True if the flight controller stores lists of a type.
+    transfers: by MAV_MISSION_TYPE.
     """
 
     def __init__(
@@ -72,16 +74,14 @@ class MessageRouter:
         parameters: Parameters,
         commands: CommandService,
         vehicle: OwnVehicle,
-        stores: Callable[[int], bool],
     ) -> None:
-        self.stores = stores
         self._ground = ground
         self._vehicle = vehicle
         self._commands = commands
         self._transfers = transfers
         self._decoder = MavlinkDecoder()
         #: Of mission messages, by the type of their lists.
-        self._of_type = {kind: self._mission_handlers(*each) for kind, each in transfers.items()}
+        self._of_type = {kind: self._mission_handlers(each.uploads, each.downloads) for kind, each in transfers.items()}
         self.handlers: Mapping[int, _Handler] = {
             **self._of_type[m.MAV_MISSION_TYPE_MISSION],
             m.MAVLINK_MSG_ID_MISSION_SET_CURRENT: self._set_current,
@@ -135,36 +135,27 @@ class MessageRouter:
             return
         mission_type = getattr(message, "mission_type", m.MAV_MISSION_TYPE_MISSION)
         clears_all = msgid == m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL and mission_type == m.MAV_MISSION_TYPE_ALL
-        if mission_type == m.MAV_MISSION_TYPE_MISSION:
-            if msgid in _READS or msgid in _ENDS_DOWNLOAD:
-                self._goes_on(mission_type, msgid, station, now)
-            handler(station, message, now)
-        elif clears_all:
-            # The one answer is the missions'.
-            self._follow(m.MAV_MISSION_TYPE_MISSION, msgid, station, message, now)
-            for kind in (m.MAV_MISSION_TYPE_FENCE, m.MAV_MISSION_TYPE_RALLY):
-                if self.stores(kind):
-                    self._transfers[kind].uploads.clear_all(station, kind, now)
-        elif self.stores(mission_type):
-            self._follow(mission_type, msgid, station, message, now)
+        if msgid in _READS or msgid in _ENDS_DOWNLOAD:
+            for kind in self._transfers.values():
+                if kind.uploads.answers.due < inf:
+                    kind.uploads.answers.went_on(station)
+        of_type = self._transfers.get(m.MAV_MISSION_TYPE_MISSION if clears_all else mission_type)
+        if of_type is not None and of_type.lists.are_stored:
+            if msgid in _READS:
+                of_type.uploads.reads(station, now)
+            if msgid in _ENDS_DOWNLOAD:
+                of_type.downloads.forget(station)
+            # Messages about no list have the type of missions.
+            (self._of_type[of_type.lists.mission_type].get(msgid) or handler)(station, message, now)
         elif msgid != m.MAVLINK_MSG_ID_MISSION_ACK:
             if msgid == m.MAVLINK_MSG_ID_MISSION_COUNT:
                 self._ground.say(Severity.ERROR, NO_PLACES.text, station)
             self._ground.mission_ack(station, MissionResult.UNSUPPORTED, mission_type)
-
-    def _follow(self, mission_type: int, msgid: int, station: Station, message: Message, now: float) -> None:
-        """Pass on a message about a list."""
-        self._goes_on(mission_type, msgid, station, now)
-        self._of_type[mission_type][msgid](station, message, now)
-
-    def _goes_on(self, mission_type: int, msgid: int, station: Station, now: float) -> None:
-        uploads, downloads = self._transfers[mission_type]
-        if msgid in _READS or msgid in _ENDS_DOWNLOAD:
-            uploads.answers.went_on(station)
-        if msgid in _READS:
-            uploads.reads(station, now)
-        if msgid in _ENDS_DOWNLOAD:
-            downloads.forget(station)
+        if clears_all:
+            # The one answer is the missions'.
+            for number in (m.MAV_MISSION_TYPE_FENCE, m.MAV_MISSION_TYPE_RALLY):
+                if self._transfers[number].lists.are_stored:
+                    self._transfers[number].uploads.clear_all(station, number, now)
 
     def _item(
         self,

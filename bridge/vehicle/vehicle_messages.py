@@ -368,7 +368,9 @@ def sys_status(at: Moment) -> Message:
     present, unknown, bad = _MOTORS | _PREARM, 0, 0
     if health is not None:
         present |= messages.MAV_SYS_STATUS_SENSOR_3D_GYRO
-        present |= sum(bit for sensor, bit in _SENSORS.items() if sensor & health.sensors)
+        for sensor, bit in _SENSORS.items():
+            if sensor & health.sensors:
+                present |= bit
     gps, sticks, signal = at.fresh(GpsFix), at.fresh(Sticks), at.fresh(Signal)
     if gps is None:
         unknown |= messages.MAV_SYS_STATUS_SENSOR_GPS
