@@ -275,11 +275,13 @@ async def test_parameters_and_telemetry_work(shared: Bench) -> None:
         assert (len(found), found["p_pitch"]) == (237, 35.0)
         await parameters.set_param_float("p_pitch", 38.0)
         assert await parameters.get_param_float("p_pitch") == 38.0
-        with pytest.raises(ParamError) as refused:
-            await parameters.set_param_float("p_pitch", 201.0)
-        assert refused.value.result == ParamResult.VALUE_OUT_OF_RANGE
-        assert await parameters.get_param_float("p_pitch") == 38.0
         await parameters.set_param_float("p_pitch", 35.0)
+        # Another parameter: on a busy machine MAVSDK repeats the request, and would take the second refusal for the
+        # answer to the next change of the same one.
+        with pytest.raises(ParamError) as refused:
+            await parameters.set_param_float("p_roll", 201.0)
+        assert refused.value.result == ParamResult.VALUE_OUT_OF_RANGE
+        assert await parameters.get_param_float("p_roll") == found["p_roll"]
         telemetry = TelemetryAsync(vehicle)
         async for position in telemetry.subscribe_position():
             if math.isfinite(position.latitude_deg):

@@ -124,7 +124,8 @@ def test_each_row_is_flown_as_documented(row: Row, kind: str) -> None:
 
 
 def test_every_supported_command_has_a_row() -> None:
-    assert {item.command for row in ROWS for item in row.items} >= set(Command)
+    flown = {command for command in Command if command < Command.FENCE_RETURN_POINT}  # the others are places
+    assert {item.command for row in ROWS for item in row.items} >= flown
 
 
 def test_the_page_has_the_table() -> None:
