@@ -12,7 +12,6 @@ from dataclasses import replace
 from bridge.fc.mission_flight import flight_report
 from bridge.fc.msp_telemetry import velocity
 from bridge.model.flight_mode import MISSION_BOXES, FlightMode, active_boxes, flight_mode, names_of_active
-from bridge.model.mission_progress import FlightReport
 from bridge.model.vehicle import (
     Charge,
     Fix,
@@ -174,19 +173,15 @@ class MavlinkTelemetry:
         progress = decode_summary(message.value) if message.name == SUMMARY else None
         if progress is None:
             return
-        before = self._flight()
+        before = self._vehicle.last_flight
         reached = before.reached if before is not None and before.number else max((progress.record or 0) - 1, 0)
         report = replace(flight_report(replace(progress, reached=reached), before), way=None)
         self._vehicle.hear(MissionLeg(now, Source.MAVLINK, report))
 
     def _mission_item_reached(self, message: Message, _now: float) -> None:
-        leg, flight = self._vehicle.last(MissionLeg), self._flight()
+        leg, flight = self._vehicle.last(MissionLeg), self._vehicle.last_flight
         if leg is not None and flight is not None and flight.number:
             self._vehicle.hear(MissionLeg(leg.heard_at, leg.source, replace(flight, reached=message.seq)))
-
-    def _flight(self) -> FlightReport | None:
-        leg = self._vehicle.last(MissionLeg)
-        return leg.report if leg is not None and isinstance(leg.report, FlightReport) else None
 
     def _attitude(self, message: Message, now: float) -> None:
         roll, pitch, yaw = map(math.degrees, (message.roll, message.pitch, message.yaw))

@@ -71,9 +71,7 @@ _WHY: Mapping[FlightReason, str] = {
 def _flight(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
     progress = decode_flight(payload)
     if progress is not None:
-        last = vehicle.last(MissionLeg)
-        before = last.report if last is not None and isinstance(last.report, FlightReport) else None
-        vehicle.hear(MissionLeg(now, Source.MSP, flight_report(progress, before)))
+        vehicle.hear(MissionLeg(now, Source.MSP, flight_report(progress, vehicle.last_flight)))
 
 
 FLIGHT_DECODERS: Mapping[int, Decoder] = {Msp.FLIGHT: _flight}

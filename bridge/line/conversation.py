@@ -177,6 +177,12 @@ def ask_status(*, tries: int = 3) -> Conversation[StatusReport | None]:
     return None if reply is None else decode_status(reply.payload)
 
 
+def ask_armed(arm_bit: int | None, *, tries: int = 3) -> Conversation[bool | None]:
+    """True if the board says now that it is armed; None if it does not answer. arm_bit: see FlightController."""
+    status = yield from ask_status(tries=tries)
+    return None if status is None or arm_bit is None else bool(status.box_flags >> arm_bit & 1)
+
+
 def _lasting(reply: MspFrame, size: int | None) -> MspFrame:
     return replace(reply, payload=reply.payload[:size])
 

@@ -373,10 +373,16 @@ class Vehicle:
         limit_s = self.stale_s.get(kind, STALE_S) if stale_s is None else stale_s
         return reading if reading is not None and now <= reading.heard_at + limit_s else None
 
+    @property
+    def last_flight(self) -> FlightReport | None:
+        """The last report of a board that reports more on its mission than the record (Harakiri)."""
+        leg = self.last(MissionLeg)
+        return leg.report if leg is not None and isinstance(leg.report, FlightReport) else None
+
     def mission_flight(self, now: float) -> FlightReport | None:
-        """The report of a board that flies its mission now and reports more than the record (Harakiri)."""
-        leg = self.fresh(MissionLeg, now)
-        return leg.report if leg is not None and isinstance(leg.report, FlightReport) and leg.report.is_flown else None
+        """The same of a board that flies its mission now."""
+        flight = None if self.fresh(MissionLeg, now) is None else self.last_flight
+        return flight if flight is not None and flight.is_flown else None
 
     def home_or_position(self) -> Home | None:
         """Home; before it is known, the current position, at the altitude of the launch."""

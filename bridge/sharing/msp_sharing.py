@@ -15,7 +15,7 @@ from bridge.fc.profile import FlightController
 from bridge.fc.session import FcSession
 from bridge.gcs.budget import TokenBucket
 from bridge.gcs.cost import Rate
-from bridge.line.conversation import Conversation, LinkLost, Receive, Send, ask_status
+from bridge.line.conversation import Conversation, LinkLost, Receive, Send, ask_armed
 from bridge.line.msp_link import MspLink
 from bridge.line.runner import Runner
 from bridge.missions.mission_service import MissionService
@@ -266,11 +266,9 @@ def _carry(request: WaitingRequest, reply_size: int, arm_bit: int | None) -> Con
     """Forward a request; its reply, or the reason for none. No poll may have reported yet that the craft was armed."""
     command = request.frame.command
     if request.is_change:
-        status = yield from ask_status()
-        if status is None or arm_bit is None:
-            return _NO_REPLY
-        if status.box_flags >> arm_bit & 1:
-            return ARMED
+        armed = yield from ask_armed(arm_bit)
+        if armed is not False:
+            return ARMED if armed else _NO_REPLY
     is_read = not request.is_change
     asked = Send(request.asked, command, reply_size, exclusive=not is_read, is_kept=is_read, is_shared=True)
     reply: MspFrame | None = yield Receive(frozenset((command,)), asked)

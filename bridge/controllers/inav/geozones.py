@@ -54,11 +54,14 @@ def has_zones(board: FlightController) -> bool:
 
 def read_zones_in_force() -> Conversation[tuple[Geozone, ...] | None]:
     """All zones if the feature is on, else none; None: it does not answer."""
-    features = yield from ask(request(FEATURE), FEATURE, FEATURE_SIZE)
-    if features is None:
-        return None
-    is_on = int.from_bytes(features.payload[:FEATURE_SIZE], "little") & GEOZONE_FEATURE
-    return (yield from read_zones()) if is_on else ()
+    is_on = yield from _ask_feature()
+    return (yield from read_zones()) if is_on else None if is_on is None else ()
+
+
+def _ask_feature() -> Conversation[bool | None]:
+    """True if geozones are in force."""
+    reply = yield from ask(request(FEATURE), FEATURE, FEATURE_SIZE)
+    return None if reply is None else bool(int.from_bytes(reply.payload[:FEATURE_SIZE], "little") & GEOZONE_FEATURE)
 
 
 def read_zones(numbers: Iterable[int] = range(GEOZONES)) -> Conversation[tuple[Geozone, ...] | None]:
@@ -92,11 +95,10 @@ class InavGeozones(InavPlaceStore[Geozone]):
     _is_in_force = True
 
     def pull(self) -> Conversation[tuple[Geozone, ...] | None]:
-        features = yield from ask(request(FEATURE), FEATURE, FEATURE_SIZE)
-        found = None if features is None else (yield from read_zones())
-        if features is not None and found is not None:
-            self._is_in_force = bool(int.from_bytes(features.payload[:FEATURE_SIZE], "little") & GEOZONE_FEATURE)
-            self._known = found
+        is_on = yield from _ask_feature()
+        found = None if is_on is None else (yield from read_zones())
+        if is_on is not None and found is not None:
+            self._is_in_force, self._known = is_on, found
         return found
 
     def _read_back(

@@ -8,7 +8,7 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 
 from bridge.fc.profile import FlightController
-from bridge.line.conversation import Conversation, LinkLost, ask, ask_status
+from bridge.line.conversation import Conversation, LinkLost, ask, ask_armed
 from bridge.missions.fc_mission_store import (
     FcMissionStore,
     PushFailure,
@@ -33,14 +33,14 @@ class InavPlaceStore(FcMissionStore[RecordT]):
 
     def __init__(self, controller: FlightController) -> None:
         assert controller.arm_bit is not None
-        self._arm_mask = 1 << controller.arm_bit
+        self._arm_bit = controller.arm_bit
         #: As last read; None: unknown.
         self._known: tuple[RecordT, ...] | None = None
         #: True if what the board holds in RAM may not be in its flash.
         self._is_unsaved = False
 
     def report(self) -> Conversation[StoreReport | None]:
-        armed = yield from self._ask_armed()
+        armed = yield from ask_armed(self._arm_bit)
         if armed is None or (yield from self.pull()) is None:
             return None
         return StoreReport(StoreState.ARMED if armed else StoreState.READY, self._rules(), None)
@@ -50,7 +50,7 @@ class InavPlaceStore(FcMissionStore[RecordT]):
         try:
             wanted = self._whole(records)
             before = self._known if self._known is not None else (yield from self.pull())
-            if before is None or (yield from self._ask_armed()) is not False:
+            if before is None or (yield from ask_armed(self._arm_bit)) is not False:
                 return PushResult(PushFailure.PLACES_KEPT)
             if before == wanted and not self._is_unsaved:
                 return PushResult(None, unchanged=True)
@@ -93,10 +93,6 @@ class InavPlaceStore(FcMissionStore[RecordT]):
     ) -> Conversation[tuple[RecordT, ...] | None]:
         """Read what may have changed."""
         return (yield from self.pull())
-
-    def _ask_armed(self) -> Conversation[bool | None]:
-        status = yield from ask_status()
-        return None if status is None else bool(status.box_flags & self._arm_mask)
 
 
 def take(command: int, payload: bytes, *, tries: int = 3) -> Conversation[bool]:

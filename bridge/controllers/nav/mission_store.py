@@ -15,7 +15,7 @@ from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.items import home_item, item_seqs, items_from_records
 from bridge.controllers.nav.rules import NavProfile
 from bridge.fc.profile import FlightController
-from bridge.line.conversation import Conversation, LinkLost, Receive, Send, Stopped, ask, ask_status, send
+from bridge.line.conversation import Conversation, LinkLost, Receive, Send, Stopped, ask, ask_armed, send
 from bridge.missions.fc_mission_store import (
     FcMissionStore,
     PushFailed,
@@ -71,7 +71,7 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
         self._profile = profile
         self._vehicle = vehicle
         assert controller.arm_bit is not None
-        self._arm_mask = 1 << controller.arm_bit
+        self._arm_bit = controller.arm_bit
         #: The flight controller's list, as last read; None: unknown, or one that cannot be flown.
         self._known: tuple[NavRecord, ...] | None = None
 
@@ -265,8 +265,7 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
             raise PushFailed(PushFailure.ARMED)
 
     def _ask_armed(self) -> Conversation[bool | None]:
-        status = yield from ask_status(tries=_TRIES)
-        return None if status is None else bool(status.box_flags & self._arm_mask)
+        return (yield from ask_armed(self._arm_bit, tries=_TRIES))
 
 
 def _frame(number: int, record: NavRecord) -> bytes:
