@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import click
 
 from payloads.mission_data import Json, printable
-from service.daemon.client import ControlError, Interrupted, NoDaemonError, ask_daemon
+from service.daemon.client import FIRMWARE_REQUESTS, ControlError, Interrupted, NoDaemonError, ask_daemon
 from service.settings import SettingsError, default_state_dir
 from service.settings.addresses import AddressError, parse_fc
 from service.settings.load import SERVICE_STATE
@@ -24,7 +24,6 @@ _LEFT = "interrupted; the daemon continues: see `naze-bridge missions list`, or 
 _WRITES = ("push", "restore", "restore-settings")
 _FLASHES_ON = "interrupted; the daemon continues, do not switch the board off: see `naze-bridge status`"
 _FLASH_BROKEN = "interrupted: the board stays in its boot loader; run the same command again"
-_FLASHES = ("flash-firmware", "restore-firmware")
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -99,7 +98,7 @@ def ask_with_steps(state_dir: Path | None, fc: str | None, request: Json) -> Jso
 
 
 def _interruption(request: Json, why: str, *, is_own: bool) -> str:
-    if request["do"] in _FLASHES:
+    if request["do"] in FIRMWARE_REQUESTS:
         return _FLASH_BROKEN if is_own else _FLASHES_ON
     return _LEFT if not is_own and request["do"] in _WRITES else why or "interrupted"
 

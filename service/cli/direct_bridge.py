@@ -8,9 +8,8 @@ from typing import Any
 
 from payloads.mission_data import Json
 from service.daemon.api import DaemonApi
-from service.daemon.client import STATUS, ControlError, Interrupted
+from service.daemon.client import FIRMWARE_REQUESTS, STATUS, ControlError, Interrupted
 from service.daemon.daemon import Daemon
-from service.daemon.firmware_api import FIRMWARE_REQUESTS
 from service.machine.log_setup import set_up_logging
 from service.settings import Settings, takeoff_limit_m
 from service.settings.addresses import AutoFc, FcAddress

@@ -12,9 +12,9 @@ from bridge.model.refusal import Refusal
 from payloads.mission_data import MOST, Json, mission_items, verdict_data, whole_number
 from protocols.mission_item import MissionItem
 from protocols.mission_record import pack_records
-from service.daemon.client import ControlError
+from service.daemon.client import FIRMWARE_REQUESTS, ControlError
 from service.daemon.daemon import Daemon
-from service.daemon.firmware_api import FIRMWARE_REQUESTS, FirmwareApi
+from service.daemon.firmware_api import FirmwareApi
 from service.daemon.settings_api import SETTINGS_REQUESTS, SettingsApi
 from service.daemon.store_worker import as_dicts
 from service.machine.package import version

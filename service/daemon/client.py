@@ -19,6 +19,8 @@ from service.settings import SettingsError, default_state_dir
 
 #: The request for the bridge's status.
 STATUS = {"do": "status"}
+#: The values of "do" that write the flight controller's firmware.
+FIRMWARE_REQUESTS = frozenset(("flash-firmware", "restore-firmware"))
 SOCKET_NAME = "control.sock"
 _ANSWERS = {"progress", "result", "error"}
 #: The unit's RuntimeDirectory=. A service's state directory is closed to other users (DynamicUser=).

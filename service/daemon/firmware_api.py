@@ -30,8 +30,6 @@ from service.settings import SettingsError, default_state_dir
 from storage.atomic_file import replace_file
 from storage.os_error import reason
 
-#: The values of "do".
-FIRMWARE_REQUESTS = frozenset(("flash-firmware", "restore-firmware"))
 FIRMWARE_FOLDER = "firmware"
 #: USB, without a battery.
 _USB_V = 5.5

@@ -64,7 +64,8 @@ class FcPort:
         self._closed = asyncio.Event()
         # Held by `run` while the port is open, or by a borrower.
         self._use = asyncio.Lock()
-        self._is_wanted = False
+        #: True while a borrower uses the port, or waits for it.
+        self.is_lent = False
         #: Why the port cannot be opened; empty once it is open.
         self.trouble = ""
         #: Bytes dropped because the line was too slow.
@@ -83,7 +84,7 @@ class FcPort:
             while True:
                 async with self._use:
                     pause_s = await self._open_once()
-                    if self._is_wanted:
+                    if self.is_lent:
                         self._shut(LENT)
                     if self._device is not None:
                         await self._closed.wait()
@@ -112,17 +113,13 @@ class FcPort:
     @asynccontextmanager
     async def lend(self) -> AsyncIterator[None]:
         """Keep the port closed, so that the caller may open it; afterwards it is opened again."""
-        self._is_wanted = True
+        self.is_lent = True
         try:
             self._shut(LENT)
             async with self._use:
                 yield
         finally:
-            self._is_wanted = False
-
-    @property
-    def is_lent(self) -> bool:
-        return self._is_wanted
+            self.is_lent = False
 
     def move_on(self) -> None:
         """Close the port. It is reopened, and `open_device` may choose another one."""

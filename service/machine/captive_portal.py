@@ -32,7 +32,7 @@ PROBES = {
 }
 #: RFC 8908's description of the network.
 API_PATH = "/captive-portal"
-_HOTSPOT_CARD = "wlan0"
+HOTSPOT_CARD = "wlan0"
 _ROUTES = Path("/proc/net/route")
 #: sd_listen_fds(3): the first socket from systemd.
 _SOCKET = 3
@@ -42,7 +42,7 @@ _IDLE_S, _REQUEST_TIMEOUT_S = 60.0, 5.0
 def dnsmasq_text(address: str) -> str:
     """Settings for the hotspot's name and DHCP server: the test addresses are the Pi's, and DHCP announces the page."""
     hosts = sorted({host for host, _ in PROBES})
-    lines = [f"dhcp-option=tag:{_HOTSPOT_CARD},114,http://{address}{API_PATH}"]  # RFC 8910
+    lines = [f"dhcp-option=tag:{HOTSPOT_CARD},114,http://{address}{API_PATH}"]  # RFC 8910
     # `local`: no AAAA from a server upstream.
     lines += [line for host in hosts for line in (f"address=/{host}/{address}", f"local=/{host}/")]
     return "".join(f"{line}\n" for line in lines)
@@ -51,7 +51,7 @@ def dnsmasq_text(address: str) -> str:
 def has_internet(routes: str) -> bool:
     """True if /proc/net/route has a default route that is not over the hotspot's card."""
     rows = [line.split() for line in routes.splitlines()[1:]]
-    return any(row[1] == "00000000" and row[0] != _HOTSPOT_CARD for row in rows if len(row) > 1)
+    return any(row[1] == "00000000" and row[0] != HOTSPOT_CARD for row in rows if len(row) > 1)
 
 
 def reply_to(host: str, path: str, page: str, *, is_online: bool) -> tuple[int, str, str, str]:

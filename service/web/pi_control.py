@@ -26,7 +26,7 @@ from starlette.routing import Route
 
 from payloads.mission_data import Json
 from service.daemon.daemon import Daemon
-from service.machine.helper_socket import HelperError, ask_helper
+from service.machine.helper_socket import MAX_PACKAGE, HelperError, ask_helper
 from service.machine.log_setup import recent_lines
 from service.web.access import MAX_FILE, check_token, guarded
 from service.web.mission_files import MissionWriter
@@ -35,8 +35,6 @@ from service.web.token import Token, TokenError
 from storage.os_error import reason
 
 _MAX_REQUEST = 64 << 10
-#: As the helper's own limit; this one keeps the disk from filling up.
-_MAX_PACKAGE = 128 << 20
 _PACKAGE_FILE = "update.deb"
 _PIECE = 1 << 16
 _CHANGE_NOTHING = ("overview", "doctor")
@@ -168,7 +166,7 @@ def _append(path: Path, start: int, piece: bytes) -> int:
     """Append a piece that follows the ones before; FileNotFoundError if it does not. Returns the size so far."""
     if start == 0:
         path.write_bytes(b"")
-    if start != path.stat().st_size or start + len(piece) > _MAX_PACKAGE:
+    if start != path.stat().st_size or start + len(piece) > MAX_PACKAGE:
         raise FileNotFoundError
     with path.open("ab") as file:
         file.write(piece)

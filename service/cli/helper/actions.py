@@ -11,7 +11,7 @@ from service.cli.doctor.command import examined
 from service.cli.doctor.fixes import REBOOT, RESTART
 from service.cli.doctor.machine import EPOCH, SET_BY_HAND
 from service.cli.helper.action import HelperRefusal, ThisPi
-from service.cli.helper.packages import MAX_PACKAGE, PREVIOUS, receive, start_update, update_outcome, version_of
+from service.cli.helper.packages import PREVIOUS, receive, start_update, update_outcome, version_of
 from service.cli.helper.page_settings import change_settings, known_settings, settings_in_force
 from service.cli.setup.answers import SetupChoices, current_key, earlier_choices, shadowed
 from service.cli.setup.change import Change, Machine, Run, Step, WriteFile
@@ -20,6 +20,7 @@ from service.cli.setup.hotspot import hotspot_is_open, hotspot_name, switch_step
 from service.cli.setup.steps import missing_steps
 from service.cli.setup.undo import forget_last, undo_steps
 from service.daemon.client import STATUS, ask_daemon
+from service.machine.helper_socket import MAX_PACKAGE
 from service.machine.package import version
 from service.machine.raspberry_pi import boot_file, pi_model
 from service.settings.addresses import AddressError, parse_fc

@@ -16,7 +16,6 @@ from service.cli.setup.change import Machine, Run, SetupError, WriteFile
 from service.daemon.client import STATUS, ControlError, ask_daemon
 from service.machine.host import Host
 
-MAX_PACKAGE = 128 << 20
 #: Not in /run, which is memory.
 _FOLDER = "/var/lib/naze-bridge-helper"
 NEW, PREVIOUS, _OUTCOME = f"{_FOLDER}/new.deb", f"{_FOLDER}/previous.deb", f"{_FOLDER}/outcome"

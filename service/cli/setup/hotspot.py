@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from service.cli.setup.change import Change, Machine, RemoveFile, Run, SetupError, Step, WriteFile
-from service.machine.captive_portal import dnsmasq_text
+from service.machine.captive_portal import HOTSPOT_CARD, dnsmasq_text
 from service.machine.host import Host
 
 CONNECTION = "naze-bridge-hotspot"
@@ -27,11 +27,10 @@ JOIN_S = 180
 #: Time to join a known network after the hotspot is closed.
 _LEAVE_S = 60
 _CLOSE = "close"
-_CARD = "wlan0"
 #: A file for each device, which names its active connection.
 _NM_DEVICES = "/run/NetworkManager/devices"
 #: NetworkManager's DHCP server notes here which devices joined.
-_LEASES = f"/var/lib/NetworkManager/dnsmasq-{_CARD}.leases"
+_LEASES = f"/var/lib/NetworkManager/dnsmasq-{HOTSPOT_CARD}.leases"
 _OFF, _ON = "autoconnect=false", "autoconnect=true"
 #: Time for setup's last lines to reach the pilot.
 _DELAY_S = 3
@@ -46,7 +45,7 @@ def hotspot_steps(host: Host, hotspot: tuple[str, str] | None) -> Iterator[Step]
     text = (
         "# Written by `naze-bridge setup`.\n"
         f"[connection]\nid={CONNECTION}\nuuid={identity}\ntype=wifi\n"
-        f"interface-name={_CARD}\n{_ON}\nautoconnect-priority=100\n\n"
+        f"interface-name={HOTSPOT_CARD}\n{_ON}\nautoconnect-priority=100\n\n"
         f"[wifi]\nmode=ap\nband=bg\nssid={_keyfile(ssid)}\n\n[wifi-security]\nkey-mgmt=wpa-psk\n"
         f"psk={_keyfile(password)}\n\n"
         f"[ipv4]\nmethod=shared\naddress1={ADDRESS}/24\n\n[ipv6]\nmethod=disabled\n"
@@ -115,7 +114,7 @@ def _keyfile(text: str) -> str:
 def open_hotspot(host: Host, machine: Machine, sleep: Callable[[float], None] = time.sleep) -> str:
     """Open the hotspot, and return to the former Wi-Fi network if no device joins; returns the outcome, a sentence."""
     active = machine.run(("nmcli", "--terse", "--fields", "UUID,DEVICE", "connection", "show", "--active"))
-    former = next((line.split(":")[0] for line in active.splitlines() if line.endswith(f":{_CARD}")), None)
+    former = next((line.split(":")[0] for line in active.splitlines() if line.endswith(f":{HOTSPOT_CARD}")), None)
     leases = host.read(_LEASES)
     try:
         machine.run(("nmcli", "connection", "up", CONNECTION))
@@ -166,7 +165,7 @@ def _has_neighbour(host: Host) -> bool:
     """True if a device in the hotspot's network answered (/proc/net/arp: address, type, flags, ..., card)."""
     network = ADDRESS.rpartition(".")[0] + "."
     rows = [line.split() for line in host.read("/proc/net/arp").splitlines()[1:]]
-    return any(row[0].startswith(network) and row[2] == "0x2" and row[-1] == _CARD for row in rows)
+    return any(row[0].startswith(network) and row[2] == "0x2" and row[-1] == HOTSPOT_CARD for row in rows)
 
 
 if __name__ == "__main__":
