@@ -12,42 +12,76 @@ from protocols.rights.effect import Effect
 from protocols.rights.mavlink import COMMANDS, MESSAGES, FieldRule
 from protocols.rights.msp import MSP_RIGHTS, Firmware, MspRight
 
-_FIRMWARE = tuple(Firmware)
 #: A longer list of payload lengths is given by its ends.
 _LISTED = 4
+_HARAKIRI = {Firmware.HARAKIRI, Firmware.HARAKIRI_MISSIONS}
+_EFFECTS = (Effect.READ, Effect.CHANGE, Effect.MOVE, Effect.UNKNOWN)
 
 
 def msp_table() -> str:
-    """A row for each command, a column for each firmware."""
-    heads = ("command", *(firmware.value for firmware in _FIRMWARE))
-    lines = [_line(heads), _line(["---"] * len(heads))]
+    """A row for each effect and set of firmware."""
+    rows: dict[tuple[Effect, tuple[Firmware, ...]], dict[int, str]] = {}
     for command in sorted({command for rights in MSP_RIGHTS.values() for command in rights}):
-        rights = [MSP_RIGHTS[firmware].get(command) for firmware in _FIRMWARE]
-        name = next(right.name for right in rights if right)
-        number = str(command) if command < 256 else f"0x{command:04X}"
-        lines.append(_line([f"{number} {name}", *(_cell(right, name) for right in rights)]))
+        alike: dict[tuple[Effect, str], list[Firmware]] = {}
+        for firmware, rights in MSP_RIGHTS.items():
+            if right := rights.get(command):
+                alike.setdefault((right.effect, _request(right)), []).append(firmware)
+        for (effect, request), firmware_list in alike.items():
+            rows.setdefault((effect, tuple(firmware_list)), {})[command] = request
+    lines = [_line(("effect", "firmware", "requests")), _line(["---"] * 3)]
+    for effect in _EFFECTS:
+        word = "refused" if effect is Effect.UNKNOWN else effect.value
+        alike_firmware = sorted((key for key in rows if key[0] is effect), key=lambda key: [*map(_order, key[1])])
+        lines += [_line((word, _names(key[1]), _requests(rows[key]))) for key in alike_firmware]
     return "\n".join(lines) + "\n"
 
 
-def _cell(right: MspRight | None, name: str) -> str:
-    if right is None:
-        return ""
-    own_name = "" if right.name == name else f"{right.name}: "
+def _order(firmware: Firmware) -> int:
+    return [*Firmware].index(firmware)
+
+
+def _names(firmware: Collection[Firmware]) -> str:
+    if len(firmware) == len(Firmware):
+        return "all"
+    names = [each.value for each in firmware]
+    if {*firmware} >= _HARAKIRI:
+        names.remove(Firmware.HARAKIRI_MISSIONS.value)
+    elif Firmware.HARAKIRI in firmware:
+        names[0] += " without the mission extension"
+    return ", ".join(names)
+
+
+def _requests(texts: Mapping[int, str]) -> str:
+    """The requests with their numbers; neighbours with the same text as a range."""
+    ranges: list[tuple[int, int, str]] = []
+    for number, text in texts.items():
+        first, last, previous = ranges[-1] if ranges else (0, -1, "")
+        if (last + 1, previous) == (number, text):
+            ranges[-1] = (first, number, text)
+        else:
+            ranges.append((number, number, text))
+    return ", ".join(
+        f"{_number(first)}{'' if first == last else f'..{_number(last)}'} {text}" for first, last, text in ranges
+    )
+
+
+def _number(command: int) -> str:
+    return str(command) if command < 256 else f"0x{command:04X}"
+
+
+def _request(right: MspRight) -> str:
     match right.effect:
         case Effect.READ:
-            others = "" if right.otherwise is Effect.UNKNOWN else f", else {right.otherwise.value}"
-            return f"{own_name}read{_payload(right)}{others}, reply {right.reply}"
-        case Effect.CHANGE:
-            return f"{own_name}change{_payload(right)}"
-        case Effect.MOVE:
-            return f"{own_name}move"
-    return f"{own_name}refused"
+            accepted = " or ".join(payload.hex(" ") for payload in sorted(right.only)) or _lengths(right.lengths)
+            otherwise = "" if right.otherwise is Effect.UNKNOWN else f", else {right.otherwise.value}"
+            return f"{right.name}{'' if accepted == '0' else f' ({accepted}{otherwise})'} {right.reply}"
+        case Effect.CHANGE if not _fills_the_buffer(right.lengths):
+            return f"{right.name} ({_lengths(right.lengths)})"
+    return right.name
 
 
-def _payload(right: MspRight) -> str:
-    if right.only:
-        return " " + " or ".join(payload.hex(" ") for payload in sorted(right.only))
-    return "" if set(right.lengths) == {0} else f" {_lengths(right.lengths)}"
+def _fills_the_buffer(lengths: Collection[int]) -> bool:
+    return len(lengths) > _LISTED and 0 in lengths
 
 
 def _lengths(lengths: Collection[int]) -> str:
@@ -64,18 +98,23 @@ def standing_table() -> str:
     heads = ("ground station", *next(iter(RIGHTS.values()))._fields)
     lines = [_line(heads), _line(["---"] * len(heads))]
     for standing, rights in RIGHTS.items():
-        lines.append(_line([standing.value, *(", ".join(effects) or "nothing" for effects in rights)]))
+        lines.append(_line([standing.value, *map(_effect_names, rights)]))
     return "\n".join(lines) + "\n"
 
 
+def _effect_names(effects: Collection[Effect]) -> str:
+    missing = [effect for effect in Effect if effect not in effects]
+    return f"all but {missing[0]}" if len(missing) == 1 else ", ".join(effects) or "nothing"
+
+
 def mavlink_table() -> str:
-    """A row for each message, then for each command."""
-    return _effects("message", {messages.mavlink_map[msgid].msgname: row for msgid, row in MESSAGES.items()})
+    """A row for each effect of messages."""
+    return _effects("messages", {messages.mavlink_map[msgid].msgname: row for msgid, row in MESSAGES.items()})
 
 
 def command_table() -> str:
-    """A row for each command that is not a move."""
-    return _effects("command", {command_name(number): row for number, row in COMMANDS.items()})
+    """A row for each effect of commands that are not moves."""
+    return _effects("commands", {command_name(number): row for number, row in COMMANDS.items()})
 
 
 def filled(page: str) -> str:
@@ -87,8 +126,11 @@ def filled(page: str) -> str:
 
 
 def _effects(head: str, rows: Mapping[str, Effect | FieldRule]) -> str:
-    lines = [_line((head, "effect")), _line(("---", "---"))]
-    lines += [_line((name, row.rule if isinstance(row, FieldRule) else row)) for name, row in sorted(rows.items())]
+    alike: dict[str, list[str]] = {}
+    for name, row in sorted(rows.items()):
+        alike.setdefault(row.rule if isinstance(row, FieldRule) else row.value, []).append(name)
+    lines = [_line(("effect", head)), _line(("---", "---"))]
+    lines += [_line((effect, ", ".join(names))) for effect, names in alike.items()]
     return "\n".join(lines) + "\n"
 
 
