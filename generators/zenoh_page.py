@@ -3,6 +3,7 @@
 
 import textwrap
 from collections.abc import Iterator
+from itertools import groupby
 from pathlib import Path
 
 from generators.zenoh_schemas import schemas
@@ -16,14 +17,17 @@ _HEAD = """\
 # Payloads over zenoh
 
 The fields of each payload of [zenoh](zenoh.md), from the JSON Schemas in
-[`payloads/schemas/`](../payloads/schemas/). Every payload begins with the first three. null means
-"not known", which includes values that the flight controller cannot measure: a board without a
-compass has no heading. Ignore fields that you do not know: new ones do not change the version.
+[`payloads/schemas/`](../payloads/schemas/). "?": may be null, which means "not known" and includes
+values that the flight controller cannot measure: a board without a compass has no heading. Ignore
+fields that you do not know: new ones do not change the version.
+
+Every payload begins with the first three, and those of `v1/telemetry/` but link end with the last:
 """
 _WIDTH = 100
 #: A command's reply is described in docs/zenoh.md: one of several objects.
 _SCHEMAS = {name: schema for name, schema in schemas().items() if "properties" in schema}
 _COMMON = ("v", "seq", "time_s")
+_AGE = "age_s"
 #: Objects within payloads, by the name of the field that holds them.
 _INNER = {
     "items": "item",
@@ -39,21 +43,22 @@ _INNER = {
 }
 _TYPES = {
     "number": "number",
-    "integer": "whole number",
+    "integer": "integer",
     "string": "text",
-    "boolean": "true or false",
+    "boolean": "true/false",
     "object": "object",
-    "null": "null",
 }
+_NULL = {"type": "null"}
 
 
 def page() -> str:
     """The whole page."""
     payloads = {_heading(key.suffix): (key.suffix, _SCHEMAS[key.schema]) for key in KEYS if key.schema in _SCHEMAS}
-    parts = [_HEAD, *_table({name: _SCHEMAS["state"]["properties"][name] for name in _COMMON})]
+    common = {name: _SCHEMAS["attitude"]["properties"][name] for name in (*_COMMON, _AGE)}
+    parts = [_HEAD, *_table(common)]
     inner: dict[str, Json] = {}
     for heading, (suffix, schema) in payloads.items():
-        fields = {name: field for name, field in schema["properties"].items() if name not in _COMMON}
+        fields = {name: field for name, field in schema["properties"].items() if name not in common}
         objects = {_INNER[name]: _object_in(field) for name, field in fields.items() if name in _INNER}
         inner |= {name: found for name, found in objects.items() if "properties" in found and name not in payloads}
         what = textwrap.fill(f"`{suffix}`. {schema['description']}", _WIDTH)
@@ -68,9 +73,12 @@ def _heading(suffix: str) -> str:
 
 
 def _table(fields: Json) -> Iterator[str]:
+    """A row for each field; neighbours with the same type and meaning share one."""
     yield from ("| field | type | meaning |", "|---|---|---|")
-    for name, field in fields.items():
-        yield f"| `{name}` | {_type(name, field)} | {field.get('description', '')} |"
+    for (kind, meaning), names in groupby(
+        fields, lambda name: (_type(name, fields[name]), fields[name].get("description", ""))
+    ):
+        yield f"| {', '.join(f'`{name}`' for name in names)} | {kind} | {meaning} |"
 
 
 def _object_in(field: Json) -> Json:
@@ -80,27 +88,25 @@ def _object_in(field: Json) -> Json:
 
 
 def _type(name: str, field: Json) -> str:
+    mark = "?" if _may_be_null(field) else ""
     if "properties" in _object_in(field):
         link = f"[{_INNER.get(name, name)}](#{_INNER.get(name, name).replace(' ', '-')})"
-        kind = f"list of {link}" if "items" in object_schema(field) else link
-        return f"{kind} or null" if _may_be_null(field) else kind
+        return f"list of {link}{mark}" if "items" in object_schema(field) else f"{link}{mark}"
     if "const" in field:
         return str(field["const"])
     if "enum" in field:
         *others, last = map(str, field["enum"])
         return f"{', '.join(others)} or {last}"
     if "items" in object_schema(field):
-        each = _type(name, _object_in(field))
-        kind = f"list of {each}" if " or " in each else f"list of {each}s"
-        return f"{kind} or null" if _may_be_null(field) else kind
+        return f"list of {_type(name, _object_in(field))}s{mark}".replace("?s", "s?")
     if "anyOf" in field:
-        return " or ".join(_type(name, each) for each in field["anyOf"])
+        return " or ".join(_type(name, each) for each in field["anyOf"] if each != _NULL) + mark
     kinds = field["type"] if isinstance(field["type"], list) else [field["type"]]
-    return " or ".join(_TYPES[kind] for kind in kinds)
+    return " or ".join(_TYPES[kind] for kind in kinds if kind != "null") + mark
 
 
 def _may_be_null(field: Json) -> bool:
-    return {"type": "null"} in field.get("anyOf", ()) or "null" in field.get("type", ())
+    return _NULL in field.get("anyOf", ()) or "null" in field.get("type", ())
 
 
 if __name__ == "__main__":

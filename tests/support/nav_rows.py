@@ -8,6 +8,7 @@ test_nav_flights compares them with the simulated board.
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile, multiwii_profile
@@ -90,14 +91,14 @@ ROWS = (
     Row("LAND without a position", (ONE, act(Command.NAV_LAND)), "1 2 lands", "1 2 lands"),
     Row("TAKEOFF", (act(Command.NAV_TAKEOFF), ONE, TWO), "1 2 hovers", "1 2 hovers"),
     Row("ROI", (ONE, leg(4, Command.NAV_ROI), TWO), "1 3 hovers", "1 3 hovers"),
+    Row("DO_SET_ROI", (ONE, leg(4, Command.DO_SET_ROI), TWO), "1 3 hovers", "1 3 hovers"),
+    Row("DO_SET_ROI_LOCATION", (ONE, leg(4, Command.DO_SET_ROI_LOCATION), TWO), "1 3 hovers", "1 3 hovers"),
     Row(
         "ROI on the next leg",
         (ONE, leg(3, Command.NAV_ROI), leg(5), leg(7)),
         "1 3 4 hovers",
         "1 3 4 hovers short of it",
     ),
-    Row("DO_SET_ROI", (ONE, leg(4, Command.DO_SET_ROI), TWO), "1 3 hovers", "1 3 hovers"),
-    Row("DO_SET_ROI_LOCATION", (ONE, leg(4, Command.DO_SET_ROI_LOCATION), TWO), "1 3 hovers", "1 3 hovers"),
     Row("DO_SET_ROI_LOCATION, last", (ONE, TWO, leg(4, Command.DO_SET_ROI_LOCATION)), "1 2 hovers", "1 2 hovers"),
     Row("DO_SET_ROI_NONE", (ONE, act(Command.DO_SET_ROI_NONE), TWO), "1 3 hovers", "1 3 hovers"),
     Row("DO_SET_ROI_NONE, last", (ONE, TWO, act(Command.DO_SET_ROI_NONE)), "1 2 hovers", "1 2 hovers"),
@@ -131,22 +132,32 @@ ROWS = (
 
 
 def table() -> str:
-    lines = ["| sent | INAV: records | flown | MultiWii: records | flown |", "|---|---|---|---|---|"]
-    for row in ROWS:
-        inav = _records(row.verdict("inav")), row.inav or "rejected"
-        multiwii = _records(row.verdict("multiwii")), row.multiwii or "rejected"
-        differences = ("same" if one == other else other for one, other in zip(inav, multiwii, strict=True))
-        lines.append(f"| {' | '.join((row.name, *inav, *differences))} |")
+    """A row for each command, or for neighbours that are treated alike."""
+    lines = ["| sent | records and messages | flown |", "|---|---|---|"]
+    for cells, rows in groupby(ROWS, _cells):
+        lines.append(f"| {' | '.join((', '.join(row.name for row in rows), *cells))} |")
     return "\n".join(lines) + "\n"
 
 
-def _records(verdict: Verdict[NavRecord]) -> str:
+def _cells(row: Row) -> tuple[str, str]:
+    inav, multiwii = _parts(row.verdict("inav")), _parts(row.verdict("multiwii"))
+    records = "; ".join(inav)
+    if inav != multiwii:
+        more = [part for part in multiwii if part not in inav]
+        records += "<br>MultiWii" + (
+            " also: " + "; ".join(more) if {*inav} < {*multiwii} else ": " + "; ".join(multiwii)
+        )
+    flown, flown_by_multiwii = row.inav or "rejected", row.multiwii or "rejected"
+    return records, flown if flown == flown_by_multiwii else f"{flown}<br>MultiWii: {flown_by_multiwii}"
+
+
+def _parts(verdict: Verdict[NavRecord]) -> list[str]:
+    """The records, unless the list is rejected, and each message."""
     texts = [f"{'**' * (f.news is News.WARNING)}{f.text()}{'**' * (f.news is News.WARNING)}"
             for f in verdict.findings if f.news is not News.NONE]  # fmt: skip
     if verdict.result is not Result.ACCEPTED:
-        return "; ".join(texts)
-    records = ", ".join(_record(record) for record in verdict.records)
-    return "; ".join([records, *texts])
+        return texts
+    return [", ".join(_record(record) for record in verdict.records), *texts]
 
 
 def _record(record: NavRecord) -> str:
