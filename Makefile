@@ -23,7 +23,7 @@
 #   make rules-page     regenerate the table of docs/mission-rules.md from the rules
 #   make rights-page    regenerate the tables of docs/rights.md from protocols/rights/
 #   make inav-page      regenerate the table of docs/inav.md
-#   make config-sample  regenerate examples/config.toml and the keys of docs/configuration.md
+#   make config-sample  regenerate examples/config.toml
 #   make zenoh-schemas  regenerate payloads/schemas/ from the payload types
 #   make clean          remove all generated files that are not in git
 
@@ -163,12 +163,9 @@ rights-page: $(VENV)/.test-ready
 	$(BIN)/python -m generators.rights_page > docs/rights.new
 	mv docs/rights.new docs/rights.md
 
-# The sample file of all settings, and their reference page.
+# The sample file of all settings.
 config-sample: $(VENV)/.test-ready
 	$(BIN)/python -m generators.config_sample > examples/config.toml
-	sed -i '/begin: make config-sample/,$$d' docs/configuration.md
-	echo '<!-- begin: make config-sample -->' >> docs/configuration.md
-	$(BIN)/python -m generators.config_sample --page >> docs/configuration.md
 
 # The published schemas, and their page.
 zenoh-schemas: $(VENV)/.test-ready

@@ -84,7 +84,6 @@ def _listed(options: Sequence[Option]) -> str:
 
 def _section(name: str, context: click.Context, own: Sequence[Option], shared: Sequence[str]) -> str:
     formatter = context.make_formatter()
-    context.command.format_usage(context, formatter)
     context.command.format_help_text(context, formatter)
     if own:
         with formatter.section("Options"):
@@ -94,7 +93,8 @@ def _section(name: str, context: click.Context, own: Sequence[Option], shared: S
         formatter.write_text(f"Common options: {', '.join(shared[:-1])}")
     if context.parent is None and isinstance(context.command, click.Group):
         context.command.format_commands(context, formatter)
-    return _block(name, formatter.getvalue())
+    arguments = context.command.collect_usage_pieces(context)[1:]  # the first is [OPTIONS]
+    return _block(" ".join([name, *arguments]), formatter.getvalue().lstrip("\n"))
 
 
 def _block(heading: str, text: str) -> str:

@@ -1,13 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sample configuration file, and the table of the reference page: `python -m generators.config_sample [--page]`.
-
-Both are made from the table of keys; a test compares them with the files in the repository (`make config-sample`).
-"""
+"""The sample configuration file, examples/config.toml, from the table of keys (`make config-sample`)."""
 
 import sys
 import textwrap
 
-from service.settings.key import Key
 from service.settings.table import KEYS, TABLES
 
 _HEAD = (
@@ -36,25 +32,9 @@ def sample() -> str:
     return "\n".join(lines) + "\n"
 
 
-def page() -> str:
-    """The rows of the reference page."""
-    rows = ["| key | default | meaning |", "|---|---|---|"]
-    rows += [f"| `{key.name}` | {_default(key)} | {_cell(key)} |" for key in KEYS]
-    return "\n".join(rows) + "\n"
-
-
-def _default(key: Key) -> str:
-    return f"`{key.default}`" if key.default else ""
-
-
-def _cell(key: Key) -> str:
-    example = "" if key.default or not key.example else f" Example: `{key.example}`."
-    return key.meaning.replace("|", "\\|") + example + (" *Live.*" if key.is_live else "")
-
-
 def _comment(text: str) -> str:
     return textwrap.fill(text, _WIDTH, initial_indent="# ", subsequent_indent="# ")
 
 
 if __name__ == "__main__":
-    sys.stdout.write(page() if "--page" in sys.argv else sample())
+    sys.stdout.write(sample())

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sample file and the page have every setting."""
+"""The sample file has every setting."""
 
 import tomllib
 from dataclasses import fields
 from pathlib import Path
 
-from generators.config_sample import page, sample
+from generators.config_sample import sample
 from service.settings import Settings
 from service.settings.table import KEYS
 from tests.service.settings.test_load import load
@@ -27,10 +27,6 @@ def test_every_line_of_the_sample_is_valid(folder: Path) -> None:
     named = {name for name, value in tables.items() if not isinstance(value, dict)}
     named |= {f"{table}.{name}" for table, inner in tables.items() if isinstance(inner, dict) for name in inner}
     assert named == {key.name for key in KEYS}
-
-
-def test_the_page_has_every_setting() -> None:
-    assert page() in (REPOSITORY / "docs" / "configuration.md").read_text(), "run make config-sample"
 
 
 def test_every_key_has_a_field_and_a_meaning() -> None:
