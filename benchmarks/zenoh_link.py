@@ -25,9 +25,9 @@ from benchmarks.processes import BenchmarkError, daemon, running, wait_for
 from benchmarks.telemetry import ATTITUDES, POLLS_HZ, Controller, drain, instant_controller, request_rates
 from benchmarks.zenoh_programs import ALL_TELEMETRY, configuration
 from bridge.model.vehicle import Orientation
-from bridge.model.vehicle_groups import Group
 from payloads.keys import TELEMETRY, full
 from payloads.names import DEFAULT_PREFIX
+from reports.vehicle_groups import Group
 from service.daemon.daemon import Daemon
 from service.settings import Settings
 from service.settings.addresses import parse_fc

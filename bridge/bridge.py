@@ -35,7 +35,6 @@ from bridge.missions.place_lists import PlaceLists
 from bridge.model.events import Armed, Disarmed, Emit
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.vehicle import FlightState, Health, MissionLeg, Readiness
-from bridge.model.vehicle_groups import Group
 from bridge.sharing.msp_sharing import MspSharing
 from bridge.sharing.program import Program
 from bridge.transfers.downloads import MissionDownloads
@@ -58,6 +57,7 @@ from bridge.vehicle.vehicle_report import VehicleReporter
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.mission_item import MissionResult
+from reports.vehicle_groups import Group
 
 
 class FcOutput(NamedTuple):

@@ -22,11 +22,9 @@ from bridge.missions.fc_mission_store import PushProgress, StoreReport, StoreSta
 from bridge.missions.list_check import ListCheck
 from bridge.missions.mission_service import DeliveryResult, HeldMission, MissionService
 from bridge.model.events import BridgeEvent
-from bridge.model.finding import Finding, News, RejectingFinding, without_defaults
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.vehicle import FlightState, Source, Vehicle
-from bridge.model.verdict import Result, Verdict
 from bridge.transfers.downloads import MissionDownloads
 from bridge.transfers.uploads import MissionUploads
 from protocols.mavlink.codec import MavlinkDecoder, item_from_float_message, item_from_int_message, repack
@@ -35,6 +33,8 @@ from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.mission_record import ListIdentity
+from reports.finding import Finding, News, RejectingFinding, without_defaults
+from reports.verdict import Result, Verdict
 
 #: As a mission file in a command (service/zenoh_link/commands.py).
 _MOST_ITEMS = 1000

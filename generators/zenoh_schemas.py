@@ -11,14 +11,14 @@ from dataclasses import is_dataclass
 from enum import Enum
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
-from bridge.model import vehicle_groups as groups
-from bridge.model.finding import Finding
-from bridge.model.vehicle_groups import Group, VehicleReport
 from payloads.compact import CBOR_KEY, SCHEMAS, object_schema
 from payloads.keys import VERSION
 from payloads.mission_data import Json
 from payloads.overview import Overview
 from protocols.mission_item import MissionItem
+from reports import vehicle_groups as groups
+from reports.finding import Finding
+from reports.vehicle_groups import Group, VehicleReport
 from storage.mission_store import MissionSummary
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"

@@ -6,10 +6,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 
-from bridge.model.finding import DROPPED, REJECTED, Finding, value_label, without_defaults
 from payloads.mission_data import Json, correction_texts, mission_findings, mission_items
 from protocols.mavlink.command import command_name
 from protocols.mission_item import MissionItem
+from reports.finding import DROPPED, REJECTED, Finding, value_label, without_defaults
 
 #: No flight controller holds more: a longer list was rejected.
 MAX_ROWS = 500

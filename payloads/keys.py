@@ -10,7 +10,7 @@ ground station.
 from dataclasses import dataclass
 from enum import Enum
 
-from bridge.model.vehicle_groups import Group
+from reports.vehicle_groups import Group
 
 #: The version of keys and payloads. A new field does not change it; a change that would mislead a reader raises it.
 VERSION = 1

@@ -7,11 +7,11 @@ from collections.abc import Iterable
 from dataclasses import asdict
 from typing import Any, TypeGuard
 
-from bridge.model.finding import Finding, News, without_defaults
-from bridge.model.verdict import Verdict
 from protocols.mission_item import MissionItem
 from protocols.mission_record import identify
 from protocols.plain_text import plain_text
+from reports.finding import Finding, News, without_defaults
+from reports.verdict import Verdict
 
 Json = dict[str, Any]
 

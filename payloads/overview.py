@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
-from bridge.model.mission_progress import Progress
 from payloads.mission_data import Json
+from reports.vehicle_groups import Progress
 
 _GREATEST = 0xFFFFFFFF
 _FIXES = {"none": 0, "2D": 2, "3D": 3}

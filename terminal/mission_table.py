@@ -8,11 +8,11 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from bridge.model.finding import Finding
 from payloads.comparison import ItemRow, sent_and_stored
 from payloads.mission_data import correction_texts
 from protocols.mavlink.command import command_name
 from protocols.mission_item import MissionItem
+from reports.finding import Finding
 
 _CHANGED = "yellow"
 _DROPPED = "red"

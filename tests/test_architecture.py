@@ -16,7 +16,7 @@ import pytest
 from tests.support.forked import PRELOADED
 
 REPOSITORY = Path(__file__).parents[1]
-#: The other packages that each one may import; of bridge/, some only its values.
+#: The other packages that each one may import.
 BRIDGE = {
     "bridge.model": set[str](),
     "bridge.line": {"bridge.model"},
@@ -41,11 +41,12 @@ PACKAGES = {
     "protocols": set[str](),
     "storage": set[str](),
     "simulator": {"protocols"},
-    "bridge": {"protocols"},
-    "payloads": {"bridge.model", "protocols", "storage"},
-    "terminal": {"payloads", "bridge.model", "protocols", "storage"},
+    "reports": {"protocols"},
+    "bridge": {"reports", "protocols"},
+    "payloads": {"reports", "protocols", "storage"},
+    "terminal": {"payloads", "reports", "protocols", "storage"},
     "fleet": {"payloads", "terminal", "protocols", "storage"},
-    "service": {"payloads", "terminal", "fleet", "bridge", "protocols", "simulator", "storage"},
+    "service": {"payloads", "terminal", "fleet", "bridge", "reports", "protocols", "simulator", "storage"},
 }
 SERVICE = {
     "service.machine": set[str](),

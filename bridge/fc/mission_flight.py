@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 from bridge.fc.profile import Decoder, FlightController
 from bridge.line.poll_schedule import Poll
-from bridge.model.mission_progress import FlightReport, Progress, Stage, Way
+from bridge.model.mission_progress import FlightReport, Stage, Way
 from bridge.model.vehicle import MissionLeg, Source, Vehicle
 from protocols.msp.commands import Msp
 from protocols.msp.mission_flight import (
@@ -16,6 +16,7 @@ from protocols.msp.mission_flight import (
     FlightReason,
     decode_flight,
 )
+from reports.vehicle_groups import Progress
 
 #: A build without mission flight refuses it, and is not asked again.
 FLIGHT_POLL = Poll(Msp.FLIGHT, FLIGHT_REQUEST, FLIGHT_SIZE, 0.5)

@@ -13,10 +13,10 @@ from typing import Any, Generic
 
 from bridge.line.conversation import Conversation
 from bridge.missions.list_check import MissionRules
-from bridge.model.verdict import RecordT
 from protocols.mission_item import MissionItem
 from protocols.mission_record import ListIdentity
 from protocols.msp.nav import NavStatus
+from reports.verdict import RecordT
 
 
 class StoreState(Enum):

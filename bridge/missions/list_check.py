@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
-from bridge.model.finding import DROPPED, Finding, News, RejectingFinding, reject, reject_list
-from bridge.model.verdict import CLEARED_LIST, Verdict, rejected
 from protocols.mission_item import MAX_LAT_E7, MAX_LON_E7, Command, Frame, MissionItem, MissionResult
+from reports.finding import DROPPED, Finding, News, RejectingFinding, reject, reject_list
+from reports.verdict import CLEARED_LIST, Verdict, rejected
 
 RELATIVE_FRAMES = (Frame.GLOBAL_RELATIVE_ALT, Frame.GLOBAL_RELATIVE_ALT_INT)
 SEA_LEVEL_FRAMES = (Frame.GLOBAL, Frame.GLOBAL_INT)

@@ -28,10 +28,10 @@ from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission, Re
 from bridge.model.mission_progress import FlightReport
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.vehicle import Vehicle
-from bridge.model.verdict import Result, SentSeqs, Verdict, is_renumbered
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.mission_record import ListIdentity, identify
 from protocols.msp.nav import NavStatus
+from reports.verdict import Result, SentSeqs, Verdict, is_renumbered
 
 T = TypeVar("T")
 

@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
-from bridge.model.finding import DROPPED, Finding, News, without_defaults
-from bridge.model.verdict import Verdict
 from protocols.mission_item import Command
+from reports.finding import DROPPED, Finding, News, without_defaults
+from reports.verdict import Verdict
 
 _MOST_LINES = 10
 #: A longer text would be split, and Mission Planner's HUD shows only the last piece.

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
-from bridge.model.verdict import SentSeqs, Verdict
 from protocols.mission_item import MissionItem
 from protocols.mission_record import ListIdentity
+from reports.verdict import SentSeqs, Verdict
 
 
 class Outcome(Enum):

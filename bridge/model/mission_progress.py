@@ -3,30 +3,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import Enum, IntEnum
+from enum import IntEnum
 
-from bridge.model.verdict import SentSeqs
 from protocols.mission_item import MissionItem
 from protocols.msp.nav import FINISHED, LEGS, NavAction, NavMode, NavState, NavStatus
+from reports.vehicle_groups import Progress
+from reports.verdict import SentSeqs
 
 #: In these states the craft is at its record's place.
 _THERE = frozenset((NavState.HOLD_TIMED, NavState.LAND_IN_PROGRESS, NavState.LANDED, NavState.HOVER_ABOVE_HOME))
 _REACHED = LEGS | {NavAction.RTH}
-
-
-class Progress(Enum):
-    """MAVLink's MISSION_STATE."""
-
-    UNKNOWN = 0
-    NO_MISSION = 1
-    NOT_STARTED = 2
-    ACTIVE = 3
-    PAUSED = 4
-    COMPLETE = 5
-
-    @property
-    def text(self) -> str:
-        return self.name.lower().replace("_", " ")
 
 
 class Stage(IntEnum):

@@ -9,8 +9,8 @@ from typing import Any
 
 from bridge.gcs.ground_station import Speaker
 from bridge.missions.list_check import ListCheck
-from bridge.model.verdict import Verdict
 from protocols.mission_item import MissionItem
+from reports.verdict import Verdict
 
 #: The timeout of an item request: 1.5 times the round trip, within these limits.
 _FIRST_TIMEOUT_S = 0.25

@@ -13,10 +13,10 @@ from bridge.missions.mission_service import DeliveryResult, HeldMission, Mission
 from bridge.model.events import Emit, PushEnded, PushStarted
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.refusal import Refusal
-from bridge.model.verdict import Result, Verdict
 from bridge.transfers.uploads import MissionUploads
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.plain_text import plain_text
+from reports.verdict import Result, Verdict
 
 _WOULD_ERASE = Refusal(MissionResult.DENIED, "No item can be stored: this would erase the current mission")
 

@@ -9,11 +9,11 @@ from bridge.gcs.ground import Ground
 from bridge.gcs.station import Peer, Severity, Station
 from bridge.missions.mission_service import DeliveryResult
 from bridge.missions.mission_texts import finding_lines
-from bridge.model.finding import News
 from bridge.model.refusal import Refusal
 from bridge.model.transfer_memory import FinalAck, TransferMemory
-from bridge.model.verdict import Result, Verdict
 from protocols.mission_item import MissionResult
+from reports.finding import News
+from reports.verdict import Result, Verdict
 
 #: Mission Planner sends its last item for 5 s, its Cancel for 2.8 s.
 _MEMORY_S = 10.0

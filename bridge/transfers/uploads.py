@@ -22,10 +22,8 @@ from bridge.missions.fc_mission_store import StoreReport
 from bridge.missions.list_check import begin_check, check_count
 from bridge.missions.mission_service import OCCUPIED, DeliveryResult, MissionService, MissionTransfer, TransferStep
 from bridge.model.events import Emit, StationMoved, UploadEnded, UploadRefused, UploadStarted
-from bridge.model.finding import Finding
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.refusal import Refusal
-from bridge.model.verdict import CLEARED_LIST, Result, Verdict
 from bridge.transfers.arriving_list import Reply, WholeList
 from bridge.transfers.upload_answers import UploadAnswers
 from bridge.transfers.upload_states import (
@@ -52,6 +50,8 @@ from bridge.transfers.upload_states import (
 )
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionItem, MissionResult
+from reports.finding import Finding
+from reports.verdict import CLEARED_LIST, Result, Verdict
 
 _TOO_MANY_UPLOADS = Refusal(MissionResult.DENIED, "Too many uploads: wait a few seconds")
 #: The maximum number of simultaneous uploads: one for each peer of a link.

@@ -19,9 +19,8 @@ from bridge.gcs.station import Peer, Severity, Station
 from bridge.missions.mission_service import MissionService
 from bridge.model.flight_memory import Home
 from bridge.model.flight_mode import FlightMode
-from bridge.model.mission_progress import FlightReport, FlownMission, MissionProgress, Progress
+from bridge.model.mission_progress import FlightReport, FlownMission, MissionProgress
 from bridge.model.vehicle import STALE_S, FlightState, Health, MissionLeg, Mode, Readiness, Reading
-from bridge.model.verdict import SentSeqs
 from bridge.vehicle import vehicle_messages as make
 from bridge.vehicle.arming_reasons import ArmingReasons
 from bridge.vehicle.link_announcer import LinkAnnouncer
@@ -31,6 +30,8 @@ from protocols.mavlink.codec import pack
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.mode_messages import AVAILABLE_MODES
 from protocols.msp.commands import Msp
+from reports.vehicle_groups import Progress
+from reports.verdict import SentSeqs
 
 #: The interval of HEARTBEAT, and the clock for messages without a reading.
 _TICK_S = 1.0

@@ -13,7 +13,7 @@ from bridge.model.airframe import Airframe
 from bridge.model.flight_memory import Home
 from bridge.model.flight_mode import FlightMode
 from bridge.model.ground_track import bearing_deg, distance_m, north_east_m
-from bridge.model.mission_progress import FlownMission, Progress, Way
+from bridge.model.mission_progress import FlownMission, Way
 from bridge.model.vehicle import (
     STALE_S,
     Airspeed,
@@ -37,12 +37,13 @@ from bridge.model.vehicle import (
     Sticks,
     Vehicle,
 )
-from bridge.model.verdict import SentSeqs
 from protocols.mavlink import mode_messages
 from protocols.mavlink.codec import pack_payload
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import Command
 from protocols.msp.telemetry import Sensor
+from reports.vehicle_groups import Progress
+from reports.verdict import SentSeqs
 
 
 class _ModeNumbers(NamedTuple):

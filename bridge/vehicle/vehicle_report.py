@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The vehicle in published groups (bridge.model.vehicle_groups): for zenoh, the status page and the command line."""
+"""The vehicle in published groups (reports.vehicle_groups): for zenoh, the status page and the command line."""
 
 from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import cache
@@ -30,7 +30,9 @@ from bridge.model.vehicle import (
     Signal,
     Sticks,
 )
-from bridge.model.vehicle_groups import (
+from bridge.vehicle.settings_seal import SettingsSeal
+from protocols.msp.telemetry import Sensor
+from reports.vehicle_groups import (
     Attitude,
     Battery,
     Gps,
@@ -44,8 +46,6 @@ from bridge.model.vehicle_groups import (
     Status,
     VehicleReport,
 )
-from bridge.vehicle.settings_seal import SettingsSeal
-from protocols.msp.telemetry import Sensor
 
 #: The readings of each group, and their poll intervals while the group is watched, seconds. A group is published when
 #: its first reading arrives; when another one does, unless it was published just before; and when one becomes stale.
@@ -139,7 +139,7 @@ class VehicleReporter:
         return fresh
 
     def group(self, group: Group, now: float) -> Any:
-        """The current values of a group: an instance of its class in bridge.model.vehicle_groups."""
+        """The current values of a group: an instance of its class in reports.vehicle_groups."""
         self._session.settle_telemetry()
         return self._makers[group](now)
 
@@ -161,7 +161,7 @@ class VehicleReporter:
         return self._session.vehicle.fresh(kind, now)
 
     def _age_s(self, group: Group, now: float) -> float | None:
-        """As in bridge.model.vehicle_groups.Age."""
+        """As in reports.vehicle_groups.Age."""
         vehicle = self._session.vehicle
         fresh = [reading.heard_at for kind in _SHOWS[group] if (reading := vehicle.fresh(kind, now)) is not None]
         if fresh:

@@ -14,8 +14,6 @@ from bridge.controllers.nav.rules import INAV_CAPACITY, MULTIWII_CAPACITY
 from bridge.controllers.table import PROFILES
 from bridge.fc.profile import RuleSettings
 from bridge.missions.list_check import MissionRules, check_list
-from bridge.model.finding import DROPPED, without_defaults
-from bridge.model.verdict import Result, Verdict
 from bridge.vehicle.parameter_names import parameter_names
 from payloads.mission_data import verdict_data
 from protocols.file_error import FileError
@@ -23,6 +21,8 @@ from protocols.inav_dump import InavDumpError, SavedSettings, read_inav_settings
 from protocols.mission_file import MissionFileError
 from protocols.mission_item import MissionItem, MissionResult, degrees_to_e7, is_on_earth
 from protocols.mission_record import identify
+from reports.finding import DROPPED, without_defaults
+from reports.verdict import Result, Verdict
 from service.settings import SettingsError, takeoff_limit_m
 from terminal.files import read_file, shown_path
 from terminal.mission_source import load_mission

@@ -12,11 +12,11 @@ from rich.table import Table
 from bridge.controllers.table import PROFILES
 from bridge.fc.profile import RuleSettings
 from bridge.missions.list_check import check_list
-from bridge.model.verdict import Result
 from protocols.file_error import FileError
 from protocols.firmware_image import FLASH_SIZE, Image
 from protocols.mission_file import MissionFileError
 from protocols.msp.mission import WpRecord
+from reports.verdict import Result
 from service.settings import SettingsError, takeoff_limit_m
 from simulator.commands.image import read_image
 from simulator.sky.earth import Place

@@ -19,8 +19,8 @@ from bridge.line.conversation import StoreEffect
 from bridge.missions.mission_service import DeliveryResult
 from bridge.model.events import Armed, BridgeEvent, Disarmed
 from bridge.model.mission_log import ArrivedMission
-from bridge.model.vehicle_groups import Group, VehicleReport
 from payloads.mission_data import Json
+from reports.vehicle_groups import Group, VehicleReport
 from service.daemon.fc_connection import FcConnection
 from service.daemon.flight_file import FlightFile
 from service.daemon.gcs_connections import GcsConnections

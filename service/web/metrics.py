@@ -17,8 +17,8 @@ from bridge.line.msp_link import BOUNDS_S, RoundTrips
 from bridge.missions.mission_service import DeliveryResult
 from bridge.model.events import BridgeEvent, PushEnded, PushStarted, UploadEnded, UploadRefused, UploadStarted
 from bridge.model.mission_log import ArrivedMission
-from bridge.model.vehicle_groups import VehicleReport
 from payloads.names import host_name
+from reports.vehicle_groups import VehicleReport
 from service.daemon.daemon import Daemon, Follower
 from service.machine.package import version
 

@@ -18,13 +18,13 @@ import zenoh
 from bridge.missions.mission_service import DeliveryResult, HeldMission
 from bridge.model.events import BridgeEvent
 from bridge.model.mission_log import ArrivedMission
-from bridge.model.vehicle_groups import Group
 from payloads import keys
 from payloads.endpoints import connect_endpoints, endpoint_trouble, tls_files
 from payloads.keys import ZenohKey
 from payloads.mission_data import Json
 from payloads.overview import overview_of
 from payloads.payload import Payloads, plain
+from reports.vehicle_groups import Group
 from service.daemon.api import DaemonApi
 from service.daemon.daemon import Daemon, Follower
 from service.daemon.telemetry_logs import TelemetryLogs

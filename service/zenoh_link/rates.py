@@ -11,7 +11,7 @@ from itertools import repeat
 from math import inf
 from typing import Any
 
-from bridge.model.vehicle_groups import Group
+from reports.vehicle_groups import Group
 
 _CHANGED_S = 5.0
 _IDLE_S = 30.0

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from bridge.gcs.station import Peer
-from bridge.model.finding import Finding, News
 from bridge.relay import Relay, WriteResult
 from protocols.mavlink.codec import FrameWriter, MavlinkDecoder, pack
 from protocols.mavlink.dialect import Message
@@ -13,6 +12,7 @@ from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.mission_record import ListIdentity
+from reports.finding import Finding, News
 
 VEHICLE = (7, 1)
 PEER = Peer("udp", "planner")

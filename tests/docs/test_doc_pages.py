@@ -10,7 +10,7 @@ import pytest
 from tests.support.doc_pages import PAGES, blocks, place_of, prose_of, spans, text_of
 from tests.support.programs import REPOSITORY
 
-CODE = ("bridge", "fleet", "payloads", "protocols", "service", "simulator", "storage", "terminal")
+CODE = ("bridge", "fleet", "payloads", "protocols", "reports", "service", "simulator", "storage", "terminal")
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 #: What the blocks of each language are tested by.
 LANGUAGES = {

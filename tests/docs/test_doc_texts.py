@@ -55,7 +55,7 @@ def test_the_report_of_doctor(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 def texts() -> str:
     """All texts in the code and the status page, one per line, with \\0 for each inserted value."""
     found = []
-    for package in ("bridge", "fleet", "payloads", "protocols", "service", "terminal"):
+    for package in ("bridge", "fleet", "payloads", "protocols", "reports", "service", "terminal"):
         for file in (REPOSITORY / package).rglob("*.py"):
             for node in ast.walk(ast.parse(file.read_text())):
                 if isinstance(node, ast.JoinedStr):

@@ -11,9 +11,9 @@ from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile
 from bridge.missions.list_check import check_list
-from bridge.model.verdict import Verdict
 from protocols.mission_item import Command, Frame
 from protocols.msp.nav import NavRecord
+from reports.verdict import Verdict
 from tests.e2e.test_mavsdk import fields, raw_items, refusal_of, vehicle_at
 from tests.support.benches import Bench, Starter
 from tests.support.mavproxy import MavProxy

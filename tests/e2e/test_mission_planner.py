@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 
 from bridge.missions.mission_texts import finding_lines, summary
-from bridge.model.verdict import Result
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import Command, Frame, MissionResult
+from reports.verdict import Result
 from tests.support.benches import Bench
 from tests.support.lossy_udp import Direction
 from tests.support.mission_planner import MissionPlanner, UploadFailed

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.missions.list_check import check_list
-from bridge.model.verdict import Result
 from payloads.comparison import MAX_ROWS, checked_mission, difference, sent_and_stored, stored_mission
 from payloads.mission_data import to_json, verdict_data
 from protocols.mission_item import MissionItem
+from reports.verdict import Result
 
 RULES = HarakiriRules(capacity=146, wp_radius_cm=200)
 numbers = st.one_of(st.sampled_from([0.0, 1.0, 0.5, 2.0, 15.0, 300.0, math.nan, math.inf]), st.floats(width=32))

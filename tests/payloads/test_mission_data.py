@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.model.finding import Finding, News
 from payloads.mission_data import correction_texts, mission_findings, mission_items, to_json
 from protocols.mission_item import MissionItem
+from reports.finding import Finding, News
 
 _NUMBER = st.floats(width=32, allow_infinity=False)
 ITEMS = st.builds(

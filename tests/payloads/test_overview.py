@@ -2,7 +2,11 @@
 """The overview of a vehicle fits 80 bytes."""
 
 from bridge.model.flight_mode import FlightMode
-from bridge.model.vehicle_groups import (
+from payloads import compact
+from payloads.keys import OVERVIEW, PayloadEncoding
+from payloads.overview import overview_of
+from payloads.payload import Payloads, plain
+from reports.vehicle_groups import (
     Attitude,
     Battery,
     Gps,
@@ -14,10 +18,6 @@ from bridge.model.vehicle_groups import (
     Status,
     VehicleReport,
 )
-from payloads import compact
-from payloads.keys import OVERVIEW, PayloadEncoding
-from payloads.overview import overview_of
-from payloads.payload import Payloads, plain
 
 
 def state_of() -> VehicleReport:

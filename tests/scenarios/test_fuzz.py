@@ -18,13 +18,13 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from hypothesis.database import DirectoryBasedExampleDatabase
 
-from bridge.model.vehicle_groups import Group
 from payloads.mission_data import to_json
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.tlog import read_tlog, tlog_record
 from protocols.uart_capture import read_capture
+from reports.vehicle_groups import Group
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from simulator.board.simulated_board import SimulatedBoard
 from simulator.commands.fc_kinds import KINDS, make_board

@@ -13,12 +13,12 @@ from typing import Any
 
 import pytest
 
-from bridge.model.vehicle_groups import Group
 from fleet.vehicle import BridgeId, FleetVehicle, vehicle_of
 from payloads.mission_data import Json
 from payloads.overview import overview_of, state_of
 from payloads.payload import plain
 from protocols.mavlink.dialect import Message
+from reports.vehicle_groups import Group
 from service.web.metrics import vehicle_gauges
 from simulator.board.flight import Craft
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol

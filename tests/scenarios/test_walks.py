@@ -3,8 +3,8 @@
 
 A walk is one or more whole wake-ups of a daemon on a simulated Naze (one UDP station, memory instead of a disk, no log
 file), from the event loop's callback until it returns. Counted with sys.setprofile are the Python functions called in
-bridge/, protocols/, service/ and storage/, comprehensions and resumed generators included; the calls into a file that
-was entered and left before; and the files.
+bridge/, protocols/, reports/, service/ and storage/, comprehensions and resumed generators included; the calls into a
+file that was entered and left before; and the files.
 
 attitude: a reply to MSP_ATTITUDE is read and sent on, at the default rates.
 item: a MISSION_ITEM_INT in the middle of a list of nine is received, and the next one requested.

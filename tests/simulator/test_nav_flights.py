@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from bridge.model.ground_track import distance_m
-from bridge.model.verdict import Result
 from protocols.mission_item import Command
 from protocols.msp.nav import LEGS, NavAction, NavRecord
+from reports.verdict import Result
 from simulator.board.nav_waypoint import unpack_waypoint
 from simulator.board.options import Faults
 from simulator.inav.boxes import BOXES, NAV_WP

@@ -7,9 +7,9 @@ from typing import Any
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile, multiwii_profile
 from bridge.missions.list_check import check_list
-from bridge.model.verdict import Result, Verdict
 from protocols.mission_item import Command, MissionItem
 from protocols.msp.nav import NavAction, NavRecord
+from reports.verdict import Result, Verdict
 
 INAV, MULTIWII = NavRules(inav_profile()), NavRules(multiwii_profile())
 LAT, LON = 453838000, 84733000

@@ -13,10 +13,10 @@ from itertools import groupby
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile, multiwii_profile
 from bridge.missions.list_check import check_list
-from bridge.model.finding import News
-from bridge.model.verdict import Result, Verdict
 from protocols.mission_item import Command, MissionItem
 from protocols.msp.nav import NavAction, NavRecord
+from reports.finding import News
+from reports.verdict import Result, Verdict
 
 RULES = {"inav": NavRules(inav_profile()), "multiwii": NavRules(multiwii_profile())}
 LAT, LON = 453838000, 84733000

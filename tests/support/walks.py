@@ -32,7 +32,7 @@ from tests.support.world import MemoryStore
 _TIMEOUT_S = 30.0
 _POLL_S = 0.001
 _ROOT = f"{Path(__file__).parents[2]}/"
-_PRODUCT = ("bridge/", "protocols/", "service/", "storage/")
+_PRODUCT = ("bridge/", "protocols/", "reports/", "service/", "storage/")
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,7 +34,6 @@ from bridge.line.conversation import Conclude, FindPending, NoteReader, Recall, 
 from bridge.model.events import BridgeEvent, Level
 from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission, RecalledMission
 from bridge.model.settings import SealMemory, SealsOfThisRun
-from bridge.model.verdict import SentSeqs
 from bridge.sharing.program import Program
 from bridge.vehicle.settings_backups import TakenBackup
 from protocols.mavlink.dialect import Message, messages
@@ -46,6 +45,7 @@ from protocols.msp.mission import WpRecord, unpack_records
 from protocols.rights.effect import Effect
 from protocols.rights.mavlink import effect_of
 from protocols.rights.msp import Firmware, msp_right
+from reports.verdict import SentSeqs
 from simulator.board.flash import ERASED, PAGE_SIZE, NorFlash
 from simulator.board.line import garble
 from simulator.board.options import Faults, SimOptions

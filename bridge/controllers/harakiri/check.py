@@ -28,10 +28,10 @@ from bridge.missions.list_check import (
     refuse_frame,
     refuse_position,
 )
-from bridge.model.finding import CLEARED, DROPPED, Finding, News, RejectingFinding, reject
-from bridge.model.verdict import Result, Verdict
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.msp.mission import WpCommand, WpRecord
+from reports.finding import CLEARED, DROPPED, Finding, News, RejectingFinding, reject
+from reports.verdict import Result, Verdict
 
 _METRES_PER_E7 = 0.0111
 

@@ -12,9 +12,7 @@ from bridge.controllers.inav.place_store import InavPlaceStore, take
 from bridge.fc.profile import FlightController
 from bridge.line.conversation import Conversation, ask
 from bridge.missions.list_check import ListCheck, missing_coordinate, refuse_frame, refuse_position
-from bridge.model.finding import DROPPED, Finding, News, RejectingFinding, reject, reject_list
 from bridge.model.ground_track import north_east_m
-from bridge.model.verdict import CLEARED_LIST, Result, Verdict
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
 from protocols.msp.frame import Direction, request
 from protocols.msp.inav_places import (
@@ -38,6 +36,8 @@ from protocols.msp.inav_places import (
     encode_read_geozone,
     encode_read_vertex,
 )
+from reports.finding import DROPPED, Finding, News, RejectingFinding, reject, reject_list
+from reports.verdict import CLEARED_LIST, Result, Verdict
 
 _FIRST_VERSION = (8, 0, 0)
 _MAX_TRIES = 3

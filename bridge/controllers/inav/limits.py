@@ -12,11 +12,11 @@ from typing import Any
 
 from bridge.controllers.inav.zone_check import judge_zones
 from bridge.controllers.nav.judgement import Departure, Judgement
-from bridge.model.finding import News
 from bridge.model.ground_track import distance_m
 from protocols.inav_dump import SavedSettings
 from protocols.msp.inav_places import Geozone, Safehome
 from protocols.msp.nav import FLY_HOME, LEGS, NavAction, NavRecord
+from reports.finding import News
 
 _ABOVE_SEA = 1
 

@@ -18,10 +18,10 @@ from bridge.missions.fc_mission_store import (
     StoreState,
 )
 from bridge.missions.list_check import MissionRules
-from bridge.model.verdict import RecordT
 from bridge.settings.eeprom_write import write_eeprom
 from protocols.mission_item import MissionItem
 from protocols.msp.frame import Direction, request
+from reports.verdict import RecordT
 
 _ACK_SIZE = 0
 

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from bridge.controllers.inav.place_store import InavPlaceStore, take
 from bridge.line.conversation import Conversation, ask
 from bridge.missions.list_check import ListCheck, missing_coordinate, refuse_frame, refuse_position
-from bridge.model.finding import DROPPED, Finding, News, RejectingFinding, reject
-from bridge.model.verdict import CLEARED_LIST, Result, Verdict
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
 from protocols.msp.inav_places import (
     SAFEHOME,
@@ -19,6 +17,8 @@ from protocols.msp.inav_places import (
     decode_safehome,
     encode_read_safehome,
 )
+from reports.finding import DROPPED, Finding, News, RejectingFinding, reject
+from reports.verdict import CLEARED_LIST, Result, Verdict
 
 
 def read_safehomes() -> Conversation[tuple[Safehome, ...] | None]:

@@ -34,11 +34,11 @@ from bridge.missions.list_check import (
     refuse_frame,
     refuse_position,
 )
-from bridge.model.finding import DROPPED, Finding, News, RejectingFinding, reject, reject_list
-from bridge.model.verdict import Result, Verdict
 from protocols.float32 import is_single
 from protocols.mission_item import ROI_COMMANDS, Command, MissionItem, MissionResult
 from protocols.msp.nav import LAST, LEGS, TURNS, NavAction, NavRecord
+from reports.finding import DROPPED, Finding, News, RejectingFinding, reject, reject_list
+from reports.verdict import Result, Verdict
 
 #: The greatest height at which single precision still resolves a centimetre.
 _MAX_HEIGHT_CM = 3_276_700

@@ -10,9 +10,9 @@ from itertools import accumulate
 from types import MappingProxyType
 
 from bridge.controllers.nav.rules import ENDLESS_S, LEAST_SPEED_CMS
-from bridge.model.verdict import SentSeqs
 from protocols.mission_item import ROI_COMMANDS, Command, Frame, MissionItem
 from protocols.msp.nav import NavAction, NavRecord
+from reports.verdict import SentSeqs
 
 _NONE_KNOWN: Mapping[int, int] = MappingProxyType({})
 _UNKNOWN_COMMAND = 0

@@ -5,9 +5,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
-from bridge.model.finding import News
 from bridge.model.ground_track import Place
 from protocols.msp.nav import NavRecord
+from reports.finding import News
 
 
 class Judgement(NamedTuple):

@@ -3,9 +3,9 @@
 
 from dataclasses import dataclass, field, replace
 
-from bridge.model.finding import Note, RejectingFinding, reject
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.nav import LEGS, NavRecord
+from reports.finding import Note, RejectingFinding, reject
 
 #: INAV does not arm with a JUMP to a closer record (navigation.c, navigationIsBlockingArming).
 _NEAREST = 2

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from bridge.missions.list_check import missing_coordinate
-from bridge.model.finding import Note
 from protocols.mission_item import Frame, MissionItem
 from protocols.msp.nav import LEGS, NavRecord
+from reports.finding import Note
 
 #: The height of half a centimetre, which a record stores as 0.
 _ROUNDED_TO_0_M = 0.005

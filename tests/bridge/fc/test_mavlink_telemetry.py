@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as m
 
-from bridge.model.vehicle_groups import Attitude, Battery, Gps, Group, Position, Rc, Status
+from reports.vehicle_groups import Attitude, Battery, Gps, Group, Position, Rc, Status
 from tests.bridge.fc.states.test_pass_through import Autopilot, passing
 from tests.bridge.vehicle.test_vehicle_report import EMPTY, without_age
 

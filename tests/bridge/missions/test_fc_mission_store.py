@@ -22,8 +22,8 @@ from bridge.missions.list_check import check_list
 from bridge.missions.mission_service import DeliveryResult, HeldMission
 from bridge.model.mission_log import Outcome
 from bridge.model.refusal import Refusal
-from bridge.model.verdict import Result
 from protocols.mission_item import Command, MissionItem, MissionResult
+from reports.verdict import Result
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from simulator.commands.fc_kinds import make_board
 from tests.support.conversations import Download, Upload, clear_message, waypoints

@@ -8,10 +8,10 @@ import pytest
 
 from bridge.controllers.harakiri.check import HarakiriCheck, HarakiriRules
 from bridge.missions.list_check import check_count, check_list
-from bridge.model.finding import CLEARED, REJECTED
-from bridge.model.verdict import Result
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.mission import WpCommand, WpRecord
+from reports.finding import CLEARED, REJECTED
+from reports.verdict import Result
 from tests.bridge.controllers.harakiri.test_check import INF, NAN, PROFILE, assert_rejected, verdict_on
 from tests.support.rule_items import (
     HERE,

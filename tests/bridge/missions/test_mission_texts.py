@@ -4,8 +4,8 @@
 from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.missions.list_check import check_list
 from bridge.missions.mission_texts import finding_lines, summary
-from bridge.model.finding import News
 from protocols.mission_item import Command
+from reports.finding import News
 from tests.support import nav_lists
 from tests.support.rule_items import SPEED, WAYPOINT, item, mission
 

@@ -7,8 +7,8 @@ from bridge.line.conversation import save
 from bridge.missions.mission_service import HeldMission
 from bridge.model.mission_log import ArrivedMission, Outcome
 from bridge.model.refusal import Refusal
-from bridge.model.verdict import CLEARED_LIST
 from protocols.mission_item import MissionResult
+from reports.verdict import CLEARED_LIST
 from tests.support.conversations import Download, Upload, records_of, waypoints
 from tests.support.world import GroundStation, World, flash_holding, ready_world
 

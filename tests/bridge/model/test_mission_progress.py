@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The record that the craft flies to, and the last one reached."""
 
-from bridge.model.mission_progress import FlownMission, MissionProgress, Progress
+from bridge.model.mission_progress import FlownMission, MissionProgress
 from protocols.msp.nav import FINISHED, NavAction, NavMode, NavState, NavStatus
+from reports.vehicle_groups import Progress
 
 ON_ITS_WAY = 5
 

@@ -9,7 +9,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.controllers.harakiri import profile as harakiri
-from bridge.model.vehicle_groups import Attitude, Battery, Gps, Group, Position, Rc, Status
+from reports.vehicle_groups import Attitude, Battery, Gps, Group, Position, Rc, Status
 from simulator.board.options import SimOptions, TelemetryProtocol
 from tests.bridge.fc.states.test_pass_through import passing
 from tests.support.world import GroundStation, World

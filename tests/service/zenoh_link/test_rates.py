@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.model import vehicle_groups
-from bridge.model.vehicle_groups import Attitude, Battery, Group, Position, Rc, Status
+from reports import vehicle_groups
+from reports.vehicle_groups import Attitude, Battery, Group, Position, Rc, Status
 from service.zenoh_link.rates import SampleRates
 
 GAPS_S = st.lists(st.floats(0.01, 3.0), min_size=2, max_size=300)

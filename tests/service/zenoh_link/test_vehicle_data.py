@@ -9,10 +9,10 @@ import pytest
 import zenoh
 from jsonschema import Draft202012Validator
 
-from bridge.model.vehicle_groups import Group
 from generators.zenoh_schemas import schemas, text
 from payloads.compact import SCHEMAS as FOLDER
 from payloads.keys import COMMANDS, KEYS, MAVLINK_OUT, VERSION, PayloadEncoding
+from reports.vehicle_groups import Group
 from tests.support.benches import Starter
 from tests.support.plan import plain_plan
 from tests.support.programs import until

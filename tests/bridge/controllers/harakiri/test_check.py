@@ -9,10 +9,10 @@ import pytest
 
 from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.missions.list_check import check_list
-from bridge.model.finding import DROPPED, REJECTED, News
-from bridge.model.verdict import Result, Verdict
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.mission import WpCommand, WpRecord
+from reports.finding import DROPPED, REJECTED, News
+from reports.verdict import Result, Verdict
 from tests.support.rule_items import (
     LAND,
     LAT,

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from bridge.controllers.harakiri.check import HarakiriCheck, HarakiriRules
 from bridge.controllers.harakiri.rules import items_from_records
 from bridge.missions.list_check import check_list
-from bridge.model.finding import DROPPED, REJECTED
-from bridge.model.verdict import Result
 from protocols.mission_item import MissionItem
 from protocols.msp.mission import WpRecord, unpack_records
+from reports.finding import DROPPED, REJECTED
+from reports.verdict import Result
 from tests.support.rule_oracle import expected
 
 KNOWN = [16, 17, 18, 19, 20, 21, 22, 80, 195, 197, 201]

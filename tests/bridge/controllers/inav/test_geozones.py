@@ -7,9 +7,9 @@ import pytest
 
 from bridge.controllers.inav.geozones import FenceRules
 from bridge.missions.list_check import check_list
-from bridge.model.verdict import Verdict
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.msp.inav_places import Corner, Geozone
+from reports.verdict import Verdict
 from tests.bridge.controllers.inav.test_place_store import CIRCLE, FIELD, place, polygon
 
 A, B, C = (0, 0), (0, 100), (100, 100)

@@ -10,10 +10,10 @@ from bridge.controllers.inav.limits import InavLimits, RthAllowLanding, RthAltMo
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile
 from bridge.missions.list_check import check_list
-from bridge.model.finding import without_defaults
 from protocols.inav_dump import read_inav_settings
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.inav_places import Safehome
+from reports.finding import without_defaults
 from tests.bridge.controllers.inav.test_mission_store import ACCEPTED, board_with
 from tests.support.conversations import Upload
 from tests.support.nav_lists import HOME, LAT, LON, RTL, RTL_LANDS, WP

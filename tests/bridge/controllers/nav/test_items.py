@@ -11,9 +11,9 @@ from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.items import home_item, items_from_records
 from bridge.controllers.nav.rules import NavProfile, inav_profile, multiwii_profile
 from bridge.missions.list_check import check_list
-from bridge.model.finding import News
-from bridge.model.verdict import Result
 from protocols.msp.nav import FLY_HOME, LAST, NavAction, NavRecord
+from reports.finding import News
+from reports.verdict import Result
 
 FIELD = st.integers(-0x8000, 0x7FFF) | st.integers(-1, 5)
 RECORDS = st.builds(

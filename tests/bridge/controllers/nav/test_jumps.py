@@ -5,10 +5,10 @@ import math
 
 import pytest
 
-from bridge.model.finding import REJECTED
-from bridge.model.verdict import Result
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.nav import LAST, NavRecord
+from reports.finding import REJECTED
+from reports.verdict import Result
 from tests.support.nav_lists import (
     MULTIWII,
     RTL,

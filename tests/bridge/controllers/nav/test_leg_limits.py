@@ -4,8 +4,8 @@
 from dataclasses import replace
 
 from bridge.controllers.nav.check import NavRules
-from bridge.model.finding import News
 from protocols.mission_item import MissionItem
+from reports.finding import News
 from tests.support.nav_lists import (
     INAV,
     LAT,

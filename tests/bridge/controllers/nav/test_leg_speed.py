@@ -4,7 +4,7 @@
 from dataclasses import replace
 
 from bridge.missions.list_check import check_list
-from bridge.model.finding import DROPPED, News
+from reports.finding import DROPPED, News
 from tests.support.nav_lists import INAV, WP, C, findings_for, item, jump, kept, speed, verdict_on
 
 

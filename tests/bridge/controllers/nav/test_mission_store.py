@@ -11,10 +11,10 @@ from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile
 from bridge.missions.list_check import check_list
 from bridge.model.mission_log import Outcome
-from bridge.model.vehicle_groups import Group
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from protocols.msp.nav import LAST, Nav, NavAction
+from reports.vehicle_groups import Group
 from tests.support.conversations import Download, Upload, clear_message, count_message, waypoints
 from tests.support.fake_inav import FakeInav, FakeMultiwii, lossy
 from tests.support.world import GroundStation, Radio, World

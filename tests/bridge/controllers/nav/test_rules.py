@@ -7,9 +7,9 @@ import pytest
 
 from bridge.controllers.nav.check import NavRules
 from bridge.missions.list_check import check_count
-from bridge.model.finding import DROPPED, News
-from bridge.model.verdict import Result
 from protocols.mission_item import MissionItem, MissionResult
+from reports.finding import DROPPED, News
+from reports.verdict import Result
 from tests.support.nav_lists import (
     INAV,
     MULTIWII,

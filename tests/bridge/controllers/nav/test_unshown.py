@@ -9,8 +9,8 @@ from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.items import home_item, items_from_records
 from bridge.controllers.nav.rules import inav_profile
 from bridge.missions.list_check import check_list
-from bridge.model.finding import News
 from protocols.msp.nav import FLY_HOME, LAST, NavRecord
+from reports.finding import News
 from tests.support.nav_lists import LAT, LON, A
 
 

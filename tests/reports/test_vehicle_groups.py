@@ -33,13 +33,13 @@ from bridge.model.vehicle import (
     Sticks,
     Vehicle,
 )
-from bridge.model.vehicle_groups import Group
 from bridge.vehicle import vehicle_messages as make
 from bridge.vehicle.vehicle_messages import Maker
 from payloads.keys import TELEMETRY, PayloadEncoding
 from payloads.payload import Payloads, decoded, plain
 from protocols.mavlink.codec import FrameWriter, pack
 from protocols.msp.telemetry import Sensor
+from reports.vehicle_groups import Group
 from tests.bridge.vehicle.test_vehicle_messages import battery_mv
 from tests.support.world import World
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Verdicts on lists."""
 
-from bridge.model.finding import Finding, RejectingFinding
-from bridge.model.verdict import Result, is_renumbered, rejected
 from protocols.mission_item import MissionResult
+from reports.finding import Finding, RejectingFinding
+from reports.verdict import Result, is_renumbered, rejected
 
 
 def test_a_list_is_renumbered_if_any_item_has_another_number() -> None:

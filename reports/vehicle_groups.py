@@ -121,6 +121,21 @@ class Link:
     ground_stations: Annotated[tuple[str, ...], "connected over MAVLink"] = ()
 
 
+class Progress(Enum):
+    """MAVLink's MISSION_STATE."""
+
+    UNKNOWN = 0
+    NO_MISSION = 1
+    NOT_STARTED = 2
+    ACTIVE = 3
+    PAUSED = 4
+    COMPLETE = 5
+
+    @property
+    def text(self) -> str:
+        return self.name.lower().replace("_", " ")
+
+
 @dataclass(frozen=True, slots=True)
 class MissionIdentity:
     """The identity of the flight controller's mission."""

@@ -11,7 +11,7 @@ from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile
 from bridge.missions.list_check import check_list
 from bridge.missions.mission_texts import finding_lines, summary
-from bridge.model.finding import DROPPED, REJECTED, Finding, News
+from reports.finding import DROPPED, REJECTED, Finding, News
 from tests.support.rule_items import (
     HOME,
     LAND,
