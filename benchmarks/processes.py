@@ -25,6 +25,8 @@ ENVIRONMENT = {key: value for key, value in os.environ.items() if key != "PYTHON
 }
 _TIMEOUT_S = 30.0
 _POLL_S = 0.002
+#: UART1 of INAV's own simulator.
+_INAV_SITL_PORT = 5760
 
 
 class BenchmarkError(Exception):
@@ -84,12 +86,22 @@ def simulated_naze(folder: Path, *options: str) -> Iterator[Board]:
 
 @contextmanager
 def inav_on_a_socket(folder: Path) -> Iterator[tuple[str, int]]:
-    """Run `naze-bridge sim --kind inav --tcp`; yields its address."""
+    """Run `naze-bridge sim --kind inav --tcp`, or INAV's own simulator; yields its address."""
     host, port = "127.0.0.1", free_port(socket.SOCK_STREAM)
     log = folder / "sim.log"
+    if real := os.environ.get("INAV_SITL"):
+        with running([real, f"--path={folder / 'eeprom.bin'}"], log):
+            wait_for(lambda: _listens(host, _INAV_SITL_PORT), "INAV's simulator is up")
+            yield host, _INAV_SITL_PORT
+        return
     with running([*NAZE_BRIDGE, "sim", "--kind", "inav", "--tcp", f"{host}:{port}"], log):
         wait_for(lambda: b"Simulated " in log.read_bytes(), "the simulated INAV is up")
         yield host, port
+
+
+def _listens(host: str, port: int) -> bool:
+    with socket.socket() as connection:
+        return connection.connect_ex((host, port)) == 0
 
 
 @contextmanager

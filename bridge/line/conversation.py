@@ -98,6 +98,18 @@ class Save:
 
 
 @dataclass(frozen=True, slots=True)
+class BeginSave:
+    """Start to store a received mission, and go on meanwhile. Answer: None."""
+
+    save: Save
+
+
+@dataclass(frozen=True, slots=True)
+class EndSave:
+    """Wait for the mission of the last BeginSave. Answer: as Save's."""
+
+
+@dataclass(frozen=True, slots=True)
 class Conclude:
     """Store the outcome of mission `number`. Answer: True if stored."""
 
@@ -126,7 +138,10 @@ class FindPending:
     """Look up missions that were never concluded. Answer: a sequence of PendingMission."""
 
 
-Effect = TimeLimit | Send | Receive | Transmit | Await | Pause | Save | Conclude | Recall | NoteReader | FindPending
+Effect = (
+    TimeLimit | Send | Receive | Transmit | Await | Pause
+    | Save | BeginSave | EndSave | Conclude | Recall | NoteReader | FindPending
+)  # fmt: skip
 StoreEffect = Save | Conclude | Recall | NoteReader | FindPending
 
 _MAX_ASKS = 5
@@ -190,6 +205,17 @@ def _lasting(reply: MspFrame, size: int | None) -> MspFrame:
 def save(mission: ArrivedMission) -> Conversation[int | None]:
     """Store a received mission; its number, or None if the store failed."""
     number: int | None = yield Save(mission)
+    return number
+
+
+def begin_save(mission: ArrivedMission) -> Conversation[None]:
+    """Start to store a received mission; `end_save` waits for it."""
+    yield BeginSave(Save(mission))
+
+
+def end_save() -> Conversation[int | None]:
+    """The number of the mission of `begin_save`, or None if the store failed."""
+    number: int | None = yield EndSave()
     return number
 
 

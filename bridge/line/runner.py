@@ -3,14 +3,16 @@
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf
 from typing import Any, Generic, TypeVar
 
 from bridge.line.conversation import (
     Await,
+    BeginSave,
     Conclude,
     Conversation,
+    EndSave,
     FindPending,
     LinkLost,
     NoteReader,
@@ -30,9 +32,10 @@ from protocols.mavlink.codec import Packed
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.msp.frame import MspFrame
 
-#: A failing SD card may hang forever, and the flight controller's conversations wait behind it. Mission Planner waits
-#: 5 s for its final ack.
+#: A failing SD card may hang forever, and the flight controller's conversations wait behind it.
 _STORE_TIMEOUT_S = 3.0
+#: The final ack waits for these, and Mission Planner waits 5 s for the ack, of which an INAV's 120 records take 2.4 s.
+_ACK_WAITS_S = 1.5
 
 
 T = TypeVar("T")
@@ -49,6 +52,14 @@ class Task(Generic[T]):
     ends_at: float = inf
 
 
+@dataclass(slots=True)
+class _BegunSave:
+    """The last BeginSave. `answers`: the store's, once it has answered."""
+
+    save: Save
+    answers: list[object] = field(default_factory=list)
+
+
 class Runner:
     """Runs conversations in the order they were started. Time is passed in.
 
@@ -63,7 +74,8 @@ class Runner:
         self._transmit: Callable[[Packed], bool] | None = None
         self._queue: deque[Task[Any]] = deque()
         self._current: Task[Any] | None = None
-        self._awaited: Receive | Await | Pause | StoreEffect | None = None
+        self._awaited: Receive | Await | Pause | StoreEffect | EndSave | None = None
+        self._begun: _BegunSave | None = None
         #: The time of the next `tick`; infinity while nothing is awaited.
         self.due = inf
         self._busy = False
@@ -127,7 +139,12 @@ class Runner:
 
     def store_answered(self, effect: StoreEffect, answer: object, now: float) -> None:
         """Pass on the store's reply to an effect; a reply after its timeout is ignored."""
-        if effect is self._awaited:
+        if self._begun is not None and effect is self._begun.save:
+            self._begun.answers.append(answer)
+            is_awaited = isinstance(self._awaited, EndSave)
+        else:
+            is_awaited = effect is self._awaited
+        if is_awaited:
             self._advance(answer, now)
 
     def tick(self, now: float) -> None:
@@ -200,9 +217,19 @@ class Runner:
                         continue
                     case Pause(seconds):
                         deadline = min(now + seconds, task.ends_at)
+                    case BeginSave(mission):
+                        self._begun = _BegunSave(mission)
+                        self.store_effects.append(mission)
+                        continue
+                    case EndSave():
+                        assert self._begun is not None
+                        if self._begun.answers:
+                            answer = self._begun.answers[0]
+                            continue
+                        deadline = now + _ACK_WAITS_S
                     case Save() | Conclude() | Recall() | NoteReader() | FindPending():
                         self.store_effects.append(effect)
-                        deadline = now + _STORE_TIMEOUT_S
+                        deadline = now + (_ACK_WAITS_S if isinstance(effect, Conclude) else _STORE_TIMEOUT_S)
                 self._awaited = effect
                 self.due = deadline
                 return

@@ -10,7 +10,18 @@ from enum import Enum
 from math import inf
 from typing import Any, TypeVar
 
-from bridge.line.conversation import Conversation, LinkLost, Pause, Stopped, conclude, note_reader, recall, save
+from bridge.line.conversation import (
+    Conversation,
+    LinkLost,
+    Pause,
+    Stopped,
+    begin_save,
+    conclude,
+    end_save,
+    note_reader,
+    recall,
+    save,
+)
 from bridge.line.runner import Runner
 from bridge.missions.fc_mission_store import (
     LIST_IS_GONE,
@@ -265,12 +276,14 @@ class MissionService:
     def deliver(
         self, arrived: ArrivedMission, progress: PushProgress = lambda _records: None, *, is_kept: bool = True
     ) -> Conversation[DeliveryResult]:
-        """Store the mission, write it to the flight controller if the rules accept it, and store the outcome.
+        """Write the mission to the flight controller if the rules accept it, store it meanwhile, and then the outcome.
 
         `is_kept` False: do not store it, because too many lists arrived.
         """
-        number = (yield from save(arrived)) if is_kept else None
+        if is_kept:
+            yield from begin_save(arrived)
         fc_store, verdict = self.fc_store, arrived.verdict
+        identity, before = identify(verdict.records), None if self.held is None else self.held.identity
         outcome: Outcome | None = Outcome.FAILED
         is_lossy, change = False, ""
         if verdict.result is Result.REJECTED:
@@ -281,7 +294,6 @@ class MissionService:
         elif not (yield from self._copy_erased(fc_store, verdict.records)):
             ack, text = MissionResult.DENIED, _NO_COPY
         else:
-            identity, before = identify(verdict.records), None if self.held is None else self.held.identity
             result = yield from self._push(fc_store, arrived, progress)
             if result.failure in LIST_IS_GONE:
                 self.is_settled, self.held, self._former = False, None, None
@@ -295,10 +307,11 @@ class MissionService:
                     change = "Mission erased" if is_erased else f"New mission, {len(verdict.items)} items"
             else:
                 ack, text = _ACKS.get(result.failure, MissionResult.DENIED), result.failure.value
-                if result.failure is PushFailure.UNCERTAIN:
-                    # Only reading the list will show the outcome.
-                    outcome = None
-                    self.pending.append(PendingMission(number, identity, before))
+                outcome = None if result.failure is PushFailure.UNCERTAIN else outcome
+        number = (yield from end_save()) if is_kept else None
+        if outcome is None:
+            # Only reading the list will show it.
+            self.pending.append(PendingMission(number, identity, before))
         if number is not None and outcome is not None and not (yield from conclude(number, outcome, text)):
             number = None
         delivery = DeliveryResult(ack, text, number, is_lossy, change)

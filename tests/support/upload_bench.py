@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A bridge whose board holds a list, and a ground station that writes another one message by message."""
 
+from bridge.line.conversation import Conversation, Pause
 from bridge.transfers.upload_states import Receiving, UploadState
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import MissionItem, MissionResult
@@ -83,6 +84,10 @@ def refused(world: World, station: GroundStation, count: int, result: MissionRes
 
 
 def hanging_push(world: World) -> None:
-    """A push from the command line that waits for a disk that hangs."""
-    world.store.delay_s = 60
+    """A push from the command line that waits 3 s for the line."""
+
+    def waiting() -> Conversation[None]:
+        yield Pause(3.0)
+
+    world.inside.runner.start(waiting(), lambda *_: None, world.now)
     world.push(waypoints(3))

@@ -44,7 +44,7 @@ from protocols.msp.nav import (
 )
 from protocols.msp.telemetry import decode_channels
 
-_MAX_SAVES = 2
+_MAX_SAVES = 3
 #: Requests after SAVE: their timeouts together exceed its flash time.
 _ASKS_AFTER_SAVE = 12
 _MAX_READS = 2

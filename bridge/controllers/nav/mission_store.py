@@ -188,6 +188,12 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
                 # A ground station that timed out may send the same list again: then this is quick.
                 progress(done)
                 continue
+            if not self._stores_slowly:
+                # Replies come in order, so the read-back does not wait for the acknowledgement.
+                yield send(frame, Nav.SET_WP, 0)
+                if (yield from self.read(number)) == record:
+                    progress(done)
+                    continue
             reply = yield from ask(frame, Nav.SET_WP, 0, tries=_TRIES, exclusive=self._stores_slowly)
             if reply is None:
                 raise PushFailed(PushFailure.NO_ANSWER)

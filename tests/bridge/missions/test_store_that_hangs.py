@@ -9,6 +9,9 @@ from bridge.model.mission_log import ArrivedMission, Outcome
 from bridge.model.refusal import Refusal
 from protocols.mission_item import MissionResult
 from reports.verdict import CLEARED_LIST
+from simulator.board.msp_options import MspOptions
+from simulator.board.options import Faults
+from simulator.commands.fc_kinds import make_board
 from tests.support.conversations import Download, Upload, records_of, waypoints
 from tests.support.world import GroundStation, World, flash_holding, ready_world
 
@@ -29,6 +32,33 @@ def test_a_mission_is_accepted_while_mission_planner_still_waits() -> None:
     assert Upload(station, items).run(4.5) is MissionResult.ACCEPTED
     assert world.stored == records_of(items)
     assert "The mission could not be stored on the Pi" in station.texts()
+
+
+def inav_of(serial_task_ms: float) -> tuple[World, GroundStation]:
+    board = make_board("inav", MspOptions(serial_task_ms=serial_task_ms), Faults(boxes=0))
+    world = World(speeds=(115200,), peer=board)
+    world.wait_ready()
+    return world, GroundStation(world)
+
+
+def test_a_hanging_disk_delays_the_ack_of_a_short_write_by_less_than_two_seconds() -> None:
+    world, station = inav_of(serial_task_ms=0.5)
+    upload = Upload(station, waypoints(9))
+    world.store.delay_s = NEVER
+    assert upload.run(2.0) is MissionResult.ACCEPTED
+
+
+def test_a_slow_disk_stores_the_mission_while_the_board_writes_it() -> None:
+    """INAV serves one request per 10 ms: 120 records take 2.4 s, which the disk may take, too."""
+    world, station = inav_of(serial_task_ms=10.0)
+    items = waypoints(121)
+    world.store.delay_s = 2.9
+    upload = Upload(station, items)
+    world.wait_until(lambda w: bool(w.store.missions), 10)
+    world.store.delay_s = 0.0
+    assert upload.run(2.0) is MissionResult.ACCEPTED
+    assert "The mission could not be stored on the Pi" not in station.texts()
+    assert world.store.outcomes() == [Outcome.VERIFIED]
 
 
 def test_a_disk_that_hangs_after_the_push_does_not_delay_the_ack() -> None:

@@ -323,7 +323,6 @@ def test_a_complete_list_whose_turn_does_not_come_is_denied() -> None:
     world.run(0.2)
     assert acks(station) == [A.DENIED]
     assert "Another mission transfer is running" in station.texts()
-    world.store.delay_s = 0.0
     world.run(5)
     assert world.stored == records_of(waypoints(3))
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Missions to INAV and MultiWii NAV through the whole bridge: verification, faults, arming, clearing, progress."""
 
+import random
 import struct
 from collections.abc import Callable
 from dataclasses import replace
@@ -105,6 +106,27 @@ def test_losses_only_delay_the_upload(make: Callable[[], FakeInav]) -> None:
         assert Upload(station, plan(30, seed), tries=40).run() is ACCEPTED
         peer.drop = lambda _frame: ""
         assert Download(station).run() == plan(30, seed)
+
+
+@pytest.mark.parametrize("loss", ["request", "reply"])
+def test_one_lost_frame_costs_less_than_two_seconds(loss: str) -> None:
+    """The longest is SAVE's: a second, in which a board may write its flash."""
+    inav = FakeInav()
+    world, _ = found(inav)
+    draw = random.Random(5)
+    for seed in range(25):
+        lost = draw.choice((Nav.SET_WP, Nav.WP, Nav.GETINFO, Nav.SAVE))
+        left = draw.randrange(1, 30) if lost in (Nav.SET_WP, Nav.WP) else 1
+
+        def drop(frame: MspFrame, command: int = lost) -> str:
+            nonlocal left
+            left -= frame.command == command
+            return loss if frame.command == command and left == 0 else ""
+
+        inav.drop = drop
+        outcome = world.push(plan(31, seed))
+        world.run(2.0)
+        assert outcome[0][0].ack is ACCEPTED
 
 
 def test_nothing_is_sent_while_armed() -> None:
