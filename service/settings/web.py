@@ -8,6 +8,7 @@ from typing import Annotated
 
 from service.settings.addresses import host_port, parse_host_port
 from service.settings.key import Example, Unfit, file_name, several, text
+from service.settings.tile_source import TileSource, parse_tile_source
 
 _FORMS = 'write "0.0.0.0:8080" for the whole network, "127.0.0.1:8080" for this machine only'
 
@@ -54,4 +55,17 @@ class WebSettings:
         "File with the token for writing missions and fetching logs, created if it is missing. By default web-token in"
         " state_dir.",
         Example('"/etc/naze-bridge/web-token"'),
+    ] = None
+    map_tiles: Annotated[
+        TileSource,
+        text('"https://HOST/{z}/{x}/{y}.png"', parse_tile_source),
+        "Server of the map's tiles. They are off until you switch them on in the page; of OpenStreetMap's server the Pi"
+        " keeps none.",
+    ] = TileSource()  # noqa: RUF009  # frozen
+    map_credit: Annotated[
+        str | None,
+        text(),
+        "The credit that the licence of map_tiles requires on the map. By default that of OpenStreetMap, or the"
+        " server's name.",
+        Example('"Example Survey, CC BY 4.0"'),
     ] = None

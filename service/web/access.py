@@ -22,10 +22,19 @@ from service.web.token import Token, TokenError
 
 Handler = Callable[[Request], Awaitable[Response]]
 
+
+def content_policy(image_origin: str = "") -> str:
+    """What a page may load; `image_origin`: an origin other than the Pi from which it may load pictures, too."""
+    sources = f"'self' {image_origin}".strip()
+    return (
+        f"default-src 'none'; script-src 'self'; style-src 'self'; img-src {sources};"
+        " connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    )
+
+
 #: The connection carries no second request (service.web.connection_limit).
 _HEADERS = {
-    b"content-security-policy": b"default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self';"
-    b" connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    b"content-security-policy": content_policy().encode(),
     b"x-content-type-options": b"nosniff",
     b"referrer-policy": b"no-referrer",
     b"cross-origin-resource-policy": b"same-origin",

@@ -18,6 +18,7 @@ GET  /api/logs/NAME?start=N              one piece of a log (token)
 GET  /api/settings...                    see service.web.settings_history
 POST /api/firmware?name=NAME             see service.web.firmware_upload
      /api/pi..., /api/log                see service.web.pi_control
+     /api/map...                         see service.web.map_tiles
 GET  /metrics                            for Prometheus
 """
 
@@ -50,6 +51,7 @@ from service.web.connect_help import connect_help, page_urls, qr_code
 from service.web.firmware_upload import FirmwareUpload
 from service.web.flown_track import FlownTrack
 from service.web.link_history import LinkHistory
+from service.web.map_tiles import MapTiles
 from service.web.metrics import CONTENT_TYPE, Metrics
 from service.web.mission_files import MissionFiles, MissionWriter
 from service.web.pi_control import PiControl
@@ -80,6 +82,7 @@ class Api:
         self._settings = SettingsHistory(self._api.settings, self._writer, self._cache, token)
         self._firmware = FirmwareUpload(self._api.firmware, self._writer, token)
         self._pi = PiControl(daemon, self._writer, token)
+        self._map = MapTiles(daemon, settings, token)
         self._history = LinkHistory(daemon)
         self._track = FlownTrack(daemon)
         state_dir = daemon.settings.state_dir
@@ -95,7 +98,12 @@ class Api:
         self._track.close()
         await self._writer.close()
         await self._pi.close()
+        await self._map.close()
         self._logs.close()
+
+    def image_origin(self) -> str:
+        """See access.content_policy."""
+        return self._map.image_origin
 
     def routes(self) -> list[Route]:
         """The table above."""
@@ -119,6 +127,7 @@ class Api:
             *self._settings.routes(),
             *self._firmware.routes(),
             *self._pi.routes(),
+            *self._map.routes(),
             Route("/api/check", guarded(self._check_file, MAX_FILE), methods=["POST"]),
             Route("/api/write", guarded(self._write_file, MAX_FILE), methods=["POST"]),
         ]
@@ -149,6 +158,7 @@ class Api:
                 "lost_s": None if daemon.fc.lost_at is None else round(now - daemon.fc.lost_at, 1),
                 "transfer": None if transfer is None else asdict(transfer) | {"step": transfer.step.value},
                 "write": self._writer.state,
+                "map": self._map.state,
             }
         )
 

@@ -53,6 +53,12 @@ def is_local(peer: str) -> bool:
     return address.is_private or address.is_link_local or address.is_loopback
 
 
+def check_disarmed(daemon: Daemon) -> None:
+    # A craft that was lost while armed may still fly.
+    if daemon.report().last_heard.armed:
+        raise HTTPException(HTTPStatus.CONFLICT, _ARMED)
+
+
 class PiControl:
     """One request at a time. Its reply is fetched later: it may take longer than a connection lasts."""
 
@@ -154,9 +160,7 @@ class PiControl:
         check_token(request, self._token)
 
     def _check_changeable(self) -> None:
-        # A craft that was lost while armed may still fly.
-        if self._daemon.report().last_heard.armed:
-            raise HTTPException(HTTPStatus.CONFLICT, _ARMED)
+        check_disarmed(self._daemon)
         # A restart would break off the flash.
         if self._daemon.fc.is_lent:
             raise HTTPException(HTTPStatus.CONFLICT, _FLASHING)

@@ -82,7 +82,7 @@ class WebServer:
 
 
 def _config(api: Api, hosts: tuple[str, ...]) -> Config:
-    routes = [*api.routes(), *(Route(path, guarded(handler)) for path, handler in static_files())]
+    routes = [*api.routes(), *(Route(path, guarded(handler)) for path, handler in static_files(api.image_origin))]
     app = Starlette(routes=routes, exception_handlers={HTTPException: refused, Exception: failed})
     app.state.hosts = hosts
     # uvicorn would log only the errors of browsers; ours are logged by `failed`.

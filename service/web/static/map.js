@@ -13,6 +13,7 @@ export const placeOf = (item) => ({ lat: item.lat_e7 / 1e7, lon: item.lon_e7 / 1
 // items: of /api/held; flown: the seq of the one that is flown, or null. position, attitude: of /api/state.
 // trail: the track that was flown, [{lat, lon}].
 // camera: zoom (1: everything fits) and dx, dy in pixels.
+// Returns { svg, view, width, height }, or null if nothing has a position. view(place): its [x, y] in the picture.
 export function drawMap({ items, flown, position, attitude, trail }, width, camera) {
   const placed = items.filter(isPlaced);
   const craft = position.lat_deg === null ? null : { lat: position.lat_deg, lon: position.lon_deg };
@@ -29,7 +30,7 @@ export function drawMap({ items, flown, position, attitude, trail }, width, came
   for (const item of placed.filter((each) => each.seq > 0)) svg.append(itemMark(item, view(placeOf(item)), item.seq === flown));
   if (craft) svg.append(craftMark(view(craft), attitude.heading_deg, position.height_m));
   svg.append(...scaleBar(view.pixelsPerMetre, width, height), ...northArrow(width));
-  return svg;
+  return { svg, view, width, height };
 }
 
 function craftHome(position) {
@@ -40,6 +41,11 @@ function metres(middle, place) {
   const shrink = Math.cos((middle.lat * Math.PI) / 180);
   const turn = ((place.lon - middle.lon + 540) % 360) - 180; // across the date line
   return { east: turn * METRES_PER_DEGREE * shrink, north: (place.lat - middle.lat) * METRES_PER_DEGREE };
+}
+
+function placeAt(middle, east, north) {
+  const shrink = Math.cos((middle.lat * Math.PI) / 180);
+  return { lat: middle.lat + north / METRES_PER_DEGREE, lon: middle.lon + east / (METRES_PER_DEGREE * shrink) };
 }
 
 export function distance(from, to) {
@@ -56,13 +62,12 @@ function projection(places, middle, width, height, camera) {
     (width - 2 * MARGIN) / Math.max(east - west, LEAST_SPAN_M),
     (height - 2 * MARGIN) / Math.max(north - south, LEAST_SPAN_M),
   );
+  const left = width / 2 + camera.dx - ((west + east) / 2) * scale, top = height / 2 + camera.dy + ((south + north) / 2) * scale;
   const view = (place) => {
     const point = metres(middle, place);
-    return [
-      round(width / 2 + camera.dx + (point.east - (west + east) / 2) * scale),
-      round(height / 2 + camera.dy - (point.north - (south + north) / 2) * scale),
-    ];
+    return [round(left + point.east * scale), round(top - point.north * scale)];
   };
+  view.placeAt = (x, y) => placeAt(middle, (x - left) / scale, (top - y) / scale);
   view.pixelsPerMetre = scale;
   return view;
 }

@@ -2,11 +2,13 @@
 // A map that is zoomed and panned: with its buttons, the arrow keys, two fingers, the mouse, or Ctrl and the wheel.
 import { make } from "./dom.js";
 import { drawMap } from "./map.js";
+import { TileLayer, tilesVersion } from "./map_tiles.js";
 
 const STEP = 1.5, LEAST = 1, MOST = 64, PAN_PX = 60, FINGER_PX = 24;
 const ARROWS = { ArrowLeft: [PAN_PX, 0], ArrowRight: [-PAN_PX, 0], ArrowUp: [0, PAN_PX], ArrowDown: [0, -PAN_PX] };
 
 export class MapView {
+  #tiles = new TileLayer();
   #canvas = make("div", { class: "map-canvas" });
   #tools;
   #told = make("p", { class: "map-told", role: "status" }); // a finger sees no tooltips
@@ -19,7 +21,7 @@ export class MapView {
     const button = (label, name, press) => make("button", { type: "button", "aria-label": `${label === "Fit" ? "Fit: show everything" : name}: ${container.id}`, title: name, onclick: press }, label);
     this.#tools = make("div", { class: "map-tools" },
       button("+", "Zoom in", () => this.#zoom(STEP)), button("−", "Zoom out", () => this.#zoom(1 / STEP)), button("Fit", "Show everything", () => this.#move({ zoom: 1, dx: 0, dy: 0 })));
-    container.append(this.#canvas, this.#tools, this.#told);
+    container.append(this.#tiles.element, this.#canvas, this.#tools, this.#tiles.told, this.#told);
     this.#canvas.addEventListener("click", (event) => this.#tell(event));
     container.addEventListener("keydown", (event) => this.#key(event));
     this.#canvas.addEventListener("wheel", (event) => this.#wheel(event), { passive: false });
@@ -35,15 +37,22 @@ export class MapView {
     this.#draw();
   }
 
+  // Of TileLayer.
+  get tileArea() {
+    return this.#tiles.area;
+  }
+
   #draw() {
     if (this.#contents === null) return;
     const width = Math.max(this.#canvas.clientWidth, 200);
-    const wanted = JSON.stringify([this.#contents, this.#camera, width]);
+    const wanted = JSON.stringify([this.#contents, this.#camera, width, tilesVersion()]);
     if (wanted === this.#drawn) return;
     this.#drawn = wanted;
-    const svg = drawMap(this.#contents, width, this.#camera);
-    this.#tools.hidden = svg === null;
-    this.#canvas.replaceChildren(svg ?? "Neither a mission nor a position is known yet.");
+    const map = drawMap(this.#contents, width, this.#camera);
+    this.#tools.hidden = map === null;
+    this.#canvas.replaceChildren(map?.svg ?? "Neither a mission nor a position is known yet.");
+    this.#tiles.draw(map);
+    this.#canvas.classList.toggle("on-tiles", this.#tiles.area !== null);
     // Until it is zoomed, one finger scrolls the page.
     this.#canvas.classList.toggle("zoomed", this.#camera.zoom > 1);
   }

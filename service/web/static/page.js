@@ -7,6 +7,8 @@ import "./firmware.js";
 import { FlownTrack } from "./flown_track.js";
 import { showLinkPlot } from "./link_plot.js";
 import "./logs.js";
+import { showTileTools } from "./map_keep.js";
+import { followTiles } from "./map_tiles.js";
 import { MapView } from "./map_view.js";
 import { followFile } from "./mission_file.js";
 import { showMissions } from "./missions.js";
@@ -38,6 +40,8 @@ async function look() {
     showStateBar(state, null);
     showOverview(state);
     showWires(state);
+    followTiles(state);
+    showTileTools(state, map);
     followWrites(state, askedAt);
     followFile(state);
     await showHeld(state);

@@ -16,6 +16,9 @@ from service.web.server import _config
 
 
 class _BrokenApi:
+    def image_origin(self) -> str:
+        return ""
+
     def routes(self) -> list[Route]:
         async def fail(_request: Request) -> Response:
             raise KeyError("armed")
