@@ -51,6 +51,7 @@ from bridge.vehicle.message_router import MessageRouter, Transfers
 from bridge.vehicle.own_parameters import OwnParameters
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.parameters import Parameters
+from bridge.vehicle.set_waypoint import SetWaypoint
 from bridge.vehicle.settings_backups import BackupTaker, OnBackup
 from bridge.vehicle.settings_seal import SettingsSeal
 from bridge.vehicle.vehicle_report import VehicleReporter
@@ -182,7 +183,15 @@ class Bridge:
         actions = FcActions(session, missions, runner)
         self._calibration = Calibration(ground, runner, self._announcer)
         commands = CommandService(
-            ground, own, actions, session, self._calibration, self._board_settings, parameters, config.version
+            ground,
+            own,
+            actions,
+            session,
+            self._calibration,
+            self._board_settings,
+            parameters,
+            SetWaypoint(missions, own, ground),
+            config.version,
         )
         router = MessageRouter(ground, transfers, parameters, commands, own)
         self._incoming = Incoming(

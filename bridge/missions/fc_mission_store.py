@@ -13,6 +13,7 @@ from typing import Any, Generic
 
 from bridge.line.conversation import Conversation
 from bridge.missions.list_check import MissionRules
+from bridge.model.refusal import Refusal
 from protocols.mission_item import MissionItem
 from protocols.mission_record import ListIdentity
 from protocols.msp.nav import NavStatus
@@ -158,6 +159,18 @@ class FcMissionStore(ABC, Generic[RecordT]):
         """Make it load its saved mission if it holds none."""
         yield from ()
         return Loading.NOT_NEEDED
+
+
+class FliesToItems(ABC):
+    """A mission store whose board can be told in flight which item to fly to."""
+
+    @abstractmethod
+    def leg_of(self, records: Sequence[Any], seq: int) -> int:
+        """The number of the record that flies to item `seq`, as read back; 0: none does."""
+
+    @abstractmethod
+    def fly_to(self, records: Sequence[Any], number: int) -> Conversation[Refusal | None]:
+        """Make it fly to this record of its mission; None if it does."""
 
 
 #: The mission store of any flight controller.

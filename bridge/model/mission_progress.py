@@ -74,6 +74,8 @@ class MissionProgress:
     def __init__(self) -> None:
         self.number = 0
         self.progress = Progress.NOT_STARTED
+        #: The record that a ground station sets: the one that is left for it is not reached.
+        self.set_to = 0
         self._action = 0
         self._reached: int | None = None
 
@@ -96,8 +98,10 @@ class MissionProgress:
     def _take_status(self, status: NavStatus) -> int | None:
         """Of several records reached since the last reply only the last is known."""
         before, action = self.number, self._action
+        if status.number == self.set_to > 0:
+            before = self._reached = self.set_to = 0
         # The return home at the end of a mission is flown in the mode RTH.
-        goes_home = status.mode == NavMode.RTH and status.action == NavAction.RTH and before > 0
+        goes_home = status.mode == NavMode.RTH and status.action == NavAction.RTH and self.number > 0
         if status.mode != NavMode.MISSION and not goes_home:
             self.number = self._action = self._reached = 0
             self.progress = Progress.NOT_STARTED

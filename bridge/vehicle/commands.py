@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """COMMAND_LONG and COMMAND_INT: every one is acknowledged (https://mavlink.io/en/services/command.html).
 
-No command may arm, steer or restart an aircraft; those that would are refused with a reason.
+No command may arm, steer or restart an aircraft; those that would are refused with a reason. The exception is
+DO_SET_MISSION_CURRENT on an INAV that flies its mission.
 """
 
 import math
@@ -21,16 +22,19 @@ from bridge.gcs.flash_budget import TOO_MANY_WRITES
 from bridge.gcs.ground import Ground
 from bridge.gcs.station import Severity, Station
 from bridge.model.flight_mode import MISSION_BOXES
+from bridge.model.refusal import Refusal
 from bridge.model.vehicle import MissionLeg, Switches
 from bridge.settings.fc_settings import Cause, SettingRefusal
 from bridge.vehicle.board_settings import BoardSettings
 from bridge.vehicle.calibration import Calibration
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.parameters import Parameters
+from bridge.vehicle.set_waypoint import SetWaypoint
 from bridge.vehicle.vehicle_messages import auto_mode
 from protocols.mavlink.command import CommandResult
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.metadata_message import COMPONENT_METADATA
+from protocols.mission_item import MissionResult
 
 _MAX_U16, _MAX_I32 = (1 << 16) - 1, (1 << 31) - 1
 _MAX_MSGID = (1 << 24) - 1
@@ -80,6 +84,8 @@ _REFUSED = {
 #: Those that would start or move a mission flight.
 _OF_A_MISSION = frozenset((messages.MAV_CMD_MISSION_START, messages.MAV_CMD_DO_SET_MISSION_CURRENT))
 _FLIES_NONE = "This flight controller flies no missions"
+_NO_RESET = Refusal(MissionResult.DENIED, "Set WP: the mission cannot be reset, only its waypoint set")
+_NOT_SET = {MissionResult.ERROR: CommandResult.FAILED}
 #: param1 of MAV_CMD_PREFLIGHT_STORAGE.
 _SAVE = 1
 _NOT_STORED = {
@@ -113,6 +119,7 @@ class CommandService:
         calibration: Calibration,
         settings: BoardSettings,
         parameters: Parameters,
+        set_waypoint: SetWaypoint,
         version: str,
     ) -> None:
         self._ground = ground
@@ -122,6 +129,7 @@ class CommandService:
         self._calibration = calibration
         self._settings = settings
         self._parameters = parameters
+        self._set_waypoint = set_waypoint
         self._version = version
 
     def take(self, station: Station, command: int, params: Sequence[float], now: float) -> None:
@@ -131,6 +139,8 @@ class CommandService:
         action = _action(command, params)
         if command == messages.MAV_CMD_PREFLIGHT_STORAGE:
             self._store(station, command, params[0], now)
+        elif command == messages.MAV_CMD_DO_SET_MISSION_CURRENT and self._set_waypoint.is_possible:
+            self._do_set_current(station, params[0], params[1], now)
         elif action is None:
             self._acknowledge(station, command, self._do(station, command, params, now))
         elif action in (self._actions.present, self._calibration.action):
@@ -143,6 +153,32 @@ class CommandService:
             self._acknowledge(station, command, CommandResult.TEMPORARILY_REJECTED)
         else:
             self._actions.start(action, lambda outcome: self._acted(station, command, action, outcome, now), now)
+
+    def set_current(self, station: Station, seq: int, now: float) -> None:
+        """MISSION_SET_CURRENT, which has no acknowledgement."""
+        if self._set_waypoint.is_possible:
+            self._set_waypoint.begin(station, seq, lambda refusal: self._set(station, refusal, now), now)
+        else:
+            self.refuse(station, messages.MAV_CMD_DO_SET_MISSION_CURRENT)
+            self._vehicle.refuse_current(station, now)
+
+    def _do_set_current(self, station: Station, seq: float, resets: float, now: float) -> None:
+        """MAV_CMD_DO_SET_MISSION_CURRENT."""
+
+        def ended(refusal: Refusal | None) -> None:
+            self._set(station, refusal, now)
+            result = CommandResult.ACCEPTED if refusal is None else _NOT_SET.get(refusal.ack, CommandResult.DENIED)
+            self._acknowledge(station, messages.MAV_CMD_DO_SET_MISSION_CURRENT, result)
+
+        if resets == 1:
+            ended(_NO_RESET)
+        else:
+            self._set_waypoint.begin(station, seq, ended, now)
+
+    def _set(self, station: Station, refusal: Refusal | None, now: float) -> None:
+        if refusal is not None:
+            self._ground.say(Severity.ERROR, refusal.text, station)
+            self._vehicle.refuse_current(station, now)
 
     def refuse(self, station: Station, command: int, custom_mode: float = -1) -> None:
         """Give the reason for refusing a command, or a message that does the same but is not acknowledged."""

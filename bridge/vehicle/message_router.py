@@ -84,7 +84,7 @@ class MessageRouter:
         self._of_type = {kind: self._mission_handlers(each.uploads, each.downloads) for kind, each in transfers.items()}
         self.handlers: Mapping[int, _Handler] = {
             **self._of_type[m.MAV_MISSION_TYPE_MISSION],
-            m.MAVLINK_MSG_ID_MISSION_SET_CURRENT: self._set_current,
+            m.MAVLINK_MSG_ID_MISSION_SET_CURRENT: lambda s, msg, now: commands.set_current(s, msg.seq, now),
             m.MAVLINK_MSG_ID_COMMAND_LONG: lambda s, msg, now: commands.take(
                 s,
                 msg.command,
@@ -170,10 +170,6 @@ class MessageRouter:
             self._ground.mission_ack(station, MissionResult.DENIED)
         else:
             uploads.item(station, convert(message), self._ground.speaker(station), now)
-
-    def _set_current(self, station: Station, _message: Message, now: float) -> None:
-        self._commands.refuse(station, m.MAV_CMD_DO_SET_MISSION_CURRENT)
-        self._vehicle.refuse_current(station, now)
 
     def _data_stream(self, station: Station, message: Message, _now: float) -> None:
         rate_hz = message.req_message_rate if message.start_stop else 0

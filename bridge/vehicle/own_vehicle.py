@@ -86,6 +86,8 @@ class OwnVehicle:
         self._polls_set_at, self._polls_due = -inf, inf
         #: Armed, mode, failsafe and lost as last announced.
         self._announced: tuple[bool | None, FlightMode | str | None, bool, bool] | None = None
+        #: The ground stations whose waypoint was set since the last report of the board.
+        self._asked_current: list[Station] = []
         #: The last reason for the stop of a mission flight.
         self._said_why = ""
 
@@ -186,7 +188,7 @@ class OwnVehicle:
             version = make.autopilot_version(self._session.vehicle, self.capabilities())
             made = [version, *self._moment(now).made((make.home_position,))]
         elif (row := _ROWS.get(msgid)) is not None:
-            made = self._moment(now, self._sent_seqs(self._ground.station(station.peer))).made(row.makers)
+            made = self._moment(now, self.sent_seqs(self._ground.station(station.peer))).made(row.makers)
         else:
             return None
         for message in made:
@@ -211,8 +213,17 @@ class OwnVehicle:
         sender = self._ground.station(station.peer)
         if sender is not None and sender.uses_streams:
             self.send_once(station, messages.MAVLINK_MSG_ID_MISSION_CURRENT, now)
-        elif sender is not None:
+        else:
+            self.withhold_current(station, now)
+
+    def withhold_current(self, station: Station, now: float) -> None:
+        """Send no MISSION_CURRENT to a ground station until its MISSION_SET_CURRENT is answered."""
+        if (sender := self._ground.station(station.peer)) is not None:
             sender.rates.due[messages.MAVLINK_MSG_ID_MISSION_CURRENT] = now + _NO_CURRENT_S
+
+    def confirm_current(self, station: Station) -> None:
+        """Send MISSION_CURRENT to a ground station with the next report of the board."""
+        self._asked_current.append(station)
 
     def let_read(self, peer: Peer, now: float) -> None:
         """Withhold SYS_STATUS from a ground station for as long as Mission Planner shows a text, while disarmed.
@@ -328,6 +339,9 @@ class OwnVehicle:
         everyone = self._ground.everyone()
         if before != (self.progress.number, self.progress.progress):
             self._send_current(everyone, now)
+        asked, self._asked_current = self._asked_current, []
+        for station in asked:
+            self.send_once(station, messages.MAVLINK_MSG_ID_MISSION_CURRENT, now)
         for seq in filter(None, map(self._missions.seq_of, reached)):
             for sent_seqs, stations in self._by_item_numbers(everyone):
                 number = (sent_seqs[seq] or 0) if sent_seqs else seq
@@ -344,10 +358,10 @@ class OwnVehicle:
             return [((), stations)]
         alike: dict[SentSeqs, list[GroundStation]] = {}
         for station in stations:
-            alike.setdefault(self._sent_seqs(station), []).append(station)
+            alike.setdefault(self.sent_seqs(station), []).append(station)
         return alike.items()
 
-    def _sent_seqs(self, station: GroundStation | None) -> SentSeqs:
+    def sent_seqs(self, station: GroundStation | None) -> SentSeqs:
         """The item numbers of a station that sent the list and has not read it since; else ()."""
         held = self._missions.on_board
         if station is None or held is None or not held.sent_seqs:

@@ -17,6 +17,7 @@ _INFO = struct.Struct("<BBBB")
 _STATUS = struct.Struct("<BBBBBH")
 WP_SIZE = _WP.size
 INFO_SIZE = _INFO.size
+NAV_STATUS_SIZE = _STATUS.size
 #: MSP_NAV_CONFIG in MultiWii 2.4, and its limits, behind two bytes of flags and the waypoint radius.
 NAV_CONFIG_SIZE = 22
 _LIMITS_AT, _LIMITS = 2, struct.Struct("<HHH")
@@ -99,14 +100,33 @@ class NavMode(IntEnum):
 
 
 class NavState(IntEnum):
-    """The states in MSP_NAV_STATUS after the craft has arrived; in the others it is on its way."""
+    """The states in MSP_NAV_STATUS. The last three are INAV's."""
 
+    RTH_START = 1
+    RTH_ENROUTE = 2
     HOLD_TIMED = 4
+    WP_ENROUTE = 5
+    LAND_START = 8
     LAND_IN_PROGRESS = 9
     LANDED = 10
+    LAND_SETTLE = 11
+    LAND_START_DESCENT = 12
     HOVER_ABOVE_HOME = 13
+    EMERGENCY_LANDING = 14
+    RTH_CLIMB = 15
 
 
+#: States of a craft that lands, or has landed.
+LANDING = frozenset(
+    (
+        NavState.LAND_START,
+        NavState.LAND_IN_PROGRESS,
+        NavState.LANDED,
+        NavState.LAND_SETTLE,
+        NavState.LAND_START_DESCENT,
+        NavState.EMERGENCY_LANDING,
+    )
+)
 #: MSP_NAV_STATUS, error: "end flag detected, navigation finished".
 FINISHED = 4
 
@@ -145,9 +165,16 @@ def encode_read_wp(number: int) -> bytes:
 #: Reads the number of the selected mission in INAV's store, from 1: a setting, over MSP v2.
 SETTING = 0x1003
 SELECTED_REQUEST = request(SETTING, b"nav_wp_multi_mission_index\0")
+#: The one request of the bridge that changes a flight.
+SET_WP_INDEX = 0x2221
 #: SAVE and LOAD have one reserved byte; INAV refuses any other length.
 SAVE_REQUEST = request(Nav.SAVE, b"\0")
 LOAD_REQUEST = request(Nav.LOAD, b"\0")
+
+
+def encode_fly_to(number: int) -> bytes:
+    """The request that makes an INAV in waypoint mode fly to record `number` of its mission (INAV 9.1)."""
+    return request(SET_WP_INDEX, bytes((number - 1,)))
 
 
 def decode_wp(payload: bytes) -> tuple[int, NavRecord] | None:

@@ -66,6 +66,7 @@ class InavCommand(IntEnum):
     INAV_MIXER = 0x2010
     INAV_DEBUG = 0x2019
     INAV_TEMPERATURES = 0x201E
+    SET_WP_INDEX = 0x2221
 
 
 #: Asked by INAV Configurator and mwp. Every sensor is healthy, and no rangefinder is on board.
@@ -201,6 +202,9 @@ class InavFirmware(MspFirmware):
                 found = self._settings.answer(command, payload)
                 self._mission.selected = int(self._settings[_SELECTED])
                 return error(command) if found is None else reply(command, found)
+            case InavCommand.SET_WP_INDEX if self._version >= (9, 1, 0):
+                done = self.armed and len(payload) == 1 and self._navigation.jump_to(payload[0])
+                return reply(command) if done else error(command)
             case InavCommand.WP_GETINFO:
                 known = self._mission.known(self.armed)
                 return reply(command, bytes((0, CAPACITY, self._mission.is_valid, known)))

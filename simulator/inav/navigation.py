@@ -79,6 +79,18 @@ class InavNavigation:
         number = self.index + 1
         return NavStatus(mode, state, self._mission[self.index].action, number, error, round(self._craft.heading))
 
+    def jump_to(self, index: int) -> bool:
+        """Fly to a waypoint of the mission in flight (MSP2_INAV_SET_WP_INDEX); False: refused. CrashError.
+
+        A landing goes on, although NAV_STATUS then names the waypoint.
+        """
+        if not (self.is_in_mission and index < self._mission.count):
+            return False
+        self.index = index
+        if self.phase is not Phase.LANDING:
+            self._pre_action()
+        return True
+
     def step(self, seconds: float, is_requested: bool) -> None:
         """Advance the flight; `is_requested`: the pilot's switch NAV WP is on. CrashError."""
         if not is_requested:

@@ -42,6 +42,7 @@ from protocols.mission_record import ListIdentity, identify
 from protocols.msp.command_line import is_clean
 from protocols.msp.frame import MspFrame, MspParser
 from protocols.msp.mission import WpRecord, unpack_records
+from protocols.msp.nav import SET_WP_INDEX
 from protocols.rights.effect import Effect
 from protocols.rights.mavlink import effect_of
 from protocols.rights.msp import Firmware, msp_right
@@ -374,8 +375,12 @@ class World:
         self.naze.receive(garble(data, speed, self.naze.baud) if speed else data, self.now)
 
     def _assert_has_right(self, frame: MspFrame) -> None:
-        """A board is asked what its kind is only as far as that is known."""
+        """A board is asked what its kind is only as far as that is known. One request changes a flight."""
         controller = self.inside.session.state.controller
+        if frame.command == SET_WP_INDEX:
+            assert controller is not None
+            assert (controller.firmware, self.bridge.vehicle.armed) == (Firmware.INAV, True)
+            return
         boards = Firmware if controller is None else (controller.firmware,)
         effects = {msp_right(firmware, frame.command, frame.payload).effect for firmware in boards}
         assert effects & ({Effect.READ} if controller is None else {Effect.READ, Effect.CHANGE}), (boards, frame)

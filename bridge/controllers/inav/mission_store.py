@@ -10,17 +10,20 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import chain
 
+from bridge.controllers.inav.fly_to import FLOWN_TO, fly_to
 from bridge.controllers.inav.geozones import has_zones, read_zones_in_force
 from bridge.controllers.inav.limits import SETTING_NAMES, InavLimits
 from bridge.controllers.inav.safehomes import read_safehomes
 from bridge.controllers.inav.settings import read_values
 from bridge.controllers.nav.check import NavRules
+from bridge.controllers.nav.items import item_seqs
 from bridge.controllers.nav.mission_store import NOTHING, NavMissions
 from bridge.controllers.nav.rules import NavProfile
 from bridge.controllers.nav.stored_missions import Mission, erased, flown, split_missions
 from bridge.fc.profile import FlightController
 from bridge.line.conversation import Conversation, LinkLost, Pause, ask
 from bridge.missions.fc_mission_store import (
+    FliesToItems,
     Loading,
     PushFailed,
     PushFailure,
@@ -28,6 +31,7 @@ from bridge.missions.fc_mission_store import (
     PushResult,
     StoreReport,
 )
+from bridge.model.refusal import Refusal
 from bridge.model.vehicle import Power, Vehicle
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, request
@@ -56,7 +60,7 @@ _LOW_US, _HIGH_US = 1300, 1700
 _LOADED_AFTER_S = 0.8
 
 
-class InavMissions(NavMissions):
+class InavMissions(NavMissions, FliesToItems):
     """The mission store of one INAV. Record 1 wipes all missions, and no list is valid before its last record."""
 
     reads_armed = True
@@ -78,6 +82,7 @@ class InavMissions(NavMissions):
     def __init__(self, profile: NavProfile, controller: FlightController, vehicle: Vehicle) -> None:
         super().__init__(profile, controller, vehicle)
         self._has_zones = has_zones(controller)
+        self._board = controller
 
     def report(self) -> Conversation[StoreReport | None]:
         """Also read the settings that the rules depend on, if they may have changed."""
@@ -133,6 +138,13 @@ class InavMissions(NavMissions):
             self._seen = None
             return True
         return not (yield from self._sticks_load()) and (yield from self._is_unchanged(seen))
+
+    def leg_of(self, records: Sequence[NavRecord], seq: int) -> int:
+        numbers = (number for number, shown in enumerate(item_seqs(records), 1) if shown == seq)
+        return next((number for number in numbers if records[number - 1].action in FLOWN_TO), 0)
+
+    def fly_to(self, records: Sequence[NavRecord], number: int) -> Conversation[Refusal | None]:
+        return fly_to(number, records[number - 1], self.read(number), self._board)
 
     def _sticks_load(self) -> Conversation[bool]:
         """True, once, after the pilot may have loaded the saved missions with the sticks; INAV refuses it armed."""

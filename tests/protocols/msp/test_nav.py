@@ -3,7 +3,7 @@
 
 import pytest
 
-from protocols.msp.nav import NavRecord, UnsafeRecord, decode_wp, encode_set_wp
+from protocols.msp.nav import NavRecord, UnsafeRecord, decode_wp, encode_fly_to, encode_set_wp
 from tests.support.nav_lists import A
 
 
@@ -23,3 +23,8 @@ def test_set_wp_has_the_bytes_of_the_specification() -> None:
 def test_a_jump_that_crashes_cannot_even_be_encoded(target: int) -> None:
     with pytest.raises(UnsafeRecord):
         encode_set_wp(2, NavRecord(A.JUMP, p1=target))
+
+
+def test_the_waypoint_is_set_by_its_index() -> None:
+    """INAV counts from 0."""
+    assert encode_fly_to(4)[:9] == bytes.fromhex("24583c002122010003")

@@ -29,9 +29,12 @@ from protocols.msp.nav import (
     LOAD_REQUEST,
     SAVE_REQUEST,
     SELECTED_REQUEST,
+    SET_WP_INDEX,
+    SETTING,
     Nav,
     NavAction,
     NavRecord,
+    encode_fly_to,
     encode_read_wp,
     encode_set_wp,
 )
@@ -90,12 +93,15 @@ CHANGES: list[tuple[Iterable[Firmware], bytes]] = [
     *((MISSIONS, encode_chunk(pack_records(RECORDS), 0, most).frame) for most in range(1, MAX_CHUNK_RECORDS + 1)),
 ]
 
+#: The only one: a station's Set WP.
+MOVES: list[tuple[Iterable[Firmware], bytes]] = [((Firmware.INAV,), encode_fly_to(3))]
+
 
 def frames(rows: Iterable[tuple[Iterable[Firmware], bytes]]) -> list[tuple[Firmware, MspFrame]]:
     return [(firmware, frame) for boards, data in rows for firmware in boards for frame in MspParser().feed(data)]
 
 
-@pytest.mark.parametrize(("rows", "effect"), [(READS, Effect.READ), (CHANGES, Effect.CHANGE)])
+@pytest.mark.parametrize(("rows", "effect"), [(READS, Effect.READ), (CHANGES, Effect.CHANGE), (MOVES, Effect.MOVE)])
 def test_requests_of_the_bridge_have_the_effect_of_their_use(
     rows: list[tuple[Iterable[Firmware], bytes]], effect: Effect
 ) -> None:
@@ -105,8 +111,8 @@ def test_requests_of_the_bridge_have_the_effect_of_their_use(
 
 
 def test_every_command_of_the_bridge_is_among_them() -> None:
-    sent = {frame.command for _, frame in frames([*READS, *CHANGES])}
-    assert sent == {*Msp, *MspAction, *MissionCommand, *SettingCommand, *Nav, MIXER, 0x1003}
+    sent = {frame.command for _, frame in frames([*READS, *CHANGES, *MOVES])}
+    assert sent == {*Msp, *MspAction, *MissionCommand, *SettingCommand, *Nav, MIXER, SETTING, SET_WP_INDEX}
 
 
 @pytest.mark.parametrize("firmware", Firmware)

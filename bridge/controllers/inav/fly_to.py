@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Set waypoint: an INAV that flies its mission is told to fly to another record of it (MSP2_INAV_SET_WP_INDEX).
+
+INAV checks that it is armed, in waypoint mode, and that its list has the record. It also accepts a new record while it
+lands and lands nevertheless, and would take off again after a landing: both are refused here. Its reply proves nothing,
+so NAV_STATUS is read afterwards.
+"""
+
+from bridge.fc.profile import FlightController
+from bridge.line.conversation import Conversation, Pause, ask
+from bridge.model.flight_mode import ARM_BOX, MISSION_BOXES, names_of_active
+from bridge.model.refusal import Refusal
+from protocols.mission_item import MissionResult
+from protocols.msp.commands import Msp
+from protocols.msp.frame import Direction, request
+from protocols.msp.inav import STATUS_SIZE, decode_inav_status
+from protocols.msp.nav import (
+    FINISHED,
+    LANDING,
+    LEGS,
+    NAV_STATUS_SIZE,
+    SET_WP_INDEX,
+    NavAction,
+    NavMode,
+    NavRecord,
+    NavStatus,
+    decode_nav_status,
+    encode_fly_to,
+)
+
+#: Records that it flies to; INAV carries out the others and goes on to the next of these.
+FLOWN_TO = LEGS | {NavAction.RTH}
+#: The first version with the request.
+_FIRST = 9, 1, 0
+_LOOKS, _LOOK_INTERVAL_S = 5, 0.1
+
+
+def _denied(text: str) -> Refusal:
+    return Refusal(MissionResult.DENIED, f"Set WP: {text}")
+
+
+_NOT_FLOWN = _denied("only in flight, in the mode NAV WP")
+_LANDS = _denied("it is landing, or has landed")
+_CHANGED = _denied("the mission on board has changed: Read it")
+_UNCHANGED = Refusal(MissionResult.ERROR, "Set WP failed: INAV flies on as before")
+_NO_ANSWER = Refusal(MissionResult.ERROR, "Set WP: no answer from INAV, see where it flies")
+
+
+def fly_to(
+    number: int, record: NavRecord, held: Conversation[NavRecord | None], board: FlightController
+) -> Conversation[Refusal | None]:
+    """Make INAV fly to record `number`; None if it does. held: reads the record that INAV has there."""
+    reply = yield from ask(request(Msp.INAV_STATUS), Msp.INAV_STATUS, STATUS_SIZE)
+    state = None if reply is None else decode_inav_status(reply.payload)
+    active = names_of_active(state.box_flags, board.boxes) if state else set()
+    status = yield from _ask_status()
+    if state is None or status is None:
+        return _NO_ANSWER
+    if ARM_BOX not in active or not active & MISSION_BOXES or status.mode != NavMode.MISSION:
+        return _NOT_FLOWN
+    if _is_down(status):
+        return _LANDS
+    if (yield from held) != record:
+        return _CHANGED
+    reply = yield from ask(encode_fly_to(number), SET_WP_INDEX, 0, tries=1)
+    if reply is not None and reply.direction is Direction.ERROR:
+        return _refused(board)
+    for _ in range(_LOOKS):
+        status = yield from _ask_status()
+        if status is not None and status.number == number:
+            return None
+        yield Pause(_LOOK_INTERVAL_S)
+    return _NO_ANSWER if reply is None or status is None else _UNCHANGED
+
+
+def _ask_status() -> Conversation[NavStatus | None]:
+    reply = yield from ask(request(Msp.NAV_STATUS), Msp.NAV_STATUS, NAV_STATUS_SIZE)
+    return None if reply is None else decode_nav_status(reply.payload)
+
+
+def _is_down(status: NavStatus) -> bool:
+    return status.state in LANDING or (status.error == FINISHED and status.action == NavAction.LAND)
+
+
+def _refused(board: FlightController) -> Refusal:
+    version = ".".join(map(str, board.version or ()))
+    is_older = board.version is not None and board.version < _FIRST
+    return _denied(f"needs INAV 9.1, this is {version}" if is_older else "INAV refused it")

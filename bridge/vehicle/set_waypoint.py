@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Set WP: the item that an armed craft flies to, on boards that have a request for that (INAV). Sans-IO.
+
+Nothing else that a ground station sends changes a flight. It takes the right to write a mission.
+"""
+
+from collections.abc import Callable
+
+from bridge.gcs.cost import Cost
+from bridge.gcs.ground import Ground
+from bridge.gcs.station import Severity, Station
+from bridge.missions.fc_mission_store import FliesToItems
+from bridge.missions.mission_service import HeldMission, MissionService
+from bridge.model.refusal import Refusal
+from bridge.vehicle.own_vehicle import OwnVehicle
+from protocols.mavlink.command import command_name
+from protocols.mission_item import MissionResult
+
+
+def _denied(text: str) -> Refusal:
+    return Refusal(MissionResult.DENIED, f"Set WP: {text}")
+
+
+_NOT_FLOWN = _denied("only in flight, in the mode NAV WP")
+_UNKNOWN = _denied("the mission on board is not known")
+_BUSY = _denied("another request is running, try again")
+
+
+class SetWaypoint:
+    """Carries out one request at a time."""
+
+    def __init__(self, missions: MissionService, vehicle: OwnVehicle, ground: Ground) -> None:
+        self._missions = missions
+        self._vehicle = vehicle
+        self._ground = ground
+        #: The station and the item of the request in progress.
+        self._present: tuple[Station, float] | None = None
+
+    @property
+    def is_possible(self) -> bool:
+        """True if the flight controller has a request for it."""
+        return isinstance(self._missions.fc_store, FliesToItems)
+
+    def begin(self, station: Station, seq: float, on_end: Callable[[Refusal | None], None], now: float) -> None:
+        """Make the craft fly to item `seq`, in the station's numbers; `on_end` gets None once it does.
+
+        A repetition of the request in progress is ignored.
+        """
+        if self._present == (station, seq):
+            return
+        store, held = self._missions.fc_store, self._missions.on_board
+        assert isinstance(store, FliesToItems)
+        refusal = self._obstacle(station)
+        number = 0
+        if held is None:
+            refusal = refusal or _UNKNOWN
+        elif refusal is None:
+            item = self._as_read(held, station, seq)
+            number = store.leg_of(held.records, item)
+            refusal = None if number else _denied(_why_not(held, item, seq))
+        if held is None or refusal is not None:
+            on_end(refusal)
+            return
+
+        def ended(refused: Refusal | None, _at: float) -> None:
+            self._present = None
+            if refused is not None:
+                self._vehicle.progress.set_to = 0
+            else:
+                self._vehicle.confirm_current(station)
+                self._ground.say_to_others(Severity.NOTICE, "Another ground station has set the waypoint", station)
+            on_end(refused)
+
+        self._present = station, seq
+        self._vehicle.withhold_current(station, now)
+        self._vehicle.progress.set_to = number
+        self._missions.run(store.fly_to(held.records, number), ended, now)
+
+    def _obstacle(self, station: Station) -> Refusal | None:
+        if not self._missions.vehicle.armed:
+            return _NOT_FLOWN
+        if self._present is not None or self._missions.runner.needs_line:
+            return _BUSY
+        return None if self._ground.allows(station, Cost.BOARD) else _BUSY
+
+    def _as_read(self, held: HeldMission, station: Station, seq: float) -> int:
+        """The number in the list as read back of the item that the station calls `seq`; 0: none."""
+        numbers = self._vehicle.sent_seqs(self._ground.station(station.peer)) or range(len(held.items))
+        return next((number for number, shown in enumerate(numbers) if shown == seq), 0)
+
+
+def _why_not(held: HeldMission, item: int, seq: float) -> str:
+    if item:
+        return f"item {seq:.0f} ({command_name(held.items[item].command)}) is not flown to"
+    return "item 0 is home" if seq == 0 else f"there is no item {seq:.0f} on board"
