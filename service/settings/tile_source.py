@@ -5,6 +5,8 @@ import re
 from dataclasses import dataclass
 from urllib.parse import urlsplit
 
+from service.settings.addresses import AddressError
+
 #: Its policy permits browsing and forbids saving areas for later: https://operations.osmfoundation.org/policies/tiles/
 _VIEW_ONLY = "openstreetmap.org"
 _PARTS = ("{z}", "{x}", "{y}")
@@ -12,10 +14,6 @@ _HOST = re.compile(r"[A-Za-z0-9-]+(\.[A-Za-z0-9-]+)*(:(?P<port>[0-9]{1,5}))?")
 #: Of what follows the host.
 _TARGET = re.compile(r"/[A-Za-z0-9/._~!$&()*+,;=:@%?{}-]*")
 _FORMS = 'write an address like "https://tiles.example.org/{z}/{x}/{y}.png"'
-
-
-class TileSourceError(ValueError):
-    """An address that is not one of map tiles; one sentence."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,12 +47,12 @@ class TileSource:
 
 
 def parse_tile_source(given: str) -> TileSource:
-    """Read the address; TileSourceError gives the reason."""
+    """Read the address; AddressError gives the reason."""
     scheme, _, rest = given.partition("://")
     host, slash, target = rest.partition("/")
     server = _HOST.fullmatch(host)
     is_address = scheme in ("http", "https") and server and int(server["port"] or 0) < 1 << 16
     braces = sorted(re.findall(r"{.*?}|[{}]", target))
     if not is_address or not _TARGET.fullmatch(slash + target) or braces != sorted(_PARTS):
-        raise TileSourceError(f"{given[:200]!r} is not an address of map tiles: {_FORMS}")
+        raise AddressError(f"{given[:200]!r} is not an address of map tiles: {_FORMS}")
     return TileSource(given)

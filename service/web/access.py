@@ -8,17 +8,23 @@ Everything else needs the token in a header, which no other site can make a brow
 
 import ipaddress
 import re
-from collections.abc import Awaitable, Callable, Container
+from collections.abc import Awaitable, Callable, Container, Iterator
+from contextlib import contextmanager
 from http import HTTPStatus
 
 import structlog
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import Response
+from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from payloads.mission_data import to_json
-from service.web.token import Token, TokenError
+from protocols.mission_file import MissionFileError
+from service.daemon.client import ControlError
+from service.web.token import TokenError
+from storage.os_error import reason
+from storage.store_error import StoreError
 
 Handler = Callable[[Request], Awaitable[Response]]
 
@@ -51,6 +57,12 @@ _WRONG_NAME = (
     "Open this page by the Pi's address in numbers or its local name, or add this name to the setting web.hosts."
 )
 _FAILED = "The daemon failed to answer; see its log."
+#: The response to an error, whose text is one sentence.
+_STATUS = {
+    ControlError: HTTPStatus.NOT_FOUND,
+    MissionFileError: HTTPStatus.UNPROCESSABLE_ENTITY,
+    StoreError: HTTPStatus.SERVICE_UNAVAILABLE,
+}
 _log = structlog.get_logger()
 
 
@@ -67,7 +79,8 @@ def is_own_name(host: str, known: Container[str]) -> bool:
     return True
 
 
-def check_token(request: Request, token: Token | TokenError) -> None:
+def check_token(request: Request) -> None:
+    token = request.app.state.token
     if isinstance(token, TokenError):
         raise HTTPException(HTTPStatus.FORBIDDEN, f"This page is read-only: {token}.")
     if not token.is_shown_by(request.headers.get("authorization")):
@@ -76,16 +89,18 @@ def check_token(request: Request, token: Token | TokenError) -> None:
         raise HTTPException(HTTPStatus.FORBIDDEN, f"Wrong token. It is in {token.path} on the Pi.")
 
 
-def guarded(handler: Handler, max_body: int = 0) -> Handler:
-    """Check a request before its handler. `max_body`: bytes."""
+def route(method: str, path: str, handler: Handler, *checks: Callable[[Request], None], max_body: int = 0) -> Route:
+    """A route whose requests are checked first. `checks`: further ones, such as check_token. `max_body`: bytes."""
 
     async def answer(request: Request) -> Response:
         if not is_own_name(request.headers.get("host", ""), request.app.state.hosts):
             raise HTTPException(HTTPStatus.MISDIRECTED_REQUEST, _WRONG_NAME)
         _check_body(request, max_body)
+        for check in checks:
+            check(request)
         return await handler(request)
 
-    return answer
+    return Route(path, answer, methods=[method])
 
 
 def _check_body(request: Request, max_body: int) -> None:
@@ -96,15 +111,28 @@ def _check_body(request: Request, max_body: int) -> None:
         raise HTTPException(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"This request may carry {limit}.")
 
 
-async def refused(_request: Request, error: Exception) -> Response:
-    assert isinstance(error, HTTPException)
+@contextmanager
+def refusing(kind: type[Exception], status: HTTPStatus, sentence: Callable[[str], str] = str) -> Iterator[None]:
+    """Respond to such an error with a status, and a sentence made of its reason."""
+    try:
+        yield
+    except kind as error:
+        raise HTTPException(status, sentence(reason(error))) from error
+
+
+async def _refused(_request: Request, error: Exception) -> Response:
+    if not isinstance(error, HTTPException):
+        error = HTTPException(next(_STATUS[kind] for kind in type(error).__mro__ if kind in _STATUS), str(error))
     return Response(to_json({"error": error.detail}), error.status_code, error.headers, "application/json")
 
 
-async def failed(request: Request, error: Exception) -> Response:
+async def _failed(request: Request, error: Exception) -> Response:
     """The response to a request whose handler raised; uvicorn's own log of it is off."""
     _log.error("web.failed", path=request.url.path, why=repr(error), exc_info=error)
-    return await refused(request, HTTPException(HTTPStatus.INTERNAL_SERVER_ERROR, _FAILED))
+    return await _refused(request, HTTPException(HTTPStatus.INTERNAL_SERVER_ERROR, _FAILED))
+
+
+EXCEPTION_HANDLERS = {Exception: _failed, **dict.fromkeys((HTTPException, *_STATUS), _refused)}
 
 
 class SafeHeaders:

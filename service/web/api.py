@@ -1,33 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The page's requests: JSON over GET; writing a mission and fetching logs need the token.
 
-GET  /api/state                          the current state, requested once a second by an open page
-GET  /api/held                           the mission that the flight controller holds
-GET  /api/link                           the serial line over the last minutes
-GET  /api/track?first=N                  the track of this flight or the last one, from place N on
-GET  /api/connect                        where ground stations and other browsers connect
-GET  /connect.svg                        the page's address as a QR code
-GET  /api/missions                       the latest missions received, newest first
-GET  /api/missions/N                     one of them, as sent and as stored
-GET  /api/missions/N/difference/M        two of them as sent
-POST /api/missions/N/restore             write it again; its progress is in the state (token)
-POST /api/check?name=NAME                the body is a mission file: the mission as it would be stored
-POST /api/write?name=NAME                the body is a mission file: write it (token)
-GET  /api/logs                           the telemetry logs (token)
-GET  /api/logs/NAME?start=N              one piece of a log (token)
-GET  /api/settings...                    see service.web.settings_history
-POST /api/firmware?name=NAME             see service.web.firmware_upload
-     /api/pi..., /api/log                see service.web.pi_control
-     /api/map...                         see service.web.map_tiles
-GET  /metrics                            for Prometheus
+docs/status-page.md, "For programs", describes them.
 """
 
 import asyncio
-from collections.abc import Awaitable
+from contextlib import AbstractContextManager
 from dataclasses import asdict
 from functools import partial
 from http import HTTPStatus
-from typing import TypeVar
 
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
@@ -46,56 +27,57 @@ from service.machine.host import Host
 from service.machine.package import version
 from service.recording.tlog_recorder import TLOG_FOLDER
 from service.settings.web import WebSettings
-from service.web.access import MAX_FILE, check_token, guarded
+from service.web.access import MAX_FILE, check_token, refusing, route
 from service.web.connect_help import connect_help, page_urls, qr_code
 from service.web.firmware_upload import FirmwareUpload
 from service.web.flown_track import FlownTrack
-from service.web.link_history import LinkHistory
+from service.web.link_history import INTERVAL_S, LinkHistory
 from service.web.map_tiles import MapTiles
 from service.web.metrics import CONTENT_TYPE, Metrics
 from service.web.mission_files import MissionFiles, MissionWriter
 from service.web.pi_control import PiControl
-from service.web.replies import answered, begun, json_reply, path_number, text_reply, whole
+from service.web.replies import begun, json_reply, path_number, text_reply, whole
 from service.web.response_cache import ResponseCache
 from service.web.settings_history import SettingsHistory
-from service.web.token import Token, TokenError
-from storage.os_error import reason
 from storage.store_error import StoreError
 
 _LISTED = 50
-T = TypeVar("T")
+_NO_LOG = "There is no such log: it may have been removed."
 
 
 class Api:
-    """Answers from DaemonApi and the bridge's report. `token` None: everything that needs it is refused."""
+    """Answers from DaemonApi and the bridge's report."""
 
-    def __init__(self, daemon: Daemon, settings: WebSettings, token: Token | TokenError) -> None:
+    def __init__(self, daemon: Daemon, settings: WebSettings) -> None:
         self._daemon = daemon
         self._listen = settings.listen
         self._api = DaemonApi(daemon)
-        self._token = token
         self._metrics = Metrics(daemon)
         self._cache = ResponseCache()
         self._held_text: tuple[HeldMission, str] | None = None
         self._writer = MissionWriter()
         self._files = MissionFiles(self._api, self._writer)
-        self._settings = SettingsHistory(self._api.settings, self._writer, self._cache, token)
-        self._firmware = FirmwareUpload(self._api.firmware, self._writer, token)
-        self._pi = PiControl(daemon, self._writer, token)
-        self._map = MapTiles(daemon, settings, token)
+        self._settings = SettingsHistory(self._api.settings, self._writer, self._cache)
+        self._firmware = FirmwareUpload(self._api.firmware, self._writer)
+        self._pi = PiControl(daemon, self._writer)
+        self._map = MapTiles(daemon, settings)
         self._history = LinkHistory(daemon)
         self._track = FlownTrack(daemon)
+        self._sampling: asyncio.TimerHandle | None = None
         state_dir = daemon.settings.state_dir
         self._logs = TelemetryLogs(None if state_dir is None else state_dir / TLOG_FOLDER)
         self._host = Host()
 
-    def start(self) -> None:
-        self._history.start()
-        self._track.start()
+    def start(self, second: int = 0) -> None:
+        """Take the first samples; more follow every second until `close`."""
+        self._sampling = asyncio.get_running_loop().call_later(1, self.start, second + 1)
+        self._track.sample()
+        if second % INTERVAL_S == 0:
+            self._history.sample()
 
     async def close(self) -> None:
-        self._history.close()
-        self._track.close()
+        if self._sampling is not None:
+            self._sampling.cancel()
         await self._writer.close()
         await self._pi.close()
         await self._map.close()
@@ -106,33 +88,30 @@ class Api:
         return self._map.image_origin
 
     def routes(self) -> list[Route]:
-        """The table above."""
-        get = {
-            "/api/state": self._state,
-            "/api/held": self._held,
-            "/api/link": self._link,
-            "/api/track": self._flown_track,
-            "/api/connect": self._connect,
-            "/connect.svg": self._connect_code,
-            "/api/missions": self._missions,
-            "/api/missions/{number}": self._mission,
-            "/api/missions/{number}/difference/{other}": self._difference,
-            "/api/logs": self._list_logs,
-            "/api/logs/{name}": self._read_log,
-            "/metrics": self._render_metrics,
-        }
         return [
-            *(Route(path, guarded(handler), methods=["GET"]) for path, handler in get.items()),
-            Route("/api/missions/{number}/restore", guarded(self._restore), methods=["POST"]),
+            route("GET", "/api/state", self._state),
+            route("GET", "/api/held", self._held),
+            route("GET", "/api/link", self._link),
+            route("GET", "/api/track", self._flown_track),
+            route("GET", "/api/connect", self._connect),
+            route("GET", "/connect.svg", self._connect_code),
+            route("GET", "/api/missions", self._missions),
+            route("GET", "/api/missions/{number}", self._mission),
+            route("GET", "/api/missions/{number}/difference/{other}", self._difference),
+            route("POST", "/api/missions/{number}/restore", self._restore, check_token),
+            route("POST", "/api/check", self._check_file, max_body=MAX_FILE),
+            route("POST", "/api/write", self._write_file, check_token, max_body=MAX_FILE),
+            route("GET", "/api/logs", self._list_logs, check_token),
+            route("GET", "/api/logs/{name}", self._read_log, check_token),
+            route("GET", "/metrics", self._render_metrics),
             *self._settings.routes(),
             *self._firmware.routes(),
             *self._pi.routes(),
             *self._map.routes(),
-            Route("/api/check", guarded(self._check_file, MAX_FILE), methods=["POST"]),
-            Route("/api/write", guarded(self._write_file, MAX_FILE), methods=["POST"]),
         ]
 
     async def _state(self, _request: Request) -> Response:
+        """The current state, requested once a second by an open page."""
         daemon = self._daemon
         now = asyncio.get_running_loop().time()
         transfer, refused = daemon.bridge.missions.transfer, daemon.bridge.counters().refused
@@ -175,6 +154,7 @@ class Api:
         return json_reply(self._history.to_json())
 
     async def _flown_track(self, request: Request) -> Response:
+        """The track of this flight or the last one, from place `first` on."""
         return json_reply(self._track.to_json(whole(request.query_params.get("first", "0"))))
 
     async def _connect(self, _request: Request) -> Response:
@@ -189,23 +169,25 @@ class Api:
         return Response(qr_code(urls[0]), media_type="image/svg+xml")
 
     async def _missions(self, _request: Request) -> Response:
-        return json_reply(await answered(self._api.list_missions(_LISTED)))
+        return json_reply(await self._api.list_missions(_LISTED))
 
     async def _mission(self, request: Request) -> Response:
+        """A mission as sent and as stored."""
         number = path_number(request, "number")
 
         async def make() -> tuple[str, bool]:
-            mission = await self._find(number)
+            mission = await self._api.show_mission(number)
             text = await asyncio.to_thread(lambda: to_json(stored_mission(mission)))
             return text, mission["outcome"] != Outcome.PENDING.value
 
         return text_reply(await self._cache.get(str(number), make))
 
     async def _difference(self, request: Request) -> Response:
+        """Two missions as sent."""
         number, other = path_number(request, "number"), path_number(request, "other")
 
         async def make() -> tuple[str, bool]:
-            first, second = await self._find(number), await self._find(other)
+            first, second = await self._api.show_mission(number), await self._api.show_mission(other)
 
             def compare() -> str:
                 return to_json({"rows": [row.to_json() for row in difference(_sent(first), _sent(second))]})
@@ -215,7 +197,6 @@ class Api:
         return text_reply(await self._cache.get(f"{number} {other}", make))
 
     async def _restore(self, request: Request) -> Response:
-        check_token(request, self._token)
         number = path_number(request, "number")
         return begun(self._writer.begin(f"mission {number}", partial(self._api.restore, number)))
 
@@ -224,38 +205,29 @@ class Api:
         return text_reply(await asyncio.to_thread(to_json, answer))
 
     async def _write_file(self, request: Request) -> Response:
-        check_token(request, self._token)
         return begun(await self._files.write(request))
 
-    async def _list_logs(self, request: Request) -> Response:
-        check_token(request, self._token)
-        return json_reply(await _from_disk(self._logs.list()))
+    async def _list_logs(self, _request: Request) -> Response:
+        with _refusing_logs():
+            return json_reply(await self._logs.list())
 
     async def _read_log(self, request: Request) -> Response:
-        check_token(request, self._token)
-        start = request.query_params.get("start", "0")
-        piece = await _from_disk(self._logs.read(request.path_params["name"], whole(start)))
+        """One piece of a log, from byte `start` on."""
+        start = whole(request.query_params.get("start", "0"))
+        with _refusing_logs(), refusing(FileNotFoundError, HTTPStatus.NOT_FOUND, lambda _: _NO_LOG):
+            piece = await self._logs.read(request.path_params["name"], start)
         return Response(piece, media_type="application/octet-stream")
 
     async def _render_metrics(self, _request: Request) -> Response:
         return Response(self._metrics.render(), media_type=CONTENT_TYPE)
-
-    async def _find(self, number: int) -> Json:
-        return await answered(self._api.show_mission(number))
 
 
 def _sent(mission: Json) -> list[MissionItem]:
     return mission_items(mission["received"]["items"])
 
 
-async def _from_disk(asked: Awaitable[T]) -> T:
-    """Wait for the logs; errors become refusals."""
-    try:
-        return await asked
-    except FileNotFoundError as error:
-        raise HTTPException(HTTPStatus.NOT_FOUND, "There is no such log: it may have been removed.") from error
-    except OSError as error:
-        raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, f"The logs cannot be read: {reason(error)}.") from error
+def _refusing_logs() -> AbstractContextManager[None]:
+    return refusing(OSError, HTTPStatus.SERVICE_UNAVAILABLE, lambda why: f"The logs cannot be read: {why}.")
 
 
 def _held_text(held: HeldMission) -> str:

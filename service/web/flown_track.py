@@ -1,12 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The track of the present flight, or of the last one, for the page's map: a page opened later shows all of it."""
 
-import asyncio
-
 from payloads.mission_data import Json
 from service.daemon.daemon import Daemon
 
-_INTERVAL_S = 1.0
 #: About 1 m: degrees.
 _STEP = 1e-5
 #: Then every second place is left out: 1000 of them draw any flight.
@@ -14,19 +11,16 @@ _MOST = 2000
 
 
 class FlownTrack:
-    """Takes the craft's place every second from `start` on, while it is armed and moves."""
+    """`sample` notes the craft's place every second, while it is armed and moves."""
 
     def __init__(self, daemon: Daemon) -> None:
         self._daemon = daemon
-        self._loop = asyncio.get_running_loop()
         self._places: list[tuple[float, float]] = []
         self._was_armed = False
         #: Another one means that the places so far are no longer the beginning of the list.
         self._version = 0
-        self._timer: asyncio.TimerHandle | None = None
 
-    def start(self) -> None:
-        """Take the first place; more follow until `close`."""
+    def sample(self) -> None:
         report = self._daemon.report()
         was_armed, self._was_armed = self._was_armed, bool(report.last_heard.armed)
         if self._was_armed and not was_armed:
@@ -34,7 +28,6 @@ class FlownTrack:
         lat, lon = report.position.lat_deg, report.position.lon_deg
         if self._was_armed and lat is not None and lon is not None:
             self._append(lat, lon)
-        self._timer = self._loop.call_later(_INTERVAL_S, self.start)
 
     def _append(self, lat: float, lon: float) -> None:
         if self._places and max(abs(lat - self._places[-1][0]), abs(lon - self._places[-1][1])) < _STEP:
@@ -42,10 +35,6 @@ class FlownTrack:
         self._places.append((lat, lon))
         if len(self._places) > _MOST:
             self._places, self._version = self._places[::2], self._version + 1
-
-    def close(self) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
 
     @property
     def state(self) -> Json:

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The serial line to the flight controller over the last minutes, for the page's plot."""
 
-import asyncio
 from collections import deque
 from dataclasses import asdict, dataclass
 
@@ -22,34 +21,21 @@ class Sample:
 
 
 class LinkHistory:
-    """Takes a sample every INTERVAL_S from `start` on."""
+    """`sample` takes one every INTERVAL_S."""
 
     def __init__(self, daemon: Daemon) -> None:
         self._daemon = daemon
-        self._loop = asyncio.get_running_loop()
         self._samples: deque[Sample] = deque(maxlen=_SAMPLES)
         self._before = (0, 0)
-        self._timer: asyncio.TimerHandle | None = None
 
-    def start(self) -> None:
-        """Take the first sample; more follow until `close`."""
+    def sample(self) -> None:
         link = self._daemon.report().link
         lost, damaged = link.requests_lost or 0, link.bad_checksums or 0
         lost_before, damaged_before = self._before
         self._before = lost, damaged
         # Both counters restart with another flight controller.
-        self._samples.append(
-            Sample(
-                link.round_trip_ms,
-                max(lost - lost_before, 0),
-                max(damaged - damaged_before, 0),
-            )
-        )
-        self._timer = self._loop.call_later(INTERVAL_S, self.start)
-
-    def close(self) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
+        since = max(lost - lost_before, 0), max(damaged - damaged_before, 0)
+        self._samples.append(Sample(link.round_trip_ms, *since))
 
     def to_json(self) -> Json:
         return {"interval_s": INTERVAL_S, "samples": [asdict(sample) for sample in self._samples]}

@@ -1,13 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The page's requests about the map's tiles: off until they are switched on, then for every browser.
 
-GET  /api/map/kept?zoom=&x=&y=&columns=&rows=   which of these tiles can be drawn from those kept on the Pi
-GET  /api/map/tiles/Z/X/Y                       one of them
-POST /api/map?on=1                              switch them on, or off with 0 (token)
-POST /api/map/keep?zoom=&x=&y=&columns=&rows=   fetch this area, also in finer levels; progress is in the state (token)
-POST /api/map/stop                              stop that (token)
-POST /api/map/forget                            delete all kept tiles (token)
-
 The Pi fetches only from the source in the settings, and only after the request "keep", never while the craft is armed.
 """
 
@@ -24,14 +17,12 @@ from service.daemon.daemon import Daemon
 from service.machine.state_file import StateFile
 from service.settings import default_state_dir
 from service.settings.web import WebSettings
-from service.web.access import Handler, check_token, guarded
+from service.web.access import check_token, refusing, route
 from service.web.pi_control import check_disarmed
 from service.web.replies import json_reply, path_number
-from service.web.tile_area import FINEST_SHOWN, TileArea, TileAreaError
-from service.web.tile_keeping import KeepError, TileKeeping
+from service.web.tile_area import FINEST_SHOWN, TileArea
+from service.web.tile_keeping import TileKeeping
 from service.web.tile_store import TileStore
-from service.web.token import Token, TokenError
-from storage.os_error import reason
 
 _FOLDER = "map-tiles"
 _FILE = "map.json"
@@ -44,10 +35,9 @@ _log = structlog.get_logger()
 class MapTiles:
     """The choice, and the kept tiles."""
 
-    def __init__(self, daemon: Daemon, settings: WebSettings, token: Token | TokenError) -> None:
+    def __init__(self, daemon: Daemon, settings: WebSettings) -> None:
         state_dir = daemon.settings.state_dir or default_state_dir()
         self._daemon = daemon
-        self._token = token
         self._source = settings.map_tiles
         self._credit = settings.map_credit
         self._file = StateFile(state_dir / _FILE, "the map has no tiles until they are switched on again")
@@ -77,20 +67,13 @@ class MapTiles:
         }
 
     def routes(self) -> list[Route]:
-        """The table above."""
-        get: dict[str, Handler] = {
-            "/api/map/kept": self._kept,
-            "/api/map/tiles/{zoom}/{x}/{y}": self._tile,
-        }
-        post: dict[str, Handler] = {
-            "/api/map": self._switch,
-            "/api/map/keep": self._keep,
-            "/api/map/stop": self._stop,
-            "/api/map/forget": self._forget,
-        }
         return [
-            *(Route(path, guarded(handler), methods=["GET"]) for path, handler in get.items()),
-            *(Route(path, self._with_token(handler), methods=["POST"]) for path, handler in post.items()),
+            route("GET", "/api/map/kept", self._kept, self._check_on),
+            route("GET", "/api/map/tiles/{zoom}/{x}/{y}", self._tile, self._check_on),
+            route("POST", "/api/map", self._switch, check_token),
+            route("POST", "/api/map/keep", self._keep, check_token, self._check_on, self._check_idle),
+            route("POST", "/api/map/stop", self._stop, check_token),
+            route("POST", "/api/map/forget", self._forget, check_token, self._check_idle),
         ]
 
     async def close(self) -> None:
@@ -98,30 +81,19 @@ class MapTiles:
         self._store.close()
         self._file.close()
 
-    def _with_token(self, handler: Handler) -> Handler:
-        async def answer(request: Request) -> Response:
-            check_token(request, self._token)
-            return await handler(request)
-
-        return guarded(answer)
-
     async def _kept(self, request: Request) -> Response:
-        self._check_on()
-        area = _area(request)
+        """Which tiles of an area can be drawn from those kept on the Pi."""
+        with refusing(ValueError, HTTPStatus.UNPROCESSABLE_ENTITY):
+            area = TileArea.from_query(request.query_params)
         if area.count > _MOST_ASKED:
             raise HTTPException(HTTPStatus.UNPROCESSABLE_ENTITY, f"At most {_MOST_ASKED} tiles are looked up at once.")
-        try:
+        with refusing(OSError, HTTPStatus.SERVICE_UNAVAILABLE, lambda why: f"Tiles cannot be read: {why}."):
             return json_reply(await self._store.kept(area.tiles()))
-        except OSError as error:
-            raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, f"Tiles cannot be read: {reason(error)}.") from error
 
     async def _tile(self, request: Request) -> Response:
-        self._check_on()
         zoom, x, y = (path_number(request, name) for name in ("zoom", "x", "y"))
-        try:
+        with refusing(OSError, HTTPStatus.NOT_FOUND, lambda why: f"This tile cannot be read: {why}."):
             data, kind = await self._store.read((zoom, x, y))
-        except OSError as error:
-            raise HTTPException(HTTPStatus.NOT_FOUND, f"This tile cannot be read: {reason(error)}.") from error
         return Response(data, headers={"Cache-Control": "private, max-age=3600"}, media_type=kind)
 
     async def _switch(self, request: Request) -> Response:
@@ -133,13 +105,10 @@ class MapTiles:
         return json_reply(self.state)
 
     async def _keep(self, request: Request) -> Response:
-        self._check_on()
-        self._check_idle()
+        """Fetch an area, also in finer levels; the progress is in the state."""
         check_disarmed(self._daemon)
-        try:
-            self._keeping.begin(_area(request))
-        except KeepError as error:
-            raise HTTPException(HTTPStatus.UNPROCESSABLE_ENTITY, str(error)) from error
+        with refusing(ValueError, HTTPStatus.UNPROCESSABLE_ENTITY):
+            self._keeping.begin(TileArea.from_query(request.query_params))
         return json_reply(self.state, HTTPStatus.ACCEPTED)
 
     async def _stop(self, _request: Request) -> Response:
@@ -147,16 +116,15 @@ class MapTiles:
         return json_reply(self.state)
 
     async def _forget(self, _request: Request) -> Response:
-        self._check_idle()
         self._store.forget()
         self._count(0, 0)
         return json_reply(self.state)
 
-    def _check_on(self) -> None:
+    def _check_on(self, _request: Request) -> None:
         if not self._is_on:
             raise HTTPException(HTTPStatus.NOT_FOUND, "Map tiles are off.")
 
-    def _check_idle(self) -> None:
+    def _check_idle(self, _request: Request) -> None:
         if self._keeping.is_running:
             raise HTTPException(HTTPStatus.CONFLICT, "An area is being fetched: stop that first.")
 
@@ -170,10 +138,3 @@ class MapTiles:
 
 def _read_file(found: Json) -> tuple[bool, int, int]:
     return bool(found["on"]), int(found["tiles"]), int(found["bytes"])
-
-
-def _area(request: Request) -> TileArea:
-    try:
-        return TileArea.from_query(request.query_params)
-    except TileAreaError as error:
-        raise HTTPException(HTTPStatus.UNPROCESSABLE_ENTITY, str(error)) from error

@@ -17,10 +17,11 @@ from starlette.requests import Request
 
 from payloads.comparison import MAX_ROWS, checked_mission
 from payloads.mission_data import ACCEPTED, Json
-from protocols.mission_file import MissionFileError, read_mission_file
+from protocols.mission_file import read_mission_file
 from protocols.mission_item import MissionItem
 from service.daemon.api import DaemonApi
 from service.daemon.client import ControlError
+from service.web.access import refusing
 from service.web.replies import received_body
 from storage.store_error import StoreError
 
@@ -89,10 +90,8 @@ class MissionFiles:
         name, body = await received(request)
         async with self._turn:
             items = await _parsed(name, body)
-            try:
+            with refusing(ControlError, HTTPStatus.SERVICE_UNAVAILABLE):
                 verdict = await self._api.check(items)
-            except ControlError as error:
-                raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, str(error)) from error
             answer = await asyncio.to_thread(checked_mission, items, verdict)
             await asyncio.sleep(_PAUSE_S)
         return answer
@@ -111,10 +110,7 @@ async def received(request: Request) -> tuple[str, bytes]:
 
 
 async def _parsed(name: str, body: bytes) -> list[MissionItem]:
-    try:
-        items = await asyncio.to_thread(read_mission_file, body, name)
-    except MissionFileError as error:
-        raise HTTPException(HTTPStatus.UNPROCESSABLE_ENTITY, str(error)) from error
+    items = await asyncio.to_thread(read_mission_file, body, name)
     if len(items) > MAX_ROWS:
         raise HTTPException(HTTPStatus.UNPROCESSABLE_ENTITY, f"{name} has {len(items)} items; the limit is {MAX_ROWS}.")
     if not items:

@@ -1,11 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The page's requests about the Pi itself: carried out by the root helper (service.cli.helper).
 
-GET  /api/pi                             the request begun last, and its reply
-POST /api/pi                             the body is a request to the helper: begin it
-POST /api/pi/package?start=N             the body is a piece of a package: kept for the request "install"
-GET  /api/log?after=N                    the daemon's log lines after the first N
-
 All need the token, and a browser on the Pi's own network. Every change is refused while the craft is armed, and while
 the page writes something to the flight controller or new firmware is flashed.
 """
@@ -28,10 +23,9 @@ from payloads.mission_data import Json
 from service.daemon.daemon import Daemon
 from service.machine.helper_socket import MAX_PACKAGE, HelperError, ask_helper
 from service.machine.log_setup import recent_lines
-from service.web.access import MAX_FILE, check_token, guarded
+from service.web.access import MAX_FILE, check_token, refusing, route
 from service.web.mission_files import MissionWriter
 from service.web.replies import begun, json_reply, received_body, whole
-from service.web.token import Token, TokenError
 from storage.os_error import reason
 
 _MAX_REQUEST = 64 << 10
@@ -53,6 +47,11 @@ def is_local(peer: str) -> bool:
     return address.is_private or address.is_link_local or address.is_loopback
 
 
+def check_local(request: Request) -> None:
+    if request.client is None or not is_local(request.client.host):
+        raise HTTPException(HTTPStatus.FORBIDDEN, _ELSEWHERE)
+
+
 def check_disarmed(daemon: Daemon) -> None:
     # A craft that was lost while armed may still fly.
     if daemon.report().last_heard.armed:
@@ -62,20 +61,19 @@ def check_disarmed(daemon: Daemon) -> None:
 class PiControl:
     """One request at a time. Its reply is fetched later: it may take longer than a connection lasts."""
 
-    def __init__(self, daemon: Daemon, writer: MissionWriter, token: Token | TokenError) -> None:
+    def __init__(self, daemon: Daemon, writer: MissionWriter) -> None:
         self._daemon = daemon
         self._writer = writer
-        self._token = token
         self._task: asyncio.Task[None] | None = None
         self._job: Json = {"id": None, "done": True}
 
     def routes(self) -> list[Route]:
-        """The table above."""
+        checks = check_local, check_token
         return [
-            Route("/api/pi", guarded(self._show), methods=["GET"]),
-            Route("/api/pi", guarded(self._begin, _MAX_REQUEST), methods=["POST"]),
-            Route("/api/pi/package", guarded(self._keep, MAX_FILE), methods=["POST"]),
-            Route("/api/log", guarded(self._read_log), methods=["GET"]),
+            route("GET", "/api/pi", self._show, *checks),
+            route("POST", "/api/pi", self._begin, *checks, max_body=_MAX_REQUEST),
+            route("POST", "/api/pi/package", self._keep, *checks, max_body=MAX_FILE),
+            route("GET", "/api/log", self._read_log, *checks),
         ]
 
     async def close(self) -> None:
@@ -83,12 +81,12 @@ class PiControl:
             self._task.cancel()
             await asyncio.gather(self._task, return_exceptions=True)
 
-    async def _show(self, request: Request) -> Response:
-        self._check(request)
+    async def _show(self, _request: Request) -> Response:
+        """The request begun last, and its reply."""
         return json_reply(self._job)
 
     async def _begin(self, request: Request) -> Response:
-        self._check(request)
+        """The body is a request to the helper."""
         try:
             asked = json.loads(await received_body(request))
             action = str(asked["action"])
@@ -131,20 +129,17 @@ class PiControl:
             path.unlink()
 
     async def _keep(self, request: Request) -> Response:
-        self._check(request)
+        """The body is a piece of a package, from byte `start` on: kept for the request "install"."""
         self._check_changeable()
         start, piece = whole(request.query_params.get("start", "0")), await received_body(request)
-        path = self._package()
-        try:
-            size = await asyncio.to_thread(_append, path, start, piece)
-        except FileNotFoundError as error:
-            raise HTTPException(HTTPStatus.CONFLICT, _NOT_NEXT) from error
-        except OSError as error:
-            raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, f"It cannot be stored: {reason(error)}.") from error
-        return json_reply({"size": size})
+        with (
+            refusing(OSError, HTTPStatus.SERVICE_UNAVAILABLE, lambda why: f"It cannot be stored: {why}."),
+            refusing(FileNotFoundError, HTTPStatus.CONFLICT, lambda _: _NOT_NEXT),
+        ):
+            return json_reply({"size": await asyncio.to_thread(_append, self._package(), start, piece)})
 
     async def _read_log(self, request: Request) -> Response:
-        self._check(request)
+        """The daemon's log lines after the first `after`."""
         count, lines = recent_lines(whole(request.query_params.get("after", "0")))
         return json_reply({"count": count, "lines": [line._asdict() for line in lines]})
 
@@ -153,11 +148,6 @@ class PiControl:
         if state_dir is None:
             raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, "There is no state directory for the package.")
         return state_dir / _PACKAGE_FILE
-
-    def _check(self, request: Request) -> None:
-        if request.client is None or not is_local(request.client.host):
-            raise HTTPException(HTTPStatus.FORBIDDEN, _ELSEWHERE)
-        check_token(request, self._token)
 
     def _check_changeable(self) -> None:
         check_disarmed(self._daemon)

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bodies of requests, numbers in paths, JSON responses, and the store's errors as refusals."""
+"""Bodies of requests, numbers in them, and JSON responses."""
 
-from collections.abc import Awaitable
 from http import HTTPStatus
 
 from starlette.exceptions import HTTPException
@@ -9,8 +8,6 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
 
 from payloads.mission_data import MOST, Json, to_json
-from service.daemon.client import ControlError
-from storage.store_error import StoreError
 
 #: A page of another site cannot send this type without a preflight request, which is refused.
 _CONTENT_TYPE = "application/octet-stream"
@@ -35,16 +32,6 @@ def whole(text: str) -> int:
     if not text.isascii() or not text.isdecimal() or len(text) > len(str(MOST)) or int(text) > MOST:
         raise HTTPException(HTTPStatus.NOT_FOUND, f"{text[:20]!r} is not a valid number.")
     return int(text)
-
-
-async def answered(asked: Awaitable[Json]) -> Json:
-    """Wait for the store; its errors become refusals."""
-    try:
-        return await asked
-    except ControlError as error:
-        raise HTTPException(HTTPStatus.NOT_FOUND, str(error)) from error
-    except StoreError as error:
-        raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, str(error)) from error
 
 
 def begun(write_id: str) -> Response:

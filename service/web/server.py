@@ -7,14 +7,12 @@ from contextlib import suppress
 
 import structlog
 from starlette.applications import Starlette
-from starlette.exceptions import HTTPException
-from starlette.routing import Route
 from uvicorn.config import Config
 from uvicorn.server import ServerState
 
 from service.daemon.daemon import Daemon
 from service.settings.web import WebSettings
-from service.web.access import SafeHeaders, failed, guarded, refused
+from service.web.access import EXCEPTION_HANDLERS, SafeHeaders, route
 from service.web.api import Api
 from service.web.connection_limit import BoundedConnection, ConnectionLimit
 from service.web.static_files import static_files
@@ -36,8 +34,8 @@ class WebServer:
 
     def __init__(self, daemon: Daemon, settings: WebSettings) -> None:
         self._address = settings.listen
-        self._api = Api(daemon, settings, _token(daemon, settings))
-        self._config = _config(self._api, settings.hosts)
+        self._api = Api(daemon, settings)
+        self._config = _config(self._api, settings.hosts, _token(daemon, settings))
         self._state = ServerState()
         self._limit = ConnectionLimit()
         self._listening: asyncio.Task[None] | None = None
@@ -81,10 +79,10 @@ class WebServer:
         _log.info("web.listening", address=str(self._address))
 
 
-def _config(api: Api, hosts: tuple[str, ...]) -> Config:
-    routes = [*api.routes(), *(Route(path, guarded(handler)) for path, handler in static_files(api.image_origin))]
-    app = Starlette(routes=routes, exception_handlers={HTTPException: refused, Exception: failed})
-    app.state.hosts = hosts
+def _config(api: Api, hosts: tuple[str, ...], token: Token | TokenError) -> Config:
+    routes = [*api.routes(), *(route("GET", *each) for each in static_files(api.image_origin))]
+    app = Starlette(routes=routes, exception_handlers=EXCEPTION_HANDLERS)
+    app.state.hosts, app.state.token = hosts, token
     # uvicorn would log only the errors of browsers; ours are logged by `failed`.
     return Config(
         SafeHeaders(app),

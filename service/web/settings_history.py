@@ -1,11 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The page's requests about the flight controller's settings: their backups, and restoring one.
-
-GET  /api/settings                       the backups, newest first
-GET  /api/settings/N                     what changed in one of them, and what restoring it would change now
-GET  /api/settings/N/file                the same as a .param file
-POST /api/settings/N/restore             write, save and verify it; its progress is in the state (token)
-"""
+"""The page's requests about the flight controller's settings: their backups, and restoring one."""
 
 from functools import partial
 
@@ -18,11 +12,10 @@ from payloads.mission_data import ACCEPTED, Json, to_json
 from protocols.param_file import write_param_file
 from service.daemon.client import ControlError
 from service.daemon.settings_api import SettingsApi
-from service.web.access import Handler, check_token, guarded
+from service.web.access import check_token, route
 from service.web.mission_files import MissionWriter, Progress
-from service.web.replies import answered, begun, json_reply, path_number, text_reply
+from service.web.replies import begun, json_reply, path_number, text_reply
 from service.web.response_cache import ResponseCache
-from service.web.token import Token, TokenError
 
 _LISTED = 50
 
@@ -30,30 +23,25 @@ _LISTED = 50
 class SettingsHistory:
     """Answers from SettingsApi. An unauthenticated request never uses the flight controller's line."""
 
-    def __init__(
-        self, api: SettingsApi, writer: MissionWriter, cache: ResponseCache, token: Token | TokenError
-    ) -> None:
+    def __init__(self, api: SettingsApi, writer: MissionWriter, cache: ResponseCache) -> None:
         self._api = api
         self._writer = writer
         self._cache = cache
-        self._token = token
 
     def routes(self) -> list[Route]:
-        """The table above."""
-        get: dict[str, Handler] = {
-            "/api/settings": self._list,
-            "/api/settings/{number}": self._show,
-            "/api/settings/{number}/file": self._file,
-        }
         return [
-            *(Route(path, guarded(handler), methods=["GET"]) for path, handler in get.items()),
-            Route("/api/settings/{number}/restore", guarded(self._restore), methods=["POST"]),
+            route("GET", "/api/settings", self._list),
+            route("GET", "/api/settings/{number}", self._show),
+            route("GET", "/api/settings/{number}/file", self._file),
+            route("POST", "/api/settings/{number}/restore", self._restore, check_token),
         ]
 
     async def _list(self, _request: Request) -> Response:
-        return json_reply(await answered(self._api.backups(_LISTED)))
+        return json_reply(await self._api.backups(_LISTED))
 
     async def _show(self, request: Request) -> Response:
+        """What changed in a backup, and what restoring it would change now."""
+
         async def make() -> tuple[str, bool]:
             backup = await self._find(request)
             try:
@@ -67,6 +55,7 @@ class SettingsHistory:
         return text_reply(await self._cache.get(question, make))
 
     async def _file(self, request: Request) -> Response:
+        """A backup as a .param file."""
         backup = await self._find(request)
         name = f"settings-{backup['number']}.param"
         text = write_param_file(by_parameter(backup["values"]), backup["kind"])
@@ -74,7 +63,6 @@ class SettingsHistory:
         return Response(text, headers=headers, media_type="application/octet-stream")
 
     async def _restore(self, request: Request) -> Response:
-        check_token(request, self._token)
         backup = await self._find(request)
         what = f"settings {backup['number']}"
         return begun(self._writer.begin(what, partial(self._write, backup), "settings"))
@@ -84,4 +72,4 @@ class SettingsHistory:
         return {"ack": ACCEPTED if result["is_saved"] else "", "text": result["text"]}
 
     async def _find(self, request: Request) -> Json:
-        return await answered(self._api.backup(path_number(request, "number")))
+        return await self._api.backup(path_number(request, "number"))

@@ -8,25 +8,24 @@ not expired are not fetched again, so a request that was stopped continues when 
 """
 
 import json
-import socket
 import sys
 import time
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from dataclasses import asdict, dataclass
 from email.message import Message
 from email.utils import parsedate_to_datetime
 from http import HTTPStatus
 from http.client import HTTPConnection, HTTPException, HTTPSConnection
 from pathlib import Path
-from threading import Lock, Timer, local
+from queue import SimpleQueue
+from threading import Lock
 
 from service.web.tile_cache import MAX_TILE, CacheFullError, TileCache, image_type
 from storage.os_error import reason
 
-#: Of one tile.
-_DEADLINE_S = 20.0
+#: Without a byte. The daemon ends this program if no tile is completed for longer.
+_TIMEOUT_S = 20.0
 _CONNECTIONS = 2
 #: Without a date of the source: the least that OpenStreetMap asks of caches.
 _EXPIRES_S = 7 * 86400
@@ -77,8 +76,11 @@ class TileFetch:
         self._cache = TileCache(Path(request.folder), request.most_bytes, wanted)
         self._lock = Lock()
         self._host = request.origin.partition("://")[2]
-        self._local = local()
-        self._connections: list[HTTPConnection] = []
+        kind = HTTPSConnection if request.origin.startswith("https:") else HTTPConnection
+        #: Those that no thread uses.
+        self._connections: SimpleQueue[HTTPConnection] = SimpleQueue()
+        for _ in range(_CONNECTIONS):
+            self._connections.put(kind(self._host, timeout=_TIMEOUT_S))
         self._reported = 0.0
 
     def run(self) -> None:
@@ -93,8 +95,8 @@ class TileFetch:
             end = str(error)
         except OSError as error:
             end = f"The tiles cannot be stored: {reason(error)}."
-        for connection in self._connections:
-            connection.close()
+        for _ in range(_CONNECTIONS):
+            self._connections.get().close()
         self._report(end)
 
     def _fetch_level(self, level: Iterable[tuple[str, str]], threads: ThreadPoolExecutor) -> bool:
@@ -121,20 +123,21 @@ class TileFetch:
 
     def _ask(self, target: str) -> tuple[bytes, float] | None:
         """A tile, and the time at which it expires; None if the source does not have it."""
+        connection = self._connections.get()
         try:
             try:
-                return self._ask_once(target)
+                return self._ask_once(connection, target)
             except (OSError, HTTPException):
-                return self._ask_once(target)  # on a new connection: servers close those that are idle
+                return self._ask_once(connection, target)  # opened again: servers close those that are idle
+        except TimeoutError as error:
+            raise FetchError(f"{self._host} does not answer: a tile takes more than {_TIMEOUT_S:.0f} s.") from error
         except (OSError, HTTPException) as error:
             why = reason(error) or type(error).__name__
             raise FetchError(f"{self._host} does not answer: {why}.") from error
+        finally:
+            self._connections.put(connection)
 
-    def _ask_once(self, target: str) -> tuple[bytes, float] | None:
-        connection = self._connection()
-        started = time.monotonic()
-        timer = Timer(_DEADLINE_S, cut_off, [connection])
-        timer.start()
+    def _ask_once(self, connection: HTTPConnection, target: str) -> tuple[bytes, float] | None:
         try:
             connection.request("GET", target, headers={"User-Agent": self._request.agent, "Accept": "image/*"})
             response = connection.getresponse()
@@ -143,11 +146,7 @@ class TileFetch:
                 raise HTTPException("the tile was cut off")
         except (OSError, HTTPException):
             connection.close()  # the next request opens it again
-            if time.monotonic() >= started + _DEADLINE_S:
-                raise TimeoutError(f"a tile takes more than {_DEADLINE_S:.0f} s") from None
             raise
-        finally:
-            timer.cancel()
         if response.status in _ABSENT:
             return None
         if response.status != HTTPStatus.OK:
@@ -158,28 +157,12 @@ class TileFetch:
             raise FetchError(f"{self._host} does not send map tiles: {target} is neither PNG, JPEG nor WebP.")
         return data, time.time() + lifetime_s(response.headers)
 
-    def _connection(self) -> HTTPConnection:
-        """The thread's own, used again for the next tile."""
-        if not hasattr(self._local, "connection"):
-            kind = HTTPSConnection if self._request.origin.startswith("https:") else HTTPConnection
-            self._local.connection = kind(self._host, timeout=_DEADLINE_S)
-            self._connections.append(self._local.connection)
-        connection: HTTPConnection = self._local.connection
-        return connection
-
     def _report(self, end: str | None = None) -> None:
         progress = self._progress
         progress.tiles, progress.bytes, progress.end = self._cache.tiles, self._cache.bytes, end
         self._reported = time.monotonic()
         sys.stdout.write(f"{json.dumps(asdict(progress))}\n")
         sys.stdout.flush()
-
-
-def cut_off(connection: HTTPConnection) -> None:
-    """End a request that another thread waits for."""
-    if connection.sock is not None:
-        with suppress(OSError):
-            connection.sock.shutdown(socket.SHUT_RDWR)
 
 
 def lifetime_s(headers: Message) -> float:

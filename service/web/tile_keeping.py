@@ -28,11 +28,10 @@ _PROGRAM = (sys.executable, "-I", "-m", "service.web.tile_fetch")
 _LOOK_S = 0.5
 #: More than two tiles' deadlines, because a tile is requested twice.
 _SILENCE_S = 60.0
+_NOT_ALLOWED = (
+    "OpenStreetMap's server does not allow saving areas. Name a server that does in the setting web.map_tiles."
+)
 _log = structlog.get_logger()
-
-
-class KeepError(Exception):
-    """A reason not to keep an area; one sentence."""
 
 
 class TileKeeping:
@@ -56,15 +55,12 @@ class TileKeeping:
         return self._task is not None and not self._task.done()
 
     def begin(self, area: TileArea) -> None:
-        """Start to fetch; KeepError."""
+        """Start to fetch; ValueError says why an area cannot be kept."""
         if self._source.is_openstreetmap:
-            raise KeepError(
-                "OpenStreetMap's server does not allow saving areas. Name a server that does in the setting"
-                " web.map_tiles."
-            )
+            raise ValueError(_NOT_ALLOWED)
         count = sum(level.count for level in area.levels())
         if count > MOST_TILES:
-            raise KeepError(f"This area has {count} tiles; at most {MOST_TILES} are kept at once: zoom in.")
+            raise ValueError(f"This area has {count} tiles; at most {MOST_TILES} are kept at once: zoom in.")
         self._is_stopped = False
         self.state = {**asdict(FetchProgress(count)), "running": True, "text": ""}
         self._task = asyncio.get_running_loop().create_task(self._run(area, self.state))

@@ -2,7 +2,8 @@
 
 import pytest
 
-from service.settings.tile_source import TileSource, TileSourceError, parse_tile_source
+from service.settings.addresses import AddressError
+from service.settings.tile_source import TileSource, parse_tile_source
 
 
 @pytest.mark.parametrize(
@@ -15,7 +16,7 @@ from service.settings.tile_source import TileSource, TileSourceError, parse_tile
 )
 def test_a_tile_has_an_address(template: str, origin: str | None, target: str | None) -> None:
     if origin is None:
-        with pytest.raises(TileSourceError):
+        with pytest.raises(AddressError):
             parse_tile_source(template)
         return
     source = parse_tile_source(template)
@@ -41,7 +42,7 @@ def test_a_tile_has_an_address(template: str, origin: str | None, target: str | 
     ],
 )
 def test_another_address_is_refused(wrong: str) -> None:
-    with pytest.raises(TileSourceError, match="is not an address of map tiles"):
+    with pytest.raises(match="is not an address of map tiles"):
         parse_tile_source(wrong)
 
 

@@ -120,7 +120,7 @@ def test_nothing_is_changed_while_firmware_is_flashed(tmp_path: Path) -> None:
     report = SimpleNamespace(last_heard=SimpleNamespace(armed=False))
     daemon: Any = SimpleNamespace(report=lambda: report, fc=SimpleNamespace(is_lent=True))
     token = Token(tmp_path / "token")
-    control = PiControl(daemon, MissionWriter(), token)
+    control = PiControl(daemon, MissionWriter())
     begin = next(
         route.endpoint for route in control.routes() if route.path == "/api/pi" and "POST" in (route.methods or ())
     )
@@ -134,7 +134,7 @@ def test_nothing_is_changed_while_firmware_is_flashed(tmp_path: Path) -> None:
         "query_string": b"",
         "headers": [(name.encode(), value.strip().encode()) for name, value in head.items()],
         "client": ("10.42.0.7", 4711),
-        "app": SimpleNamespace(state=SimpleNamespace(hosts=())),
+        "app": SimpleNamespace(state=SimpleNamespace(hosts=(), token=token)),
     }
 
     async def receive() -> dict[str, Any]:

@@ -101,7 +101,7 @@ def test_a_server_that_sends_no_tiles_ends_the_request(
 
 
 def test_a_silent_server_is_not_waited_for(tiles: TileServer, fetch: Fetch, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tile_fetch, "_DEADLINE_S", 0.1)
+    monkeypatch.setattr(tile_fetch, "_TIMEOUT_S", 0.1)
     tiles.pause_s = 2
     assert "takes more than" in fetch.run(tiles)["end"]
 
