@@ -44,7 +44,7 @@ class FixablePi(FaultyMachine):
     def ask(self, action: str, **arguments: Any) -> Json:
         """The reply to a request."""
         line = to_json({"action": action, **arguments}).encode()
-        return parse_action(line, actions.ACTIONS).carry_out(ThisPi(self, BytesIO()))
+        return parse_action(line, actions.ACTIONS)(ThisPi(self, BytesIO()))
 
     def checked(self, check: str) -> list[Json]:
         """Doctor's findings of a check."""

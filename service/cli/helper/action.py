@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The form of an action: a dataclass whose fields are the arguments, checked by name and type."""
+"""The form of an action: a function whose keyword arguments are the request's, checked by name and type."""
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, dataclass, fields
-from typing import Any, BinaryIO, Protocol, get_type_hints
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from inspect import signature
+from typing import BinaryIO
 
 from payloads.mission_data import Json
 from service.cli.setup.change import Machine, Step
@@ -52,7 +54,6 @@ class ThisPi:
         return self.shown(steps)
 
     def shown(self, steps: Sequence[Step]) -> Json:
-        """The steps as the page shows them."""
         return {
             "steps": [{"purpose": each.purpose, "changes": [one.describe() for one in each.changes]} for each in steps],
             "needs_reboot": any(each.needs_reboot for each in steps),
@@ -60,25 +61,22 @@ class ThisPi:
         }
 
 
-class Action(Protocol):
-    """One of `actions.ACTIONS`."""
-
-    def carry_out(self, pi: ThisPi) -> Json: ...
+#: One of `actions.ACTIONS`.
+Action = Callable[..., Json]
 
 
-def parse_action(line: bytes, actions: Mapping[str, Any]) -> Action:
+def parse_action(line: bytes, actions: Mapping[str, Action]) -> partial[Json]:
     """Read a request; HelperRefusal if it is none, or has an argument that is missing, unknown or of another type."""
     try:
         request: Json = json.loads(line)
-        kind = actions[request.pop("action")]
+        action = actions[request.pop("action")]
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         raise HelperRefusal(f"This is not an action; known are {', '.join(actions)}") from None
-    hints = get_type_hints(kind)
-    required = {each.name for each in fields(kind) if each.default is MISSING}
-    if not required <= request.keys() <= hints.keys() or any(
-        type(value) is not hints[name] for name, value in request.items()
+    known = {name: each for name, each in signature(action).parameters.items() if each.kind is each.KEYWORD_ONLY}
+    required = {name for name, each in known.items() if each.default is each.empty}
+    if not required <= request.keys() <= known.keys() or any(
+        type(value) is not known[name].annotation for name, value in request.items()
     ):
-        shown = ", ".join(f"{name} ({hint.__name__})" for name, hint in hints.items()) or "none"
+        shown = ", ".join(f"{name} ({each.annotation.__name__})" for name, each in known.items()) or "none"
         raise HelperRefusal(f"The arguments of this action are: {shown}")
-    action: Action = kind(**request)
-    return action
+    return partial(action, **request)

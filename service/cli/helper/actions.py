@@ -2,7 +2,8 @@
 """The actions of the helper. Each recomputes what it changes from this machine; a request can only choose."""
 
 import re
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
 
@@ -10,7 +11,7 @@ from payloads.mission_data import Json
 from service.cli.doctor.command import examined
 from service.cli.doctor.fixes import REBOOT, RESTART
 from service.cli.doctor.machine import EPOCH, SET_BY_HAND
-from service.cli.helper.action import HelperRefusal, ThisPi
+from service.cli.helper.action import Action, HelperRefusal, ThisPi
 from service.cli.helper.packages import PREVIOUS, receive, start_update, update_outcome, version_of
 from service.cli.helper.page_settings import change_settings, known_settings, settings_in_force
 from service.cli.setup.answers import SetupChoices, current_key, earlier_choices, shadowed
@@ -30,169 +31,119 @@ from service.settings.passphrase import new_passphrase
 _LATEST = datetime(2100, 1, 1, tzinfo=UTC)
 
 
-@dataclass(frozen=True, slots=True)
-class PiOverview:
+def overview(pi: ThisPi) -> Json:
     """The answers to setup so far, the settings, and what can be undone. Changes nothing."""
-
-    def carry_out(self, pi: ThisPi) -> Json:
-        host = pi.host
-        earlier = earlier_choices(host)
-        country = re.search(r"cfg80211\.ieee80211_regdom=([A-Z]{2})", host.read(boot_file(host, "cmdline.txt") or ""))
-        model = pi_model(host)
-        return {
-            "is_set_up": earlier is not None,
-            "fc": (earlier or SetupChoices()).fc,
-            "has_key": bool(current_key(host)),
-            "hotspot": hotspot_name(host),
-            "hotspot_is_open": hotspot_is_open(host),
-            "country": country and country[1],
-            "name": host.read("/etc/hostname").strip(),
-            "model": None if model is None else model.name,
-            "can_undo": bool(undo_steps(host)[0]),
-            "version": version(),
-            "previous": version_of(host.path(PREVIOUS), Machine(host)),
-            "update": update_outcome(host),
-            "settings": settings_in_force(host),
-            "keys": known_settings(),
-        }
+    host = pi.host
+    earlier = earlier_choices(host)
+    country = re.search(r"cfg80211\.ieee80211_regdom=([A-Z]{2})", host.read(boot_file(host, "cmdline.txt") or ""))
+    model = pi_model(host)
+    return {
+        "is_set_up": earlier is not None,
+        "fc": (earlier or SetupChoices()).fc,
+        "has_key": bool(current_key(host)),
+        "hotspot": hotspot_name(host),
+        "hotspot_is_open": hotspot_is_open(host),
+        "country": country and country[1],
+        "name": host.read("/etc/hostname").strip(),
+        "model": None if model is None else model.name,
+        "can_undo": bool(undo_steps(host)[0]),
+        "version": version(),
+        "previous": version_of(host.path(PREVIOUS), Machine(host)),
+        "update": update_outcome(host),
+        "settings": settings_in_force(host),
+        "keys": known_settings(),
+    }
 
 
-@dataclass(frozen=True, slots=True)
-class Doctor:
-    """Doctor's checks. Changes nothing. `fix` names a remedy for the action Fix."""
-
-    def carry_out(self, pi: ThisPi) -> Json:
-        return {"checks": [found for found, _ in _examine(pi)]}
+def doctor(pi: ThisPi) -> Json:
+    """Doctor's checks. Changes nothing. `fix` names a remedy for the action of that name."""
+    return {"checks": [found for found, _ in _examine(pi)]}
 
 
-@dataclass(frozen=True, slots=True)
-class ApplyFix:
+def apply_fix(pi: ThisPi, *, fix: str) -> Json:
     """One of doctor's remedies, by its purpose; doctor must find the problem again."""
-
-    fix: str
-
-    def carry_out(self, pi: ThisPi) -> Json:
-        step = next((step for _, step in _examine(pi) if step is not None and step.purpose == self.fix), None)
-        if step is None:
-            raise HelperRefusal("Doctor no longer finds this problem: check again.")
-        return pi.make([step])
+    step = next((step for _, step in _examine(pi) if step is not None and step.purpose == fix), None)
+    if step is None:
+        raise HelperRefusal("Doctor no longer finds this problem: check again.")
+    return pi.make([step])
 
 
-@dataclass(frozen=True, slots=True)
-class Answer:
+def answer(
+    pi: ThisPi,
+    *,
+    is_trial: bool = False,
+    fc: str = "",
+    hotspot: str = "",
+    password: str = "",
+    country: str = "",
+    name: str = "",
+    new_key: bool = False,
+) -> Json:
     """The answers to setup's questions; what is not given stays. `is_trial`: only show the changes."""
-
-    is_trial: bool = False
-    fc: str = ""
-    hotspot: str = ""
-    password: str = ""
-    country: str = ""
-    name: str = ""
-    new_key: bool = False
-
-    def carry_out(self, pi: ThisPi) -> Json:
-        if bool(self.hotspot) != bool(self.password):
-            raise HelperRefusal("A hotspot needs a name and a password.")
-        check_answers(self.hotspot or None, self.password or None, self.country or None, self.name or None)
-        answers = earlier_choices(pi.host) or SetupChoices()
-        try:
-            fc = answers.fc if not self.fc else None if self.fc == "auto" else str(parse_fc(self.fc))
-        except AddressError as error:
-            raise HelperRefusal(str(error)) from error
-        answers = replace(
-            answers,
-            fc=fc,
-            hotspot=(self.hotspot, self.password) if self.hotspot else None,
-            country=self.country.upper() or None,
-            name=self.name or None,
-            key=new_passphrase() if self.new_key else None,
-        )
-        steps = missing_steps(pi.host, answers)
-        warnings = list(shadowed(pi.host, answers))
-        made = pi.shown(steps) if self.is_trial else pi.make(steps)
-        return made | {"warnings": warnings, "key": None if self.is_trial else answers.key}
+    if bool(hotspot) != bool(password):
+        raise HelperRefusal("A hotspot needs a name and a password.")
+    check_answers(hotspot or None, password or None, country or None, name or None)
+    earlier = earlier_choices(pi.host) or SetupChoices()
+    try:
+        wanted = earlier.fc if not fc else None if fc == "auto" else str(parse_fc(fc))
+    except AddressError as error:
+        raise HelperRefusal(str(error)) from error
+    answers = replace(
+        earlier,
+        fc=wanted,
+        hotspot=(hotspot, password) if hotspot else None,
+        country=country.upper() or None,
+        name=name or None,
+        key=new_passphrase() if new_key else None,
+    )
+    steps = missing_steps(pi.host, answers)
+    warnings = list(shadowed(pi.host, answers))
+    made = pi.shown(steps) if is_trial else pi.make(steps)
+    return made | {"warnings": warnings, "key": None if is_trial else answers.key}
 
 
-@dataclass(frozen=True, slots=True)
-class ChangeSettings:
-    """Settings by name, each as in the configuration file; null: the default. The bridge takes them over."""
-
-    values: dict  # type: ignore[type-arg]  # checked as a whole by its type, and inside by change_settings
-
-    def carry_out(self, pi: ThisPi) -> Json:
-        return change_settings(pi, self.values)
-
-
-@dataclass(frozen=True, slots=True)
-class SwitchHotspot:
+def switch_hotspot(pi: ThisPi, *, on: bool) -> Json:
     """Open or close the hotspot of the last setup."""
-
-    on: bool
-
-    def carry_out(self, pi: ThisPi) -> Json:
-        if hotspot_name(pi.host) is None:
-            raise HelperRefusal("No hotspot is set up: give it a name and a password first.")
-        return pi.make([switch_step(is_on=self.on)])
+    if hotspot_name(pi.host) is None:
+        raise HelperRefusal("No hotspot is set up: give it a name and a password first.")
+    return pi.make([switch_step(is_on=on)])
 
 
-@dataclass(frozen=True, slots=True)
-class Undo:
+def undo(pi: ThisPi, *, is_trial: bool = False) -> Json:
     """Revert the last setup, fix, or change of settings. `is_trial`: only show the changes."""
-
-    is_trial: bool = False
-
-    def carry_out(self, pi: ThisPi) -> Json:
-        steps, kept = undo_steps(pi.host)
-        if self.is_trial:
-            return pi.shown(steps) | {"kept": kept}
-        forget_last(pi.host, Machine(pi.host))
-        return pi.make_for_good(steps) | {"kept": kept}
+    steps, kept = undo_steps(pi.host)
+    if is_trial:
+        return pi.shown(steps) | {"kept": kept}
+    forget_last(pi.host, Machine(pi.host))
+    return pi.make_for_good(steps) | {"kept": kept}
 
 
-@dataclass(frozen=True, slots=True)
-class Restart:
+def restart(pi: ThisPi, *, machine: bool = False) -> Json:
     """Restart the bridge, or the Pi."""
-
-    machine: bool = False
-
-    def carry_out(self, pi: ThisPi) -> Json:
-        return pi.make([REBOOT if self.machine else RESTART])
+    return pi.make([REBOOT if machine else RESTART])
 
 
-@dataclass(frozen=True, slots=True)
-class SetClock:
+def set_clock(pi: ThisPi, *, unix_s: int) -> Json:
     """Set the clock to the phone's: seconds since 1970, UTC."""
-
-    unix_s: int
-
-    def carry_out(self, pi: ThisPi) -> Json:
-        if not EPOCH.timestamp() <= self.unix_s < _LATEST.timestamp():
-            raise HelperRefusal("This time cannot be right: look at the clock of this phone.")
-        changes: list[Change] = [Run(("date", "--utc", "--set", f"@{self.unix_s}")), WriteFile(SET_BY_HAND, "")]
-        return pi.make_for_good([Step("set the clock", changes)])
+    if not EPOCH.timestamp() <= unix_s < _LATEST.timestamp():
+        raise HelperRefusal("This time cannot be right: look at the clock of this phone.")
+    changes: list[Change] = [Run(("date", "--utc", "--set", f"@{unix_s}")), WriteFile(SET_BY_HAND, "")]
+    return pi.make_for_good([Step("set the clock", changes)])
 
 
-@dataclass(frozen=True, slots=True)
-class InstallPackage:
+def install(pi: ThisPi, *, size: int) -> Json:
     """The body is a package of this program: check it, and install it in a process of its own."""
-
-    size: int
-
-    def carry_out(self, pi: ThisPi) -> Json:
-        if not 0 < self.size <= MAX_PACKAGE:
-            raise HelperRefusal(f"A package has at most {MAX_PACKAGE >> 20} MB.")
-        return {"version": receive(pi, self.size)}
+    if not 0 < size <= MAX_PACKAGE:
+        raise HelperRefusal(f"A package has at most {MAX_PACKAGE >> 20} MB.")
+    return {"version": receive(pi, size)}
 
 
-@dataclass(frozen=True, slots=True)
-class Downgrade:
+def downgrade(pi: ThisPi) -> Json:
     """Go back to the package before the last update."""
-
-    def carry_out(self, pi: ThisPi) -> Json:
-        if (known := version_of(pi.host.path(PREVIOUS), Machine(pi.host))) is None:
-            raise HelperRefusal("No earlier version is kept: this release was not installed from the page.")
-        start_update(pi, PREVIOUS)
-        return {"version": known}
+    if (known := version_of(pi.host.path(PREVIOUS), Machine(pi.host))) is None:
+        raise HelperRefusal("No earlier version is kept: this release was not installed from the page.")
+    start_update(pi, PREVIOUS)
+    return {"version": known}
 
 
 def _examine(pi: ThisPi) -> list[tuple[Json, Step | None]]:
@@ -208,16 +159,16 @@ def _examine(pi: ThisPi) -> list[tuple[Json, Step | None]]:
 
 
 #: Everything that the helper does.
-ACTIONS = {
-    "overview": PiOverview,
-    "doctor": Doctor,
-    "fix": ApplyFix,
-    "answer": Answer,
-    "settings": ChangeSettings,
-    "hotspot": SwitchHotspot,
-    "undo": Undo,
-    "restart": Restart,
-    "clock": SetClock,
-    "install": InstallPackage,
-    "downgrade": Downgrade,
+ACTIONS: Mapping[str, Action] = {
+    "overview": overview,
+    "doctor": doctor,
+    "fix": apply_fix,
+    "answer": answer,
+    "settings": change_settings,
+    "hotspot": switch_hotspot,
+    "undo": undo,
+    "restart": restart,
+    "clock": set_clock,
+    "install": install,
+    "downgrade": downgrade,
 }

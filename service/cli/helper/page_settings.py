@@ -2,7 +2,6 @@
 """The bridge's settings on the page: those in force, and the file of those made there (page.toml)."""
 
 import tomllib
-from collections.abc import Mapping
 from pathlib import Path
 
 from payloads.mission_data import Json, to_json
@@ -32,13 +31,15 @@ def settings_in_force(host: Host) -> Json:
 
 
 def known_settings() -> list[Json]:
-    """The table of all settings, as the page shows it."""
     shown = ("name", "meaning", "default", "example", "is_live")
     return [{name: getattr(key, name) for name in shown} for key in KEYS]
 
 
-def change_settings(pi: ThisPi, values: Mapping[str, object]) -> Json:
-    """Write the settings, if all files together can then be used. A value is text as in the file; None: the default."""
+def change_settings(pi: ThisPi, *, values: dict) -> Json:  # type: ignore[type-arg]  # its contents are checked here
+    """Write the settings, if all files together can then be used; the bridge takes them over.
+
+    `values`: by name, each text as in the file; None: the default.
+    """
     host = pi.host
     in_force, keys = settings_in_force(host), {key.name: key for key in KEYS}
     before = host.read(_FILE)
@@ -63,7 +64,6 @@ def change_settings(pi: ThisPi, values: Mapping[str, object]) -> Json:
 
 
 def toml_text(value: object) -> str:
-    """A value as in the file."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{name} = {toml_text(each)}" for name, each in value.items()) + "}"
     if isinstance(value, list):
@@ -87,7 +87,7 @@ def _try(host: Host, file: WriteFile, before: str) -> None:
     path, machine = host.path(_FILE), Machine(host)
     machine.carry_out(file)
     try:
-        load_settings(host.path(SERVICE_CONFIG), None, (), host.path(SERVICE_STATE))
+        load_settings(host.path(SERVICE_CONFIG), state_dir=host.path(SERVICE_STATE))
     finally:
         if before:
             machine.carry_out(WriteFile(_FILE, before))

@@ -45,7 +45,7 @@ def _carry_out(pi: ThisPi, lock: Path) -> Json:
     try:
         action = parse_action(pi.body.readline(_MAX_REQUEST), ACTIONS)
         with _alone(lock):
-            return action.carry_out(pi)
+            return action(pi)
     except (HelperRefusal, SetupError, SettingsError) as error:
         return {"error": str(error)}
     except click.UsageError as error:

@@ -86,7 +86,6 @@ class Machine:
             raise SetupError(f"{change.path} cannot be changed: {reason(error)}") from error
 
     def run(self, command: Sequence[str], timeout_s: float = 60) -> str:
-        """Run a program; returns its output."""
         try:
             done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=timeout_s)  # noqa: S603  # our own words
         except (OSError, subprocess.TimeoutExpired) as error:

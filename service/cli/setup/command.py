@@ -245,7 +245,6 @@ def _print_addresses(host: Host, answers: SetupChoices) -> None:
 
 
 def _print_code(text: str) -> None:
-    """Show a QR code."""
     import segno  # imported here: no other command needs it
 
     segno.make(text, error="l").terminal(compact=True)

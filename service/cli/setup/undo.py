@@ -38,7 +38,6 @@ class UndoLog:
         self._now: _Setup = {"files": [], "commands": []}
 
     def carry_out(self, change: Change) -> None:
-        """Make a change and note how to revert it."""
         if isinstance(change, Run):
             self._machine.carry_out(change)
             if change.undo and list(change.undo) not in self._now["commands"]:
@@ -70,7 +69,6 @@ def undo_steps(host: Host) -> tuple[list[Step], list[str]]:
 
 
 def forget_last(host: Host, machine: Machine) -> None:
-    """Drop the setup that was undone."""
     if left := _read(host)[:-1]:
         _write(machine, left)
     else:

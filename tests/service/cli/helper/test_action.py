@@ -4,7 +4,7 @@
 import pytest
 
 from service.cli.helper.action import HelperRefusal, parse_action
-from service.cli.helper.actions import ACTIONS, Answer, ApplyFix, PiOverview
+from service.cli.helper.actions import ACTIONS
 
 
 @pytest.mark.parametrize(
@@ -39,7 +39,14 @@ def test_a_number_is_not_a_truth_value() -> None:
         parse_action(b'{"action": "undo", "is_trial": 1}', ACTIONS)
 
 
-def test_requests_that_fit() -> None:
-    assert parse_action(b'{"action": "overview"}', ACTIONS) == PiOverview()
-    assert parse_action(b'{"action": "fix", "fix": "restart the Pi"}\n', ACTIONS) == ApplyFix("restart the Pi")
-    assert parse_action(b'{"action": "answer", "fc": "sim"}', ACTIONS) == Answer(fc="sim")
+@pytest.mark.parametrize(
+    ("line", "name", "arguments"),
+    [
+        (b'{"action": "overview"}', "overview", {}),
+        (b'{"action": "fix", "fix": "restart the Pi"}\n', "fix", {"fix": "restart the Pi"}),
+        (b'{"action": "answer", "fc": "sim"}', "answer", {"fc": "sim"}),
+    ],
+)
+def test_requests_that_fit(line: bytes, name: str, arguments: dict[str, str]) -> None:
+    action = parse_action(line, ACTIONS)
+    assert (action.func, action.args, action.keywords) == (ACTIONS[name], (), arguments)

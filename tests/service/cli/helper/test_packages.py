@@ -112,10 +112,10 @@ def test_it_is_received(tmp_path: Path, host: Host, monkeypatch: pytest.MonkeyPa
     pi = ThisPi(host, BytesIO(data[: len(data) - missing]))
     if missing:
         with pytest.raises(HelperRefusal, match="not received completely"):
-            action.carry_out(pi)
+            action(pi)
         assert not host.path(NEW).exists()
         return
-    assert action.carry_out(pi) == {"version": "2.0"}
+    assert action(pi) == {"version": "2.0"}
     assert host.path(NEW).read_bytes() == data
     assert started[0].endswith(f"-m service.cli.helper.packages {NEW}")
 

@@ -23,7 +23,7 @@ def test_a_setting_is_written_and_the_bridge_restarted(pi: FixablePi) -> None:
     pi.ask("settings", values={"sysid": "7", "web.listen": '"0.0.0.0:8081"'})
     assert page_file(pi) == {"sysid": 7, "web": {"listen": "0.0.0.0:8081"}}
     assert any("restart naze-bridge.service" in command for command in pi.ran)
-    settings = load_settings(pi.path(SERVICE_CONFIG), None, (), pi.root)
+    settings = load_settings(pi.path(SERVICE_CONFIG), state_dir=pi.root)
     assert settings.sysid == 7
     assert settings.web is not None
     assert settings.web.listen.port == 8081
@@ -84,7 +84,7 @@ def test_what_was_written_by_hand_wins(pi: FixablePi) -> None:
     with pytest.raises(HelperRefusal, match=r"sysid is set in /etc/naze-bridge/config.toml:2, which overrides"):
         pi.ask("settings", values={"sysid": "7"})
     pi.write(_PAGE, "sysid = 7\n")
-    assert load_settings(pi.path(SERVICE_CONFIG), None, (), pi.root).sysid == 3
+    assert load_settings(pi.path(SERVICE_CONFIG), state_dir=pi.root).sysid == 3
 
 
 @pytest.mark.parametrize(
