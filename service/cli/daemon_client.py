@@ -5,8 +5,10 @@ import asyncio
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 
@@ -17,6 +19,7 @@ from service.settings.addresses import AddressError, parse_fc
 from service.settings.load import SERVICE_STATE
 from storage.store_error import StoreError
 from terminal.options import PATH
+from terminal.printing import print_json
 from terminal.sentences import INTERRUPTED, complain, fail
 
 _GOES_ON = "the daemon continues, and the result follows; to exit now, press Ctrl-C again"
@@ -25,10 +28,78 @@ _WRITES = ("push", "restore", "restore-settings")
 _FLASHES_ON = "interrupted; the daemon continues, do not switch the board off: see `naze-bridge status`"
 _FLASH_BROKEN = "interrupted: the board stays in its boot loader; run the same command again"
 
-F = TypeVar("F", bound=Callable[..., Any])
+
+@dataclass(frozen=True, slots=True)
+class BridgeClient:
+    """The bridge that a command talks to: its own on `fc`, else the daemon of `state_dir`. `as_json`: print JSON."""
+
+    state_dir: Path | None
+    as_json: bool
+    fc: str | None = None
+
+    def ask(self, request: Json, progress: Callable[[Any], None] = lambda _: None) -> Json:
+        """Ask the bridge; a refusal ends the program with status 1, an unusable option with 2."""
+        try:
+            if self.fc is None:
+                return ask_daemon(self.state_dir, request, progress)
+            from service.cli.direct_bridge import ask_directly  # the whole daemon: --help does without
+
+            return asyncio.run(ask_directly(parse_fc(self.fc), request, progress))
+        except (KeyboardInterrupt, Interrupted) as error:
+            complain(_interruption(request, str(error), is_own=self.fc is not None))
+            raise SystemExit(INTERRUPTED) from None
+        except (AddressError, SettingsError) as error:
+            raise click.UsageError(str(error)) from error
+        except (ControlError, StoreError) as error:
+            fail(str(error))
+
+    def ask_with_progress(self, request: Json, total: int | None = None) -> Json:
+        """Ask for something that takes a while, with a progress bar on standard error.
+
+        `total`: the records to write; None: the bridge reports steps of "step", "done" and "total".
+        """
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+        columns = (TextColumn("[progress.description]{task.description}"), BarColumn(), MofNCompleteColumn())
+        console = Console(stderr=True)
+        with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+            task = bar.add_task("Starting" if total is None else "Flight controller", total=total)
+
+            def show(progress: Any) -> None:
+                if total is not None:
+                    bar.update(task, completed=progress)
+                elif progress["total"]:
+                    step, done, of = (progress[key] for key in ("step", "done", "total"))
+                    bar.update(task, description=step.capitalize(), completed=done, total=of)
+                else:
+                    console.out(f"naze-bridge: {progress['step']}")
+
+            goes_on = _first_interrupt(lambda: console.out(f"naze-bridge: {_GOES_ON}"))
+            with goes_on if self.fc is None else nullcontext():
+                return self.ask(request, show)
+
+    def ask_store(self, request: Json) -> Json:
+        """Ask the daemon for what it has stored; without one, read its store. A refusal ends the program: status 1."""
+        try:
+            try:
+                return ask_daemon(self.state_dir, request)
+            except NoDaemonError:
+                return _read_store(self.state_dir, request)
+        except SettingsError as error:
+            raise click.UsageError(str(error)) from error
+        except (ControlError, StoreError) as error:
+            fail(str(error))
+
+    def show(self, answer: object, show_people: Callable[[], object]) -> None:
+        if self.as_json:
+            print_json(answer)
+        else:
+            show_people()
 
 
-def daemon_options(command: F) -> F:
+def daemon_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options that select a daemon; the command gets them as a BridgeClient."""
     state_dir = click.option(
         "--state-dir",
         type=PATH,
@@ -36,65 +107,18 @@ def daemon_options(command: F) -> F:
         help="State directory of the running daemon.",
     )
     as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-    return state_dir(as_json(command))
+
+    @wraps(command)
+    def run(*args: Any, state_dir: Path | None, as_json: bool, fc: str | None = None, **options: Any) -> None:
+        command(BridgeClient(state_dir, as_json, fc), *args, **options)
+
+    return state_dir(as_json(run))
 
 
-def bridge_options(command: F) -> F:
+def bridge_options(command: Callable[..., None]) -> Callable[..., None]:
     """Add the options that select a bridge: a daemon's, or one of the command's own."""
     fc = click.option("--fc", metavar="FC", help="Talk to this flight controller directly, without a daemon.")
     return daemon_options(fc(command))
-
-
-def ask(
-    state_dir: Path | None, fc: str | None, request: Json, progress: Callable[[Any], None] = lambda _: None
-) -> Json:
-    """Ask the bridge; a refusal ends the program with status 1, an unusable option with 2."""
-    try:
-        if fc is None:
-            return ask_daemon(state_dir, request, progress)
-        from service.cli.direct_bridge import ask_directly  # the whole daemon: --help does without
-
-        return asyncio.run(ask_directly(parse_fc(fc), request, progress))
-    except (KeyboardInterrupt, Interrupted) as error:
-        complain(_interruption(request, str(error), is_own=fc is not None))
-        raise SystemExit(INTERRUPTED) from None
-    except (AddressError, SettingsError) as error:
-        raise click.UsageError(str(error)) from error
-    except (ControlError, StoreError) as error:
-        fail(str(error))
-
-
-def ask_with_progress(state_dir: Path | None, fc: str | None, request: Json, total: int) -> Json:
-    """Ask the bridge to push `total` records, with a progress bar on standard error."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-
-    columns = (TextColumn("[progress.description]{task.description}"), BarColumn(), MofNCompleteColumn())
-    console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("Flight controller", total=total)
-        with nullcontext() if fc is not None else _first_interrupt(lambda: bar.console.out(f"naze-bridge: {_GOES_ON}")):
-            return ask(state_dir, fc, request, lambda records: bar.update(task, completed=records))
-
-
-def ask_with_steps(state_dir: Path | None, fc: str | None, request: Json) -> Json:
-    """Ask the bridge for something in steps of "step", "done" and "total", with a progress bar on standard error."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-
-    columns = (TextColumn("[progress.description]{task.description}"), BarColumn(), MofNCompleteColumn())
-    console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("Starting", total=None)
-
-        def show(step: Json) -> None:
-            if step["total"]:
-                bar.update(task, description=step["step"].capitalize(), completed=step["done"], total=step["total"])
-            else:
-                console.out(f"naze-bridge: {step['step']}")
-
-        with nullcontext() if fc is not None else _first_interrupt(lambda: bar.console.out(f"naze-bridge: {_GOES_ON}")):
-            return ask(state_dir, fc, request, show)
 
 
 def _interruption(request: Json, why: str, *, is_own: bool) -> str:
@@ -120,19 +144,6 @@ def _first_interrupt(say: Callable[[], None]) -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, usual)
-
-
-def ask_store(state_dir: Path | None, request: Json) -> Json:
-    """Ask the daemon for what it has stored; if none runs, read its store. A refusal ends the program with status 1."""
-    try:
-        try:
-            return ask_daemon(state_dir, request)
-        except NoDaemonError:
-            return _read_store(state_dir, request)
-    except SettingsError as error:
-        raise click.UsageError(str(error)) from error
-    except (ControlError, StoreError) as error:
-        fail(str(error))
 
 
 def _read_store(state_dir: Path | None, request: Json) -> Json:

@@ -12,12 +12,11 @@ import click
 from payloads.mission_data import Json
 from protocols.file_error import FileError
 from protocols.firmware_image import ImageError, check_backup, check_patched, parse_image
-from service.cli.daemon_client import ask_with_steps, bridge_options
+from service.cli.daemon_client import BridgeClient, bridge_options
 from service.machine.package import shipped
 from terminal.command_group import CommandGroup
 from terminal.files import read_file, shown_path
 from terminal.options import PATH
-from terminal.printing import print_json
 from terminal.sentences import complain, fail, say
 
 _UNREADABLE = 2
@@ -44,7 +43,7 @@ def firmware() -> None:
 @click.argument("image", type=PATH)
 @click.option("--battery", is_flag=True, help="Flash even if the board measures a battery.")
 @bridge_options
-def flash(image: Path, battery: bool, state_dir: Path | None, fc: str | None, as_json: bool) -> None:
+def flash(client: BridgeClient, image: Path, battery: bool) -> None:
     """Flash IMAGE (.hex, .bin or .elf): a Harakiri with the mission patch, for a Naze32.
 
     The former flash is stored as a backup first. Everything written is read back, and the new firmware must answer.
@@ -59,14 +58,14 @@ def flash(image: Path, battery: bool, state_dir: Path | None, fc: str | None, as
         check_patched(program)
     except ImageError as error:
         fail(f"{shown_path(image)}: {error}")
-    _flash({"do": "flash-firmware", "image": _as_text(program), "battery": battery}, state_dir, fc, as_json=as_json)
+    _flash(client, {"do": "flash-firmware", "image": _as_text(program), "battery": battery})
 
 
 @firmware.command()
 @click.argument("backup", type=PATH)
 @click.option("--battery", is_flag=True, help="Write even if the board measures a battery.")
 @bridge_options
-def restore(backup: Path, battery: bool, state_dir: Path | None, fc: str | None, as_json: bool) -> None:
+def restore(client: BridgeClient, backup: Path, battery: bool) -> None:
     """Write BACKUP, the whole flash as `flash` stored it: firmware, settings and missions.
 
     Exit code 1: refused or failed, 2: BACKUP is unreadable.
@@ -77,7 +76,7 @@ def restore(backup: Path, battery: bool, state_dir: Path | None, fc: str | None,
     except (FirmwareFileError, ImageError) as error:
         complain(error if isinstance(error, FirmwareFileError) else f"{shown_path(backup)}: {error}")
         raise SystemExit(_UNREADABLE) from None
-    _flash({"do": "restore-firmware", "image": _as_text(contents), "battery": battery}, state_dir, fc, as_json=as_json)
+    _flash(client, {"do": "restore-firmware", "image": _as_text(contents), "battery": battery})
 
 
 @firmware.command()
@@ -107,14 +106,11 @@ def build(checkout: Path, flight: bool) -> None:
     say(f"{shown_path(image)} is ready: naze-bridge firmware flash {shown_path(image)}")
 
 
-def _flash(request: Json, state_dir: Path | None, fc: str | None, *, as_json: bool) -> None:
-    if not as_json and sys.stdin.isatty():
+def _flash(client: BridgeClient, request: Json) -> None:
+    if not client.as_json and sys.stdin.isatty():
         click.confirm("Are the propellers off?", abort=True, err=True)
-    result = ask_with_steps(state_dir, fc, request)
-    if as_json:
-        print_json(result)
-    else:
-        say(result["text"])
+    result = client.ask_with_progress(request)
+    client.show(result, lambda: say(result["text"]))
 
 
 def _as_text(image: bytes) -> str:

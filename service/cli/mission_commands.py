@@ -9,7 +9,7 @@ import click
 
 from payloads.mission_data import ACCEPTED, Json, mission_findings, mission_items
 from protocols.mission_file import MissionFileError, write_mission_file, write_qgc_wpl
-from service.cli.daemon_client import ask, ask_with_progress, bridge_options
+from service.cli.daemon_client import BridgeClient, bridge_options
 from terminal.files import shown_path, write_file
 from terminal.mission_source import load_mission
 from terminal.mission_table import mission_table
@@ -27,7 +27,7 @@ _STANDARD_OUTPUT = Path("-")
 @click.argument("file", type=PATH)
 @click.option("--erase", is_flag=True, help="Erase without asking if no item of the file can be stored.")
 @bridge_options
-def push(file: Path, erase: bool, state_dir: Path | None, fc: str | None, as_json: bool) -> None:
+def push(client: BridgeClient, file: Path, erase: bool) -> None:
     """Write a mission file to the flight controller and verify it there.
 
     Exit code 0: verified, 1: refused or failed (the old mission is kept), 2: the file is unreadable, 3: no item of it
@@ -39,11 +39,11 @@ def push(file: Path, erase: bool, state_dir: Path | None, fc: str | None, as_jso
         complain(error)
         raise SystemExit(_UNREADABLE) from error
     request: Json = {"do": "push", "items": [asdict(item) for item in items], "source": f"push of {file.name}"}
-    delivery = ask_with_progress(state_dir, fc, request | {"may_erase": erase}, len(items))
-    is_asked = _would_erase(delivery) and not as_json and sys.stdin.isatty()
+    delivery = client.ask_with_progress(request | {"may_erase": erase}, len(items))
+    is_asked = _would_erase(delivery) and not client.as_json and sys.stdin.isatty()
     if is_asked and click.confirm(f"{delivery['text']}. Erase it?", err=True):
-        delivery = ask_with_progress(state_dir, fc, request, len(items))
-    show_delivery(delivery, as_json=as_json)
+        delivery = client.ask_with_progress(request, len(items))
+    show_delivery(client, delivery)
 
 
 def _would_erase(delivery: Json) -> bool:
@@ -54,7 +54,7 @@ def _would_erase(delivery: Json) -> bool:
 @click.argument("file", type=PATH, required=False)
 @click.option("--all", "with_others", is_flag=True, help="Also read the missions in INAV's store that are not loaded.")
 @bridge_options
-def pull(file: Path | None, with_others: bool, state_dir: Path | None, fc: str | None, as_json: bool) -> None:
+def pull(client: BridgeClient, file: Path | None, with_others: bool) -> None:
     """Read the flight controller's mission, into FILE or as a table.
 
     FILE is written as QGC WPL 110, or as a QGroundControl plan if its name ends with .plan; - is standard output.
@@ -62,16 +62,16 @@ def pull(file: Path | None, with_others: bool, state_dir: Path | None, fc: str |
     With --all, further missions go to FILE-2, FILE-3 and so on. Exit code 0: read, 1: there is no link, or FILE cannot
     be written.
     """
-    if as_json and file == _STANDARD_OUTPUT:
+    if client.as_json and file == _STANDARD_OUTPUT:
         raise click.UsageError("the file and --json cannot both go to standard output: omit one of them")
     if with_others and file == _STANDARD_OUTPUT:
         raise click.UsageError("--all cannot write several missions to standard output: name a file")
-    held = ask(state_dir, fc, {"do": "pull"})
+    held = client.ask({"do": "pull"})
     others = held["others"] if with_others else []
-    summaries = [_show_held(held, file, is_quiet=as_json)]
+    summaries = [_show_held(held, file, is_quiet=client.as_json)]
     for number, other in enumerate(others, 2):
-        summaries.append(_show_held(other, file and file.with_stem(f"{file.stem}-{number}"), is_quiet=as_json))
-    if as_json:
+        summaries.append(_show_held(other, file and file.with_stem(f"{file.stem}-{number}"), is_quiet=client.as_json))
+    if client.as_json:
         print_json(held)
     elif file == _STANDARD_OUTPUT:
         click.echo(summaries[0], err=True)
@@ -100,21 +100,22 @@ def _show_held(held: Json, file: Path | None, *, is_quiet: bool) -> str:
 
 @click.command()
 @bridge_options
-def clear(state_dir: Path | None, fc: str | None, as_json: bool) -> None:
+def clear(client: BridgeClient) -> None:
     """Clear the mission on the flight controller and verify the result."""
-    show_delivery(ask(state_dir, fc, {"do": "push", "items": [], "source": "clear"}), as_json=as_json)
+    show_delivery(client, client.ask({"do": "push", "items": [], "source": "clear"}))
 
 
-def show_delivery(delivery: Json, *, as_json: bool) -> None:
+def _print_delivery(delivery: Json) -> None:
+    if delivery.get("sent") and delivery["ack"] != _NO_SPACE:
+        sent, stored = (mission_items(delivery[key]) for key in ("sent", "stored"))
+        findings = mission_findings(delivery["findings"])
+        print_table(mission_table(sent, stored, findings, delivery["sent_seqs"]))
+    say(f"{delivery['ack'].removeprefix('MAV_MISSION_')}: {delivery['text']}")
+
+
+def show_delivery(client: BridgeClient, delivery: Json) -> None:
     """Print the list as sent and as held; ends the program with status 1 or 3 if it was not accepted."""
-    if as_json:
-        print_json(delivery)
-    else:
-        if delivery.get("sent") and delivery["ack"] != _NO_SPACE:
-            sent, stored = (mission_items(delivery[key]) for key in ("sent", "stored"))
-            findings = mission_findings(delivery["findings"])
-            print_table(mission_table(sent, stored, findings, delivery["sent_seqs"]))
-        say(f"{delivery['ack'].removeprefix('MAV_MISSION_')}: {delivery['text']}")
+    client.show(delivery, lambda: _print_delivery(delivery))
     if _would_erase(delivery):
         raise SystemExit(_WOULD_ERASE)
     if delivery["ack"] != ACCEPTED:

@@ -13,7 +13,7 @@ from rich.text import Text
 from payloads.mission_data import MOST, Json
 from payloads.settings_comparison import SettingRow, SettingValues, setting_values, settings_difference
 from protocols.param_file import ParamFileError, read_param_file, shown_value, write_param_file
-from service.cli.daemon_client import ask, ask_store, ask_with_progress, bridge_options, daemon_options
+from service.cli.daemon_client import BridgeClient, bridge_options, daemon_options
 from terminal.command_group import CommandGroup
 from terminal.files import read_file, shown_path, write_file
 from terminal.options import PATH
@@ -23,7 +23,6 @@ from terminal.sentences import complain, fail, say
 _UNREADABLE = 2
 _STANDARD_OUTPUT = Path("-")
 _BOARD = "board"
-_SOURCE_HELP = "a .param file, a backup's number, or `board` for the flight controller's present settings"
 
 
 @click.group(cls=CommandGroup)
@@ -36,12 +35,13 @@ def settings() -> None:
 
 @settings.command("list")
 @bridge_options
-def list_settings(state_dir: Path | None, fc: str | None, as_json: bool) -> None:
+def list_settings(client: BridgeClient) -> None:
     """List all settings with their values and ranges."""
-    held = _held(state_dir, fc)
-    if as_json:
-        print_json(held)
-        return
+    held = _held(client)
+    client.show(held, lambda: _print_settings(held))
+
+
+def _print_settings(held: Json) -> None:
     table = Table("Name", Column("Value", justify="right"), "Range", box=None, pad_edge=False)
     for each in held["settings"]:
         table.add_row(each["name"], each["shown"], Text(each["fixed"] or each["range"]))
@@ -52,44 +52,43 @@ def list_settings(state_dir: Path | None, fc: str | None, as_json: bool) -> None
 @settings.command("get")
 @click.argument("name")
 @bridge_options
-def get_setting(name: str, state_dir: Path | None, fc: str | None, as_json: bool) -> None:
+def get_setting(client: BridgeClient, name: str) -> None:
     """Print the value of the setting NAME."""
-    found = ask(state_dir, fc, {"do": "setting", "name": name})
-    if as_json:
-        print_json(found)
-    else:
-        click.echo(found["shown"])
+    found = client.ask({"do": "setting", "name": name})
+    client.show(found, lambda: click.echo(found["shown"]))
 
 
 @settings.command("set", context_settings={"ignore_unknown_options": True})
 @click.argument("name")
 @click.argument("value")
 @bridge_options
-def set_setting(name: str, value: str, state_dir: Path | None, fc: str | None, as_json: bool) -> None:
+def set_setting(client: BridgeClient, name: str, value: str) -> None:
     """Change the setting NAME to VALUE, until the flight controller's power is off.
 
     Exit code 1: refused.
     """
-    _print_text(ask(state_dir, fc, {"do": "set-setting", "name": name, "value": value}), as_json=as_json)
+    changed = client.ask({"do": "set-setting", "name": name, "value": value})
+    client.show(changed, lambda: say(changed["text"]))
 
 
 @settings.command("save")
 @bridge_options
-def save_settings(state_dir: Path | None, fc: str | None, as_json: bool) -> None:
+def save_settings(client: BridgeClient) -> None:
     """Save all changes in the flight controller."""
-    _print_text(ask(state_dir, fc, {"do": "save-settings"}), as_json=as_json)
+    saved = client.ask({"do": "save-settings"})
+    client.show(saved, lambda: say(saved["text"]))
 
 
 @settings.command()
 @click.argument("file", type=PATH)
 @bridge_options
-def backup(file: Path, state_dir: Path | None, fc: str | None, as_json: bool) -> None:
+def backup(client: BridgeClient, file: Path) -> None:
     """Write the settings to FILE in Mission Planner's .param format; - is standard output."""
-    if as_json and file == _STANDARD_OUTPUT:
+    if client.as_json and file == _STANDARD_OUTPUT:
         raise click.UsageError("the file and --json cannot both go to standard output: omit one of them")
     from bridge.vehicle.settings_restore import by_parameter
 
-    held = _held(state_dir, fc)
+    held = _held(client)
     now = datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %z")
     text = write_param_file(by_parameter(_values(held)), held["board"], [f"taken: {now}, by naze-bridge"])
     if file == _STANDARD_OUTPUT:
@@ -99,38 +98,35 @@ def backup(file: Path, state_dir: Path | None, fc: str | None, as_json: bool) ->
         write_file(file, text, ParamFileError)
     except ParamFileError as error:
         fail(str(error))
-    if as_json:
-        print_json(held)
-    else:
-        click.echo(f"{len(held['settings'])} settings of {held['board']} written to {shown_path(file)}")
+    written = f"{len(held['settings'])} settings of {held['board']} written to {shown_path(file)}"
+    client.show(held, lambda: click.echo(written))
 
 
 @settings.command()
 @click.argument("source")
 @click.option("--dry-run", is_flag=True, help="Show what would be written; write nothing.")
 @bridge_options
-def restore(source: str, dry_run: bool, state_dir: Path | None, fc: str | None, as_json: bool) -> None:
+def restore(client: BridgeClient, source: str, dry_run: bool) -> None:
     """Write the settings of SOURCE to the flight controller, save them, and verify them.
 
     SOURCE is a .param file or the number of a backup. Everything that differs is shown first, and in a terminal you are
     asked. Exit code 0: the flight controller holds all settings of SOURCE, 1: it does not, 2: SOURCE is unreadable.
     """
-    values, board = _source(source, state_dir, fc)
+    values, board = _source(client, source)
     request: Json = {"do": "plan-settings", "values": dict(values), "board": board}
-    plan = ask(state_dir, fc, request)
-    if not as_json:
+    plan = client.ask(request)
+    if not client.as_json:
         _show_plan(plan)
     if dry_run:
-        if as_json:
+        if client.as_json:
             print_json(plan)
         raise SystemExit(1 if plan["changes"] or plan["left_out"] else 0)
-    if not plan["changes"] and not as_json:
+    if not plan["changes"] and not client.as_json:
         raise SystemExit(1 if plan["left_out"] else 0)
-    if not as_json and sys.stdin.isatty():
+    if not client.as_json and sys.stdin.isatty():
         click.confirm(f"Write and save {len(plan['changes'])} settings?", abort=True, err=True)
-    total = len(plan["changes"])
-    result = ask_with_progress(state_dir, fc, request | {"do": "restore-settings"}, total)
-    if as_json:
+    result = client.ask_with_progress(request | {"do": "restore-settings"}, len(plan["changes"]))
+    if client.as_json:
         print_json({"plan": plan, "result": result})
     else:
         _show_left_out([each for each in result["left_out"] if each not in plan["left_out"]])
@@ -143,7 +139,7 @@ def restore(source: str, dry_run: bool, state_dir: Path | None, fc: str | None, 
 @click.argument("first")
 @click.argument("second", default=_BOARD)
 @bridge_options
-def diff(first: str, second: str, state_dir: Path | None, fc: str | None, as_json: bool) -> None:
+def diff(client: BridgeClient, first: str, second: str) -> None:
     """Compare the settings of FIRST and SECOND. Exit code 1 if they differ.
 
     Each is a .param file, a backup's number, or `board` for the flight controller's present settings (the default of
@@ -151,9 +147,9 @@ def diff(first: str, second: str, state_dir: Path | None, fc: str | None, as_jso
     """
     from bridge.vehicle.settings_restore import by_setting  # other commands do without the bridge
 
-    (left, _), (right, _) = (_source(each, state_dir, fc) for each in (first, second))
+    (left, _), (right, _) = (_source(client, each) for each in (first, second))
     rows = settings_difference(by_setting(left, right), by_setting(right, left))
-    if as_json:
+    if client.as_json:
         print_json({"equal": not rows, "changes": [asdict(row) for row in rows]})
     elif rows:
         print_table(rows_table(rows, first, second))
@@ -166,10 +162,10 @@ def diff(first: str, second: str, state_dir: Path | None, fc: str | None, as_jso
 @settings.command()
 @click.option("--limit", type=click.IntRange(1, MOST), default=20, show_default=True, help="The maximum number.")
 @daemon_options
-def history(limit: int, state_dir: Path | None, as_json: bool) -> None:
+def history(client: BridgeClient, limit: int) -> None:
     """List the backups, newest first. One is taken when a board is first met, and at every change."""
-    found = ask_store(state_dir, {"do": "backups", "limit": limit})["backups"]
-    if as_json:
+    found = client.ask_store({"do": "backups", "limit": limit})["backups"]
+    if client.as_json:
         print_json(found)
         return
     if not found:
@@ -198,15 +194,15 @@ def rows_table(rows: list[SettingRow], first: str, second: str) -> Table:
     return table
 
 
-def _source(name: str, state_dir: Path | None, fc: str | None) -> tuple[SettingValues, str]:
+def _source(client: BridgeClient, name: str) -> tuple[SettingValues, str]:
     """The settings that a word on the command line names, and the board they are from; "" if it is unknown."""
     if name == _BOARD:
-        held = _held(state_dir, fc)
+        held = _held(client)
         return _values(held), held["board"]
     if name.isascii() and name.isdecimal() and not Path(name).exists():
         if int(name) > MOST:
             raise click.UsageError(f"{name} is not a backup's number: see `naze-bridge settings history`")
-        stored = ask_store(state_dir, {"do": "backup", "number": int(name)})
+        stored = client.ask_store({"do": "backup", "number": int(name)})
         return setting_values(stored["values"]), stored["kind"]
     try:
         found = read_param_file(read_file(Path(name), ParamFileError), shown_path(Path(name)))
@@ -216,9 +212,9 @@ def _source(name: str, state_dir: Path | None, fc: str | None) -> tuple[SettingV
     return found.values, found.board
 
 
-def _held(state_dir: Path | None, fc: str | None) -> Json:
+def _held(client: BridgeClient) -> Json:
     """All settings, with a complaint if they may not be the present ones."""
-    held = ask(state_dir, fc, {"do": "settings"})
+    held = client.ask({"do": "settings"})
     if not held["is_checked"]:
         complain("the flight controller cannot be asked now: these are its settings as last read")
     if not held["is_complete"]:
@@ -245,10 +241,3 @@ def _show_left_out(settings: list[Json]) -> None:
     for each in settings:
         held = "" if each["held"] is None else f" stays {shown_value(each['held'])}"
         say(f"{each['name']}{held}: {each['why']}", prefix="Left out: ", indent=10)
-
-
-def _print_text(answer: Json, *, as_json: bool) -> None:
-    if as_json:
-        print_json(answer)
-    else:
-        say(answer["text"])

@@ -1,18 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`naze-bridge status`: the bridge and the vehicle, for people; `--json` for scripts."""
 
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Iterator, Sequence
 
 import click
 
 from payloads.mission_data import Json
-from service.cli.daemon_client import ask, bridge_options
+from service.cli.daemon_client import BridgeClient, bridge_options
 from service.daemon.client import STATUS
 from service.machine.host import Host
 from service.settings.addresses import client_hosts, parse_gcs
 from service.settings.web import ListenAddress, parse_listen
-from terminal.printing import print_json
 from terminal.sentences import say
 
 _MINUTE_S, _HOUR_S, _DAY_S = 60, 3600, 86400
@@ -21,13 +19,13 @@ _OLD_S = 5.0
 
 @click.command()
 @bridge_options
-def status(state_dir: Path | None, fc: str | None, as_json: bool) -> None:
+def status(client: BridgeClient) -> None:
     """Show the state of the bridge and the vehicle: connections, mode, GPS fix, battery, mission."""
-    facts = ask(state_dir, fc, STATUS)
-    if as_json:
-        print_json(facts)
-        return
-    lines = list(status_lines(facts, Host().ipv4_addresses()))
+    facts = client.ask(STATUS)
+    client.show(facts, lambda: _print_lines(list(status_lines(facts, Host().ipv4_addresses()))))
+
+
+def _print_lines(lines: Sequence[tuple[str, str]]) -> None:
     width = max(len(name) for name, _ in lines)
     for name, text in lines:
         say(text, prefix=f"{name:{width}}  ", indent=width + 2)

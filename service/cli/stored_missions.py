@@ -2,7 +2,6 @@
 """`naze-bridge missions`: the received missions and their results."""
 
 from datetime import datetime
-from pathlib import Path
 from typing import NoReturn
 
 import click
@@ -11,7 +10,7 @@ from rich.text import Text
 
 from payloads.comparison import difference
 from payloads.mission_data import MOST, Json, mission_findings, mission_items
-from service.cli.daemon_client import ask_store, ask_with_progress, bridge_options, daemon_options
+from service.cli.daemon_client import BridgeClient, bridge_options, daemon_options
 from service.cli.mission_commands import show_delivery
 from terminal.command_group import CommandGroup
 from terminal.mission_table import mission_table, rows_table
@@ -38,10 +37,10 @@ def missions() -> None:
 @missions.command("list")
 @click.option("--limit", type=_LIMIT, default=20, show_default=True, help="The maximum number of missions.")
 @daemon_options
-def list_missions(limit: int, state_dir: Path | None, as_json: bool) -> None:
+def list_missions(client: BridgeClient, limit: int) -> None:
     """List the received missions, newest first."""
-    found = ask_store(state_dir, {"do": "missions", "limit": limit})["missions"]
-    if as_json:
+    found = client.ask_store({"do": "missions", "limit": limit})["missions"]
+    if client.as_json:
         print_json(found)
         return
     if not found:
@@ -60,10 +59,10 @@ def list_missions(limit: int, state_dir: Path | None, as_json: bool) -> None:
 @missions.command()
 @click.argument("number", type=_NUMBER)
 @daemon_options
-def show(number: int, state_dir: Path | None, as_json: bool) -> None:
+def show(client: BridgeClient, number: int) -> None:
     """Show mission NUMBER as sent and as stored, with the reasons."""
-    mission = _fetch(state_dir, number)
-    if as_json:
+    mission = _fetch(client, number)
+    if client.as_json:
         print_json(mission)
         return
     received = mission["received"]
@@ -78,11 +77,11 @@ def show(number: int, state_dir: Path | None, as_json: bool) -> None:
 @click.argument("first", type=_NUMBER)
 @click.argument("second", type=_NUMBER)
 @daemon_options
-def diff(first: int, second: int, state_dir: Path | None, as_json: bool) -> None:
+def diff(client: BridgeClient, first: int, second: int) -> None:
     """Compare missions FIRST and SECOND as sent. Exit code 1 if they differ."""
-    before, after = (_fetch(state_dir, number)["received"]["items"] for number in (first, second))
+    before, after = (_fetch(client, number)["received"]["items"] for number in (first, second))
     changed = [row for row in difference(mission_items(before), mission_items(after)) if row.kind != "same"]
-    if as_json:
+    if client.as_json:
         print_json({"equal": not changed, "changes": [row.to_json() for row in changed]})
     elif changed:
         print_table(rows_table(changed, f"\nMission {first} -> Mission {second}"))
@@ -95,17 +94,17 @@ def diff(first: int, second: int, state_dir: Path | None, as_json: bool) -> None
 @missions.command(short_help="Write mission NUMBER to the flight controller again.")
 @click.argument("number", type=_NUMBER)
 @bridge_options
-def restore(number: int, state_dir: Path | None, fc: str | None, as_json: bool) -> None:
+def restore(client: BridgeClient, number: int) -> None:
     """Write mission NUMBER to the flight controller again, as originally sent."""
-    items = _fetch(state_dir, number)["received"]["items"]
+    items = _fetch(client, number)["received"]["items"]
     request: Json = {"do": "restore", "number": number}
-    if fc is not None:
+    if client.fc is not None:
         request = {"do": "push", "items": items, "source": f"restore of mission {number}"}
-    show_delivery(ask_with_progress(state_dir, fc, request, len(items)), as_json=as_json)
+    show_delivery(client, client.ask_with_progress(request, len(items)))
 
 
-def _fetch(state_dir: Path | None, number: int) -> Json:
-    return ask_store(state_dir, {"do": "mission", "number": number})
+def _fetch(client: BridgeClient, number: int) -> Json:
+    return client.ask_store({"do": "mission", "number": number})
 
 
 def _local_time(unix_s: float) -> str:
