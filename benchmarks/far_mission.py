@@ -15,7 +15,7 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from socket import SOCK_STREAM
 
-from tests.service.cli.test_gcs_relay import relay
+from tests.service.cli.test_vehicle_relay import relay
 from tests.support.fleet_bench import I_KNOW, Fleet
 from tests.support.mission_planner import MissionPlanner
 from tests.support.plan import judge, plain_plan, records_of

@@ -12,7 +12,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from benchmarks.processes import cpu_s, resident_mb
-from tests.service.cli.test_gcs_relay import relay
+from tests.service.cli.test_vehicle_relay import relay
 from tests.support.fleet_bench import I_KNOW, Fleet
 from tests.support.mission_planner import MissionPlanner
 from tests.support.plan import plain_plan

@@ -20,7 +20,7 @@ def _daemon_address(config: Path) -> FleetAddress:
 
     try:
         # The flight controller does not matter here, and a file need not name one.
-        found = load_settings(config, "sim:", (), None).zenoh
+        found = load_settings(config, fc="sim:").zenoh
     except SettingsError as error:
         raise ZenohSettingsError(str(error)) from error
     if found is None:
@@ -51,7 +51,7 @@ def mavlink(names: tuple[str, ...], to_all: bool, gcs: tuple[str, ...], **where:
     that appear later.
     """
     # Imported here, because the other commands do not need them.
-    from service.cli.fleet_relay import FleetRelay
+    from service.cli.fleet_relay import relay_fleet
     from service.links.gcs_links import LinkError
     from service.settings.addresses import parse_gcs
 
@@ -65,7 +65,7 @@ def mavlink(names: tuple[str, ...], to_all: bool, gcs: tuple[str, ...], **where:
         bridges = alive(session, prefix)
         vehicles = chosen(bridges, names, prefix)
         try:
-            asyncio.run(FleetRelay(session, prefix, vehicles, bridges, is_all=to_all).run(addresses))
+            asyncio.run(relay_fleet(session, prefix, vehicles, bridges, addresses, is_all=to_all))
         except LinkError as error:
             fail(str(error))
         except KeyboardInterrupt:

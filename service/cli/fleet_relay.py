@@ -1,18 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`fleet mavlink` while it runs: the vehicles at the ground stations, those that join and leave, and its messages."""
+"""`fleet mavlink` while it runs: the MAVLink of vehicles between zenoh and local ground stations, and its messages."""
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from math import inf
 
 import click
 import zenoh
 
+from bridge.gcs.station import Peer
+from bridge.relays import Relays
 from fleet.enrolment import SYSIDS
 from fleet.session import FleetError
 from fleet.tables import in_few_words
 from fleet.vehicle import BridgeId, bridge_of
 from payloads.keys import ALIVE, full
-from service.cli.gcs_relay import GcsRelay
+from service.cli.vehicle_relay import VehicleRelay
+from service.links.gcs_links import GcsLink, open_link
 from service.machine.threads import post
 from service.settings.addresses import GcsAddress
 
@@ -22,68 +26,137 @@ _FIRST_HEARTBEAT_S = 5.0
 _LOOK_S = 0.1
 
 
+async def relay_fleet(
+    session: zenoh.Session,
+    prefix: str,
+    names: Sequence[str],
+    bridges: set[BridgeId],
+    gcs: Sequence[GcsAddress],
+    *,
+    is_all: bool,
+) -> None:
+    """Relay vehicles until cancelled. `bridges`: those alive. `is_all`: also vehicles that appear later.
+
+    FleetError if vehicles share a system id or there are more than ids; LinkError if a link cannot be opened.
+    """
+    if len(names) > len(SYSIDS):
+        raise FleetError(f"MAVLink has ids for {len(SYSIDS)} vehicles, not for {len(names):,}: use --vehicle")
+    relay = FleetRelay(session, prefix, bridges, gcs, is_all=is_all)
+    try:
+        for name in names:
+            relay.add(name)
+        await relay.start(names, ", ".join(map(str, gcs)))
+        await asyncio.Event().wait()
+    finally:
+        relay.close()
+
+
 class FleetRelay:
-    """Relays these vehicles. `bridges`: those alive. `is_all`: also vehicles that appear later, until they leave."""
+    """The vehicles and the links to ground stations. Implements GcsEvents."""
 
     def __init__(
-        self, session: zenoh.Session, prefix: str, names: Sequence[str], bridges: set[BridgeId], *, is_all: bool
+        self, session: zenoh.Session, prefix: str, bridges: set[BridgeId], gcs: Sequence[GcsAddress], *, is_all: bool
     ) -> None:
-        self._session, self._prefix, self._bridges = session, prefix, bridges
-        self._names, self._is_all = names, is_all
+        self._loop = asyncio.get_running_loop()
+        self._session, self._prefix, self._bridges, self._is_all = session, prefix, bridges, is_all
+        self._relays = Relays(self._left_out)
+        self._vehicles: dict[str, VehicleRelay] = {}
         self._clash = ""
         self._is_started = False
-
-    async def run(self, gcs: Sequence[GcsAddress]) -> None:
-        """Relay until cancelled. FleetError if vehicles share a system id or there are more than ids; LinkError."""
-        if len(self._names) > len(SYSIDS):
-            raise FleetError(f"MAVLink has ids for {len(SYSIDS)} vehicles, not for {len(self._names):,}: use --vehicle")
-        loop = asyncio.get_running_loop()
-        relay = GcsRelay(self._session, self._prefix, gcs, _input_changed, self._clashes)
-        tokens = self._session.liveliness().declare_subscriber(
-            full(self._prefix, "*", f"{ALIVE}/*"), lambda sample: post(loop, self._token, relay, sample), history=True
+        self.add_default_peer = self._relays.add_default_peer
+        self.remove_default_peer = self._relays.remove_default_peer
+        self._timer: asyncio.TimerHandle | None = None
+        self._links: dict[str, GcsLink] = {}
+        for address in gcs:
+            link = open_link(address, self)
+            self._links[link.name] = link
+        self._tokens = session.liveliness().declare_subscriber(
+            full(prefix, "*", f"{ALIVE}/*"), lambda sample: post(self._loop, self._token, sample), history=True
         )
-        try:
-            for name in self._names:
-                relay.add(name, self._bridges)
-            await self._start(relay, ", ".join(map(str, gcs)))
-            await asyncio.Event().wait()
-        finally:
-            tokens.undeclare()  # type: ignore[no-untyped-call]
-            relay.close()
 
-    async def _start(self, relay: GcsRelay, where: str) -> None:
+    async def start(self, names: Sequence[str], where: str) -> None:
         """Wait for all to be heard: until then their ids are unknown."""
-        if len(self._names) > 1:
+        if len(names) > 1:
             for _ in range(round(_FIRST_HEARTBEAT_S / _LOOK_S)):
-                if self._clash or relay.heard.issuperset(self._names):
+                if self._clash or self._relays.heard.issuperset(names):
                     break
                 await asyncio.sleep(_LOOK_S)
         if self._clash:
             raise FleetError(self._clash)
         self._is_started = True
-        title = f"{self._names[0]} is" if len(self._names) == 1 else f"{len(self._names)} vehicles are"
+        title = f"{names[0]} is" if len(names) == 1 else f"{len(names)} vehicles are"
         click.echo(f"{title} at {where}. Ctrl-C ends.")
-        if len(self._names) > 1 and (unheard := [name for name in self._names if name not in relay.heard]):
+        if len(names) > 1 and (unheard := [name for name in names if name not in self._relays.heard]):
             click.echo(f"No MAVLink yet from {in_few_words(unheard)}", err=True)
 
-    def _token(self, relay: GcsRelay, sample: zenoh.Sample) -> None:
+    def add(self, name: str) -> None:
+        """Connect a vehicle."""
+        if name not in self._vehicles:
+            vehicle = VehicleRelay(self._session, self._prefix, name, self._bridges, self._sent, _input_changed)
+            self._vehicles[name] = vehicle
+            self._relays.add(name, vehicle.relay)
+
+    def close(self) -> None:
+        self._tokens.undeclare()  # type: ignore[no-untyped-call]
+        if self._timer is not None:
+            self._timer.cancel()
+        for name in [*self._vehicles]:
+            self._remove(name)
+        for link in self._links.values():
+            link.close()
+
+    def gcs_data(self, peer: Peer, data: bytes, *, datagram: bool) -> None:
+        self._relays.gcs_received(peer, data, self._loop.time(), datagram=datagram)
+        self._flush()
+
+    def gcs_gone(self, peer: Peer) -> None:
+        self._relays.gcs_gone(peer, self._loop.time())
+
+    def displaced(self, peers: Mapping[Peer, float]) -> Peer:
+        """The longest-silent connection."""
+        return min(peers, key=peers.__getitem__)
+
+    def _remove(self, name: str) -> None:
+        self._relays.remove(name)
+        if (vehicle := self._vehicles.pop(name, None)) is not None:
+            vehicle.close()
+
+    def _token(self, sample: zenoh.Sample) -> None:
         bridge = bridge_of(str(sample.key_expr), self._prefix)
         if bridge is None:
             return
         if sample.kind == zenoh.SampleKind.PUT:
             self._bridges.add(bridge)
-            if self._is_all and len(relay.heard) < len(SYSIDS):
-                relay.add(bridge.vehicle, self._bridges)
+            if self._is_all and len(self._relays.heard) < len(SYSIDS):
+                self.add(bridge.vehicle)
             return
         self._bridges.discard(bridge)
         if self._is_all and bridge.vehicle not in {each.vehicle for each in self._bridges}:
-            relay.remove(bridge.vehicle)
+            self._remove(bridge.vehicle)
             click.echo(f"{bridge.vehicle} has left", err=True)
 
-    def _clashes(self, name: str, other: str, system: int) -> None:
+    def _left_out(self, name: str, other: str, system: int) -> None:
+        self._vehicles.pop(name).close()
         self._clash = f"{name} and {other} both have system id {system}: give each its own sysid (fleet enroll does)"
         if self._is_started:
             click.echo(f"{self._clash}; {name} is left out", err=True)
+
+    def _sent(self, name: str, data: bytes) -> None:
+        """Frames of a vehicle, or none: its relay has something to send."""
+        self._relays.vehicle_received(name, data, self._loop.time())
+        self._flush()
+
+    def _flush(self) -> None:
+        for peer, data in self._relays.take_datagrams():
+            self._links[peer.link].send(peer, data)
+        if self._timer is not None:
+            self._timer.cancel()
+        due = self._relays.due
+        self._timer = None if due == inf else self._loop.call_at(due, self._tick)
+
+    def _tick(self) -> None:
+        self._relays.tick(self._loop.time())
+        self._flush()
 
 
 def _input_changed(name: str, accepts: bool) -> None:

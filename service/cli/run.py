@@ -26,17 +26,9 @@ from terminal.sentences import complain
 @click.option("--record-uart", type=PATH, help="File to record the port's traffic into.")
 @click.option("--verbose", is_flag=True, help="Also show debug events.")
 @click.option("--check-config", is_flag=True, help="Check the settings and exit.")
-def run(
-    fc: str | None,
-    gcs: tuple[str, ...],
-    config: Path | None,
-    state_dir: Path | None,
-    record_uart: Path | None,
-    verbose: bool,
-    check_config: bool,
-) -> None:
+def run(config: Path | None, gcs: tuple[str, ...], verbose: bool, check_config: bool, **flags: object) -> None:
     """Run the bridge between a flight controller and ground stations."""
-    load = partial(load_settings, config, fc, gcs, state_dir, record_uart, verbose=verbose)
+    load = partial(load_settings, config, gcs, **flags, log_level="debug" if verbose else None)
     try:
         settings = load()
     except SettingsError as error:

@@ -29,7 +29,7 @@ class VehicleRelay:
     """Must be made on a running event loop. If the vehicle takes commands, `relay` receives its missions as a whole.
 
     `bridges`: those that are alive. `sent`: called with the vehicle's name and frames, or none after a result.
-    `on_input`: see GcsRelay.
+    `on_input`: called with its name and False if it does not accept frames, or is gone; with True when it does again.
     """
 
     def __init__(

@@ -36,23 +36,9 @@ def default_state_dir() -> Path:
     return Path(base) / "naze-bridge"
 
 
-def load_settings(
-    config: Path | None,
-    named_fc: str | None,
-    gcs: Sequence[str],
-    state_dir: Path | None,
-    record_uart: Path | None = None,
-    *,
-    verbose: bool = False,
-) -> Settings:
-    """Load the settings for `run`; SettingsError lists all problems."""
+def load_settings(config: Path | None, gcs: Sequence[str] = (), **flags: object) -> Settings:
+    """Load the settings for `run`; SettingsError lists all problems. `flags`: settings by name, None: not given."""
     problems: list[Problem] = []
-    flags = {
-        "fc": named_fc,
-        "state_dir": None if state_dir is None else str(state_dir),
-        "record_uart": None if record_uart is None else str(record_uart),
-        "log_level": "debug" if verbose else None,
-    }
     given, values = _read(config, flags, problems)
     links: Sequence[tuple[GcsAddress, WriteAccess]] = values.get("gcs", ())
     addresses = _named_links(gcs, problems) or [address for address, _ in links] or [parse_gcs(DEFAULT_GCS)]
@@ -96,12 +82,13 @@ def takeoff_limit_m() -> int:
 
 
 def _read(
-    config: Path | None, flags: Mapping[str, str | None], problems: list[Problem]
+    config: Path | None, flags: Mapping[str, object], problems: list[Problem]
 ) -> tuple[dict[str, Given], dict[str, Any]]:
     """The settings given in files, environment and flags, and their values."""
     given = {} if config is None else read_files(config, problems)
     given |= _read_environment(os.environ, problems)
-    given |= {name: Given(value, f"--{name.replace('_', '-')}") for name, value in flags.items() if value is not None}
+    named = {name: str(value) for name, value in flags.items() if value is not None}
+    given |= {name: Given(value, f"--{name.replace('_', '-')}") for name, value in named.items()}
     return given, _read_values(given, problems)
 
 
@@ -167,7 +154,6 @@ def _table(table: str, values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _zenoh_problems(zenoh: ZenohSettings, given: Mapping[str, Given]) -> Iterator[Problem]:
-    """Problems that zenoh itself finds."""
     from service.settings.zenoh_config import make_config  # loads zenoh, 10 MB
 
     try:

@@ -35,7 +35,7 @@ def test_a_setting_of_the_bridge_reaches_it_from_the_file(
     text, value = another_value(field)
     config = tmp_path / "config.toml"
     config.write_text(f"{field.name} = {text}\n")
-    settings = load_settings(config, "sim:", (), tmp_path / "state")
+    settings = load_settings(config, fc="sim:", state_dir=tmp_path / "state")
     made: list[BridgeConfig] = []
 
     def note(*arguments: Any, **named: Any) -> BridgeConfig:

@@ -31,7 +31,7 @@ NOT_RUN = {
     "naze-bridge fleet settings": "needs a router: tests/fleet/test_settings_command.py runs it",
     "naze-bridge fleet verify": "needs a router: tests/fleet/test_push_command.py runs it",
     "naze-bridge fleet pull": "needs a router: tests/fleet/test_push_command.py runs it",
-    "naze-bridge fleet mavlink": "needs a router: tests/service/cli/test_gcs_relay.py runs it",
+    "naze-bridge fleet mavlink": "needs a router: tests/service/cli/test_vehicle_relay.py runs it",
     "naze-bridge fly": "needs a firmware image: `make real-board FLY=1` flies some",
     "naze-bridge sim --image": "needs a firmware image: `make real-board` runs it",
     "naze-bridge sim --link /tmp/naze --core": "needs the compiled core: tests/e2e/test_compiled_core.py runs it",

@@ -38,7 +38,7 @@ def load(folder: Path, text: str) -> Settings:
     shutil.copy(REPOSITORY / "examples" / "zenoh-tls" / "vehicle.json5", folder)
     file = folder / "config.toml"
     file.write_text(text.replace("/etc/naze-bridge", str(folder)))
-    return load_settings(file, None, (), folder)
+    return load_settings(file, state_dir=folder)
 
 
 @pytest.mark.parametrize("block", BLOCKS, ids=lambda block: block.place)

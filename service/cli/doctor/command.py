@@ -70,7 +70,7 @@ def examined(
     from service.cli.doctor.examination import examine  # half the daemon: --help does without
 
     try:
-        settings = load_settings(config, fc, (), state_dir)
+        settings = load_settings(config, fc=fc, state_dir=state_dir)
     except SettingsError as error:
         for wrong in error.problems:
             yield problem("configuration", str(wrong), "correct this, and run doctor again")

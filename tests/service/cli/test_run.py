@@ -13,11 +13,11 @@ from tests.support.programs import run_naze_bridge
 def test_flags_override_the_file(tmp_path: Path) -> None:
     config = tmp_path / "naze.toml"
     config.write_text('fc = "/dev/serial0,57600"\ngcs = ["udpin:127.0.0.1:1"]\nsysid = 7\nstate_dir = "/elsewhere"\n')
-    settings = load_settings(config, None, (), None)
+    settings = load_settings(config)
     assert settings.fc == SerialFc("/dev/serial0", 57600)
     assert settings.gcs == [GcsAddress("udpin", "127.0.0.1", 1)]
     assert (settings.sysid, settings.state_dir) == (7, Path("/elsewhere"))
-    settings = load_settings(config, "sim:", ["tcpin:127.0.0.1:2"], tmp_path)
+    settings = load_settings(config, ["tcpin:127.0.0.1:2"], fc="sim:", state_dir=tmp_path)
     assert settings.fc == SimulatedFc()
     assert settings.gcs == [GcsAddress("tcpin", "127.0.0.1", 2)]
     assert (settings.sysid, settings.state_dir) == (7, tmp_path)
@@ -26,7 +26,7 @@ def test_flags_override_the_file(tmp_path: Path) -> None:
 def test_a_byte_order_mark_is_accepted(tmp_path: Path) -> None:
     config = tmp_path / "naze.toml"
     config.write_bytes(b"\xef\xbb\xbfsysid = 9\r\n")
-    assert load_settings(config, "sim:", (), tmp_path).sysid == 9
+    assert load_settings(config, fc="sim:", state_dir=tmp_path).sysid == 9
 
 
 WRONG = {

@@ -16,7 +16,7 @@ def load(folder: Path, text: str, **drop_ins: str) -> Settings:
     config.write_text(text)
     for name, drop_in in drop_ins.items():
         (folder / "conf.d" / f"{name}.toml").write_text(drop_in)
-    return load_settings(config, "sim:", (), folder)
+    return load_settings(config, fc="sim:", state_dir=folder)
 
 
 def problems(folder: Path, text: str, **drop_ins: str) -> list[str]:
@@ -192,4 +192,4 @@ def test_the_flight_controllers_port_is_not_recorded_into(folder: Path) -> None:
     config = folder / "naze.toml"
     config.write_text('fc = "/dev/ttyUSB0,57600"\nrecord_uart = "/dev/ttyUSB0"')
     with pytest.raises(SettingsError, match="is the flight controller's port: name a file"):
-        load_settings(config, None, (), folder)
+        load_settings(config, state_dir=folder)

@@ -10,7 +10,7 @@ from service.settings import Settings, SettingsError, TlogLimits, load_settings
 def settings_of(tmp_path: Path, text: str, record_uart: Path | None = None) -> Settings:
     config = tmp_path / "naze.toml"
     config.write_text(text)
-    return load_settings(config, "sim:", (), tmp_path, record_uart)
+    return load_settings(config, fc="sim:", state_dir=tmp_path, record_uart=record_uart)
 
 
 def test_telemetry_is_recorded_by_default(tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 import pytest
 
 from service.settings.addresses import AddressError
-from service.settings.tile_source import TileSource, parse_tile_source
+from service.settings.web import TileSource, parse_tile_source
 
 
 @pytest.mark.parametrize(

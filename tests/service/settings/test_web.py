@@ -12,7 +12,7 @@ from service.settings.web import ListenAddress, WebSettings
 def load(tmp_path: Path, text: str) -> WebSettings | None:
     config = tmp_path / "naze.toml"
     config.write_text(text)
-    return load_settings(config, "sim:", (), tmp_path).web
+    return load_settings(config, fc="sim:", state_dir=tmp_path).web
 
 
 def test_the_table_has_defaults_and_is_read(tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ def key_file(tmp_path: Path) -> Path:
 def access(tmp_path: Path, gcs: str, *flags: str) -> dict[str, WriteAccess]:
     config = tmp_path / "naze-bridge.toml"
     config.write_text(f'fc = "sim:"\ngcs = [{gcs}]\n')
-    return dict(load_settings(config, None, flags, tmp_path).access)
+    return dict(load_settings(config, flags, state_dir=tmp_path).access)
 
 
 def complaint(tmp_path: Path, gcs: str) -> str:
@@ -43,7 +43,7 @@ def test_one_list_may_have_strings_and_tables(tmp_path: Path, key_file: Path) ->
     config = tmp_path / "naze-bridge.toml"
     table = f'{{address = "{LINK}", key_file = "{key_file}", writers = ["192.168.4.0/24", "::1"]}}'
     config.write_text(f'fc = "sim:"\ngcs = ["tcpin:127.0.0.1:5760", {table}]\n')
-    settings = load_settings(config, None, (), tmp_path)
+    settings = load_settings(config, state_dir=tmp_path)
     assert [str(address) for address in settings.gcs] == ["tcpin:127.0.0.1:5760", LINK]
     (found,) = settings.access.items()
     assert found[0] == LINK

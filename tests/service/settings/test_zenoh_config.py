@@ -42,7 +42,7 @@ def test_invalid_settings_stop_the_start_with_one_sentence(tmp_path: Path, name:
         (tmp_path / "zenoh.json5").write_text(zenoh_file)
     config = write_config(tmp_path, table, vehicle="")
     with pytest.raises(SettingsError) as caught:
-        load_settings(config, "sim:", (), tmp_path)
+        load_settings(config, fc="sim:", state_dir=tmp_path)
     (problem,) = caught.value.problems
     assert reason in problem.text
     assert "\n" not in problem.text
@@ -54,6 +54,6 @@ def test_the_examples_count_as_authentication(tmp_path: Path, of: str) -> None:
     """With authentication, "I know" is not needed."""
     example = Path(__file__).parents[3] / "examples" / of / "vehicle.json5"
     config = write_config(tmp_path, f'config_file = "{example}"\ncommands = true\nmavlink_in = true')
-    settings = load_settings(config, "sim:", (), tmp_path)
+    settings = load_settings(config, fc="sim:", state_dir=tmp_path)
     assert settings.zenoh is not None
     assert (settings.zenoh.commands, settings.zenoh.mavlink_in) == (True, True)

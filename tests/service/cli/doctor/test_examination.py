@@ -18,7 +18,7 @@ def test_a_key_that_can_be_guessed(pi: FaultyMachine, tmp_path: Path, passphrase
     key.write_text(passphrase)
     key.chmod(0o600)
     config.write_text(f'gcs = [{{address = "{GCS[0]}", key_file = "{key}"}}]')
-    settings = load_settings(config, None, (), tmp_path)
+    settings = load_settings(config, state_dir=tmp_path)
     (found,) = (each for each in examine(pi, settings, no_answer, lambda: STATUS) if each.check == "key")
     if is_weak:
         assert_note(found, f"the key in {key} is weak")

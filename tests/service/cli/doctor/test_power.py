@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Undervoltage: now by the kernel or the firmware, and earlier since the start."""
 
-from service.cli.doctor.power import check_power
+from service.cli.doctor.machine import check_power
 from tests.support.doctor import assert_note, assert_ok, assert_problem
 from tests.support.faulty_machine import FaultyMachine
 

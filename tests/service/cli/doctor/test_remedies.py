@@ -10,7 +10,7 @@ import pytest
 
 from service.cli.doctor.checked import Checked, Grade
 from service.cli.doctor.flight_controller import check_flight_controller
-from service.cli.doctor.keys import check_keys
+from service.cli.doctor.network import check_keys
 from service.cli.doctor.port import check_console, check_permission, check_port
 from service.settings import Settings, load_settings
 from service.settings.addresses import SerialFc
@@ -36,7 +36,7 @@ def settings_of(setup_pi: Pi) -> Settings:
     config = setup_pi.root / _CONFIG
     config.parent.mkdir(parents=True, exist_ok=True)
     config.touch()
-    return load_settings(config, None, (), setup_pi.root)
+    return load_settings(config, state_dir=setup_pi.root)
 
 
 def setup_by(setup_pi: Pi, remedy: str) -> None:

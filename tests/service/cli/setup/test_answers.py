@@ -37,7 +37,7 @@ def test_a_key_leaves_the_configured_links_as_they_are(pi: Pi, tmp_path: Path) -
     # Only in this test the key is elsewhere.
     answers = config.parent / "setup.toml"
     answers.write_text(answers.read_text().replace(KEY_FILE, str(pi.key_file)))
-    settings = load_settings(config, None, (), tmp_path)
+    settings = load_settings(config, state_dir=tmp_path)
     assert [str(link) for link in settings.gcs] == ["udpin:0.0.0.0:14550", "tcpin:0.0.0.0:5760"]
     assert all(settings.access[str(link)].key is not None for link in settings.gcs)
 
