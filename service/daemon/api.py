@@ -64,20 +64,19 @@ class DaemonApi:
         self, items: list[MissionItem], source: str, progress: Callable[[Json], None], *, may_erase: bool = True
     ) -> Json:
         """Check, push and verify a list; an empty one clears the mission. `may_erase`: see LocalMissions.push."""
-        future: asyncio.Future[Json] = self._loop.create_future()
-
-        def done(outcome: DeliveryResult | Refusal, arrived: ArrivedMission | None) -> None:
-            _resolve(future, delivery_data(outcome, arrived))
 
         def written(records: int) -> None:
             progress({"progress": records})
 
-        self._daemon.bridge.missions.push(items, source, written, done, self._loop.time(), may_erase=may_erase)
-        self._daemon.flush()
-        return await future
+        def start(done: Callable[[Json], None], now: float) -> None:
+            def ended(outcome: DeliveryResult | Refusal, arrived: ArrivedMission | None) -> None:
+                done(delivery_data(outcome, arrived))
+
+            self._daemon.bridge.missions.push(items, source, written, ended, now, may_erase=may_erase)
+
+        return await self._daemon.answer(start)
 
     async def check(self, items: list[MissionItem]) -> Json:
-        """The verdict on a list for the current flight controller."""
         check = self._daemon.bridge.missions.check
         return verdict_data(await self._answer(lambda answered, now: check(items, answered, now)))
 
@@ -86,11 +85,8 @@ class DaemonApi:
         return _held(held) | {"others": [_held(other) for other in self._daemon.bridge.missions.others]}
 
     async def _answer(self, start: Callable[[Callable[[T | Refusal], None], float], None]) -> T:
-        """Start an operation and wait for its result; ControlError if it is refused."""
-        future: asyncio.Future[T | Refusal] = self._loop.create_future()
-        start(lambda result: _resolve(future, result), self._loop.time())
-        self._daemon.flush()
-        result = await future
+        """Wait for an operation's result; ControlError if it is refused."""
+        result = await self._daemon.answer(start)
         if isinstance(result, Refusal):
             raise ControlError(result.text)
         return result
@@ -144,7 +140,6 @@ class DaemonApi:
         }
 
     async def list_missions(self, limit: int) -> Json:
-        """List the received missions, newest first."""
         return await self._daemon.store.ask(lambda store: listed(store, limit))
 
     async def missions_between(self, start_s: float, end_s: float, limit: int) -> Json:
@@ -176,7 +171,6 @@ def delivery_data(outcome: DeliveryResult | Refusal, arrived: ArrivedMission | N
 
 
 def listed(store: MissionStore, limit: int) -> Json:
-    """Answer the request "missions"."""
     return _listed(store.list(min(limit, _MOST_LISTED)))
 
 
@@ -192,12 +186,6 @@ def shown(store: MissionStore, number: int) -> Json:
     received = mission.received
     as_text = {"records": received.records.hex(), "checksum": _hex(received.checksum)}
     return _fields(mission) | {"received": _fields(received) | as_text}
-
-
-def _resolve(future: asyncio.Future[T], result: T) -> None:
-    # The client may have disconnected.
-    if not future.done():
-        future.set_result(result)
 
 
 def _fields(thing: MissionSummary | StoredMission | ReceivedMission) -> Json:

@@ -4,10 +4,10 @@
 import asyncio
 import time
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import structlog
 
@@ -47,6 +47,7 @@ _TOO_EARLY_S = 0.01
 #: Frames are accepted over zenoh only if its transport is authenticated, or the owner waived that.
 _ZENOH = {"zenoh": LinkAccess(may_write=lambda _peer: True)}
 
+T = TypeVar("T")
 _log = structlog.get_logger()
 
 
@@ -154,7 +155,6 @@ class Daemon:
         self._followers.append(follower)
 
     def report(self) -> VehicleReport:
-        """The vehicle as it is known now."""
         return self.bridge.report(self._loop.time())
 
     def followers_status(self) -> Json:
@@ -192,6 +192,18 @@ class Daemon:
         if self._followers and (fresh := self.bridge.take_fresh(self._loop.time())):
             for follower in self._followers:
                 follower.telemetry(fresh)
+
+    async def answer(self, start: Callable[[Callable[[T], None], float], None]) -> T:
+        """Start an operation of the bridge at the given time, and wait until it calls back with its result."""
+        future: asyncio.Future[T] = self._loop.create_future()
+
+        def done(result: T) -> None:
+            if not future.done():  # the client may have disconnected
+                future.set_result(result)
+
+        start(done, self._loop.time())
+        self.flush()
+        return await future
 
     async def finish(self) -> None:
         """Start no more transfers; the current one finishes soon, or is aborted cleanly."""

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The requests about the flight controller's settings, as part of DaemonApi."""
 
-import asyncio
 from collections.abc import Callable
 from dataclasses import asdict
 from functools import partial
@@ -31,7 +30,6 @@ class SettingsApi:
 
     def __init__(self, daemon: Daemon) -> None:
         self._daemon = daemon
-        self._loop = asyncio.get_running_loop()
 
     async def do(self, request: Json, progress: Progress) -> Json:
         match request["do"]:
@@ -62,9 +60,7 @@ class SettingsApi:
         }
 
     async def save(self) -> Json:
-        result = await self._wait(self._daemon.bridge.settings.save)
-        if result is not None:
-            raise ControlError(result.text)
+        await self._answer(self._daemon.bridge.settings.save)
         return {"text": "Settings saved"}
 
     async def plan(self, values: SettingValues, board: str, *, is_checked: bool = True) -> Json:
@@ -85,7 +81,6 @@ class SettingsApi:
         return asdict(await self._answer(restore))
 
     async def backups(self, limit: int) -> Json:
-        """List the backups, newest first."""
         return await self._daemon.store.ask(lambda store: backups_listed(store, limit))
 
     async def newest_backup(self) -> int | None:
@@ -118,27 +113,18 @@ class SettingsApi:
         return _data(after) | {"was": setting.value, "text": text}
 
     async def _answer(self, start: Callable[[Callable[[T | SettingRefusal, float], None], float], None]) -> T:
-        """Start an operation and wait for its result; ControlError if it is refused."""
-        result = await self._wait(start)
+        """Wait for an operation's result; ControlError if it is refused."""
+
+        def begin(done: Callable[[T | SettingRefusal], None], now: float) -> None:
+            start(lambda result, _at: done(result), now)
+
+        result = await self._daemon.answer(begin)
         if isinstance(result, SettingRefusal):
             raise ControlError(result.text)
         return result
 
-    async def _wait(self, start: Callable[[Callable[[T, float], None], float], None]) -> T:
-        future: asyncio.Future[T] = self._loop.create_future()
-
-        def done(result: T, _at: float) -> None:
-            # The client may have disconnected.
-            if not future.done():
-                future.set_result(result)
-
-        start(done, self._loop.time())
-        self._daemon.flush()
-        return await future
-
 
 def backups_listed(store: MissionStore, limit: int) -> Json:
-    """Answer the request "backups"."""
     return {"backups": [asdict(line) for line in store.backups.list(min(limit, _MOST_LISTED))]}
 
 
@@ -190,7 +176,6 @@ def _data(setting: BoardSetting) -> Json:
 
 
 def _shown(setting: BoardSetting) -> str:
-    """The value, or the name of the choice."""
     if setting.choices and not isinstance(setting.value, str):
         place = int(setting.value - setting.minimum)
         if 0 <= place < len(setting.choices):

@@ -1,15 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Queries about the vehicle: state, overview, history, mission/current and mission/list."""
+"""Queries about the vehicle: state, overview, history, mission/current and mission/list.
+
+docs/zenoh-payloads.md describes the bodies.
+"""
+
+from collections.abc import Callable
+from dataclasses import asdict
 
 from bridge.bridge import Bridge
+from bridge.missions.mission_service import DeliveryResult, HeldMission
+from bridge.model.mission_log import ArrivedMission
 from payloads import keys
 from payloads.mission_data import Json, strict
 from payloads.overview import overview_of
 from payloads.payload import plain
-from service.daemon.api import DaemonApi
+from service.daemon.api import DaemonApi, delivery_data
 from service.zenoh_link.history import History
 from service.zenoh_link.queries import Answerer, Question
-from service.zenoh_link.vehicle_data import VehicleData, mission_current
 
 _USUAL_LIMIT, _MAX_LIMIT = 20, 200
 _MAX_POSITIONS = 1000
@@ -17,11 +24,11 @@ _TIMES = ("received_at", "concluded_at")
 
 
 class Answers:
-    """The bodies of the replies."""
+    """The bodies of the replies. `state`: the vehicle's, as published."""
 
-    def __init__(self, data: VehicleData, bridge: Bridge, api: DaemonApi, history: History) -> None:
+    def __init__(self, state: Callable[[], Json], bridge: Bridge, api: DaemonApi, history: History) -> None:
         self._bridge = bridge
-        self._data = data
+        self._vehicle_state = state
         self._api = api
         self._history = history
         self.answerers: dict[keys.ZenohKey, Answerer] = {
@@ -33,10 +40,10 @@ class Answers:
         }
 
     async def _state(self, _: Question) -> Json:
-        return self._data.state()
+        return self._vehicle_state()
 
     async def _overview(self, _: Question) -> Json:
-        return plain(overview_of(self._data.state()))
+        return plain(overview_of(self._vehicle_state()))
 
     async def _past(self, question: Question) -> Json:
         most = question.whole_number("positions", 0, _MAX_POSITIONS)
@@ -50,6 +57,21 @@ class Answers:
         limit = question.whole_number("limit", _USUAL_LIMIT, _MAX_LIMIT)
         found = (await self._api.list_missions(limit))["missions"]
         return {"missions": [_with_units(mission) for mission in found]}
+
+
+def mission_current(held: HeldMission | None) -> Json:
+    if held is None:
+        return {"count": None, "checksum": None, "items": None}
+    return {
+        "count": held.identity.count,
+        "checksum": f"{held.identity.checksum:08x}",
+        "items": [strict(asdict(item)) for item in held.items],
+    }
+
+
+def mission_report(mission: ArrivedMission, delivery: DeliveryResult) -> Json:
+    body: Json = strict(delivery_data(delivery, mission) | {"source": mission.source})
+    return body
 
 
 def _with_units(mission: Json) -> Json:

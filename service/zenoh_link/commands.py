@@ -2,34 +2,40 @@
 """The commands below @cmd: those of the command line, sent as queries."""
 
 import asyncio
+import base64
+import json
+import zlib
 from collections.abc import Callable, Set
 
 from payloads import keys
-from payloads.mission_data import ACCEPTED, MOST, Json
+from payloads.mission_data import ACCEPTED, MOST, Json, whole_number
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
+from protocols.param_file import ParamFile, ParamFileError, read_param_file
 from service.daemon.api import DaemonApi
 from service.daemon.telemetry_logs import TelemetryLogs
 from service.zenoh_link.liveliness import RENAME
-from service.zenoh_link.log_commands import LogQueries
 from service.zenoh_link.queries import Answerer, QueryRefused, Question
-from service.zenoh_link.settings_commands import SettingsQueries
 
 _PAYLOAD = "the query's payload"
-#: Larger files are read by the command line only, not alongside a running link: a mission that fits has about 20 KB.
+#: Larger files are read by the command line only, not alongside a running link. A mission that fits has about 20 KB,
+#: and so have the 650 settings of an INAV.
 _MAX_BYTES = 1 << 18
 _MAX_ITEMS = 1000
+_LOG_FORM = 'the payload must be {"name": "2026-05-01 10-00-00.tlog", "start": 0}'
 
 
 class CommandQueries:
     """Handles the commands through DaemonApi, like all other interfaces. `others`: bridges with the same name.
 
-    They get each command, too, so none that changes a mission is obeyed.
+    They get each command, too, so none that changes a mission or settings is obeyed. Telemetry logs are read by
+    commands, because they reveal the flights.
     """
 
     def __init__(self, api: DaemonApi, others: Set[str], logs: TelemetryLogs) -> None:
         self._api = api
         self._others = others
+        self._logs = logs
         #: Parsing takes about 50 times the file's size in memory.
         self._one_at_a_time = asyncio.Lock()
         self.answerers: dict[keys.ZenohKey, Answerer] = {
@@ -38,9 +44,12 @@ class CommandQueries:
             keys.CLEAR: self._alone(self._clear),
             keys.RESTORE: self._alone(self._restore),
             keys.STATUS: self._status,
+            keys.SETTINGS_LIST: self._list_settings,
+            keys.SETTINGS_PLAN: self._plan_settings,
+            keys.SETTINGS_RESTORE: self._alone(self._restore_settings),
+            keys.LOG_LIST: self._list_logs,
+            keys.LOG_READ: self._read_log,
         }
-        self.answerers |= SettingsQueries(api.settings, self._alone).answerers
-        self.answerers |= LogQueries(logs).answerers
 
     def _alone(self, answerer: Answerer) -> Answerer:
         async def answer(question: Question) -> Json:
@@ -71,13 +80,45 @@ class CommandQueries:
     async def _status(self, _: Question) -> Json:
         return {"result": self._api.status()}
 
+    async def _list_settings(self, _: Question) -> Json:
+        table = await self._api.settings.table()
+        values = {setting["name"]: setting["value"] for setting in table["settings"]}
+        return {"result": {"board": table["board"], "values": values}}
+
+    async def _plan_settings(self, question: Question) -> Json:
+        file = _param_file(question)
+        return {"result": await self._api.settings.plan(file.values, file.board)}
+
+    async def _restore_settings(self, question: Question) -> Json:
+        file = _param_file(question)
+        question.send({"progress": 0, "of": len(file.values)})
+        total = len((await self._api.settings.plan(file.values, file.board))["changes"])
+        result = await self._api.settings.restore(file.values, file.board, "zenoh", _progress_of(question, total))
+        if not result["is_saved"] or result["left_out"]:
+            raise QueryRefused(result["text"], result)
+        return {"result": {"ack": ACCEPTED} | result}
+
+    async def _list_logs(self, _: Question) -> Json:
+        return {"result": await self._logs.list()}
+
+    async def _read_log(self, question: Question) -> Json:
+        """One piece, for a slow uplink."""
+        try:
+            wanted = json.loads(question.payload())
+            name, start = wanted["name"], whole_number(wanted, "start", 0, MOST)
+        except (ValueError, LookupError, TypeError) as error:
+            raise QueryRefused(_LOG_FORM) from error
+        piece = await self._logs.read(str(name), start)
+        # MAVLink halves; its base64 form is a third longer.
+        data = base64.b64encode(zlib.compress(piece, 9)).decode()
+        return {"result": {"start": start, "size": len(piece), "data": data}}
+
     async def _items(self, question: Question) -> list[MissionItem]:
         """Parse the mission in the payload, with the formats, reader and messages of `naze-bridge check`."""
-        if question.size > _MAX_BYTES:
-            raise QueryRefused(f"{_PAYLOAD} is larger than {_MAX_BYTES >> 10} KiB: send a mission file")
+        payload = _payload(question, "mission")
         try:
             async with self._one_at_a_time:
-                items = await asyncio.to_thread(read_mission_file, question.payload(), _PAYLOAD)
+                items = await asyncio.to_thread(read_mission_file, payload, _PAYLOAD)
         except MissionFileError as error:
             raise QueryRefused(str(error)) from None
         if not items:
@@ -86,6 +127,19 @@ class CommandQueries:
             held = f"{_PAYLOAD} holds {len(items)} items"
             raise QueryRefused(f"{held}, more than any flight controller stores: shorten it")
         return items
+
+
+def _payload(question: Question, kind: str) -> bytes:
+    if question.size > _MAX_BYTES:
+        raise QueryRefused(f"{_PAYLOAD} is larger than {_MAX_BYTES >> 10} KiB: send a {kind} file")
+    return question.payload()
+
+
+def _param_file(question: Question) -> ParamFile:
+    try:
+        return read_param_file(_payload(question, ".param"), _PAYLOAD)
+    except ParamFileError as error:
+        raise QueryRefused(str(error)) from None
 
 
 def _progress_of(question: Question, count: int) -> Callable[[Json], None]:

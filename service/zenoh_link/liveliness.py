@@ -89,7 +89,6 @@ class Liveliness:
 
     @property
     def is_alone(self) -> bool:
-        """True if no other session is connected."""
         return not self._neighbours
 
     def status(self) -> Json:

@@ -31,19 +31,16 @@ from service.daemon.telemetry_logs import TelemetryLogs
 from service.recording.tlog_recorder import TLOG_FOLDER
 from service.settings.zenoh import ZenohProfile, ZenohSettings
 from service.settings.zenoh_config import make_config
-from service.zenoh_link import vehicle_data
-from service.zenoh_link.answers import Answers
+from service.zenoh_link.answers import Answers, mission_current, mission_report
 from service.zenoh_link.commands import CommandQueries
 from service.zenoh_link.history import History
 from service.zenoh_link.liveliness import Liveliness
 from service.zenoh_link.mavlink_link import MavlinkLink
-from service.zenoh_link.outage_log import log_outages
 from service.zenoh_link.publisher import Publisher
 from service.zenoh_link.queries import Queries
 from service.zenoh_link.rates import SampleRates
-from service.zenoh_link.session import SessionThread
+from service.zenoh_link.session import SessionThread, log_outages
 from service.zenoh_link.time_source import SampleClock
-from service.zenoh_link.vehicle_data import VehicleData
 
 _STATE_INTERVAL_S = 1.0
 _GROUPS = {key.suffix: group for group, key in keys.TELEMETRY.items()}
@@ -61,19 +58,18 @@ class Node(Follower):
         config = make_config(settings)
         self._endpoints, self._tls_files = connect_endpoints(config), tls_files(config)
         self._thread = SessionThread(config, self._declare)
-        clock = SampleClock(self._loop.time)
-        self._payloads = Payloads(settings.encoding, clock.unix_s)
+        self._clock = SampleClock(self._loop.time)
+        self._payloads = Payloads(settings.encoding, self._clock.unix_s)
         self._publisher = Publisher(self._payloads, self._readers_changed)
         self._presence = Liveliness(settings.vehicle, self._emit)
         self._mavlink = MavlinkLink(self._publisher, daemon.gcs, self._presence.others)
-        self._data = VehicleData(settings.vehicle, daemon, self._presence.others, clock)
         self._queries = Queries(self._payloads, self._thread)
         api = DaemonApi(daemon)
-        state_dir = daemon.settings.state_dir
+        logs = None if daemon.settings.state_dir is None else daemon.settings.state_dir / TLOG_FOLDER
         self._rates = SampleRates(is_metered=settings.profile is ZenohProfile.METERED)
-        self._logs = TelemetryLogs(None if state_dir is None else state_dir / TLOG_FOLDER)
-        self._history = History(api, None if state_dir is None else state_dir / TLOG_FOLDER, clock.unix_s)
-        self._answerers = Answers(self._data, daemon.bridge, api, self._history).answerers
+        self._logs = TelemetryLogs(logs)
+        self._history = History(api, logs, self._clock.unix_s)
+        self._answerers = Answers(self._state, daemon.bridge, api, self._history).answerers
         if settings.commands:
             self._answerers |= CommandQueries(api, self._presence.others, self._logs).answerers
         self._held: HeldMission | None = None
@@ -109,14 +105,15 @@ class Node(Follower):
 
     def happened(self, event: BridgeEvent) -> None:
         """Publish an event, and soon after it the changed state."""
-        body = self._payloads.head(keys.EVENT) | vehicle_data.event_data(event)
+        about = {"level": event.level, "event": event.name_in_log, "facts": event.facts()}
+        body = self._payloads.head(keys.EVENT) | about
         self._history.add(body)
         self._thread.submit(lambda: self._publisher.put_raw(keys.EVENT, self._payloads.encode(keys.EVENT, body)))
         if event.level != "debug":
             self._publish_soon()
 
     def mission_ended(self, mission: ArrivedMission, delivery: DeliveryResult) -> None:
-        self._send_reliably(keys.MISSION_REPORT, lambda: vehicle_data.mission_report(mission, delivery))
+        self._send_reliably(keys.MISSION_REPORT, partial(mission_report, mission, delivery))
         self._publish_soon()
 
     def status(self) -> Json:
@@ -152,6 +149,14 @@ class Node(Follower):
             self._daemon.bridge.watch(read)
             self._daemon.flush()
 
+    def _state(self) -> Json:
+        return {
+            "vehicle": self._settings.vehicle,
+            "others_of_this_name": len(self._presence.others),
+            "time_source": self._clock.source(self._daemon.bridge.vehicle),
+            **plain(self._daemon.report()),
+        }
+
     def _publish(self, group: Group, *, gathered: bool = False) -> None:
         key = keys.TELEMETRY[group]
         if self._publisher.has_readers(key):
@@ -178,7 +183,7 @@ class Node(Follower):
         self._pending_publish = None
         for group in {Group.LINK, *self._rates.held_back}:
             self._publish(group, gathered=True)
-        state = self._data.state()
+        state = self._state()
         marks = (state["status"]["armed"], state["mission"], state["link"]["state"], state["others_of_this_name"])
         if self._publisher.is_declared and self._rates.admits_state(marks, self._loop.time()):
             self._publisher.put(keys.STATE, state)
@@ -189,4 +194,4 @@ class Node(Follower):
         held = self._daemon.bridge.missions.held
         if held is not self._held:
             self._held = held
-            self._send_reliably(keys.MISSION_CURRENT, partial(vehicle_data.mission_current, held))
+            self._send_reliably(keys.MISSION_CURRENT, partial(mission_current, held))

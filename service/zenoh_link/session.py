@@ -4,6 +4,7 @@
 zenoh connects and reconnects in its own threads. The event loop never waits for any of it.
 """
 
+import asyncio
 import threading
 from collections import deque
 from collections.abc import Callable
@@ -13,8 +14,11 @@ import structlog
 import zenoh
 
 from payloads.endpoints import in_short
+from service.machine.threads import BackgroundThread
 
 Job = Callable[[], None]
+#: The interval of diagnoses. zenoh tries again at least every 4 s.
+_DIAGNOSIS_S = 5.0
 
 
 class JobKind(Enum):
@@ -129,3 +133,23 @@ class SessionThread:
         level = _log.debug if why == self._complaint else _log.warning
         level(event, why=why)
         self._complaint = why
+
+
+async def log_outages(diagnose: Callable[[], str], is_alone: Callable[[], bool]) -> None:
+    """Log why no session is connected, because zenoh keeps trying without a message; never returns.
+
+    Each new reason is logged once, if two diagnoses in a row find it and the bridge is still alone: a single one may
+    meet a router that has just returned, before zenoh has joined it. `diagnose` may block: it is called on a thread,
+    because an endpoint that drops all packets takes seconds to time out.
+    """
+    thread = BackgroundThread("zenoh why")
+    found = logged = ""
+    try:
+        while True:
+            await asyncio.sleep(_DIAGNOSIS_S)
+            before, found = found, await thread.ask(diagnose) if is_alone() else ""
+            if found and found == before != logged and is_alone():
+                logged = found
+                _log.warning("zenoh.alone", why=found)
+    finally:
+        thread.close(0)

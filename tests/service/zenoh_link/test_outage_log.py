@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import pytest
 from structlog.testing import capture_logs
 
-from service.zenoh_link.outage_log import log_outages
+from service.zenoh_link.session import log_outages
 
 DOWN, REJECTED, CONNECTED = "connection refused", "rejected the session", ""
 #: The router is back before the diagnosis ends.
