@@ -19,10 +19,9 @@ class SealFile:
 
     def __init__(self, folder: Path | None, port: Callable[[], str]) -> None:
         self._port = port
-        self._file = None if folder is None else StateFile(folder / SEALS_FILE, "earlier changes of settings go unseen")
-        self._seals: dict[str, Seal] = {}
-        if self._file is not None:
-            self._seals = self._file.load(_read) or {}
+        self._file = StateFile(folder, SEALS_FILE, "earlier changes of settings go unseen")
+        self._seals: dict[str, Seal] = self._file.load(_read) or {}
+        self.close = self._file.close
 
     def recall(self, board: BoardId) -> Seal | None:
         return self._seals.get(self._key(board))
@@ -32,13 +31,7 @@ class SealFile:
         self._seals[self._key(board)] = seal
         while len(self._seals) > _MOST:
             del self._seals[next(iter(self._seals))]
-        if self._file is not None:
-            self._file.save({key: _plain(seal) for key, seal in self._seals.items()})
-
-    def close(self) -> None:
-        """Finish writing."""
-        if self._file is not None:
-            self._file.close()
+        self._file.save({key: _plain(seal) for key, seal in self._seals.items()})
 
     def _key(self, board: BoardId) -> str:
         return f"{board.kind}, {board.uid or self._port()}"

@@ -13,13 +13,13 @@ class PortMemory:
     """Ports by their key (see SerialPort). Without a `folder` they are remembered until the program ends."""
 
     def __init__(self, folder: Path | None) -> None:
-        self._file = None if folder is None else StateFile(folder / PORTS_FILE, "every port is searched again")
+        self._file = StateFile(folder, PORTS_FILE, "every port is searched again")
+        self.close = self._file.close
         #: The last port of the flight controller; empty at first.
         self.flight_controller = ""
         #: Ports to skip, and the device found on each.
         self.others: dict[str, str] = {}
-        if self._file is not None:
-            self._file.load(self._read)
+        self._file.load(self._read)
 
     def found_flight_controller(self, key: str) -> None:
         if key != self.flight_controller:
@@ -34,15 +34,9 @@ class PortMemory:
                 self.flight_controller = ""
             self._save()
 
-    def close(self) -> None:
-        """Finish writing the file."""
-        if self._file is not None:
-            self._file.close()
-
     def _read(self, kept: Any) -> None:
         others = {str(key): str(what) for key, what in kept["others"].items()}
         self.flight_controller, self.others = str(kept["flight_controller"]), others
 
     def _save(self) -> None:
-        if self._file is not None:
-            self._file.save({"flight_controller": self.flight_controller, "others": self.others})
+        self._file.save({"flight_controller": self.flight_controller, "others": self.others})

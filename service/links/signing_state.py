@@ -41,7 +41,7 @@ class SigningState:
         self._file: StateFile | None = None
         kept: _Kept | None = None
         if keys and state_dir is not None:
-            self._file = StateFile(state_dir / FILE_NAME, "timestamps restart from the clock")
+            self._file = StateFile(state_dir, FILE_NAME, "timestamps restart from the clock")
             kept = self._file.load(_read)
         self._stored, streams, self._refused_until = kept or (0, {}, -1)
         self._timestamps = Timestamps(clock, self._stored)

@@ -22,16 +22,21 @@ _log = structlog.get_logger()
 
 
 class StateFile:
-    """Written by its own thread, because an SD card may take a second. `without`: the effect of losing it."""
+    """Written by its own thread, because an SD card may take a second. `without`: the effect of losing it.
 
-    def __init__(self, path: Path, without: str) -> None:
-        self._path = path
+    Without a `folder` nothing is stored.
+    """
+
+    def __init__(self, folder: Path | None, name: str, without: str) -> None:
+        self._path = (folder or Path()) / name
         self._without = without
         self._latest = b""
-        self._thread = BackgroundThread(path.name)
+        self._thread = None if folder is None else BackgroundThread(name)
 
     def load(self, read: Callable[[Any], T]) -> T | None:
         """The contents, converted by `read`; None if there are none, or they are damaged, which is logged."""
+        if self._thread is None:
+            return None
         try:
             return read(json.loads(read_bounded(self._path, _MAX_BYTES)))
         except FileNotFoundError:
@@ -42,12 +47,14 @@ class StateFile:
 
     def save(self, contents: object) -> None:
         """Replace the contents. A failure is logged."""
-        self._latest = json.dumps(contents).encode()
-        self._thread.submit(partial(self._write, self._latest))
+        if self._thread is not None:
+            self._latest = json.dumps(contents).encode()
+            self._thread.submit(partial(self._write, self._latest))
 
     def close(self) -> None:
         """Finish writing, unless the disk hangs."""
-        self._thread.close(_CLOSE_TIMEOUT_S)
+        if self._thread is not None:
+            self._thread.close(_CLOSE_TIMEOUT_S)
 
     def _write(self, data: bytes) -> None:
         if data is not self._latest:
