@@ -20,7 +20,19 @@ export function setClass(element, name) {
   if (element.className !== name) element.className = name;
 }
 
-// The same for a parent of simple elements: only those with changed text are updated.
+// The result of an action.
+export function say(element, kind, text) {
+  setClass(element, `result ${kind}`.trim());
+  setText(element, text);
+}
+
+// A form that never leaves the page.
+export const form = (attributes, submit, ...children) => make("form", { ...attributes, onsubmit: (event) => {
+  event.preventDefault();
+  submit();
+} }, ...children);
+
+// setText for a parent of simple elements: only those with changed text are updated.
 export function setList(parent, name, texts) {
   while (parent.children.length > texts.length) parent.lastElementChild.remove();
   texts.forEach((text, index) => {

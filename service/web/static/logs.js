@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The telemetry logs: listed and downloaded with the token. A connection to the Pi is short, so a log comes in pieces.
 import { ask, fetchBytes } from "./daemon.js";
-import { byId, make, setClass, setText } from "./dom.js";
+import { byId, form, make, say } from "./dom.js";
 import { currentToken, tokenField } from "./token.js";
 
 const result = make("p", { class: "result", role: "status" });
 const list = make("ul", { class: "logs" });
 
-byId("logs").append(make("form", { class: "row", onsubmit: showLogs }, tokenField(), make("button", {}, "List logs"), result), list);
+byId("logs").append(form({ class: "row" }, showLogs, tokenField(), make("button", {}, "List logs"), result), list);
 
-async function showLogs(event) {
-  event.preventDefault();
+async function showLogs() {
   list.replaceChildren();
   say(result, "", "Reading …");
   try {
@@ -53,8 +52,3 @@ async function download(name, size, tellProgress) {
 }
 
 const sizeText = (bytes) => (bytes < 1e6 ? `${Math.ceil(bytes / 1000)} kB` : `${(bytes / 1e6).toFixed(1)} MB`);
-
-function say(element, kind, text) {
-  setClass(element, `result ${kind}`.trim());
-  setText(element, text);
-}

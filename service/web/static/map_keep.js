@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Switches the map's tiles on and off, and has the Pi keep those of the view for the field.
 import { tell } from "./daemon.js";
-import { byId, make, setText } from "./dom.js";
-import { pressed, say } from "./pi_request.js";
+import { byId, make, say, setText } from "./dom.js";
+import { action } from "./pi_request.js";
 import { currentToken, tokenField } from "./token.js";
 
 const about = make("p"), result = make("p", { class: "result", role: "status" });
@@ -11,24 +11,20 @@ let tiles = null; // of /api/state
 let map = null; // the MapView
 let ended = null; // the result that is shown
 
-const button = (text, work) => {
-  const each = make("button", { type: "button", onclick: () => pressed(each, result, work) }, text);
-  return each;
-};
 const post = (path) => tell(`/api/map${path}`, currentToken());
-const toggle = button("", async () => {
+const toggle = action("", result, async () => {
   await post(`?on=${tiles.on ? 0 : 1}`);
   // Only a newly loaded page may, or may no longer, load pictures from the source. The token comes along.
   location.hash = `token=${encodeURIComponent(currentToken())}`;
   location.reload();
 });
-const keep = button("Keep this area for the field", async () => {
+const keep = action("Keep this area for the field", result, async () => {
   if (map.tileArea === null) throw new Error("The map shows no place yet.");
   ended = null;
   await post(`/keep?${new URLSearchParams(map.tileArea)}`);
 });
-const stop = button("Stop", () => post("/stop").then(() => ""));
-const forget = button("Delete the kept tiles", () => post("/forget").then(() => "Deleted."));
+const stop = action("Stop", result, () => post("/stop").then(() => ""));
+const forget = action("Delete the kept tiles", result, () => post("/forget").then(() => "Deleted."));
 
 progress.append(count, " ", bar);
 byId("map-tiles").append(about, make("div", { class: "row" }, tokenField(), toggle, keep, stop, forget), progress, result);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The Pi itself: opened with the token, because the answers come from its root helper.
-import { byId, make } from "./dom.js";
+import { byId, form, make, say } from "./dom.js";
 import { answersPanel } from "./pi_answers.js";
 import { doctorPanel } from "./pi_doctor.js";
 import { logPanel } from "./pi_log.js";
-import { aftermath, askPi, pressed, say, stepList } from "./pi_request.js";
+import { action, aftermath, askPi, pressed, stepList } from "./pi_request.js";
 import { settingsPanel } from "./pi_settings.js";
 import { updatePanel } from "./pi_update.js";
 import { tokenField } from "./token.js";
@@ -13,10 +13,7 @@ const result = make("p", { class: "result", role: "status" });
 const button = make("button", {}, "Open");
 const panels = make("div", { class: "panels" });
 
-byId("pi").append(make("form", { class: "row", onsubmit: (event) => {
-  event.preventDefault();
-  open();
-} }, tokenField(), button, result), panels);
+byId("pi").append(form({ class: "row" }, open, tokenField(), button, result), panels);
 
 async function open() {
   await pressed(button, result, async () => {
@@ -37,11 +34,8 @@ function summary(pi) {
 function last({ hotspot, hotspot_is_open: isOpen, can_undo: canUndo }) {
   const said = make("p", { class: "result", role: "status" });
   const plan = make("div");
-  const act = (text, request, note) => {
-    const each = make("button", { type: "button", onclick: () => pressed(each, said, async () => aftermath(await askPi(request)) + note) }, text);
-    return each;
-  };
-  const undo = make("button", { type: "button", onclick: () => pressed(undo, said, () => showUndo(plan, said)) }, "Undo the last change …");
+  const act = (text, request, note) => action(text, said, async () => aftermath(await askPi(request)) + note);
+  const undo = action("Undo the last change …", said, () => showUndo(plan, said));
   undo.disabled = !canUndo;
   const note = isOpen ? " This phone must join the Pi's other network." : " Join the hotspot within 3 minutes, or the Pi returns to this network.";
   const hotspots = hotspot === null ? [] : [act(isOpen ? "Close the hotspot" : "Open the hotspot", { action: "hotspot", on: !isOpen }, note)];
@@ -51,11 +45,11 @@ function last({ hotspot, hotspot_is_open: isOpen, can_undo: canUndo }) {
 
 async function showUndo(plan, said) {
   const trial = await askPi({ action: "undo", is_trial: true });
-  const confirm = make("button", { type: "button", onclick: () => pressed(confirm, said, async () => {
+  const confirm = action("Undo this", said, async () => {
     const text = aftermath(await askPi({ action: "undo" }));
     plan.replaceChildren();
     return text;
-  }) }, "Undo this");
+  });
   const kept = trial.kept.map((file) => make("li", {}, `${file} was changed since, and is kept as it is`));
   plan.replaceChildren(stepList(trial.steps), make("ul", {}, ...kept), confirm);
   say(said, "", "");

@@ -1,17 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Setup's questions. The changes are shown first; what is left empty stays as it is.
-import { make } from "./dom.js";
-import { aftermath, askPi, pressed, say, stepList } from "./pi_request.js";
+import { form as makeForm, make, say } from "./dom.js";
+import { action, aftermath, askPi, pressed, stepList } from "./pi_request.js";
 
 export function answersPanel(pi, refresh) {
   const field = (label, name, value, more = {}) => make("label", {}, label, " ", make("input", { name, value, autocomplete: "off", ...more }));
   const result = make("p", { class: "result", role: "status" }), plan = make("div");
   const show = make("button", {}, "Show the changes");
   const key = make("label", { class: "check" }, make("input", { type: "checkbox", name: "new_key" }), pi.has_key ? " Make a new key" : " Require a key for changes: make one");
-  const form = make("form", { onsubmit: (event) => {
-    event.preventDefault();
-    pressed(show, result, () => tryOut(given(form, pi)));
-  } }, make("div", { class: "row" }, field("Flight controller", "fc", pi.fc ?? "auto"), field("Name of this Pi", "name", pi.name, { maxlength: 63 })),
+  const form = makeForm({}, () => pressed(show, result, () => tryOut(given(form, pi))), make("div", { class: "row" }, field("Flight controller", "fc", pi.fc ?? "auto"), field("Name of this Pi", "name", pi.name, { maxlength: 63 })),
   make("div", { class: "row" }, field("Hotspot: name", "hotspot", "", { placeholder: pi.hotspot ?? "none", maxlength: 32 }),
     field("Password, 8 or more", "password", "", { type: "password", minlength: 8, maxlength: 63, autocomplete: "new-password" }), field("Country", "country", pi.country ?? "", { size: 3, maxlength: 2, placeholder: "DE" })),
   key, make("div", { class: "row" }, show, result));
@@ -24,12 +21,12 @@ export function answersPanel(pi, refresh) {
       return "Everything is set up like this already.";
     }
     const network = trial.cuts_network ? [make("p", {}, "The Wi-Fi changes to the hotspot. Join it within 3 minutes: if no device does, the Pi returns to the present network.")] : [];
-    const act = make("button", { type: "button", onclick: () => pressed(act, result, async () => {
+    const act = action("Make these changes", result, async () => {
       const made = await askPi({ action: "answer", ...answers });
       plan.replaceChildren(...(made.key ? [make("p", {}, "The key, for ground stations that may change something: ", make("b", { class: "secret" }, made.key)), make("p", {}, "In Mission Planner: Setup, Advanced, MAVLink Signing, Add. Note it now: it is not shown again.")] : []));
       if (!made.key && !made.cuts_network) await refresh();
       return aftermath(made);
-    }) }, "Make these changes");
+    });
     plan.replaceChildren(stepList(trial.steps), ...warnings, ...network, act);
     say(result, "", "");
     return "";

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Doctor's findings, each with its remedy as a button where the helper can carry it out; and what the wires tell, live.
 import { make, setText } from "./dom.js";
-import { aftermath, askPi, pressed } from "./pi_request.js";
+import { action, aftermath, askPi } from "./pi_request.js";
 import { evidence } from "./state_bar.js";
 
 const KINDS = { ok: "good", note: "soft", problem: "bad" };
@@ -9,7 +9,7 @@ const wires = make("p", { id: "wires" });
 
 export function doctorPanel() {
   const result = make("p", { class: "result", role: "status" }), list = make("ul", { class: "findings" });
-  const button = make("button", { type: "button", onclick: () => pressed(button, result, () => examine(list, result)) }, "Check now");
+  const button = action("Check now", result, () => examine(list, result));
   return make("details", {}, make("summary", {}, "Check"), wires, make("div", { class: "row" }, button, result), list);
 }
 
@@ -35,11 +35,10 @@ function finding({ check, grade, found, remedy, fix }, list, result) {
 }
 
 function fixButton(request, purpose, list, result) {
-  const button = make("button", { type: "button", onclick: () => pressed(button, result, async () => {
+  return action(`Fix it: ${purpose}`, result, async () => {
     const now = request.action === "clock" ? { unix_s: Math.round(Date.now() / 1000) } : {};
     const text = aftermath(await askPi({ ...request, ...now }));
     await examine(list, result);
     return text;
-  }) }, `Fix it: ${purpose}`);
-  return button;
+  });
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Requests about the Pi itself. Each is begun, and its reply fetched when there is one: it may take longer than a connection.
 import { ask, tell } from "./daemon.js";
-import { make, setClass, setText } from "./dom.js";
+import { make, say } from "./dom.js";
 import { currentToken } from "./token.js";
 
 const PAUSE_MS = 300, TIMEOUT_MS = 150000;
@@ -32,9 +32,10 @@ export async function pressed(button, result, work) {
   button.disabled = false;
 }
 
-export function say(element, kind, text) {
-  setClass(element, `result ${kind}`.trim());
-  setText(element, text);
+// Does `work` when it is pressed.
+export function action(text, result, work) {
+  const button = make("button", { type: "button", onclick: () => pressed(button, result, work) }, text);
+  return button;
 }
 
 // What comes after changes were made, as a sentence.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The bridge's settings, with the texts of their table. What is set in a file written by hand can only be changed there.
-import { make } from "./dom.js";
+import { form, make } from "./dom.js";
 import { aftermath, askPi, pressed } from "./pi_request.js";
 
 const PAGE_FILE = "/etc/naze-bridge/page.toml";
@@ -9,18 +9,16 @@ export function settingsPanel({ keys, settings }, refresh) {
   const result = make("p", { class: "result", role: "status" });
   const rows = keys.map((key) => row(key, settings[key.name]));
   const save = make("button", {}, "Save the settings");
-  const form = make("form", { onsubmit: (event) => {
-    event.preventDefault();
-    pressed(save, result, async () => {
-      const changed = rows.filter(({ input, before }) => input.value.trim() !== before);
-      if (!changed.length) return "Nothing was changed.";
-      const values = Object.fromEntries(changed.map(({ name, input, isText }) => [name, asInFile(input.value.trim(), isText)]));
-      const text = aftermath(await askPi({ action: "settings", values }));
-      await refresh();
-      return text;
-    });
-  } }, ...rows.map(({ element }) => element), make("div", { class: "row" }, save, result));
-  return make("details", {}, make("summary", {}, "Settings of the bridge"), make("p", {}, "Empty: the default. The bridge takes them over at once, or restarts."), form);
+  const write = async () => {
+    const changed = rows.filter(({ input, before }) => input.value.trim() !== before);
+    if (!changed.length) return "Nothing was changed.";
+    const values = Object.fromEntries(changed.map(({ name, input, isText }) => [name, asInFile(input.value.trim(), isText)]));
+    const text = aftermath(await askPi({ action: "settings", values }));
+    await refresh();
+    return text;
+  };
+  const all = form({}, () => pressed(save, result, write), ...rows.map(({ element }) => element), make("div", { class: "row" }, save, result));
+  return make("details", {}, make("summary", {}, "Settings of the bridge"), make("p", {}, "Empty: the default. The bridge takes them over at once, or restarts."), all);
 }
 
 function row({ name, meaning, default: preset, example }, given) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // An update from a file. A connection to the Pi is short, so the package is sent in pieces.
 import { tell } from "./daemon.js";
-import { make } from "./dom.js";
-import { askPi, pressed, say } from "./pi_request.js";
+import { form, make, say } from "./dom.js";
+import { action, askPi, pressed } from "./pi_request.js";
 import { currentToken } from "./token.js";
 
 const PIECE = 256 * 1024, MOST_BYTES = 128 * 1024 * 1024;
@@ -13,15 +13,10 @@ export function updatePanel({ version, previous }) {
   const bar = make("progress", { hidden: "", "aria-label": "Package sent" });
   const file = make("input", { type: "file", accept: ".deb" });
   const send = make("button", {}, "Install");
-  const form = make("form", { class: "row", onsubmit: (event) => {
-    event.preventDefault();
-    pressed(send, result, () => install(file.files[0], bar, result));
-  } }, make("label", {}, "Package (.deb) ", file), send, bar, result);
-  const back = make("button", { type: "button", onclick: () => pressed(back, result, async () => {
-    await askPi({ action: "downgrade" });
-    return LATER;
-  }) }, `Back to version ${previous}`);
-  return make("details", {}, make("summary", {}, "Update"), make("p", {}, `This is version ${version}. A version that does not run is replaced by this one again.`), form, ...(previous ? [back] : []));
+  const update = form({ class: "row" }, () => pressed(send, result, () => install(file.files[0], bar, result)),
+    make("label", {}, "Package (.deb) ", file), send, bar, result);
+  const back = action(`Back to version ${previous}`, result, () => askPi({ action: "downgrade" }).then(() => LATER));
+  return make("details", {}, make("summary", {}, "Update"), make("p", {}, `This is version ${version}. A version that does not run is replaced by this one again.`), update, ...(previous ? [back] : []));
 }
 
 async function install(file, bar, result) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The form that writes a mission or settings: token, button, and next to it the result of this press, never of another write.
-import { make, setClass, setText } from "./dom.js";
+import { form as makeForm, make, say, setText } from "./dom.js";
 import { currentToken, tokenField } from "./token.js";
 
 const forms = new Set();
@@ -12,10 +12,7 @@ export function writeForm(label, start) {
   const result = make("p", { class: "result", role: "status" }), hint = make("p", { class: "why" });
   const bar = make("progress", { hidden: "", "aria-label": "Records written" });
   const form = { id: null, begunAt: 0, button, hint, result, bar, element: null };
-  form.element = make("form", { class: "row", onsubmit: (event) => {
-    event.preventDefault();
-    press(form, start);
-  } }, tokenField(), button, hint, bar, result);
+  form.element = makeForm({ class: "row" }, () => press(form, start), tokenField(), button, hint, bar, result);
   forms.add(form);
   block(form);
   return form.element;
@@ -23,14 +20,14 @@ export function writeForm(label, start) {
 
 async function press(form, start) {
   form.id = null;
-  say(form, "", "Sending …");
+  say(form.result, "", "Sending …");
   form.button.disabled = true;
   try {
     form.id = (await start(currentToken())).id;
     form.begunAt = performance.now();
-    say(form, "", "Writing …");
+    say(form.result, "", "Writing …");
   } catch (error) {
-    say(form, "bad", error.message);
+    say(form.result, "bad", error.message);
     block(form);
   }
 }
@@ -49,22 +46,17 @@ function follow(form, { write, transfer }) {
   const isOurs = write?.id === form.id;
   if (isOurs && !write.done) {
     if (transfer) Object.assign(form.bar, { hidden: false, max: transfer.total, value: write.records });
-    say(form, "", write.text || `${write.records} ${write.unit} written …`);
+    say(form.result, "", write.text || `${write.records} ${write.unit} written …`);
     return;
   }
   form.id = null;
   form.bar.hidden = true;
-  if (isOurs) say(form, write.ok ? "good" : "bad", write.text);
-  else say(form, "bad", "The result of this write is no longer known here. The stored missions and settings show it.");
+  if (isOurs) say(form.result, write.ok ? "good" : "bad", write.text);
+  else say(form.result, "bad", "The result of this write is no longer known here. The stored missions and settings show it.");
   block(form);
 }
 
 function block(form) {
   form.button.disabled = armed === true;
   setText(form.hint, armed === true ? "Armed: disarm to write." : "");
-}
-
-function say(form, kind, text) {
-  setClass(form.result, `result ${kind}`.trim());
-  setText(form.result, text);
 }
