@@ -11,7 +11,7 @@ import sqlite3
 import stat
 import struct
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager
 from datetime import UTC, datetime
 from importlib import resources
@@ -113,6 +113,14 @@ def transaction(connection: sqlite3.Connection, failure: str) -> Iterator[None]:
             if connection.in_transaction:  # SQLite itself has rolled back after some errors
                 connection.execute("ROLLBACK")
             raise
+
+
+def insert(connection: sqlite3.Connection, table: str, row: Mapping[str, object]) -> int:
+    """Insert a row, by column; returns its number."""
+    marks = ", ".join("?" * len(row))
+    cursor = connection.execute(f"INSERT INTO {table} ({', '.join(row)}) VALUES ({marks})", (*row.values(),))  # noqa: S608 - constants
+    assert cursor.lastrowid is not None  # an INSERT that did not raise has made a row
+    return cursor.lastrowid
 
 
 def row_crc32(*values: object) -> int:

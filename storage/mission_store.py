@@ -13,6 +13,7 @@ from storage.database import (
     CONTENTS,
     SUMMARY,
     contents_crc32,
+    insert,
     memory_database,
     open_database,
     read_database,
@@ -124,38 +125,26 @@ class MissionStore:
         sender: the ground station that counts the items as in this list, see item_numbers().
         A full store drops others first: rejected and cancelled ones before the rest, verified ones last.
         """
-        contents = (
-            json.dumps(received.items),
-            json.dumps(received.findings),
-            json.dumps(received.stored_items),
-            json.dumps(received.roi_commands),
-            received.records,
-            json.dumps(received.sent_seqs),
-        )
+        values = {name: getattr(received, name) for name in CONTENTS}
+        contents = {name: each if isinstance(each, bytes) else json.dumps(each) for name, each in values.items()}
+        line = {
+            "received_at": received.received_at,
+            "source": _text(received.source),
+            "verdict": _text(received.verdict),
+            "ack": _text(received.ack),
+            "item_count": len(received.items),
+            "finding_count": sum(finding.get("news") != "none" for finding in received.findings),
+            "record_count": received.record_count,
+            "checksum": received.checksum,
+            "outcome": PENDING,
+            "sender": _text(sender),
+            "detail": "",
+        }
         with self._transaction("cannot store the mission"):
             self._make_room()
-            number = self._connection.execute(
-                "INSERT INTO missions (received_at, source, verdict, ack, item_count, finding_count,"
-                " record_count, checksum, outcome, sender, detail) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, '')",
-                (
-                    received.received_at,
-                    _text(received.source),
-                    _text(received.verdict),
-                    _text(received.ack),
-                    len(received.items),
-                    sum(finding.get("news") != "none" for finding in received.findings),
-                    received.record_count,
-                    received.checksum,
-                    PENDING,
-                    _text(sender),
-                ),
-            ).lastrowid
-            assert number is not None  # an INSERT that did not raise has made a row
-            self._connection.execute(
-                "INSERT INTO mission_contents (number, items, findings, stored_items, roi_commands, records,"
-                " sent_seqs, crc32) VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
-                (number, *contents, contents_crc32(contents)),
-            )
+            number = insert(self._connection, "missions", line)
+            crc32 = contents_crc32(contents.values())
+            insert(self._connection, "mission_contents", {"number": number, **contents, "crc32": crc32})
             self._seal(number)
         return number
 

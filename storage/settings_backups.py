@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from storage.database import BACKUP, row_crc32, transaction
+from storage.database import BACKUP, insert, row_crc32, transaction
 from storage.store_error import StoreError, explained
 
 #: The newest ones are kept. 500 settings are 15 kB.
@@ -61,21 +61,17 @@ class SettingsBackups:
         if last is not None and changed == 0:
             return last.line.number
         with transaction(self._connection, f"cannot store the settings in {self._path}"):
-            row = (
-                board,
-                kind,
-                taken_at,
-                occasion,
-                len(values),
-                changed,
-                json.dumps(dict(values)),
-            )
-            number = self._connection.execute(
-                "INSERT INTO settings_backups (board, kind, taken_at, occasion, setting_count, changed_count, contents,"
-                " crc32) VALUES (?, ?, ?, ?, ?, ?, ?, 0)",
-                row,
-            ).lastrowid
-            assert number is not None  # an INSERT that did not raise has made a row
+            row = {
+                "board": board,
+                "kind": kind,
+                "taken_at": taken_at,
+                "occasion": occasion,
+                "setting_count": len(values),
+                "changed_count": changed,
+                "contents": json.dumps(dict(values)),
+                "crc32": 0,
+            }
+            number = insert(self._connection, "settings_backups", row)
             self._connection.execute(
                 f"UPDATE settings_backups SET crc32 = row_crc32({BACKUP}) WHERE number = ?",  # noqa: S608 - a constant
                 (number,),
@@ -103,19 +99,11 @@ class SettingsBackups:
 
     def newest(self) -> int | None:
         """The number of the last backup of any board; None if there is none."""
-        with explained(f"cannot list the settings' backups in {self._path}"):
-            number: int | None = self._connection.execute("SELECT max(number) FROM settings_backups").fetchone()[0]
-        return number
+        return self._newest("TRUE")
 
     def before(self, backup: BackupLine) -> int | None:
         """The number of the same board's backup before this one; None if there is none."""
-        with explained(f"cannot list the settings' backups in {self._path}"):
-            row = self._connection.execute(
-                "SELECT max(number) FROM settings_backups WHERE board = ? AND kind = ? AND number < ?",
-                (backup.board, backup.kind, backup.number),
-            ).fetchone()
-        number: int | None = row[0]
-        return number
+        return self._newest("board = ? AND kind = ? AND number < ?", backup.board, backup.kind, backup.number)
 
     def list(self, limit: int) -> builtins.list[BackupLine]:
         """The `limit` newest backups of all boards, newest first.
@@ -136,14 +124,17 @@ class SettingsBackups:
 
     def _last(self, board: str, kind: str) -> SettingsBackup | None:
         """The board's last backup; None also if it is damaged: then the next one is stored whole."""
-        with explained(f"cannot list the settings' backups in {self._path}"):
-            row = self._connection.execute(
-                "SELECT max(number) FROM settings_backups WHERE board = ? AND kind = ?", (board, kind)
-            ).fetchone()
+        number = self._newest("board = ? AND kind = ?", board, kind)
         try:
-            return None if row[0] is None else self.get(row[0])
+            return None if number is None else self.get(number)
         except StoreError:
             return None
+
+    def _newest(self, condition: str, *values: object) -> int | None:
+        with explained(f"cannot list the settings' backups in {self._path}"):
+            question = f"SELECT max(number) FROM settings_backups WHERE {condition}"  # noqa: S608 - constants
+            number: int | None = self._connection.execute(question, values).fetchone()[0]
+        return number
 
 
 def _changed_count(before: SettingValues, after: SettingValues) -> int:
