@@ -39,7 +39,6 @@ class GcsConnections:
         self.add(open_link(address, self))
 
     def warn(self, address: GcsAddress) -> None:
-        """Log that anyone may write over a link."""
         _log.warning("gcs.open", link=str(address), what=_WHO_MAY_WRITE)
 
     def add(self, link: GcsLink) -> None:

@@ -10,7 +10,7 @@ from bridge.bridge import Bridge
 from bridge.sharing.program import Program
 from service.links.gcs_links import LinkError
 from service.settings.addresses import family_of
-from service.settings.share import ShareSettings
+from service.settings.settings import ShareSettings
 from storage.os_error import reason
 
 #: A program that does not read its replies is disconnected.

@@ -30,7 +30,6 @@ class Process:
 
     @property
     def name(self) -> str:
-        """The program's name without its folder."""
         return os.path.basename(self.arguments[0]) if self.arguments else ""
 
     @property
@@ -64,7 +63,6 @@ class Host:
             return ""
 
     def names(self, folder: str, pattern: str = "*") -> list[str]:
-        """The names in a folder, sorted."""
         return sorted(path.name for path in self.path(folder).glob(pattern))
 
     def processes(self) -> Iterator[Process]:

@@ -133,7 +133,6 @@ def warn_once(known: set[str], event: str, /, **facts: object) -> None:
 
 
 def set_log_level(level: str) -> None:
-    """Show events from this level on: debug, info, warning or error."""
     _least_level.level = level
 
 

@@ -65,7 +65,6 @@ class TlogFolder:
 
     @property
     def is_full(self) -> bool:
-        """True if the open file has reached its maximum size."""
         return self._file is not None and self._file.tell() >= self._limits.file_size
 
     def describe(self) -> str:

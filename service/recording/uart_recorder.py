@@ -33,7 +33,6 @@ class UartRecorder:
         self._put(capture_header(started))
 
     def note(self, action: UartAction, speed: int | None, data: bytes = b"", text: str = "") -> None:
-        """Record an event with the current time."""
         if not self._over_because:
             self._put(capture_line(UartEvent(time.monotonic() - self._began_at, speed, action, data, text)))
 

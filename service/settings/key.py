@@ -77,7 +77,6 @@ class Key:
 
     @property
     def variable(self) -> str:
-        """The name of its environment variable."""
         return ENVIRONMENT_PREFIX + self.name.upper().replace(".", "_")
 
 
@@ -117,8 +116,6 @@ def file_name(*, in_config_folder: bool = False) -> Reader:
 
 
 def whole(least: int, most: int) -> Reader:
-    """A whole number from `least` to `most`."""
-
     def read(value: object, _folder: Path) -> object:
         if type(value) is not int:
             raise _wrong(value, f"a whole number, {least}..{most}")
@@ -133,8 +130,6 @@ def whole(least: int, most: int) -> Reader:
 
 
 def yes_no() -> Reader:
-    """True or false."""
-
     def read(value: object, _folder: Path) -> object:
         if type(value) is not bool:
             raise _wrong(value, "true or false")

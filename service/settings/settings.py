@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The settings of a daemon: every key of the configuration file but those of its tables."""
+"""The settings of a daemon: every key of the configuration file but those of [zenoh] and [web]."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -8,14 +8,33 @@ from pathlib import Path
 from typing import Annotated
 
 from bridge.config import BridgeSettings
-from service.settings.addresses import AutoFc, FcAddress, GcsAddress, parse_fc
+from service.settings.addresses import AddressError, AutoFc, FcAddress, GcsAddress, parse_fc, parse_table
 from service.settings.key import LIVE, Default, Example, file_name, several, text
-from service.settings.share import ShareSettings, parse_share
 from service.settings.web import WebSettings
 from service.settings.write_access import WriteAccess, parse_link
 from service.settings.zenoh import ZenohSettings
 
 DEFAULT_GCS = "udpin:0.0.0.0:14550"
+_SHARE_KINDS = ("tcpin", "udpin")
+
+
+@dataclass(frozen=True, slots=True)
+class ShareSettings:
+    """`address`: tcpin or udpin. `write`: also forward requests that change something."""
+
+    address: GcsAddress
+    write: bool = False
+
+
+def parse_share(entry: object, _folder: Path) -> ShareSettings:
+    """Read one entry of `share`, or one [[share]] table; AddressError explains problems."""
+    address, table = parse_table(entry, "share", "tcpin:127.0.0.1:5761", ["write"])
+    if address.kind not in _SHARE_KINDS:
+        raise AddressError(f"share {address}: programs connect to it, so write tcpin:ADDR:PORT or udpin:ADDR:PORT")
+    write = table.get("write", False)
+    if not isinstance(write, bool):
+        raise AddressError(f"share {address}: write is {write!r}, but must be true or false")
+    return ShareSettings(address, write)
 
 
 class LogLevel(StrEnum):

@@ -5,12 +5,64 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
+from urllib.parse import urlsplit
 
-from service.settings.addresses import host_port, parse_host_port
+from service.settings.addresses import AddressError, host_port, parse_host_port
 from service.settings.key import Example, Unfit, file_name, several, text
-from service.settings.tile_source import TileSource, parse_tile_source
 
 _FORMS = 'write "0.0.0.0:8080" for the whole network, "127.0.0.1:8080" for this machine only'
+#: Its policy permits browsing and forbids saving areas for later: https://operations.osmfoundation.org/policies/tiles/
+_VIEW_ONLY = "openstreetmap.org"
+_PARTS = ("{z}", "{x}", "{y}")
+_HOST = re.compile(r"[A-Za-z0-9-]+(\.[A-Za-z0-9-]+)*(:(?P<port>[0-9]{1,5}))?")
+#: Of what follows the host.
+_TARGET = re.compile(r"/[A-Za-z0-9/._~!$&()*+,;=:@%?{}-]*")
+_TILE_FORMS = 'write an address like "https://tiles.example.org/{z}/{x}/{y}.png"'
+
+
+@dataclass(frozen=True, slots=True)
+class TileSource:
+    """A server of map tiles. `template`: a tile's address with {z}, {x} and {y}, as map programs write it.
+
+    `origin`: its scheme and host; `target`: the rest.
+    """
+
+    template: str = "https://tile.openstreetmap.org/{z}/{x}/{y}.png"
+
+    def __str__(self) -> str:
+        return self.template
+
+    @property
+    def host(self) -> str:
+        return urlsplit(self.template).netloc
+
+    @property
+    def origin(self) -> str:
+        return self.template.partition(self.host)[0] + self.host
+
+    @property
+    def is_openstreetmap(self) -> bool:
+        """True if it is OpenStreetMap's own server: the Pi must keep nothing of it."""
+        return f".{self.host.partition(':')[0].lower()}".endswith(f".{_VIEW_ONLY}")
+
+    def target(self, zoom: int, x: int, y: int) -> str:
+        """The address of a tile, without the origin."""
+        text = self.template.removeprefix(self.origin)
+        for part, value in zip(_PARTS, (zoom, x, y), strict=True):
+            text = text.replace(part, str(value))
+        return text
+
+
+def parse_tile_source(given: str) -> TileSource:
+    """Read the address; AddressError gives the reason."""
+    scheme, _, rest = given.partition("://")
+    host, slash, target = rest.partition("/")
+    server = _HOST.fullmatch(host)
+    is_address = scheme in ("http", "https") and server and int(server["port"] or 0) < 1 << 16
+    braces = sorted(re.findall(r"{.*?}|[{}]", target))
+    if not is_address or not _TARGET.fullmatch(slash + target) or braces != sorted(_PARTS):
+        raise AddressError(f"{given[:200]!r} is not an address of map tiles: {_TILE_FORMS}")
+    return TileSource(given)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +113,7 @@ class WebSettings:
         text('"https://HOST/{z}/{x}/{y}.png"', parse_tile_source),
         "Server of the map's tiles. They are off until you switch them on in the page; of OpenStreetMap's server the Pi"
         " keeps none.",
-    ] = TileSource()  # noqa: RUF009  # frozen
+    ] = TileSource()  # frozen
     map_credit: Annotated[
         str | None,
         text(),

@@ -30,14 +30,12 @@ from service.settings.web import WebSettings
 from service.web.access import MAX_FILE, check_token, refusing, route
 from service.web.connect_help import connect_help, page_urls, qr_code
 from service.web.firmware_upload import FirmwareUpload
-from service.web.flown_track import FlownTrack
-from service.web.link_history import INTERVAL_S, LinkHistory
+from service.web.histories import INTERVAL_S, FlownTrack, LinkHistory
 from service.web.map_tiles import MapTiles
 from service.web.metrics import CONTENT_TYPE, Metrics
 from service.web.mission_files import MissionFiles, MissionWriter
 from service.web.pi_control import PiControl
-from service.web.replies import begun, json_reply, path_number, text_reply, whole
-from service.web.response_cache import ResponseCache
+from service.web.replies import ResponseCache, begun, json_reply, path_number, text_reply, whole
 from service.web.settings_history import SettingsHistory
 from storage.store_error import StoreError
 
@@ -183,7 +181,6 @@ class Api:
         return text_reply(await self._cache.get(str(number), make))
 
     async def _difference(self, request: Request) -> Response:
-        """Two missions as sent."""
         number, other = path_number(request, "number"), path_number(request, "other")
 
         async def make() -> tuple[str, bool]:

@@ -40,7 +40,7 @@ class MapTiles:
         self._daemon = daemon
         self._source = settings.map_tiles
         self._credit = settings.map_credit
-        self._file = StateFile(state_dir / _FILE, "the map has no tiles until they are switched on again")
+        self._file = StateFile(state_dir, _FILE, "the map has no tiles until they are switched on again")
         self._store = TileStore(state_dir / _FOLDER, self._source)
         self._keeping = TileKeeping(daemon, self._store, self._source, self._count)
         self._is_on, self._tiles, self._bytes = self._file.load(_read_file) or (False, 0, 0)

@@ -104,7 +104,6 @@ class MissionFiles:
 
 
 async def received(request: Request) -> tuple[str, bytes]:
-    """The file's name and contents."""
     name = request.query_params.get("name", "")[-_MAX_NAME:] or "mission file"
     return name, await received_body(request)
 

@@ -14,8 +14,7 @@ from service.daemon.client import ControlError
 from service.daemon.settings_api import SettingsApi
 from service.web.access import check_token, route
 from service.web.mission_files import MissionWriter, Progress
-from service.web.replies import begun, json_reply, path_number, text_reply
-from service.web.response_cache import ResponseCache
+from service.web.replies import ResponseCache, begun, json_reply, path_number, text_reply
 
 _LISTED = 50
 
@@ -55,7 +54,6 @@ class SettingsHistory:
         return text_reply(await self._cache.get(question, make))
 
     async def _file(self, request: Request) -> Response:
-        """A backup as a .param file."""
         backup = await self._find(request)
         name = f"settings-{backup['number']}.param"
         text = write_param_file(by_parameter(backup["values"]), backup["kind"])

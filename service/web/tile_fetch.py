@@ -21,7 +21,7 @@ from pathlib import Path
 from queue import SimpleQueue
 from threading import Lock
 
-from service.web.tile_cache import MAX_TILE, CacheFullError, TileCache, image_type
+from service.web.tile_store import MAX_TILE, CacheFullError, TileCache, image_type
 from storage.os_error import reason
 
 #: Without a byte. The daemon ends this program if no tile is completed for longer.
@@ -166,7 +166,6 @@ class TileFetch:
 
 
 def lifetime_s(headers: Message) -> float:
-    """The time for which a response may be kept."""
     for word in headers.get("Cache-Control", "").replace(" ", "").split(","):
         name, _, value = word.partition("=")
         if name.lower() == "max-age" and value.isdecimal():

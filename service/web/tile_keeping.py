@@ -15,7 +15,7 @@ import structlog
 from payloads.mission_data import Json, to_json
 from service.daemon.daemon import Daemon
 from service.machine.package import address, version
-from service.settings.tile_source import TileSource
+from service.settings.web import TileSource
 from service.web.tile_area import TileArea
 from service.web.tile_fetch import FetchProgress, FetchRequest
 from service.web.tile_store import TileStore

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tiles kept on the Pi, as the page reads them. Every method may raise OSError, also if the disk hangs."""
+"""The tiles kept on the Pi, as the page reads them and as the program that fetches them writes them."""
 
 import hashlib
+import os
 import shutil
 from collections.abc import Iterable
 from functools import partial
@@ -9,19 +10,71 @@ from pathlib import Path
 
 from payloads.mission_data import Json
 from service.machine.threads import BackgroundThread
-from service.settings.tile_source import TileSource
+from service.settings.web import TileSource
 from service.web.tile_area import Place
-from service.web.tile_cache import MAX_TILE, image_type
 from storage.bounded_file import read_bounded
 
 #: A tile of so much coarser a level is only a blur.
 _COARSER = 5
 #: The page itself waits for 8 s.
 _TIMEOUT_S = 5.0
+MAX_TILE = 1 << 20
+
+
+class CacheFullError(Exception):
+    """There is no room for another tile; one sentence."""
+
+
+def image_type(data: bytes) -> str | None:
+    """The media type of a tile's image; None if it is none."""
+    if data.startswith(b"\x89PNG\r\n\x1a\n"):
+        return "image/png"
+    if data.startswith(b"\xff\xd8\xff"):
+        return "image/jpeg"
+    return "image/webp" if data.startswith(b"RIFF") and data[8:12] == b"WEBP" else None
+
+
+class TileCache:
+    """The files of a folder. A file's modification time is the time at which its tile expires.
+
+    `most_bytes`: of all files; for new ones those that expire first are deleted, but none of `wanted`.
+    """
+
+    def __init__(self, folder: Path, most_bytes: int, wanted: set[Path]) -> None:
+        self._most_bytes = most_bytes
+        files = [(path, path.stat()) for path in folder.rglob("*") if path.is_file()]
+        self.tiles, self.bytes = len(files), sum(status.st_size for _, status in files)
+        files.sort(key=lambda file: file[1].st_mtime)
+        self._spare = iter([(path, status.st_size) for path, status in files if path not in wanted])
+
+    def is_fresh(self, path: Path, now: float) -> bool:
+        return path.exists() and path.stat().st_mtime > now
+
+    def keep(self, path: Path, data: bytes, expires: float) -> None:
+        """Write a file; CacheFullError."""
+        before = path.stat().st_size if path.exists() else None
+        added = len(data) - (before or 0)
+        while self.bytes + added > self._most_bytes:
+            self._delete_one()
+        path.parent.mkdir(parents=True, exist_ok=True)
+        new = path.with_suffix(".new")
+        new.write_bytes(data)
+        os.utime(new, (expires, expires))
+        new.replace(path)
+        self.tiles += before is None
+        self.bytes += added
+
+    def _delete_one(self) -> None:
+        path, size = next(self._spare, (None, 0))
+        if path is None:
+            raise CacheFullError(f"The {self._most_bytes >> 20} MB for map tiles are full.")
+        path.unlink()
+        self.tiles -= 1
+        self.bytes -= size
 
 
 class TileStore:
-    """The tiles of one source. `folder`: of all sources."""
+    """The tiles of one source. `folder`: of all sources. Every method may raise OSError, also if the disk hangs."""
 
     def __init__(self, folder: Path, source: TileSource) -> None:
         self.folder = folder

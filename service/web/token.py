@@ -56,7 +56,6 @@ def _read(path: Path) -> bytes | None:
 
 
 def new_token() -> str:
-    """A random token."""
     return "".join(secrets.choice(_ALPHABET) for _ in range(_LENGTH))
 
 

@@ -11,9 +11,8 @@ from pathlib import Path
 from payloads.mission_data import Json
 from service.cli.doctor.checked import Checked, Grade
 from service.cli.doctor.flight_controller import check_flight_controller
-from service.cli.doctor.keys import check_keys
-from service.cli.doctor.machine import check_clock, check_database, check_disk, check_versions
-from service.cli.doctor.network import check_ports, check_wifi
+from service.cli.doctor.machine import check_clock, check_database, check_disk, check_power, check_versions
+from service.cli.doctor.network import check_keys, check_ports, check_wifi
 from service.cli.doctor.port import (
     check_candidates,
     check_console,
@@ -24,7 +23,6 @@ from service.cli.doctor.port import (
     check_port,
     holder_of_port,
 )
-from service.cli.doctor.power import check_power
 from service.cli.doctor.running import check_daemons, check_running
 from service.cli.doctor.zenoh import check_zenoh
 from service.daemon.client import ControlError

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Checks of the machine: its clock, disk, stored missions and software versions."""
+"""Checks of the machine: its clock, power supply, disk, stored missions and software versions."""
 
 import os
 import platform
 import shutil
 import sqlite3
+import subprocess
 from collections.abc import Callable
 from contextlib import closing
 from datetime import UTC, datetime
@@ -27,6 +28,11 @@ _TIME_PROGRAMS = ("chronyd", "ntpd", "gpsd")
 EPOCH = datetime(2026, 1, 1, tzinfo=UTC)
 _LEAST_FREE = 64 << 20
 _LIBRARIES = ("pymavlink", "pyserial", "eclipse-zenoh")
+_HWMON = "/sys/class/hwmon"
+_THROTTLED = ("vcgencmd", "get_throttled")
+#: Of its reply: undervoltage now, and since the start.
+_NOW, _SINCE_START = 1 << 0, 1 << 16
+_BETTER_SUPPLY = "use the Pi's own supply or a BEC of 5.1 V and 3 A, with short, thick wires"
 
 
 def check_versions(host: Host) -> Checked:
@@ -62,7 +68,6 @@ def check_clock(host: Host, now: datetime) -> Checked:
 
 
 def check_disk(state_dir: Path, free_of: Callable[[Path], int] = lambda path: shutil.disk_usage(path).free) -> Checked:
-    """Check the space for missions and logs."""
     folder = state_dir
     try:
         while not folder.exists():
@@ -86,7 +91,6 @@ def check_disk(state_dir: Path, free_of: Callable[[Path], int] = lambda path: sh
 
 
 def check_database(state_dir: Path) -> list[Checked]:
-    """Check the integrity of the stored missions."""
     path = state_dir / DATABASE_NAME
     found = []
     try:
@@ -119,3 +123,37 @@ def _look_into(path: Path) -> Checked:
         return ok("missions", f"{count} stored in {path}, intact")
     remedy = "restart the bridge: it sets the file aside and begins a new one (sudo systemctl restart naze-bridge)"
     return problem("missions", f"{path} is damaged: {finding}", remedy, restart_service)
+
+
+def _ask_firmware() -> str:
+    try:
+        done = subprocess.run(_THROTTLED, capture_output=True, text=True, check=False, timeout=5)  # noqa: S603  # our own words
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+    return done.stdout
+
+
+def check_power(host: Host, ask_firmware: Callable[[], str] = _ask_firmware) -> Checked | None:
+    """Check for undervoltage: below 4.63 V a Pi slows down, loses USB devices and damages its card.
+
+    None on a machine that does not measure it.
+    """
+    alarm = next((alarm for name in host.names(_HWMON) if (alarm := _alarm(host, name)) is not None), None)
+    try:
+        flags = int(ask_firmware().strip().removeprefix("throttled="), 16)
+    except ValueError:
+        flags = None  # not a Pi, or no permission
+    if alarm or (flags is not None and flags & _NOW):
+        return problem("power", "the supply's voltage is too low", _BETTER_SUPPLY)
+    if flags is not None and flags & _SINCE_START:
+        return note("power", "the supply's voltage was too low since the start", _BETTER_SUPPLY)
+    if flags is not None:
+        return ok("power", "no undervoltage since the start")
+    return None if alarm is None else ok("power", "no undervoltage")
+
+
+def _alarm(host: Host, name: str) -> bool | None:
+    """The kernel's undervoltage alarm; None if this is another sensor."""
+    if host.read(f"{_HWMON}/{name}/name").strip() != "rpi_volt":
+        return None
+    return host.read(f"{_HWMON}/{name}/in0_lcrit_alarm").strip() == "1"

@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Checks of the network: the bridge's address for ground stations, and its free ports."""
+"""Checks of the network: the bridge's address for ground stations, its free ports, and the keys of its links."""
 
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from service.cli.doctor.checked import Checked, note, ok, problem
 from service.cli.doctor.fixes import reboot, stop_programs, unblock_wifi
 from service.machine.host import Host
 from service.machine.package import page
 from service.settings.addresses import GcsAddress
+from service.settings.passphrase import STRONGER
+from service.settings.write_access import WriteAccess
 
 #: The state of listening sockets in /proc/net/tcp.
 _LISTENS = "0A"
@@ -77,3 +79,12 @@ def _inode(host: Host, transport: str, port: int) -> str | None:
             if taken and int(taken[1], 16) == port and (transport == "udp" or words[3] == _LISTENS):
                 return words[9]
     return None
+
+
+def check_keys(access_by_link: Mapping[str, WriteAccess]) -> Iterator[Checked]:
+    """Check that the links' keys, if they have any, cannot be guessed."""
+    for link, access in access_by_link.items():
+        if access.weak_key is not None:
+            yield note("key", f"{link}: {access.weak_key}", STRONGER)
+        elif access.key is not None:
+            yield ok("key", f"required for changes on {link}")

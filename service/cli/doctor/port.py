@@ -125,7 +125,6 @@ def check_console(host: Host, fc: FcAddress) -> Checked | None:
 
 
 def check_holder(host: Host, fc: FcAddress) -> Checked | None:
-    """Check that no other program has the port open."""
     device = _device(host, fc)
     if device is None:
         return None

@@ -15,7 +15,7 @@ from service.daemon.api import DaemonApi
 from service.daemon.daemon import Daemon
 from service.settings import Settings
 from service.settings.addresses import SimulatedFc, parse_gcs
-from service.settings.share import ShareSettings, parse_share
+from service.settings.settings import ShareSettings, parse_share
 from simulator.board.options import Faults
 from simulator.naze.board import SimulatedNaze
 from terminal.mission_source import load_mission

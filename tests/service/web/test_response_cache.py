@@ -3,7 +3,7 @@
 
 import asyncio
 
-from service.web.response_cache import ResponseCache
+from service.web.replies import ResponseCache
 
 
 class _Maker:

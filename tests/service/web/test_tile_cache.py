@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from service.web.tile_cache import CacheFullError, TileCache, image_type
+from service.web.tile_store import CacheFullError, TileCache, image_type
 
 
 def names(folder: Path) -> set[str]:

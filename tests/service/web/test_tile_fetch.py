@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from service.web import tile_fetch
-from service.web.tile_cache import MAX_TILE
 from service.web.tile_fetch import FetchRequest, TileFetch, lifetime_s
+from service.web.tile_store import MAX_TILE
 from tests.support.tile_server import TileServer, plain, tile_server
 
 
