@@ -381,6 +381,10 @@ class Ground:
             if not is_refusal or station.texts.is_new(text, station.heard_at):
                 self._say(severity, text, [station])
 
+    def say_among(self, stations: Iterable[GroundStation], severity: Severity, text: str) -> None:
+        """Show a text on these ground stations."""
+        self._say(severity, text, [reader for reader in stations if not reader.is_listener])
+
     def say_to_others(self, severity: Severity, text: str, station: Station) -> None:
         """Show a text on all ground stations but one."""
         self._say(severity, text, [reader for reader in self._readers_of_texts() if reader.peer != station.peer])

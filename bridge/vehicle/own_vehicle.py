@@ -17,6 +17,7 @@ from bridge.gcs.ground_station import GroundStation
 from bridge.gcs.message_rates import fastest_s, share_out, take_due
 from bridge.gcs.station import Peer, Severity, Station
 from bridge.missions.mission_service import MissionService
+from bridge.model.airframe import Airframe
 from bridge.model.flight_memory import Home
 from bridge.model.flight_mode import FlightMode
 from bridge.model.mission_progress import FlightReport, FlownMission, MissionProgress
@@ -24,12 +25,14 @@ from bridge.model.vehicle import STALE_S, FlightState, Health, MissionLeg, Mode,
 from bridge.vehicle import vehicle_messages as make
 from bridge.vehicle.arming_reasons import ArmingReasons
 from bridge.vehicle.link_announcer import LinkAnnouncer
+from bridge.vehicle.nav_words import NavWords, severity_of
 from bridge.vehicle.telemetry_table import NO_STREAM, TELEMETRY, Row
 from bridge.vehicle.vehicle_messages import Moment
 from protocols.mavlink.codec import pack
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.mode_messages import AVAILABLE_MODES
 from protocols.msp.commands import Msp
+from protocols.msp.nav import NavStatus
 from reports.vehicle_groups import Progress
 from reports.verdict import SentSeqs
 
@@ -88,6 +91,7 @@ class OwnVehicle:
         self._announced: tuple[bool | None, FlightMode | str | None, bool, bool] | None = None
         #: The ground stations whose waypoint was set since the last report of the board.
         self._asked_current: list[Station] = []
+        self._nav_words = NavWords()
         #: The last reason for the stop of a mission flight.
         self._said_why = ""
 
@@ -331,6 +335,8 @@ class OwnVehicle:
             if self._said_why:
                 is_flown = leg.report.progress is Progress.COMPLETE
                 self._ground.say(Severity.NOTICE if is_flown else Severity.WARNING, self._said_why)
+        if isinstance(leg.report, NavStatus):
+            self._say_nav_words(leg.report, now)
         if self._missions.on_board is None:
             # Until the list is read, no record has an item.
             return
@@ -346,6 +352,18 @@ class OwnVehicle:
             for sent_seqs, stations in self._by_item_numbers(everyone):
                 number = (sent_seqs[seq] or 0) if sent_seqs else seq
                 self._ground.multicast(pack(make.mission_item_reached(number)), stations)
+
+    def _say_nav_words(self, status: NavStatus, now: float) -> None:
+        """The numbers are those of the items, as each ground station counts them."""
+        vehicle, held = self._session.vehicle, self._missions.on_board
+        is_plane = vehicle.airframe is Airframe.FIXED_WING
+        words = self._nav_words.changed(status if vehicle.armed else None, now, is_plane=is_plane)
+        item = self._missions.seq_of(status.number)
+        if not words or ("{}" in words and not item):
+            return
+        flown = FlownMission(() if held is None else held.items, item)
+        for sent_seqs, stations in self._by_item_numbers(self._ground.everyone()):
+            self._ground.say_among(stations, severity_of(words), words.format(*flown.counted(sent_seqs)))
 
     def _send_current(self, receivers: Sequence[GroundStation], now: float) -> None:
         for sent_seqs, stations in self._by_item_numbers(receivers):

@@ -348,6 +348,30 @@ class TestRestart:
         assert not any(glance.failsafe for glance in screens.look())
 
 
+def test_a_mission_of_an_inav_is_told_in_the_words_of_its_osd() -> None:
+    """QGroundControl says them; the HUD of Mission Planner stays free for what has gone wrong."""
+    world, station, screens = inav()
+    home = world.bridge.vehicle.home
+    assert home is not None
+    first, *legs = waypoints(4)
+    legs = [replace(leg, lat_e7=home.lat_e7 + 900 * n, lon_e7=home.lon_e7) for n, leg in enumerate(legs, 1)]
+    assert Upload(station, [first, *legs]).run() is MissionResult.ACCEPTED
+    assert world.faults is not None
+    world.faults.armed = True
+    world.run(15)
+    began = world.now
+    world.faults.boxes = 1 << INAV_BOXES["9.1.0"].index(28)
+    ask(station, m.MAVLink_mission_set_current_message(1, 1, 2))
+    world.run(1)
+    ask(station, m.MAVLink_mission_set_current_message(1, 1, 3))
+    world.run(60)
+    words = ["TO WP 1/3", "TO WP 3/3", "WP END>HOLDING POSITION"]
+    assert [text for text in screens.mission_planner.texts(began) if text.isupper() or "TO WP" in text] == words
+    assert screens.qgc.heard(began) == ["Set WP: only in flight, in the mode NAV WP", *words]
+    assert screens.mission_planner.heard(began) == ["Set WP: only in flight, in the mode NAV WP"]
+    assert screens.glance().hud == ""
+
+
 def test_once_after_its_first_write_a_station_hears_that_only_missions_are_stored() -> None:
     world, station, screens = on_the_ground()
     for _ in range(2):
