@@ -2,7 +2,7 @@
 """Values of a record that no item can show, from other planners: kept if the leg is written again unchanged."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import zip_longest
 
@@ -28,19 +28,43 @@ def flies_home(record: NavRecord) -> bool:
 
 
 def keep_unshown(records: Sequence[NavRecord], former: Sequence[NavRecord]) -> tuple[list[NavRecord], str]:
-    """The records with the unshown values of those that they replace, and the lost ones as text, "" if there are none.
+    """The records with the unshown values of those that they repeat, and the lost ones as text, "" if there are none.
 
-    `former`: the list on the flight controller. A record is unchanged if its shown values and its number are.
+    `former`: the list on the flight controller.
     """
     kept: list[NavRecord] = []
     lost: Counter[str] = Counter()
-    for record, old in zip_longest(records, former):
-        is_same = record is not None and old is not None and record == _shown(old)
+    for record, old in _aligned(records, former):
+        if record is not None and old is not None and _repeats(record, old):
+            kept.append(replace(old, flag=old.flag if old.flag == FLY_HOME else 0))
+            continue
         if record is not None:
-            kept.append(replace(old, flag=old.flag if old.flag == FLY_HOME else 0) if is_same else record)
-        if old is not None and not is_same:
+            kept.append(record)
+        if old is not None:
             lost.update(_unshown(old))
     return kept, ", ".join(f"{name} ({count})" for name, count in lost.items())
+
+
+def _aligned(
+    records: Sequence[NavRecord], former: Sequence[NavRecord]
+) -> Iterator[tuple[NavRecord | None, NavRecord | None]]:
+    """Each record and the one in its place, counted from the end where the lists end alike: items may be inserted."""
+    alike = 0
+    for record, old in zip(reversed(records), reversed(former), strict=False):
+        # The target of a jump has another number then.
+        if not (_repeats(record, old) or record.action == old.action == NavAction.JUMP):
+            break
+        alike += 1
+    yield from zip_longest(records[: len(records) - alike], former[: len(former) - alike])
+    yield from zip(records[len(records) - alike :], former[len(former) - alike :], strict=True)
+
+
+def _repeats(record: NavRecord, old: NavRecord) -> bool:
+    """True if it has the shown values. Mission Planner truncates a sixteenth of all coordinates to the one below."""
+    shown = _shown(old)
+    if max(abs(record.lat_e7 - shown.lat_e7), abs(record.lon_e7 - shown.lon_e7)) > 1:
+        return False
+    return replace(record, lat_e7=shown.lat_e7, lon_e7=shown.lon_e7) == shown
 
 
 def _shown(record: NavRecord) -> NavRecord:
