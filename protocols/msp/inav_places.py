@@ -55,6 +55,7 @@ class Geozone:
     """number: from 0. corners: of a polygon, or a circle's centre. radius_cm: 0 for a polygon.
 
     lowest_cm, highest_cm: 0 is the ground, and no limit; above sea level if is_above_sea, else above home.
+    missing: vertices that the board counts, but lacks; one is enough for INAV to turn all zones off.
     """
 
     number: int
@@ -65,6 +66,7 @@ class Geozone:
     highest_cm: int = 0
     is_above_sea: bool = False
     action: int = field(default=FenceAction.NONE)
+    missing: int = 0
 
     @property
     def is_circle(self) -> bool:

@@ -11,6 +11,8 @@ COMMON_SETTING, COMMON_SET_SETTING, COMMON_SETTING_INFO = 0x1003, 0x1004, 0x1007
 _DETAILS = struct.Struct("<HBBBiIHBB")
 _INDEX = struct.Struct("<BH")
 _LOOKUP = 1 << 6
+#: Of each kind: control profiles, rates, batteries, mixers only two.
+_PROFILES = 3
 
 
 class InavType(IntEnum):
@@ -53,11 +55,17 @@ class InavSetting(NamedTuple):
 
     def encode(self) -> bytes:
         mode = _LOOKUP if self.choices else 0
+        profiles = _PROFILES if self.section else 0
         details = _DETAILS.pack(
-            self.group, self.type, self.section, mode, self.minimum, self.maximum, self.place, 0, bool(self.section)
+            self.group, self.type, self.section, mode, self.minimum, self.maximum, self.place, 0, profiles
         )
         texts = b"".join(_text(choice) for choice in self.choices)
-        return _text(self.name) + details + texts + pack_value(self.type, self.value)
+        return _text(self.name) + details + texts + self.pack()
+
+    def pack(self) -> bytes:
+        """The value as INAV sends it: a text fills its place."""
+        packed = pack_value(self.type, self.value)
+        return packed.ljust(self.maximum, b"\0") if self.type is InavType.STRING else packed
 
 
 def encode_about_index(index: int) -> bytes:

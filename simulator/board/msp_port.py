@@ -201,5 +201,5 @@ def reply(command: int, payload: bytes = b"") -> bytes:
     return MspFrame(Direction.REPLY, command, payload).encode()
 
 
-def error(command: int) -> bytes:
-    return MspFrame(Direction.ERROR, command).encode()
+def error(command: int, payload: bytes = b"") -> bytes:
+    return MspFrame(Direction.ERROR, command, payload).encode()

@@ -37,10 +37,16 @@ class Dialect:
     settings: Mapping[int, bytes] = field(default_factory=dict)
 
 
+#: A blank board: of eight UARTs the first has MSP (1); 115200 baud (5) for MSP and black box, 57600 (4) for GPS.
+_UARTS, _FUNCTIONS, _BAUDS = range(8), (1, *(0,) * 7), bytes((5, 4, 0, 5))
+_SERIAL_CONFIG = b"".join(struct.pack("<BH", uart, _FUNCTIONS[uart]) + _BAUDS for uart in _UARTS)
+_COMMON_SERIAL_CONFIG = b"\x08" + b"".join(struct.pack("<BI", uart, _FUNCTIONS[uart]) + _BAUDS for uart in _UARTS)
+
 #: Its STATUS continues with load, gyro cycle, no further flags, and arming blockers; ANALOG with 0.01 V.
 BETAFLIGHT = Dialect(
-    PortHabits(buffer_size=192, cli_guard_s=0.1, obeys_r=True),
+    PortHabits(buffer_size=192, cli_guard_s=0.1, obeys_r=True, speaks_v2=True),
     {
+        54: _SERIAL_CONFIG, 0x1009: _COMMON_SERIAL_CONFIG,
         1: bytes((0, 1, 46)), 2: b"BTFL", 3: bytes((4, 5, 0)), 102: struct.pack("<9h", 0, 0, 512, 0, 0, 0, 0, 0, 0),
         117: b"ROLL;PITCH;YAW;LEVEL;MAG;",
     },

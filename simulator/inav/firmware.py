@@ -16,7 +16,7 @@ from simulator.board.waypoint_craft import WaypointCraft
 from simulator.inav.boxes import ANGLE, ARM, BOXES, NAMES, NAV_ALTHOLD, NAV_RTH, NAV_WP, PLANE_BOXES
 from simulator.inav.mission import CAPACITY, EEPROM_SIZE, FAKE, InavMission
 from simulator.inav.navigation import InavNavigation
-from simulator.inav.places import PLACES_SIZE, InavPlaces
+from simulator.inav.places import PLACES_SIZE, InavPlaces, PartialReplyError
 from simulator.inav.settings import InavSettings
 
 _PLANE = 1
@@ -74,7 +74,7 @@ _CONSTANT_REPLIES: dict[int, bytes] = {
     InavCommand.API_VERSION: _API_VERSION,
     InavCommand.FC_VARIANT: b"INAV",
     InavCommand.BOARD_INFO: b"SIMU\x00\x00\x02\x00\x04SIMU",
-    InavCommand.BUILD_INFO: b"Jan 01 202600:00:00abcdefg",
+    InavCommand.BUILD_INFO: b"Jan  1 202600:00:00abcdef01",
     InavCommand.SONAR: b"\xff\xff\xff\xff",
     InavCommand.SENSOR_STATUS: bytes((1, 1, 1, 1, 1, 1, 0, 0, 0)),
     InavCommand.GPSSTATISTICS: bytes(20),
@@ -110,11 +110,11 @@ class InavFirmware(MspFirmware):
         self._mission = InavMission(boot.eeprom)
         self._craft = WaypointCraft()
         settings, places = boot.eeprom[EEPROM_SIZE:-PLACES_SIZE], boot.eeprom[-PLACES_SIZE:]
-        self._settings = InavSettings(settings, has_ez_tune=self._version >= (7, 0, 0))
+        self._settings = InavSettings(settings, self._version)
         self._places = InavPlaces(places, self._version)
         self._navigation = InavNavigation(self._mission, self._craft, self._settings)
         self._booted_at = boot.now
-        self._name = b"INAV"
+        self._received = bytearray(self.habits.buffer_size)
         self._stick_loads = boot.faults.stick_loads
         self._load_at: float | None = None
         self._sticks_released_at = boot.now
@@ -188,6 +188,7 @@ class InavFirmware(MspFirmware):
     def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
         """The reply frame: an error frame for refused or unknown commands."""
         self._fly_until(now)
+        self._received[: len(payload)] = payload
         match command:
             case MspCommand.SET_WP:
                 return self._set_waypoint(payload)
@@ -195,8 +196,10 @@ class InavFirmware(MspFirmware):
                 return reply(command, self._waypoint(payload))
             case InavCommand.SET_NAME:
                 # Any length up to the longest, also an empty one.
-                self._name = payload if len(payload) <= _LONGEST_NAME else self._name
-                return reply(command) if payload == self._name else error(command)
+                if len(payload) > _LONGEST_NAME:
+                    return error(command)
+                self._settings["name"] = payload.decode("ascii", "replace")
+                return reply(command)
             case InavCommand.SETTING | InavCommand.SET_SETTING | InavCommand.SETTING_INFO:
                 self._settings[_SELECTED] = self._mission.selected
                 found = self._settings.answer(command, payload)
@@ -223,7 +226,10 @@ class InavFirmware(MspFirmware):
             return reply(command)
         answer = self._read(command)
         if answer is None:
-            answer = self._places.answer(command, payload)
+            try:
+                answer = self._places.answer(command, payload, bytes(self._received[len(payload) :]))
+            except PartialReplyError as partial:
+                return error(command, partial.payload)
         return error(command) if answer is None else reply(command, answer)
 
     def _when_disarmed(self, command: int, done: bool) -> bytes:
@@ -269,7 +275,7 @@ class InavFirmware(MspFirmware):
         flight = craft.flight
         match command:
             case InavCommand.NAME:
-                return self._name
+                return str(self._settings["name"]).partition("\0")[0].encode("ascii", "replace")
             case InavCommand.FC_VERSION:
                 return bytes(self._version)
             case MspCommand.BOX:
@@ -279,7 +285,8 @@ class InavFirmware(MspFirmware):
             case InavCommand.INAV_STATUS:
                 flags = self._arming_blockers() | (_ARMED_FLAGS if self.armed else 0)
                 status = struct.pack("<HHHHBI", _CYCLE_TIME_US, 0, self._sensors.sensors, _LOAD_PERCENT, 0, flags)
-                return status + craft.boxes.to_bytes(8, "little") + b"\0"
+                mixer_profile = b"\0" if self._version >= (7, 0, 0) else b""
+                return status + craft.boxes.to_bytes(8, "little") + mixer_profile
             case InavCommand.INAV_ANALOG:
                 current = self._sensors.currents_ca[self.armed]
                 volts_e2 = round(flight.volts * 100)
@@ -288,7 +295,8 @@ class InavFirmware(MspFirmware):
             case InavCommand.INAV_AIR_SPEED:
                 return struct.pack("<I", round(flight.speed_ms * 100) + _WIND_CMS if self._options.pitot else 0)
             case InavCommand.INAV_MIXER:
-                return struct.pack("<BBBBBhBB", 0, 0, 0, self._options.platform, 0, -1, 12, 18)
+                stops_on_low, servos = (1, 18) if self._version >= (8, 0, 0) else (0, 16)
+                return struct.pack("<BBBBBhBB", 0, 0, stops_on_low, self._options.platform, 0, -1, 12, servos)
             case InavCommand.RTC:
                 unix_s = self._options.unix_s and self._options.unix_s + self._clock - self._booted_at
                 return struct.pack("<IH", int(unix_s), int(unix_s % 1 * 1000))

@@ -30,6 +30,14 @@ PLACES_SIZE = (
 )
 
 
+class PartialReplyError(Exception):
+    """INAV's handler failed after it had written a part of its reply, which the error frame then has."""
+
+    def __init__(self, payload: bytes) -> None:
+        super().__init__()
+        self.payload = payload
+
+
 class InavPlaces:
     """`stored`: PLACES_SIZE bytes of the EEPROM; the first one is set once they were saved."""
 
@@ -52,8 +60,11 @@ class InavPlaces:
         content = b"".join(map(b"".join, self._tables))
         self._stored[:] = b"\1" + self._features.to_bytes(4, "little") + content
 
-    def answer(self, command: int, payload: bytes) -> bytes | None:
-        """The payload of the reply; None: an error, also for other commands."""
+    def answer(self, command: int, payload: bytes, behind: bytes = b"") -> bytes | None:
+        """The payload of the reply; None: an error, also for other commands. PartialReplyError.
+
+        `behind`: the bytes of earlier requests that are still in the receive buffer, behind the payload.
+        """
         index = payload[0] if payload else 0
         match command:
             case _ if command == FEATURE:
@@ -72,9 +83,9 @@ class InavPlaces:
             case _ if command == SET_FW_APPROACH and len(payload) == 1 + _APPROACH_SIZE and index < _APPROACHES:
                 self._approaches[index] = payload[1:-1] + bytes((payload[-1] > 0,))
                 return b"" if self._has_approaches else None
-        return self._about_zone(command, index, payload) if self._has_zones and index < _ZONES else None
+        return self._about_zone(command, index, payload, behind) if self._has_zones and index < _ZONES else None
 
-    def _about_zone(self, command: int, zone: int, payload: bytes) -> bytes | None:
+    def _about_zone(self, command: int, zone: int, payload: bytes, behind: bytes) -> bytes | None:
         match command, len(payload):
             case (0x2210, _):
                 return bytes((zone,)) + self._zones[zone]
@@ -82,11 +93,12 @@ class InavPlaces:
                 self._vertices[:] = [_FREE if vertex[0] == zone else vertex for vertex in self._vertices]
                 self._zones[zone] = payload[1:]
                 return b""
-            case (0x2212, 2):
+            case (0x2212, size) if size >= 2:
                 return self._vertex(zone, payload[1])
             case (0x2213, 10 | 14):
                 _, number, lat, lon = _PLACE.unpack_from(payload)
-                radius = int.from_bytes(payload[10:14], "little", signed=True)
+                # Of a circle it reads a radius even from a request that has none.
+                radius = int.from_bytes((payload + behind)[10:14], "little", signed=True)
                 is_circle = self._zones[zone][1] == _CIRCLE
                 is_added = self._add(zone, number, lat, lon) and (not is_circle or self._add(zone, number + 1, radius))
                 return b"" if is_added else None
@@ -100,7 +112,9 @@ class InavPlaces:
         if self._zones[zone][1] != _CIRCLE:
             return reply
         radius = self._find(self._vertices, zone, number + 1)
-        return None if radius is None else reply + radius[2].to_bytes(4, "little", signed=True)
+        if radius is None:
+            raise PartialReplyError(reply)
+        return reply + radius[2].to_bytes(4, "little", signed=True)
 
     @staticmethod
     def _find(vertices: list[bytes], zone: int, number: int) -> tuple[int, int, int, int] | None:

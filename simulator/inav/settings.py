@@ -10,7 +10,6 @@ from protocols.msp.inav_settings import (
     InavSetting,
     InavType,
     decode_value,
-    pack_value,
 )
 from simulator.inav.setting_table import PIDS, SETTINGS
 
@@ -31,12 +30,16 @@ _SETTERS = {SET_PID_V2: PID_V2, SET_RATE_PROFILE: RATE_PROFILE}
 
 
 class InavSettings:
-    """`has_ez_tune`: from version 7 on. It is off. `stored`: SETTINGS_SIZE bytes of the EEPROM."""
+    """`stored`: SETTINGS_SIZE bytes of the EEPROM. EZ tune, from version 7 on, is off."""
 
-    def __init__(self, stored: memoryview, *, has_ez_tune: bool) -> None:
+    def __init__(self, stored: memoryview, version: tuple[int, ...]) -> None:
         self._stored = stored
+        # One bit further in the table's entries of version 6 (settings.h).
+        shift = 0 if version >= (7, 0, 0) else 1
         self._settings = {
-            setting.name: setting._replace(value=self._saved_value(setting) if stored[0] else setting.value)
+            setting.name: setting._replace(
+                section=setting.section << shift, value=self._saved_value(setting) if stored[0] else setting.value
+            )
             for setting in SETTINGS
         }
         ranges = b"".join(bytes((box, aux, *_HIGH)) for box, aux in ((_ARM, _AUX1), (_ANGLE, _AUX2), (_NAV_WP, _AUX2)))
@@ -50,8 +53,9 @@ class InavSettings:
             RATE_PROFILE: bytes((50, 0, 0, 0xDC, 5, 70, 20, 20, 20, 20, 35, 20, 100, 100, 100)),
             PID_V2: bytes((40, 30, 23, 60)) * _PIDS,
         }
-        if has_ez_tune:
-            self._replies[EZ_TUNE] = bytes((0, 110, 0, 100, 100, 100, 100, 100, 100, 0, 0))
+        if version >= (7, 0, 0):
+            snappiness = b"\0" if version >= (8, 0, 0) else b""
+            self._replies[EZ_TUNE] = bytes((0, 110, 0, 110, *(100,) * 6)) + snappiness
 
     def read(self, command: int) -> bytes | None:
         """The payload of a reply; None for other commands."""
@@ -73,7 +77,7 @@ class InavSettings:
             return None
         match command:
             case _ if command == COMMON_SETTING:
-                return pack_value(setting.type, setting.value)
+                return setting.pack()
             case _ if command == COMMON_SETTING_INFO:
                 return setting.encode()
             case _ if command == COMMON_SET_SETTING:
@@ -85,12 +89,13 @@ class InavSettings:
         self._stored[0] = 1
         for setting in self._settings.values():
             at = 1 + setting.place * _STORED_SIZE
-            packed = pack_value(setting.type, setting.value).ljust(_STORED_SIZE, b"\0")
+            packed = setting.pack().ljust(_STORED_SIZE, b"\0")
             self._stored[at : at + _STORED_SIZE] = packed
 
     def _saved_value(self, setting: InavSetting) -> float | str:
         at = 1 + setting.place * _STORED_SIZE
-        value = decode_value(setting.type, bytes(self._stored[at : at + _STORED_SIZE]))
+        stored = bytes(self._stored[at : at + _STORED_SIZE])
+        value = _text(stored) if setting.type is InavType.STRING else decode_value(setting.type, stored)
         assert value is not None
         return value
 
@@ -109,7 +114,9 @@ class InavSettings:
         if value is None:
             return False
         if isinstance(value, str):
-            value = data.decode("ascii", "replace")[: setting.maximum]
+            # Written over the old text, with a zero behind it.
+            new = data[: setting.maximum] + b"\0"
+            value = _text((new + setting.pack()[len(new) :])[: setting.maximum])
         elif value > setting.maximum or (value < setting.minimum and setting.type in _CHECKED_BELOW):
             return False
         self[setting.name] = value
@@ -130,3 +137,8 @@ class InavSettings:
             for name, value in zip(PIDS, payload, strict=False):
                 self[name] = value
         return True
+
+
+def _text(stored: bytes) -> str:
+    """All of a text's place: INAV keeps bytes behind its end."""
+    return stored.decode("ascii", "replace").rstrip("\0")

@@ -53,9 +53,12 @@ def has_zones(board: FlightController) -> bool:
 
 
 def read_zones_in_force() -> Conversation[tuple[Geozone, ...] | None]:
-    """All zones if the feature is on, else none; None: it does not answer."""
+    """All zones, or none if the feature is off or one of them lacks corners; None: it does not answer."""
     is_on = yield from _ask_feature()
-    return (yield from read_zones()) if is_on else None if is_on is None else ()
+    if not is_on:
+        return None if is_on is None else ()
+    zones = yield from read_zones()
+    return () if zones is not None and any(zone.missing for zone in zones) else zones
 
 
 def _ask_feature() -> Conversation[bool | None]:
@@ -80,12 +83,13 @@ def read_zones(numbers: Iterable[int] = range(GEOZONES)) -> Conversation[tuple[G
             reply = yield from ask(encode_read_vertex(number, vertex), GEOZONE_VERTEX, VERTEX_SIZE)
             if reply is None:
                 return None
-            # A zone may lack corners that it counts: INAV then turns all zones off.
-            if (found := decode_vertex(reply.payload)) is not None:
+            found = decode_vertex(reply.payload) if reply.direction is Direction.REPLY else None
+            if found is not None:
                 corners.append(found[0])
                 radius_cm = found[1]
         heights = head.lowest_cm, head.highest_cm, head.is_above_sea
-        zones.append(Geozone(number, head.is_inclusive, tuple(corners), radius_cm, *heights, head.action))
+        zone = Geozone(number, head.is_inclusive, tuple(corners), radius_cm, *heights, head.action)
+        zones.append(replace(zone, missing=head.vertices - zone.vertices))
     return tuple(zones)
 
 

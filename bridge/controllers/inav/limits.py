@@ -22,13 +22,14 @@ _ABOVE_SEA = 1
 
 
 class RthAltMode(IntEnum):
-    """nav_rth_alt_mode."""
+    """nav_rth_alt_mode; the last one only in version 6."""
 
     CURRENT = 0
     EXTRA = 1
     FIXED = 2
     MAX = 3
     AT_LEAST = 4
+    AT_LEAST_LINEAR_DESCENT = 5
 
 
 class RthAllowLanding(IntEnum):

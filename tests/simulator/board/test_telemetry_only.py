@@ -28,6 +28,14 @@ def test_a_betaflight_without_gps_has_no_gps_messages(command: int) -> None:
     assert frame.direction == "!"
 
 
+def test_betaflights_first_uart_of_eight_has_msp_in_either_version() -> None:
+    bench = MspBench("betaflight")
+    ports = [struct.unpack_from("<BHBBBB", bench.payload(54), 7 * place) for place in range(8)]
+    assert ports == [(uart, uart == 0, 5, 4, 0, 5) for uart in range(8)]
+    wide = bench.payload_v2(0x1009)
+    assert [wide[0], *(struct.unpack_from("<BIBBBB", wide, 1 + 9 * place) for place in range(8))] == [8, *ports]
+
+
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(("command", "payload"), [(18, b"\0"), (19, b"\0"), (20, b""), (121, b""), (122, b"")])
 def test_mission_requests_are_errors(kind: str, command: int, payload: bytes) -> None:

@@ -5,7 +5,7 @@ import struct
 
 import pytest
 
-from protocols.msp.frame import request
+from protocols.msp.frame import MspParser, request
 from simulator.board.msp_options import MspOptions
 from simulator.board.options import Faults
 from tests.support.msp_bench import MspBench, waypoint
@@ -68,11 +68,27 @@ def test_the_number_of_channels_depends_on_the_version(version: str, receiver: b
 def test_msp_v2_works_alongside_v1() -> None:
     """Lengths as observed on INAV 9.1.0's own simulator."""
     bench = MspBench("inav", MspOptions(platform=1, pitot=True), Faults(arming_blockers=1 << 18))
-    lengths = {command: len(bench.payload_v2(command)) for command in (0x2000, 0x2002, 0x2009, 0x2010)}
-    assert lengths == {0x2000: 22, 0x2002: 24, 0x2009: 4, 0x2010: 9}
+    lengths = {command: len(bench.payload_v2(command)) for command in (5, 0x2000, 0x2002, 0x2009, 0x2010)}
+    assert lengths == {5: 27, 0x2000: 22, 0x2002: 24, 0x2009: 4, 0x2010: 9}
     assert struct.unpack_from("<I", bench.payload_v2(0x2000), 9)[0] == 1 << 18
     assert bench.payload_v2(0x2010)[3] == 1
     assert bench.payload(2) == b"INAV"
+
+
+@pytest.mark.parametrize(
+    ("version", "status", "mixer", "ez_tune"),
+    [
+        ("6.1.1", 21, "0000000000ffff0c10", 0),
+        ("7.1.2", 22, "0000000000ffff0c10", 10),
+        ("8.0.1", 22, "0000010000ffff0c12", 11),
+    ],
+)
+def test_msp_v2_replies_of_each_version(version: str, status: int, mixer: str, ez_tune: int) -> None:
+    bench = MspBench("inav", MspOptions(version=version))
+    assert (len(bench.payload_v2(0x2000)), bench.payload_v2(0x2010).hex()) == (status, mixer)
+    bench.send(request(0x2070))
+    (frame,) = MspParser().feed(bench.run(0.2))
+    assert len(frame.payload) == ez_tune
 
 
 def test_a_truncated_v2_frame_swallows_the_next_request() -> None:

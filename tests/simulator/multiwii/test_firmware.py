@@ -9,7 +9,7 @@ from protocols.msp.nav import NavAction
 from simulator.board.msp_options import MspOptions
 from simulator.board.nav_waypoint import FLAG_LAST
 from simulator.board.options import Faults
-from tests.support.msp_bench import SET_WP, MspBench, waypoint
+from tests.support.msp_bench import SET_WP, WP, MspBench, waypoint
 
 LENGTHS = {
     100: 7,
@@ -29,6 +29,7 @@ LENGTHS = {
 MISSION, RETURN = 1 << 10, 1 << 7
 CRC_ERROR, IN_PROGRESS = 0xFE, 0xFF
 DISARMED = 10
+PID, SET_PID = 112, 202
 
 
 @pytest.mark.parametrize(("command", "length"), LENGTHS.items())
@@ -127,6 +128,14 @@ def test_a_return_home_lands_if_the_waypoint_read_last_has_p1(p1: int, state: in
     bench.faults.armed, bench.faults.boxes = True, RETURN
     bench.run(60)
     assert status(bench)[:2] == (2, state)
+
+
+def test_an_empty_setter_takes_the_bytes_that_an_earlier_request_left() -> None:
+    """`read8()` in s_struct_w does not look at the payload's size."""
+    bench = MspBench("multiwii")
+    bench.payload(WP, bytes(range(100, 130)))
+    assert bench.payload(SET_PID) == b""
+    assert bench.payload(PID)[:30] == bytes(range(100, 130))
 
 
 def test_in_a_mission_writes_get_no_reply_and_reads_are_empty() -> None:

@@ -9,10 +9,10 @@ import pytest
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.msp.frame import Direction, MspFrame
-from protocols.msp.inav_places import SET_GEOZONE_VERTEX, SET_SAFEHOME
+from protocols.msp.inav_places import GEOZONE_FEATURE, SET_GEOZONE_VERTEX, SET_SAFEHOME
 from simulator.board.options import Faults
 from simulator.commands.fc_kinds import make_board
-from simulator.inav.places import GEOZONE, SAFEHOME, SET_GEOZONE
+from simulator.inav.places import GEOZONE, SAFEHOME, SET_FEATURE, SET_GEOZONE
 from tests.bridge.controllers.inav.test_mission_store import ACCEPTED, board_with
 from tests.bridge.controllers.nav.test_mission_store import plan
 from tests.support.conversations import Download, Upload, clear_message
@@ -177,6 +177,24 @@ def test_heights_and_actions_of_unchanged_zones_stay_and_are_named() -> None:
     assert "geozone 0 keeps ceiling 120 m above home, action RTH" in " ".join(station.texts())
     assert Upload(station, FIELD, mission_type=FENCE).run() is ACCEPTED
     assert "Geozone 0 is erased, with ceiling 120 m above home, action RTH" in " ".join(station.texts())
+
+
+def test_a_zone_whose_corners_are_missing_turns_all_off_and_is_cleared_by_the_next_fence() -> None:
+    """As after an upload that broke off: INAV then acts at no border, and flies missions as without zones."""
+    board, world, station = board_with()
+    places = board._firmware._places  # type: ignore[union-attr]
+    places.answer(SET_FEATURE, GEOZONE_FEATURE.to_bytes(4, "little"))
+    places.answer(SET_GEOZONE, struct.pack("<BBBiiBBB", 1, 1, 1, 0, 0, 0, 0, 3))
+    places.answer(SET_GEOZONE, struct.pack("<BBBiiBBB", 5, 0, 0, 0, 0, 0, 0, 2))
+    places.save()
+    board.power_off(world.now)
+    world.run(10)
+    board.power_on_booted(world.now)
+    world.run(10)
+    assert read(station, FENCE) == []
+    assert Upload(station, plan(3)).run() is ACCEPTED
+    assert Upload(station, FENCE_ITEMS, mission_type=FENCE).run() is ACCEPTED
+    assert board._firmware._places.answer(GEOZONE, b"\5")[-1] == 0  # type: ignore[union-attr]
 
 
 def test_unchanged_safehomes_keep_their_number_and_so_their_landing_approach() -> None:
