@@ -5,6 +5,7 @@ MSP_BOX has one word per box, with three bits per aux channel: low (below 1300 u
 """
 
 import struct
+from functools import cache
 
 _LOW, _MIDDLE, _HIGH = 1000, 1500, 2000
 _POSITIONS = {_LOW: 0b001, _MIDDLE: 0b010, _HIGH: 0b100}
@@ -37,6 +38,7 @@ def channels_us(armed: bool, boxes: int) -> tuple[int, ...]:
     return (_MIDDLE, _MIDDLE, _MIDDLE, 1450 if armed else _LOW, *aux)
 
 
+@cache  # each main loop asks
 def switch_positions(armed: bool, boxes: int) -> int:
     """The positions of aux 1..4, as in a word of MSP_BOX."""
     aux = channels_us(armed, boxes)[4:]

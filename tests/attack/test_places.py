@@ -39,8 +39,13 @@ def guarded(start: Starter, key_file: Path) -> Bench:
     return bench
 
 
-def crowd(bench: Bench, stack: ExitStack, *messages: Message, size: int = CROWD, per_s: float = 30) -> Attack:
-    """Strangers, each with its own address and ids, that send heartbeats and other messages from time to time."""
+def crowd(
+    bench: Bench, stack: ExitStack, *messages: Message, size: int = CROWD, per_s: float = 30, at_once: int = 1
+) -> Attack:
+    """Strangers, each with its own address and ids, that send heartbeats and other messages from time to time.
+
+    `per_s` times a second, the next `at_once` of them.
+    """
     strangers = [
         Stranger(bench.daemon.address, f"127.0.{1 + row}.{1 + number}", sysid=1 + number, compid=190 + row)
         for row, number in (divmod(each, 200) for each in range(size))
@@ -51,7 +56,8 @@ def crowd(bench: Bench, stack: ExitStack, *messages: Message, size: int = CROWD,
 
     def send() -> None:
         happens(lambda: has_read_all(bench.daemon.address[1]))
-        next(turns).send(*messages or (HELLO,))
+        for stranger in itertools.islice(turns, at_once):
+            stranger.send(*messages or (HELLO,))
 
     return Attack(send, per_s=per_s)
 
@@ -81,7 +87,7 @@ def test_a_crowd_neither_displaces_a_pilot_nor_locks_one_out(start: Starter, sta
         for _ in range(3):
             assert receives_heartbeats(first, 1)
         count = m.MAVLink_mission_count_message(1, 1, 9)
-        with Watch(bench.daemon), crowd(bench, stack, HELLO, count, size=MAX_PEERS + 40, per_s=100):
+        with Watch(bench.daemon), crowd(bench, stack, HELLO, count, size=MAX_PEERS + 40, per_s=10, at_once=10):
             until(lambda: len(places()) == MAX_PEERS, "the crowd")
             for _ in range(3):
                 assert receives_heartbeats(late, 1)

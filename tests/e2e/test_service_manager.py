@@ -18,7 +18,7 @@ from service.settings import Settings
 from service.settings.addresses import parse_fc
 from tests.support.benches import Starter
 from tests.support.plain_station import udp_station
-from tests.support.plan import as_items, judge, plain_plan, records_of
+from tests.support.plan import PlanRow, as_items, judge, plain_plan, records_of
 from tests.support.programs import TIMEOUT_S, until
 from tests.support.programs import Daemon as DaemonProgram
 
@@ -44,12 +44,12 @@ async def test_a_bug_does_not_prevent_a_stop(tmp_path: Path, monkeypatch: pytest
     assert running.exception() is None
 
 
-def push_begun(daemon: DaemonProgram) -> socket.socket:
-    """Push a long list like the command line; return the connection once the board has part of it."""
+def push_begun(daemon: DaemonProgram, plan: list[PlanRow] = _LONG) -> socket.socket:
+    """Push a list like the command line; return the connection once the board has part of it."""
     connection = socket.socket(socket.AF_UNIX)
     connection.settimeout(TIMEOUT_S)
     connection.connect(str(daemon.state_dir / "control.sock"))
-    items = [asdict(item) for item in as_items(_LONG)]
+    items = [asdict(item) for item in as_items(plan)]
     connection.sendall(json.dumps({"do": "push", "source": "test", "items": items}).encode() + b"\n")
     while b"progress" not in connection.recv(4096):
         pass
@@ -81,10 +81,10 @@ def test_a_push_close_to_its_end_is_finished(start: Starter) -> None:
 @pytest.mark.parametrize("trouble", ["slow", "deaf"])
 def test_a_push_that_would_take_long_is_aborted(start: Starter, trouble: str) -> None:
     """The old list is kept, the sender is told, the outcome is stored, and systemd waits at most 2 s."""
-    bench = start.bench("--baud", "9600") if trouble == "slow" else start.bench()
+    bench = start.bench(*(("--baud", "9600", "--capacity", "600") if trouble == "slow" else ()))
     bench.daemon.push(plain_plan(5))
     old = bench.board.records()
-    connection = push_begun(bench.daemon)
+    connection = push_begun(bench.daemon, plain_plan(600) if trouble == "slow" else _LONG)
     if trouble == "deaf":
         bench.board.set("hang 10")
     # Neither push can finish within 2 s, so the result shows that the daemon did not wait.

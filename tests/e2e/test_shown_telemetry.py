@@ -180,7 +180,7 @@ def check_position(bench: Bench, mavproxy: MavProxy) -> None:
         high = abs(position["relative_alt"] / 1000 - now["height_m"]) <= HEIGHT_M
         return near and high and degrees_between(position["hdg"] / 100, now["heading"]) <= DIRECTION_DEG
 
-    assert happens(agrees_now, seconds=3.0)
+    assert happens(agrees_now)
 
 
 def shows_mode(vehicle: Any, name: str) -> bool:

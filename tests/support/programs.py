@@ -2,13 +2,16 @@
 """The daemon and the simulated Naze as processes, as started by a user."""
 
 import asyncio
+import itertools
 import json
+import os
 import signal
 import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -50,11 +53,19 @@ async def until_async(condition: Callable[[], T | None], what: str) -> T:
     return found
 
 
+#: Above all default ports, and below 32768, where the kernel's own choices begin: one of those could take a port
+#: before the program under test does. Each test process starts at another port and repeats none before 12,000 others.
+_FIRST_PORT, _PORTS = 20_000, 12_000
+_ports = itertools.count(os.getpid() * 211)
+
+
 def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM, host: str = "127.0.0.1") -> int:
-    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, kind) as probe:
-        probe.bind((host, 0))
-        port: int = probe.getsockname()[1]
-        return port
+    for number in _ports:
+        port = _FIRST_PORT + number % _PORTS
+        with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, kind) as probe, suppress(OSError):
+            probe.bind((host, port))
+            return port
+    raise AssertionError("unreachable: the ports never end")
 
 
 def run_naze_bridge(*arguments: str | Path, **options: Any) -> subprocess.CompletedProcess[str]:

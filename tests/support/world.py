@@ -32,6 +32,7 @@ from bridge.gcs.routes import MAX_DATAGRAM_SIZE
 from bridge.gcs.station import Peer
 from bridge.line.conversation import Conclude, FindPending, NoteReader, Recall, Save, StoreEffect
 from bridge.model.events import BridgeEvent, Level
+from bridge.model.flight_memory import FlightMemory
 from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission, RecalledMission
 from bridge.model.settings import SealMemory, SealsOfThisRun
 from bridge.sharing.program import Program
@@ -180,7 +181,7 @@ class World:
         )
         self._on_frames = on_frames
         self.backups: list[TakenBackup] = []
-        self.bridge = Bridge(self._config, self._note, self.now, on_frames, on_backup=self.backups.append)
+        self._start_bridge()
         if powered:
             self.naze.power_on_booted(self.now)
         if plugged:
@@ -203,11 +204,11 @@ class World:
         """Kill the bridge, and start another one after `away_s`, with the flight that the former one left."""
         left = self.bridge.flight if flight else None
         self._plugged = False
-        self.bridge = Bridge(self._config, self._note, self.now, self._on_frames, on_backup=self.backups.append)
+        self._start_bridge()
         self._is_away = True
         self.run(away_s)
         self._is_away = False
-        self.bridge = Bridge(replace(self._config, flight=left), self._note, self.now, self._on_frames)
+        self._start_bridge(left)
         self.plug()
 
     def power_off(self) -> None:
@@ -279,10 +280,6 @@ class World:
     # State for tests.
 
     @property
-    def inside(self) -> Inside:
-        return Inside(self.bridge)
-
-    @property
     def kind(self) -> Profile | None:
         controller = self.inside.session.state.controller
         return None if controller is None else controller.profile
@@ -309,6 +306,11 @@ class World:
         assert counters.max_outstanding_reply_bytes <= 255
 
     # Passing time.
+
+    def _start_bridge(self, flight: FlightMemory | None = None) -> None:
+        config = replace(self._config, flight=flight)
+        self.bridge = Bridge(config, self._note, self.now, self._on_frames, on_backup=self.backups.append)
+        self.inside = Inside(self.bridge)
 
     def _step(self, end: float) -> None:
         """Advance to the next event and execute it."""

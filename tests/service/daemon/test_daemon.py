@@ -18,7 +18,7 @@ from service.settings import Settings
 from service.settings.addresses import SerialFc, SimulatedFc
 from tests.support.benches import Starter
 from tests.support.inside import inside
-from tests.support.programs import NAZE_BRIDGE, REPOSITORY, free_port, until
+from tests.support.programs import NAZE_BRIDGE, REPOSITORY, TIMEOUT_S, free_port, until
 
 LOSSES = {"fc.lost", "fc.port_lost"}
 
@@ -79,7 +79,7 @@ async def test_a_search_without_result_is_reported_repeatedly(monkeypatch: pytes
     tty.setraw(far)
     with capture_logs() as events:
         running = asyncio.create_task(Daemon(Settings(SerialFc(os.ttyname(far), None))).run())
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(TIMEOUT_S):
             while len([event for event in events if event["event"] == "fc.searching"]) < 3:  # noqa: ASYNC110
                 await asyncio.sleep(0.01)
         running.cancel()
@@ -96,7 +96,7 @@ async def test_an_exception_in_the_bridge_is_logged_and_the_line_restarted(tmp_p
         running = asyncio.create_task(daemon.run())
 
         async def found() -> None:
-            async with asyncio.timeout(20):
+            async with asyncio.timeout(TIMEOUT_S):
                 while inside(daemon.bridge).session.state.controller is None:  # noqa: ASYNC110
                     await asyncio.sleep(0.01)
 
@@ -108,7 +108,7 @@ async def test_an_exception_in_the_bridge_is_logged_and_the_line_restarted(tmp_p
             raise AttributeError("link")
 
         inside(daemon.bridge).session.tick = faulty  # type: ignore[assignment,method-assign]
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(TIMEOUT_S):
             while inside(daemon.bridge).session.state.controller is not None:  # noqa: ASYNC110
                 await asyncio.sleep(0)
         await found()

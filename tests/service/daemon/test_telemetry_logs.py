@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Telemetry logs over HTTP."""
 
+import threading
 from pathlib import Path
 
 import pytest
 
 from service.daemon import telemetry_logs
 from service.daemon.telemetry_logs import PIECE, TelemetryLogs
-from tests.service.daemon.test_store_worker import HANGS, LOG, hung_file
+from tests.service.daemon.test_store_worker import HANGS, LOG
 from tests.support.web_bench import WebBench
 
 pytest_plugins = ("tests.support.web_fixtures",)
@@ -40,11 +41,13 @@ async def test_without_a_state_directory_there_are_no_logs() -> None:
 
 
 async def test_the_logs_of_the_page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(telemetry_logs, "_TIMEOUT_S", 0.5)  # the first request has begun by then
+    monkeypatch.setattr(telemetry_logs, "_TIMEOUT_S", 0.01)
     logs = TelemetryLogs(tmp_path)
-    with hung_file(tmp_path / LOG):
-        with pytest.raises(TimeoutError, match=HANGS):
-            await logs.read(LOG, 0)
-        with pytest.raises(TimeoutError, match=HANGS):
-            await logs.list()
+    hangs = threading.Event()
+    logs._disk.submit(hangs.wait)
+    with pytest.raises(TimeoutError, match=HANGS):
+        await logs.read(LOG, 0)
+    with pytest.raises(TimeoutError, match=HANGS):
+        await logs.list()
+    hangs.set()
     logs.close()

@@ -113,7 +113,7 @@ async def test_without_free_descriptors_the_loop_does_not_spin(monkeypatch: pyte
     resource.setrlimit(resource.RLIMIT_NOFILE, (max(spare) + 1, hard))
     try:
         await loop.sock_connect(client, ("127.0.0.1", port))
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(TIMEOUT_S):
             while link._resting is None:  # noqa: ASYNC110 - a product's timer, not an event of ours
                 await asyncio.sleep(0)
         # The loop is not woken for the waiting client.
@@ -122,7 +122,7 @@ async def test_without_free_descriptors_the_loop_does_not_spin(monkeypatch: pyte
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
         for descriptor in spare:
             os.close(descriptor)
-    async with asyncio.timeout(10):
+    async with asyncio.timeout(TIMEOUT_S):
         await listener.came.wait()
     link.close()
     client.close()

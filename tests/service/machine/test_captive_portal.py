@@ -14,6 +14,7 @@ from service.cli.setup.answers import PAGE_PORT
 from service.cli.setup.hotspot import ADDRESS
 from service.machine import captive_portal
 from service.machine.captive_portal import API_PATH, PROBES, dnsmasq_text, has_internet, reply_to, serve
+from tests.support.programs import TIMEOUT_S
 
 _PAGE = f"http://{ADDRESS}:{PAGE_PORT}/"
 _SYSTEMD = Path(__file__).parents[3] / "systemd"
@@ -87,17 +88,19 @@ def test_the_units_have_the_hotspots_address() -> None:
 
 @pytest.fixture
 def port(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
-    monkeypatch.setattr(captive_portal._Server, "timeout", 1.0)
+    monkeypatch.setattr(captive_portal._Server, "timeout", TIMEOUT_S)
     listening = create_server(("127.0.0.1", 0))
     serving = Thread(target=serve, args=(listening, _PAGE))
     number: int = listening.getsockname()[1]
     serving.start()
     yield number
-    serving.join()  # it ends by itself when there are no more requests
+    monkeypatch.setattr(captive_portal._Server, "timeout", 0)  # after the next request it finds no other
+    ask(number, "GET", "", "/")
+    serving.join()
 
 
 def ask(port: int, method: str, host: str, path: str) -> tuple[HTTPResponse, bytes]:
-    connection = HTTPConnection("127.0.0.1", port, timeout=10)
+    connection = HTTPConnection("127.0.0.1", port, timeout=TIMEOUT_S)
     connection.request(method, path, headers={"Host": host})
     response = connection.getresponse()
     body = response.read()

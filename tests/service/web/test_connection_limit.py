@@ -19,6 +19,7 @@ from service.web.connection_limit import (
     BoundedConnection,
     ConnectionLimit,
 )
+from tests.support.programs import TIMEOUT_S
 
 visits = st.lists(
     st.tuples(st.sampled_from(["a", "a", "b", "c", "d"]), st.sampled_from([0.0, 0.0, 0.01, 0.4]), st.booleans()),
@@ -82,7 +83,7 @@ async def test_connections_over_the_rate_wait_and_are_served() -> None:
             writer.close()
             return answer[-1:]
 
-    async with asyncio.timeout(60), asyncio.TaskGroup() as group:
+    async with asyncio.timeout(TIMEOUT_S), asyncio.TaskGroup() as group:
         asked = [group.create_task(ask()) for _ in range(2 * MAX_IN_A_SECOND_FROM_ONE)]
     assert {task.result() for task in asked} == {b"!"}
     server.close()
@@ -114,7 +115,7 @@ async def _is_cut_off(request: bytes) -> None:
     for _, writer in connections:
         writer.write(request)
     try:
-        async with asyncio.timeout(30):
+        async with asyncio.timeout(TIMEOUT_S):
             await limit.emptied.wait()
         assert not limit.transports
     finally:
