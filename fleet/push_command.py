@@ -36,9 +36,7 @@ from protocols.mission_file import MissionFileError, read_mission_file
 from terminal.files import read_file, shown_path
 from terminal.options import PATH
 from terminal.printing import print_json, print_table
-from terminal.sentences import INTERRUPTED, complain
-
-UNREADABLE = 2
+from terminal.sentences import INTERRUPTED, UNREADABLE, complain, fail
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,8 +127,7 @@ def _read(file: Path) -> tuple[bytes, int]:
         mission = read_file(file, MissionFileError)
         return mission, len(read_mission_file(mission, shown_path(file)))
     except MissionFileError as error:
-        complain(error)
-        raise SystemExit(UNREADABLE) from error
+        fail(error, UNREADABLE)
 
 
 def require_choice(names: tuple[str, ...], to_all: bool) -> None:

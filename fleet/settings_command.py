@@ -11,7 +11,7 @@ from rich.text import Text
 
 from fleet.conditions import Condition
 from fleet.options import address_options, all_option, fleet_session, json_option, vehicle_option, where_option
-from fleet.push_command import UNREADABLE, Pushed, end, push_file, require_choice, vehicles_meant
+from fleet.push_command import Pushed, end, push_file, require_choice, vehicles_meant
 from fleet.roll_call import alive, chosen
 from fleet.settings import SettingsTrial, read_settings, try_settings, variants
 from fleet.tables import in_few_words
@@ -21,7 +21,7 @@ from terminal.command_group import CommandGroup
 from terminal.files import read_file, shown_path
 from terminal.options import PATH
 from terminal.printing import print_json, print_table
-from terminal.sentences import complain
+from terminal.sentences import UNREADABLE, fail
 
 _SETTINGS = Pushed(
     SETTINGS_RESTORE,
@@ -108,8 +108,7 @@ def _read(file: Path) -> tuple[bytes, int]:
         data = read_file(file, ParamFileError)
         return data, len(read_param_file(data, shown_path(file)).values)
     except ParamFileError as error:
-        complain(error)
-        raise SystemExit(UNREADABLE) from error
+        fail(error, UNREADABLE)
 
 
 def _show_trials(trials: list[SettingsTrial], unknown: str, as_json: bool) -> None:

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from protocols.file_error import FileError
 from protocols.plain_text import plain_text
-from storage.bounded_file import read_bounded
 from storage.os_error import reason
+from storage.small_files import read_bounded
 
 MAX_BYTES = 8 * 2**20  # 65,535 items, the most that MAVLink can count, are about 5 MB of text
 

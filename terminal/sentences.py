@@ -10,6 +10,8 @@ import click
 
 #: The exit status after Ctrl-C, as shells have it: 128 + SIGINT.
 INTERRUPTED = 130
+#: The exit status if a file that was named cannot be read.
+UNREADABLE = 2
 
 
 def say(text: str, *, to_error: bool = False, prefix: str = "", indent: int = 0) -> None:
@@ -26,7 +28,7 @@ def complain(text: object) -> None:
     say(f"naze-bridge: {text}", to_error=True)
 
 
-def fail(text: str) -> NoReturn:
-    """End the program with one sentence and status 1."""
+def fail(text: object, status: int = 1) -> NoReturn:
+    """End the program with one sentence and this status."""
     complain(text)
-    raise SystemExit(1)
+    raise SystemExit(status)

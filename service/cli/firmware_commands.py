@@ -17,9 +17,8 @@ from service.machine.package import shipped
 from terminal.command_group import CommandGroup
 from terminal.files import read_file, shown_path
 from terminal.options import PATH
-from terminal.sentences import complain, fail, say
+from terminal.sentences import UNREADABLE, fail, say
 
-_UNREADABLE = 2
 #: What both trees' Makefile builds.
 _BUILT = "obj/baseflight_NAZE.hex"
 _COMPILER = "arm-none-eabi-gcc"
@@ -52,8 +51,7 @@ def flash(client: BridgeClient, image: Path, battery: bool) -> None:
     try:
         program = parse_image(read_file(image, FirmwareFileError), shown_path(image)).program
     except (FirmwareFileError, ImageError) as error:
-        complain(error)
-        raise SystemExit(_UNREADABLE) from None
+        fail(error, UNREADABLE)
     try:
         check_patched(program)
     except ImageError as error:
@@ -74,8 +72,7 @@ def restore(client: BridgeClient, backup: Path, battery: bool) -> None:
         contents = read_file(backup, FirmwareFileError)
         check_backup(contents)
     except (FirmwareFileError, ImageError) as error:
-        complain(error if isinstance(error, FirmwareFileError) else f"{shown_path(backup)}: {error}")
-        raise SystemExit(_UNREADABLE) from None
+        fail(error if isinstance(error, FirmwareFileError) else f"{shown_path(backup)}: {error}", UNREADABLE)
     _flash(client, {"do": "restore-firmware", "image": _as_text(contents), "battery": battery})
 
 

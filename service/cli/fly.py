@@ -25,7 +25,7 @@ from terminal.files import read_file, shown_path, write_file
 from terminal.mission_source import load_mission
 from terminal.options import PATH
 from terminal.printing import print_json, print_table
-from terminal.sentences import complain, say
+from terminal.sentences import fail, say
 
 if TYPE_CHECKING:
     from simulator.flights.judgement import ItemResult
@@ -111,8 +111,7 @@ def fly(
 
 
 def _refuse(text: str) -> NoReturn:
-    complain(text)
-    raise SystemExit(FlyStatus.UNUSABLE)
+    fail(text, FlyStatus.UNUSABLE)
 
 
 def _unfit() -> tuple[type[Exception], ...]:

@@ -15,10 +15,9 @@ from terminal.mission_source import load_mission
 from terminal.mission_table import mission_table
 from terminal.options import PATH
 from terminal.printing import print_json, print_table
-from terminal.sentences import complain, fail, say
+from terminal.sentences import UNREADABLE, fail, say
 
 _NO_SPACE = "MAV_MISSION_NO_SPACE"
-_UNREADABLE = 2
 _WOULD_ERASE = 3
 _STANDARD_OUTPUT = Path("-")
 
@@ -36,8 +35,7 @@ def push(client: BridgeClient, file: Path, erase: bool) -> None:
     try:
         items = load_mission(file)
     except MissionFileError as error:
-        complain(error)
-        raise SystemExit(_UNREADABLE) from error
+        fail(error, UNREADABLE)
     request: Json = {"do": "push", "items": [asdict(item) for item in items], "source": f"push of {file.name}"}
     delivery = client.ask_with_progress(request | {"may_erase": erase}, len(items))
     is_asked = _would_erase(delivery) and not client.as_json and sys.stdin.isatty()
@@ -91,7 +89,7 @@ def _show_held(held: Json, file: Path | None, *, is_quiet: bool) -> str:
         try:
             write_file(file, write_mission_file(items, file.name), MissionFileError)
         except MissionFileError as error:
-            fail(str(error))
+            fail(error)
         summary += f", written to {shown_path(file)}"
     elif items and not is_quiet:
         print_table(mission_table(items, items, ()))

@@ -18,9 +18,8 @@ from terminal.command_group import CommandGroup
 from terminal.files import read_file, shown_path, write_file
 from terminal.options import PATH
 from terminal.printing import print_json, print_table
-from terminal.sentences import complain, fail, say
+from terminal.sentences import UNREADABLE, complain, fail, say
 
-_UNREADABLE = 2
 _STANDARD_OUTPUT = Path("-")
 _BOARD = "board"
 
@@ -97,7 +96,7 @@ def backup(client: BridgeClient, file: Path) -> None:
     try:
         write_file(file, text, ParamFileError)
     except ParamFileError as error:
-        fail(str(error))
+        fail(error)
     written = f"{len(held['settings'])} settings of {held['board']} written to {shown_path(file)}"
     client.show(held, lambda: click.echo(written))
 
@@ -207,8 +206,7 @@ def _source(client: BridgeClient, name: str) -> tuple[SettingValues, str]:
     try:
         found = read_param_file(read_file(Path(name), ParamFileError), shown_path(Path(name)))
     except ParamFileError as error:
-        complain(error)
-        raise SystemExit(_UNREADABLE) from error
+        fail(error, UNREADABLE)
     return found.values, found.board
 
 
