@@ -132,7 +132,7 @@ def _save(held: Held, path: Path, *, is_file: bool) -> None:
         target = path if is_file else path / f"{held.vehicle}.waypoints"
         write_file(target, write_qgc_wpl(held.items), MissionFileError)
     except MissionFileError as error:
-        fail(str(error))
+        fail(error)
     except OSError as error:
         fail(f"{shown_path(path)} is not a writable folder: {reason(error)}")
 

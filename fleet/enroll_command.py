@@ -46,7 +46,7 @@ def enroll(name: str, role: str, folder: Path, prefix: str, router: str) -> None
     except ZenohSettingsError as error:
         raise click.UsageError(str(error)) from error
     except EnrolmentError as error:
-        fail(str(error))
+        fail(error)
     click.echo(f"Copy into one folder of {name}: {', '.join(map(str, enrolled.files))}")
     if role == Role.VEHICLE.value:
         sysid = "" if enrolled.member.sysid is None else f"sysid = {enrolled.member.sysid}\n\n"
@@ -72,6 +72,6 @@ def expel(name: str, folder: Path) -> None:
     try:
         fleet.expel(name)
     except EnrolmentError as error:
-        fail(str(error))
+        fail(error)
     click.echo(f"{name} is expelled.\n\nNow restart the router in {fleet.path} with router.json5.")
     click.echo(f"Until then {name}'s sessions go on, and it can open new ones.")

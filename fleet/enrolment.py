@@ -19,8 +19,8 @@ from typing import Any
 
 from payloads.mission_data import Json
 from payloads.names import check_name
-from storage.atomic_file import replace_file
 from storage.os_error import reason
+from storage.small_files import replace_file
 
 #: zenoh's own is 1,000. Each session costs the router some 100 kB.
 _MAX_SESSIONS = 12_000

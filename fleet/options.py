@@ -99,6 +99,6 @@ def fleet_session(where: dict[str, Any]) -> Iterator[tuple[zenoh.Session, str]]:
         with open_session(where["connect"] or usual.connect, where["zenoh_config"] or usual.config_file) as session:
             yield session, prefix
     except FleetError as error:
-        fail(str(error))
+        fail(error)
     except KeyboardInterrupt:
         raise SystemExit(INTERRUPTED) from None

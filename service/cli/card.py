@@ -112,14 +112,14 @@ def card(
     try:
         prepare(boot, package, named, secrets)
     except CardError as error:
-        fail(str(error))
+        fail(error)
     except OSError as error:
         fail(f"{error.filename or boot} cannot be changed: {reason(error)}")
     click.echo(f"The card is ready. Put it into the Pi and wait 5 minutes, then join {hotspot!r}:")
-    _print(helpers.make_wifi(ssid=hotspot, password=password, security="WPA"))
+    helpers.make_wifi(ssid=hotspot, password=password, security="WPA").terminal(compact=True)
     url = f"http://{ADDRESS}:{PAGE_PORT}/"
     click.echo(f"Status page, with its token: {url}#token={token}")
-    _print(segno.make(f"{url}#token={token}", error="l"))
+    segno.make(f"{url}#token={token}", error="l").terminal(compact=True)
     if key:
         click.echo(f"The key, for ground stations that may change something: {key}")
 
@@ -183,7 +183,3 @@ def _with_command(file: Path, text: str) -> str:
         raise CardError(f"{file}: write runcmd as a list of lines that begin with -, not in brackets")
     line = text.index("\n", found.start()) + 1
     return f"{text[:line]}{found[2]}- {_IN_USER_DATA}\n{text[line:]}"
-
-
-def _print(code: segno.QRCode) -> None:
-    code.terminal(compact=True)

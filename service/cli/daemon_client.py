@@ -51,7 +51,7 @@ class BridgeClient:
         except (AddressError, SettingsError) as error:
             raise click.UsageError(str(error)) from error
         except (ControlError, StoreError) as error:
-            fail(str(error))
+            fail(error)
 
     def ask_with_progress(self, request: Json, total: int | None = None) -> Json:
         """Ask for something that takes a while, with a progress bar on standard error.
@@ -89,7 +89,7 @@ class BridgeClient:
         except SettingsError as error:
             raise click.UsageError(str(error)) from error
         except (ControlError, StoreError) as error:
-            fail(str(error))
+            fail(error)
 
     def show(self, answer: object, show_people: Callable[[], object]) -> None:
         if self.as_json:

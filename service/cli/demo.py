@@ -55,7 +55,7 @@ def demo(file: Path, once: bool, port: int) -> None:
     except MissionFileError as error:
         raise click.UsageError(str(error)) from error
     except (ClientError, ControlError) as error:
-        fail(str(error))
+        fail(error)
 
 
 def _show(items: list[MissionItem], file: Path, port: int, state_dir: Path) -> None:

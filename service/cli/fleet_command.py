@@ -67,6 +67,6 @@ def mavlink(names: tuple[str, ...], to_all: bool, gcs: tuple[str, ...], **where:
         try:
             asyncio.run(relay_fleet(session, prefix, vehicles, bridges, addresses, is_all=to_all))
         except LinkError as error:
-            fail(str(error))
+            fail(error)
         except KeyboardInterrupt:
             raise SystemExit(INTERRUPTED) from None

@@ -31,7 +31,7 @@ def serve(settings: Settings, load: Callable[[], Settings]) -> None:
     try:
         _serve(settings, load)
     except (ControlError, LinkError, StoreError, SettingsError, ZenohSettingsError) as error:
-        fail(str(error))
+        fail(error)
 
 
 def _serve(settings: Settings, load: Callable[[], Settings]) -> None:

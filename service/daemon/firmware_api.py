@@ -12,7 +12,6 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-import serial
 import structlog
 
 from bridge.controllers.harakiri.profile import PATCHED, UNPATCHED
@@ -27,8 +26,8 @@ from service.daemon.settings_api import SettingsApi
 from service.links.fc_device import PortError
 from service.links.serial_dialogue import carry_out, use_parity
 from service.settings import SettingsError, default_state_dir
-from storage.atomic_file import replace_file
 from storage.os_error import reason
+from storage.small_files import replace_file
 
 FIRMWARE_FOLDER = "firmware"
 #: USB, without a battery.
@@ -125,7 +124,10 @@ class FirmwareApi:
         _log.info("firmware.begins", where=self._daemon.fc.where)
         try:
             async with asyncio.timeout(_LONGEST_S), self._daemon.fc.lend() as port:
-                dump = await self._start_boot_loader(port) if is_running else ""
+                dump = ""
+                if is_running:
+                    dump = await carry_out(read_dump(), port)
+                    await carry_out(start_boot_loader(), port)
                 use_parity(port)
                 await carry_out(find_chip(_BOOT_LOADER_S if is_running else _BY_HAND_S, wait_for_pads), port)
                 try:
@@ -150,11 +152,6 @@ class FirmwareApi:
             raise ControlError(f"Nothing was changed: {error}") from error
         _log.info("firmware.written", backup=str(backup))
         return backup
-
-    async def _start_boot_loader(self, port: serial.Serial) -> str:
-        dump = await carry_out(read_dump(), port)
-        await carry_out(start_boot_loader(), port)
-        return dump
 
     async def _store(self, contents: bytes, dump: str) -> Path:
         """Store the flash before it is changed, and the settings as text. ControlError."""

@@ -6,7 +6,7 @@ from dataclasses import asdict
 from functools import partial
 from typing import TypeVar
 
-from bridge.settings.board_setting import BoardSetting, SettingTable, Value, ValueKind, shown
+from bridge.settings.board_setting import BoardSetting, Value, ValueKind, shown
 from bridge.settings.fc_settings import SettingRefusal
 from payloads.mission_data import MOST, Json, whole_number
 from payloads.settings_comparison import SettingValues, setting_values, settings_difference
@@ -36,7 +36,7 @@ class SettingsApi:
             case "settings":
                 return await self.table()
             case "setting":
-                return _data((await self._setting(request))[0])
+                return _data(await self._setting(request))
             case "set-setting":
                 return await self._change(request)
             case "save-settings":
@@ -90,16 +90,15 @@ class SettingsApi:
         """One backup, with its difference from the same board's one before."""
         return await self._daemon.store.ask(lambda store: backup_shown(store, number))
 
-    async def _setting(self, request: Json) -> tuple[BoardSetting, SettingTable]:
+    async def _setting(self, request: Json) -> BoardSetting:
         name = str(request.get("name"))[:_LONGEST_NAME]
-        table = await self._answer(self._daemon.bridge.settings.read)
-        setting = table.find(name)
+        setting = (await self._answer(self._daemon.bridge.settings.read)).find(name)
         if setting is None:
             raise ControlError(f"this flight controller has no setting {name}: see `naze-bridge settings list`")
-        return setting, table
+        return setting
 
     async def _change(self, request: Json) -> Json:
-        setting, _ = await self._setting(request)
+        setting = await self._setting(request)
         value = _value(setting, str(request.get("value")))
 
         def start(done: Callable[[BoardSetting | SettingRefusal, float], None], now: float) -> None:

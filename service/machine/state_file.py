@@ -10,9 +10,8 @@ from typing import Any, TypeVar
 import structlog
 
 from service.machine.threads import BackgroundThread
-from storage.atomic_file import replace_file
-from storage.bounded_file import read_bounded
 from storage.os_error import reason
+from storage.small_files import read_bounded, replace_file
 
 _MAX_BYTES = 1 << 20
 _CLOSE_TIMEOUT_S = 1.0

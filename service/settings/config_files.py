@@ -13,8 +13,8 @@ from typing import Any
 
 from service.settings.key import Problem, short
 from service.settings.table import KEYS, TABLES
-from storage.bounded_file import read_bounded
 from storage.os_error import reason
+from storage.small_files import read_bounded
 
 DROP_INS = "conf.d"
 #: The answers to `naze-bridge setup`: first, so that everything written by hand overrides them.

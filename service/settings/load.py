@@ -3,12 +3,12 @@
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from payloads.names import ZenohSettingsError
-from service.settings.addresses import AddressError, GcsAddress, SerialFc, parse_gcs, split_gcs
+from service.settings.addresses import GcsAddress, SerialFc, parse_gcs, split_gcs
 from service.settings.config_files import Given, nearest, read_files
 from service.settings.key import ENVIRONMENT_PREFIX, Problem, SettingsError, Unfit
 from service.settings.settings import DEFAULT_GCS, Settings
@@ -50,8 +50,14 @@ def load_settings(config: Path | None, gcs: Sequence[str] = (), **flags: object)
         text = f"record_uart {record_to} is the flight controller's port: name a file"
         problems.append(Problem(given["record_uart"].where, text))
     if zenoh is not None:
-        problems += _zenoh_problems(zenoh, given)
-    key = _key(values.get("key_file"), given, problems)
+        from service.settings.zenoh_config import make_config  # loads zenoh, 10 MB
+
+        with _noting(problems, given["zenoh"].where):
+            make_config(zenoh)
+    key = WriteAccess()
+    if (file := values.get("key_file")) is not None:
+        with _noting(problems, given["key_file"].where):
+            key = signing_access(file)
     if problems:
         raise SettingsError(problems)
     # A link that is also given by a flag keeps the file's access rules.
@@ -122,22 +128,19 @@ def _read_values(given: Mapping[str, Given], problems: list[Problem]) -> dict[st
     return values
 
 
-def _key(file: Path | None, given: Mapping[str, Given], problems: list[Problem]) -> WriteAccess:
-    """The key for links without their own."""
+@contextmanager
+def _noting(problems: list[Problem], where: str) -> Iterator[None]:
     try:
-        return WriteAccess() if file is None else signing_access(file)
-    except AddressError as error:
-        problems.append(Problem(given["key_file"].where, str(error)))
-        return WriteAccess()
+        yield
+    except ValueError as error:
+        problems.append(Problem(where, str(error)))
 
 
 def _named_links(gcs: Sequence[str], problems: list[Problem]) -> list[GcsAddress]:
     links: list[GcsAddress] = []
     for text in (link for named in gcs for link in split_gcs(named)):
-        try:
+        with _noting(problems, "--gcs"):
             links.append(parse_gcs(text))
-        except ValueError as error:
-            problems.append(Problem("--gcs", str(error)))
     return links
 
 
@@ -151,12 +154,3 @@ def _tlog_problems(values: Mapping[str, Any], given: Mapping[str, Given]) -> Ite
 def _table(table: str, values: Mapping[str, Any]) -> dict[str, Any]:
     start = f"{table}."
     return {name.removeprefix(start): value for name, value in values.items() if name.startswith(start)}
-
-
-def _zenoh_problems(zenoh: ZenohSettings, given: Mapping[str, Given]) -> Iterator[Problem]:
-    from service.settings.zenoh_config import make_config  # loads zenoh, 10 MB
-
-    try:
-        make_config(zenoh)
-    except ZenohSettingsError as error:
-        yield Problem(given["zenoh"].where, str(error))

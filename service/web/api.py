@@ -27,15 +27,14 @@ from service.machine.host import Host
 from service.machine.package import version
 from service.recording.tlog_recorder import TLOG_FOLDER
 from service.settings.web import WebSettings
-from service.web.access import MAX_FILE, check_token, refusing, route
+from service.web.access import check_token, refusing, route
 from service.web.connect_help import connect_help, page_urls, qr_code
-from service.web.firmware_upload import FirmwareUpload
 from service.web.histories import INTERVAL_S, FlownTrack, LinkHistory
 from service.web.map_tiles import MapTiles
 from service.web.metrics import CONTENT_TYPE, Metrics
-from service.web.mission_files import MissionFiles, MissionWriter
 from service.web.pi_control import PiControl
 from service.web.replies import ResponseCache, begun, json_reply, path_number, text_reply, whole
+from service.web.sent_files import MissionWriter, SentFiles
 from service.web.settings_history import SettingsHistory
 from storage.store_error import StoreError
 
@@ -54,9 +53,8 @@ class Api:
         self._cache = ResponseCache()
         self._held_text: tuple[HeldMission, str] | None = None
         self._writer = MissionWriter()
-        self._files = MissionFiles(self._api, self._writer)
+        self._files = SentFiles(self._api, self._writer)
         self._settings = SettingsHistory(self._api.settings, self._writer, self._cache)
-        self._firmware = FirmwareUpload(self._api.firmware, self._writer)
         self._pi = PiControl(daemon, self._writer)
         self._map = MapTiles(daemon, settings)
         self._history = LinkHistory(daemon)
@@ -97,13 +95,11 @@ class Api:
             route("GET", "/api/missions/{number}", self._mission),
             route("GET", "/api/missions/{number}/difference/{other}", self._difference),
             route("POST", "/api/missions/{number}/restore", self._restore, check_token),
-            route("POST", "/api/check", self._check_file, max_body=MAX_FILE),
-            route("POST", "/api/write", self._write_file, check_token, max_body=MAX_FILE),
             route("GET", "/api/logs", self._list_logs, check_token),
             route("GET", "/api/logs/{name}", self._read_log, check_token),
             route("GET", "/metrics", self._render_metrics),
             *self._settings.routes(),
-            *self._firmware.routes(),
+            *self._files.routes(),
             *self._pi.routes(),
             *self._map.routes(),
         ]
@@ -196,13 +192,6 @@ class Api:
     async def _restore(self, request: Request) -> Response:
         number = path_number(request, "number")
         return begun(self._writer.begin(f"mission {number}", partial(self._api.restore, number)))
-
-    async def _check_file(self, request: Request) -> Response:
-        answer = await self._files.check(request)
-        return text_reply(await asyncio.to_thread(to_json, answer))
-
-    async def _write_file(self, request: Request) -> Response:
-        return begun(await self._files.write(request))
 
     async def _list_logs(self, _request: Request) -> Response:
         with _refusing_logs():

@@ -43,7 +43,9 @@ class MapTiles:
         self._file = StateFile(state_dir, _FILE, "the map has no tiles until they are switched on again")
         self._store = TileStore(state_dir / _FOLDER, self._source)
         self._keeping = TileKeeping(daemon, self._store, self._source, self._count)
-        self._is_on, self._tiles, self._bytes = self._file.load(_read_file) or (False, 0, 0)
+        self._is_on, self._tiles, self._bytes = self._file.load(
+            lambda kept: (bool(kept["on"]), int(kept["tiles"]), int(kept["bytes"]))
+        ) or (False, 0, 0)
 
     @property
     def image_origin(self) -> str:
@@ -134,7 +136,3 @@ class MapTiles:
 
     def _save(self) -> None:
         self._file.save({"on": self._is_on, "tiles": self._tiles, "bytes": self._bytes})
-
-
-def _read_file(found: Json) -> tuple[bool, int, int]:
-    return bool(found["on"]), int(found["tiles"]), int(found["bytes"])

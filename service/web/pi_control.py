@@ -24,8 +24,8 @@ from service.daemon.daemon import Daemon
 from service.machine.helper_socket import MAX_PACKAGE, HelperError, ask_helper
 from service.machine.log_setup import recent_lines
 from service.web.access import MAX_FILE, check_token, refusing, route
-from service.web.mission_files import MissionWriter
 from service.web.replies import begun, json_reply, received_body, whole
+from service.web.sent_files import MissionWriter
 from storage.os_error import reason
 
 _MAX_REQUEST = 64 << 10

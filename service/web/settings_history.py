@@ -13,8 +13,8 @@ from protocols.param_file import write_param_file
 from service.daemon.client import ControlError
 from service.daemon.settings_api import SettingsApi
 from service.web.access import check_token, route
-from service.web.mission_files import MissionWriter, Progress
 from service.web.replies import ResponseCache, begun, json_reply, path_number, text_reply
+from service.web.sent_files import MissionWriter, Progress
 
 _LISTED = 50
 

@@ -12,7 +12,7 @@ from payloads.mission_data import Json
 from service.machine.threads import BackgroundThread
 from service.settings.web import TileSource
 from service.web.tile_area import Place
-from storage.bounded_file import read_bounded
+from storage.small_files import read_bounded
 
 #: A tile of so much coarser a level is only a blur.
 _COARSER = 5

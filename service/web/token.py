@@ -6,9 +6,8 @@ import secrets
 import stat
 from pathlib import Path
 
-from storage.atomic_file import replace_file
-from storage.bounded_file import read_bounded
 from storage.os_error import reason
+from storage.small_files import read_bounded, replace_file
 
 DEFAULT_NAME = "web-token"
 #: Letters and digits that are easy to type on a phone and to tell apart: 16 of them are 78 bits.

@@ -136,7 +136,7 @@ def _pieces(log: _Log, wanted: TimeRange, max_positions: int) -> Iterator[Logged
     """A log in pieces of whole records, from its end to about the start of the range."""
     data = log.path.read_bytes()
     before_s = wanted.start_s - _BEFORE_S
-    step = bisect_left(range(len(data) // _STEP), before_s, key=lambda step: _time_s(data, step * _STEP))
+    step = bisect_left(range(len(data) // _STEP), before_s, key=lambda step: _record_near(data, step * _STEP)[1])
     first, end = max(step - 1, 0) * _STEP, len(data)
     for place in reversed(range(first, end, _PIECE)):
         start, start_s = (first, log.begun_s) if place == first else _record_near(data, place)
@@ -184,10 +184,6 @@ def _messages(records: bytes) -> Iterator[tuple[float, Message]]:
         if time.monotonic() > pause_at:
             time.sleep(_PAUSE_S)
             pause_at = time.monotonic() + _SLICE_S
-
-
-def _time_s(data: bytes, place: int) -> float:
-    return _record_near(data, place)[1]
 
 
 def _record_near(data: bytes, place: int) -> tuple[int, float]:

@@ -48,7 +48,7 @@ def examine(
     if len(ports) > 1:
         # One port with a flight controller is enough.
         results = [replace(found, grade=Grade.NOTE) if found.grade is Grade.PROBLEM else found for found in results]
-    results.append(check_modem_manager(host, ports[0]) if ports else check_no_port(host))
+    results.append(check_modem_manager(host, ports[0]) if ports else check_no_port())
     yield check_versions(host)
     yield from filter(None, (check_power(host), check_daemons(host)))
     yield from results

@@ -70,7 +70,7 @@ def check_candidates(host: Host) -> list[SerialFc]:
     return ports or ([SerialFc(model.header_uart, None)] if model else [])
 
 
-def check_no_port(host: Host) -> Checked:
+def check_no_port() -> Checked:
     remedy = "plug the flight controller into USB, or name its port: sudo naze-bridge setup --fc /dev/NAME"
     return problem("port", "there is no serial port for a flight controller", remedy)
 

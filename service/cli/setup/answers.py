@@ -10,7 +10,7 @@ from pathlib import Path
 from service.machine.host import Host
 from service.settings.config_files import read_files
 from service.settings.load import SERVICE_CONFIG
-from storage.bounded_file import read_untrusted
+from storage.small_files import read_untrusted
 
 SETTINGS_FILE = "/etc/naze-bridge/setup.toml"
 #: Where releases up to 0.2.0 kept the answers; there they overrode config.toml.

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from service.machine.host import Host
-from storage.atomic_file import replace_file
 from storage.os_error import reason
+from storage.small_files import replace_file
 
 
 class SetupError(Exception):

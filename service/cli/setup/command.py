@@ -155,7 +155,7 @@ def _undo(host: Host, *, yes: bool, dry_run: bool) -> None:
     try:
         steps, kept = undo_steps(host)
     except SetupError as error:
-        fail(str(error))
+        fail(error)
     for path in kept:
         complain(f"{path} was changed since the last setup, and is kept as it is")
     if not steps:

@@ -13,8 +13,8 @@ from service.links.port_memory import PORTS_FILE
 from service.machine.host import Host
 from service.settings.load import SERVICE_STATE
 from service.web.token import DEFAULT_NAME
-from storage.bounded_file import read_untrusted
 from storage.os_error import reason
+from storage.small_files import read_untrusted
 from terminal.sentences import complain
 
 _MAX_PORTS_FILE, _MAX_TOKEN_FILE = 1 << 16, 4096

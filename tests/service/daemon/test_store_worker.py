@@ -13,7 +13,7 @@ import pytest
 from service.daemon import store_worker
 from service.daemon.api import DaemonApi
 from service.daemon.store_worker import StoreWorker
-from service.zenoh_link import log_reader
+from service.zenoh_link import history
 from service.zenoh_link.history import History
 from storage.store_error import StoreError
 
@@ -47,7 +47,7 @@ async def test_the_history_over_zenoh(monkeypatch: pytest.MonkeyPatch, tmp_path:
         async def missions_between(self, *_: Any) -> dict[str, Any]:
             return {"missions": []}
 
-    monkeypatch.setattr(log_reader, "_TIMEOUT_S", 0.01)
+    monkeypatch.setattr(history, "_TIMEOUT_S", 0.01)
     past = History(cast("DaemonApi", Api()), tmp_path, lambda: 0.0)
     with hung_file(tmp_path / LOG), pytest.raises(TimeoutError, match=HANGS):
         await past.answer("[..]", 0)

@@ -8,7 +8,7 @@ import pytest
 
 from protocols.firmware_image import PROGRAM_END
 from simulator.naze.whole_flash import stand_in
-from tests.service.web.test_mission_files import post
+from tests.service.web.test_sent_files import post
 from tests.support.benches import Starter
 from tests.support.chromium import PHONE, Browsers
 from tests.support.programs import happens, until

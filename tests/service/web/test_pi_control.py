@@ -13,8 +13,8 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 
 from service.cli.helper import packages
-from service.web.mission_files import MissionWriter
 from service.web.pi_control import PiControl, is_local
+from service.web.sent_files import MissionWriter
 from service.web.token import Token
 from tests.support.fixable_pi import FixablePi
 from tests.support.helper_bench import helper_bench

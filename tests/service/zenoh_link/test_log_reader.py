@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from service.zenoh_link import log_reader
-from service.zenoh_link.log_reader import LogReader
+from service.zenoh_link import history
+from service.zenoh_link.history import LogReader
 from service.zenoh_link.logged_past import LoggedPast
 from service.zenoh_link.time_range import TimeRange
 
@@ -19,7 +19,7 @@ from service.zenoh_link.time_range import TimeRange
 @pytest.fixture(autouse=True)
 def shorter_times(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("_TIMEOUT_S", "_SEARCH_S", "_SHARED_SEARCH_S", "_SPARE_S"):
-        monkeypatch.setattr(log_reader, name, getattr(log_reader, name) / 4)
+        monkeypatch.setattr(history, name, getattr(history, name) / 4)
 
 
 @pytest.fixture
@@ -34,7 +34,7 @@ def searches(monkeypatch: pytest.MonkeyPatch) -> list[TimeRange]:
             time.sleep(0.001)
         return LoggedPast(from_s=wanted.start_s)
 
-    monkeypatch.setattr(log_reader, "read_logged_past", search)
+    monkeypatch.setattr(history, "read_logged_past", search)
     return begun
 
 
@@ -61,13 +61,13 @@ async def test_a_query_that_gets_no_turn_blames_the_others_and_not_the_disk(
 ) -> None:
     found = await results(LogReader(tmp_path), list(range(100)))
     refusals = {str(each) for each in found if isinstance(each, TimeoutError)}
-    assert refusals == {log_reader._BUSY}
+    assert refusals == {history._BUSY}
     assert 0 < len(searches) < 100
 
 
 async def test_all_queries_to_a_hung_disk_blame_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     hangs = threading.Event()
-    monkeypatch.setattr(log_reader, "read_logged_past", lambda *_: hangs.wait())
+    monkeypatch.setattr(history, "read_logged_past", lambda *_: hangs.wait())
     found = await results(LogReader(tmp_path), [1, 2, 3])
     hangs.set()
     assert ["the disk does not answer" in str(each) for each in found] == [True] * 3

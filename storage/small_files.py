@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads files written by others, up to a maximum size."""
+"""Small files: read up to a maximum size, and written atomically, even if the power is cut."""
 
 import os
 import stat
@@ -27,3 +27,21 @@ def _bounded(file: BinaryIO, most: int) -> bytes:
         size = f"{most >> 20} MB" if most >> 20 else f"{most >> 10} kB"
         raise OSError(f"it is larger than {size}")
     return data
+
+
+def replace_file(path: Path, data: bytes, mode: int = 0o600) -> None:
+    """Replace the file's content with `data`; on OSError the old content is kept."""
+    draft = path.with_name(f"{path.name}.new")
+    # Not through a link: a root daemon may have been given a folder that another user can write to.
+    descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, 0o600)
+    with open(descriptor, "wb") as file:
+        os.fchmod(descriptor, mode)
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+    draft.replace(path)
+    folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)

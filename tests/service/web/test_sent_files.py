@@ -13,9 +13,9 @@ from structlog.testing import capture_logs
 from payloads.mission_data import Json
 from protocols.mission_item import MissionItem
 from service.daemon.api import DaemonApi
-from service.web import mission_files
+from service.web import sent_files
 from service.web.access import MAX_FILE
-from service.web.mission_files import MissionFiles, MissionWriter, Progress
+from service.web.sent_files import MissionWriter, Progress, SentFiles
 from tests.support.plan import plain_plan, plan_text
 from tests.support.programs import TIMEOUT_S
 from tests.support.web_bench import EXAMPLE, Answer, WebBench
@@ -107,8 +107,8 @@ async def test_a_check_does_not_wait_for_a_slow_upload(monkeypatch: pytest.Monke
     async def whole() -> Any:
         return {"type": "http.request", "body": plan_text(plain_plan(5)).encode(), "more_body": False}
 
-    monkeypatch.setattr(mission_files, "checked_mission", lambda _items, verdict: verdict)
-    files = MissionFiles(cast("DaemonApi", Api()), MissionWriter())
+    monkeypatch.setattr(sent_files, "checked_mission", lambda _items, verdict: verdict)
+    files = SentFiles(cast("DaemonApi", Api()), MissionWriter())
     slow = asyncio.create_task(files.check(request(never)))
     await asyncio.sleep(0)
     assert (await asyncio.wait_for(files.check(request(whole)), TIMEOUT_S))["count"] > 0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mission file sent by the browser: checked by the rules of the current flight controller, or written to it.
+"""Files sent by the browser: firmware, and missions, checked by the rules of the current flight controller or written.
 
 The check needs no token, because it changes nothing. It costs the flight controller one request and this machine some
 milliseconds, so checks run one at a time with a pause after each.
@@ -14,19 +14,24 @@ from http import HTTPStatus
 import structlog
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import Route
 
 from payloads.comparison import MAX_ROWS, checked_mission
-from payloads.mission_data import ACCEPTED, Json
+from payloads.mission_data import ACCEPTED, Json, to_json
+from protocols.firmware_image import ImageError, check_patched, parse_image
 from protocols.mission_file import read_mission_file
 from protocols.mission_item import MissionItem
 from service.daemon.api import DaemonApi
 from service.daemon.client import ControlError
-from service.web.access import refusing
-from service.web.replies import received_body
+from service.web.access import MAX_FILE, check_token, refusing, route
+from service.web.replies import begun, received_body, text_reply
 from storage.store_error import StoreError
 
 _PAUSE_S = 0.25
 _MAX_NAME = 80
+#: An ELF file has symbols, too: 300 kB.
+_MAX_IMAGE = 1 << 20
 _log = structlog.get_logger()
 
 Progress = Callable[[Json], None]
@@ -77,7 +82,7 @@ class MissionWriter:
             state["done"] = True
 
 
-class MissionFiles:
+class SentFiles:
     """The body of a request is the file; the query has its name."""
 
     def __init__(self, api: DaemonApi, writer: MissionWriter) -> None:
@@ -85,9 +90,16 @@ class MissionFiles:
         self._writer = writer
         self._turn = asyncio.Lock()
 
+    def routes(self) -> list[Route]:
+        return [
+            route("POST", "/api/check", self._check, max_body=MAX_FILE),
+            route("POST", "/api/write", self._write, check_token, max_body=MAX_FILE),
+            route("POST", "/api/firmware", self._flash, check_token, max_body=_MAX_IMAGE),
+        ]
+
     async def check(self, request: Request) -> Json:
         """The mission as the flight controller would hold it."""
-        name, body = await received(request)
+        name, body = await _received(request)
         async with self._turn:
             items = await _parsed(name, body)
             with refusing(ControlError, HTTPStatus.SERVICE_UNAVAILABLE):
@@ -96,14 +108,34 @@ class MissionFiles:
             await asyncio.sleep(_PAUSE_S)
         return answer
 
-    async def write(self, request: Request) -> str:
-        """Start writing; returns the write's id. The caller has checked the token."""
-        name, body = await received(request)
+    async def _check(self, request: Request) -> Response:
+        return text_reply(await asyncio.to_thread(to_json, await self.check(request)))
+
+    async def _write(self, request: Request) -> Response:
+        name, body = await _received(request)
         items = await _parsed(name, body)
-        return self._writer.begin(name, partial(self._api.push, items, f"{name}, from the page"))
+        return begun(self._writer.begin(name, partial(self._api.push, items, f"{name}, from the page")))
+
+    async def _flash(self, request: Request) -> Response:
+        """With `battery=1` flash also with a battery connected."""
+        name, body = await _received(request)
+        with refusing(ImageError, HTTPStatus.UNPROCESSABLE_ENTITY, lambda why: f"{name}: {why}"):
+            image = (await asyncio.to_thread(parse_image, body, name)).program
+            check_patched(image)
+        with_battery = request.query_params.get("battery") == "1"
+        return begun(self._writer.begin(name, partial(self._write_firmware, image, with_battery)))
+
+    async def _write_firmware(self, image: bytes, with_battery: bool, progress: Progress) -> Json:
+        def show(message: Json) -> None:
+            step, done, total = (message["progress"][key] for key in ("step", "done", "total"))
+            text = f"{step.capitalize()}: {done} of {total} pages …" if total else step
+            progress({"progress": done, "text": text})
+
+        result = await self._api.firmware.flash(image, show, with_battery=with_battery)
+        return {"ack": ACCEPTED, "text": result["text"]}
 
 
-async def received(request: Request) -> tuple[str, bytes]:
+async def _received(request: Request) -> tuple[str, bytes]:
     name = request.query_params.get("name", "")[-_MAX_NAME:] or "mission file"
     return name, await received_body(request)
 
