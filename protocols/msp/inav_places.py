@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""INAV's safehomes and geozones over MSP v2 (src/main/fc/fc_msp.c; geozones from 8.0 on)."""
+"""INAV's safehomes, landing approaches and geozones over MSP v2 (src/main/fc/fc_msp.c).
+
+Approaches exist from 7.1 on, geozones from 8.0 on.
+"""
 
 import struct
 from dataclasses import dataclass, field
@@ -11,15 +14,19 @@ from protocols.msp.frame import request
 FEATURE = 36
 FEATURE_SIZE = 4
 GEOZONE_FEATURE = 1 << 4
-SAFEHOME, SET_SAFEHOME = 0x2038, 0x2039
+SAFEHOME, SET_SAFEHOME, FW_APPROACH = 0x2038, 0x2039, 0x204A
 GEOZONE, SET_GEOZONE, GEOZONE_VERTEX, SET_GEOZONE_VERTEX = 0x2210, 0x2211, 0x2212, 0x2213
 #: MAX_SAFE_HOMES, MAX_GEOZONES_IN_CONFIG, MAX_VERTICES_IN_CONFIG; a circle takes two vertices.
 SAFEHOMES, GEOZONES, VERTICES = 8, 63, 126
 _SAFEHOME = struct.Struct("<BBii")
+_APPROACH = struct.Struct("<BiiBhhB")
 _GEOZONE = struct.Struct("<BBBiiBBB")
 _VERTEX = struct.Struct("<BBii")
 _RADIUS = struct.Struct("<i")
-SAFEHOME_SIZE, GEOZONE_SIZE, VERTEX_SIZE = _SAFEHOME.size, _GEOZONE.size, _VERTEX.size + _RADIUS.size
+SAFEHOME_SIZE, APPROACH_SIZE, GEOZONE_SIZE = _SAFEHOME.size, _APPROACH.size, _GEOZONE.size
+VERTEX_SIZE = _VERTEX.size + _RADIUS.size
+#: Of the first mission in INAV's store; before it are those of the safehomes.
+MISSION_APPROACH = SAFEHOMES
 
 
 class Safehome(NamedTuple):
@@ -32,6 +39,25 @@ class Safehome(NamedTuple):
 
     def pack(self) -> bytes:
         return _SAFEHOME.pack(*self)
+
+
+class FwApproach(NamedTuple):
+    """How an aeroplane lands. Heights above home, or above sea level.
+
+    headings: of the landing, degrees; a negative one is not flown in the opposite direction, 0 is none.
+    """
+
+    number: int
+    approach_cm: int
+    ground_cm: int
+    turns_right: bool
+    headings: tuple[int, int]
+    is_above_sea: bool
+
+    def directions(self) -> tuple[int, ...]:
+        """In which it may land, degrees; empty: INAV does not use this approach."""
+        found = [way for each in self.headings if each for way in ((abs(each),) if each < 0 else (each, each + 180))]
+        return tuple(dict.fromkeys(each % 360 for each in found))
 
 
 class FenceAction(IntEnum):
@@ -108,6 +134,10 @@ def encode_read_safehome(number: int) -> bytes:
     return request(SAFEHOME, bytes((number,)))
 
 
+def encode_read_approach(number: int) -> bytes:
+    return request(FW_APPROACH, bytes((number,)))
+
+
 def encode_read_geozone(number: int) -> bytes:
     return request(GEOZONE, bytes((number,)))
 
@@ -127,6 +157,14 @@ def decode_safehome(payload: bytes) -> Safehome | None:
         return None
     number, enabled, lat_e7, lon_e7 = _SAFEHOME.unpack_from(payload)
     return Safehome(number, bool(enabled), lat_e7, lon_e7)
+
+
+def decode_approach(payload: bytes) -> FwApproach | None:
+    """Read a reply; None if it is cut."""
+    if len(payload) < APPROACH_SIZE:
+        return None
+    number, approach_cm, ground_cm, right, *headings, above_sea = _APPROACH.unpack_from(payload)
+    return FwApproach(number, approach_cm, ground_cm, bool(right), (headings[0], headings[1]), bool(above_sea))
 
 
 def decode_geozone(payload: bytes) -> GeozoneHead | None:

@@ -14,7 +14,7 @@ from bridge.controllers.inav.zone_check import judge_zones
 from bridge.controllers.nav.judgement import Departure, Judgement
 from bridge.model.ground_track import distance_m
 from protocols.inav_dump import SavedSettings
-from protocols.msp.inav_places import Geozone, Safehome
+from protocols.msp.inav_places import FwApproach, Geozone, Safehome
 from protocols.msp.nav import FLY_HOME, LEGS, NavAction, NavRecord
 from reports.finding import News
 
@@ -54,7 +54,8 @@ class InavLimits:
 
     Their defaults are INAV's; 0 turns the first, nav_max_altitude and nav_wp_enforce_altitude off.
     vbat_warning_cell_voltage: 0.01 V. zones: those in force; none without the feature GEOZONE. cell_voltage: of the
-    battery, as last heard. selected: the mission that was selected, from 1, if there are several.
+    battery, as last heard. selected: the mission that was selected, from 1, if there are several. approach: an
+    aeroplane's to the LAND of the first mission, where the new list is stored; None before 7.1.
     """
 
     nav_wp_max_safe_distance: int = 100
@@ -71,6 +72,8 @@ class InavLimits:
     zones: tuple[Geozone, ...] = ()
     cell_voltage: float | None = None
     selected: int = 1
+    is_aeroplane: bool = False
+    approach: FwApproach | None = None
 
     def with_settings(self, values: Mapping[str, float | str]) -> "InavLimits":
         """With these settings; ValueError for one that is neither a number nor one of its choices."""
@@ -84,6 +87,8 @@ class InavLimits:
         for place, record in enumerate(records):
             if record.action == NavAction.RTH:
                 yield from self._return(place, record, highest_cm, departure)
+            if record.action == NavAction.LAND and self.is_aeroplane:
+                yield self._landing(place)
             if record.action not in LEGS:
                 continue
             height_cm = _above_home_cm(record, departure)
@@ -130,6 +135,19 @@ class InavLimits:
                 limit = f"safehome_max_distance is {self.safehome_max_distance / 100:g} m"
                 yield Judgement(place, "p1", f"returns to safehome {number}, {metres:.0f} m from home ({limit})")
 
+    def _landing(self, place: int) -> Judgement:
+        """Items have no place for an approach: a second height, two headings, a circuit (docs/inav.md)."""
+        approach = self.approach
+        directions = approach.directions() if approach else ()
+        if approach is None or not directions:
+            name = f"FW approach {approach.number} has no heading" if approach else "no FW approach before INAV 7.1"
+            return Judgement(place, "command", f"circles down here and lands in any direction ({name})")
+        level = "sea level" if approach.is_above_sea else "home"
+        heights = f"from {approach.approach_cm / 100:g} m to the ground at {approach.ground_cm / 100:g} m above {level}"
+        headings = " or ".join(map(str, directions))
+        why = f"lands by FW approach {approach.number}: heading {headings}, {heights}"
+        return Judgement(place, "command", why, News.NOTICE)
+
     def _of_the_board(self) -> Iterable[Judgement]:
         if self.selected > 1:
             why = f"nav_wp_multi_mission_index changes from {self.selected} to 1: the new mission is stored first"
@@ -144,7 +162,7 @@ _CHOICES: Mapping[str, type[IntEnum]] = {
     "nav_rth_allow_landing": RthAllowLanding,
     "safehome_usage_mode": SafehomeUsageMode,
 }
-_OTHER_FIELDS = ("safehomes", "zones", "cell_voltage", "selected")
+_OTHER_FIELDS = ("safehomes", "zones", "cell_voltage", "selected", "is_aeroplane", "approach")
 SETTING_NAMES = tuple(field.name for field in fields(InavLimits) if field.name not in _OTHER_FIELDS)
 
 

@@ -31,10 +31,18 @@ from bridge.missions.fc_mission_store import (
     PushResult,
     StoreReport,
 )
+from bridge.model.airframe import Airframe
 from bridge.model.refusal import Refusal
 from bridge.model.vehicle import Power, Vehicle
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, request
+from protocols.msp.inav_places import (
+    APPROACH_SIZE,
+    FW_APPROACH,
+    MISSION_APPROACH,
+    decode_approach,
+    encode_read_approach,
+)
 from protocols.msp.nav import (
     INFO_SIZE,
     LOAD_REQUEST,
@@ -82,6 +90,7 @@ class InavMissions(NavMissions, FliesToItems):
     def __init__(self, profile: NavProfile, controller: FlightController, vehicle: Vehicle) -> None:
         super().__init__(profile, controller, vehicle)
         self._has_zones = has_zones(controller)
+        self._is_aeroplane = controller.airframe is Airframe.FIXED_WING
         self._board = controller
 
     def report(self) -> Conversation[StoreReport | None]:
@@ -202,10 +211,12 @@ class InavMissions(NavMissions, FliesToItems):
         values = yield from read_values(SETTING_NAMES)
         safehomes = (yield from read_safehomes()) if values else ()
         zones = (yield from read_zones_in_force()) if values and self._has_zones else ()
-        if values is None or safehomes is None or zones is None:
+        approach = (yield from _ask_approach()) if values and self._is_aeroplane else b""
+        if values is None or safehomes is None or zones is None or approach is None:
             self._are_limits_doubtful = self._are_limits_silent = True
         elif values:
-            self._limits = InavLimits(safehomes=safehomes, zones=zones).with_settings(values)
+            limits = InavLimits(safehomes=safehomes, zones=zones, is_aeroplane=self._is_aeroplane)
+            self._limits = replace(limits, approach=decode_approach(approach)).with_settings(values)
 
     def _store_content(self, records: Mission) -> Mission:
         """SAVE selects the first mission, so the new one goes there."""
@@ -239,8 +250,11 @@ class InavMissions(NavMissions, FliesToItems):
         yield from self._load_first(before)
 
     def _load_first(self, saved: NavInfo) -> Conversation[None]:
-        """Until LOAD, INAV takes the written records for one long mission, whose last record decides about landing."""
-        if self._kept:
+        """Until LOAD, INAV takes the written records for one long mission, whose last record decides about landing.
+
+        An aeroplane would land without its approach: only a loaded mission has a number (loadedMultiMissionIndex).
+        """
+        if self._kept or self._is_aeroplane:
             reply = yield from ask(LOAD_REQUEST, Nav.LOAD, 0)
             if reply is None or reply.direction is Direction.ERROR or (yield from self._info()) != saved:
                 raise PushFailed(PushFailure.UNCERTAIN)
@@ -285,6 +299,12 @@ class InavMissions(NavMissions, FliesToItems):
     def _info(self, *, tries: int = 3) -> Conversation[NavInfo | None]:
         reply = yield from ask(request(Nav.GETINFO), Nav.GETINFO, INFO_SIZE, tries=tries)
         return None if reply is None else decode_info(reply.payload)
+
+
+def _ask_approach() -> Conversation[bytes | None]:
+    """The payload, empty from a version before 7.1; None: it does not answer."""
+    reply = yield from ask(encode_read_approach(MISSION_APPROACH), FW_APPROACH, APPROACH_SIZE)
+    return None if reply is None else reply.payload
 
 
 def _is_load_gesture(channels_us: Sequence[int]) -> bool:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """An INAV's own settings decide whether it arms with a list, and how it flies it: the answer comes at Write."""
 
+import struct
 from dataclasses import replace
 from typing import Any
 
@@ -11,16 +12,19 @@ from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile
 from bridge.missions.list_check import check_list
 from protocols.inav_dump import read_inav_settings
-from protocols.mission_item import MissionItem, MissionResult
-from protocols.msp.inav_places import Safehome
+from protocols.mission_item import Command, MissionItem, MissionResult
+from protocols.msp.inav_places import FW_APPROACH, MISSION_APPROACH, FwApproach, Safehome
 from reports.finding import without_defaults
+from simulator.inav.places import SET_FW_APPROACH
 from tests.bridge.controllers.inav.test_mission_store import ACCEPTED, board_with
 from tests.support.conversations import Upload
-from tests.support.nav_lists import HOME, LAT, LON, RTL, RTL_LANDS, WP
+from tests.support.nav_lists import HOME, LAT, LON, RTL, RTL_LANDS, WP, item
 from tests.support.settings_client import SettingsClient
 
 #: 100 m to the north.
 NORTH = 8983
+LAND = item(Command.NAV_LAND)
+APPROACH = FwApproach(8, 5000, 350, turns_right=False, headings=(90, -10), is_above_sea=False)
 NEAR, FAR = replace(WP, lat_e7=LAT + NORTH // 2), replace(WP, lat_e7=LAT + 2 * NORTH)
 
 
@@ -100,6 +104,47 @@ def test_a_low_battery_and_another_selected_mission_are_named() -> None:
         "nav_wp_multi_mission_index changes from 2 to 1: the new mission is stored first",
         "Battery at 3.42 V per cell, vbat_warning_cell_voltage is 3.50 V",
     ]
+
+
+@pytest.mark.parametrize(
+    ("approach", "news"),
+    [
+        (None, "circles down here and lands in any direction (no FW approach before INAV 7.1)"),
+        (
+            APPROACH._replace(headings=(0, 0)),
+            "circles down here and lands in any direction (FW approach 8 has no heading)",
+        ),
+        (APPROACH, "lands by FW approach 8: heading 90 or 270 or 10, from 50 m to the ground at 3.5 m above home"),
+        (
+            APPROACH._replace(headings=(0, 360), is_above_sea=True),
+            "lands by FW approach 8: heading 0 or 180, from 50 m to the ground at 3.5 m above sea level",
+        ),
+    ],
+)
+def test_how_an_aeroplane_lands_is_named(approach: FwApproach | None, news: str) -> None:
+    there = replace(LAND, lat_e7=LAT + NORTH)
+    assert texts(WP, there, is_aeroplane=True, approach=approach) == [f"WP 2: {news}"]
+    assert texts(WP, there, approach=approach) == []
+
+
+def test_an_aeroplanes_approach_is_read_and_its_mission_loaded_because_only_then_inav_uses_it() -> None:
+    board, world, station = board_with(version="9.0.1", platform=1)
+    firmware = board._firmware
+    approach = struct.pack("<BiiBhhB", MISSION_APPROACH, 4000, 0, 0, -90, 0, 0)
+    firmware._places.answer(SET_FW_APPROACH, approach)  # type: ignore[union-attr]
+    client = SettingsClient(world)
+    client.wait_read()
+    client.change("nav_wp_radius", 200)
+    assert Upload(station, [HOME, NEAR, replace(LAND, lat_e7=LAT + NORTH)]).run() is ACCEPTED
+    assert "WP 2: lands by FW approach 8: heading 90, from 40 m to the ground at 0 m" in " ".join(station.texts())
+    assert firmware._mission._loaded == 1  # type: ignore[union-attr]
+    assert firmware._places.answer(FW_APPROACH, bytes((MISSION_APPROACH,))) == approach  # type: ignore[union-attr]
+
+
+def test_a_version_without_approaches_is_named() -> None:
+    _, _, station = board_with(version="6.1.1", platform=1)
+    assert Upload(station, [HOME, NEAR, replace(LAND, lat_e7=LAT + NORTH)]).run() is ACCEPTED
+    assert "WP 2: circles down here and lands in any direction" in " ".join(station.texts())
 
 
 def test_the_boards_settings_are_read_by_name_and_again_after_a_change() -> None:
