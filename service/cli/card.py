@@ -160,16 +160,16 @@ def _hooked(boot: Path) -> tuple[Path, str]:
     """The file for the first start, and its text with our line."""
     user_data, firstrun = boot / "user-data", boot / "firstrun.sh"
     if user_data.exists():
-        text = user_data.read_text()
+        text = user_data.read_text("utf-8")
         if not text.startswith("#cloud-config"):
             raise CardError(f"{user_data} is not cloud-init's: write the card again")
         return user_data, text if _IN_USER_DATA in text else _with_command(user_data, text)
-    if not firstrun.exists() or "systemd.run=" not in (boot / "cmdline.txt").read_text():
+    if not firstrun.exists() or "systemd.run=" not in (boot / "cmdline.txt").read_text("utf-8"):
         raise CardError(
             f"{boot} has neither user-data nor firstrun.sh: write the card with Raspberry Pi Imager, and give it a "
             "user name and a password there (Edit settings)"
         )
-    text = firstrun.read_text()
+    text = firstrun.read_text("utf-8")
     first, _, rest = text.partition("\n")
     return firstrun, text if _IN_FIRSTRUN in text else f"{first}\n{_IN_FIRSTRUN}\n{rest}"
 

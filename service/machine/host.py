@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The machine, for doctor, setup and the port search: files below a root, which tests create."""
 
-import fcntl
 import os
 import re
 import socket
@@ -109,6 +108,8 @@ class Host:
 
     def address(self, interface: str) -> str | None:
         """A network interface's IPv4 address; None if it has none."""
+        import fcntl  # Windows, where `naze-bridge card` runs too, has none
+
         request = struct.pack("256s", interface.encode()[:15])
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
             try:

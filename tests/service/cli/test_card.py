@@ -6,6 +6,7 @@ tests/packaging/test_debian_package.py starts from such a card.
 
 import shlex
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -37,10 +38,23 @@ class Card:
         (self.boot / "user-data").write_text(_USER_DATA + more)
         (self.boot / "network-config").write_text("network:\n  version: 2\n")
 
-    def prepare(self, *options: str) -> Result:
+    def words(self, *options: str) -> tuple[str, ...]:
         files = ("--package", str(self.package), "--password-file", str(self.password))
-        words = ("card", str(self.boot), *files, "--hotspot", "pilot's kite", "--country", "de", *options)
-        return CliRunner().invoke(main, words)
+        return ("card", str(self.boot), *files, "--hotspot", "pilot's kite", "--country", "de", *options)
+
+    def prepare(self, *options: str) -> Result:
+        return CliRunner().invoke(main, self.words(*options))
+
+
+#: Runs the command without what Windows lacks.
+_LIKE_WINDOWS = """
+import os, socket, sys
+for name in "fcntl", "grp", "pwd", "resource", "termios":
+    sys.modules[name] = None
+del os.geteuid, os.fork, socket.AF_UNIX
+from service.cli.main import main
+main(sys.argv[1:])
+"""
 
 
 @pytest.fixture
@@ -132,3 +146,10 @@ def test_wrong_answers_are_refused(card: Card) -> None:
     card.trixie()
     for options in (("--country", "Germany"), ("--name", "my pi"), ("--hotspot", "n" * 33)):
         assert card.prepare(*options).exit_code == 2
+
+
+def test_a_card_is_prepared_on_windows_too(card: Card) -> None:
+    card.trixie()
+    done = subprocess.run([sys.executable, "-c", _LIKE_WINDOWS, *card.words()], capture_output=True, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert (card.boot / "naze-bridge" / "first-boot.sh").exists()
