@@ -82,8 +82,8 @@ def setup(
         raise click.UsageError("give either --key-file or --new-key")
     earlier = earlier_choices(host)
     if earlier is not None:
+        _print_kept(host, earlier.fc, page=earlier.page)
         fc, page = earlier.fc if fc is None else fc, earlier.page if page is None else page
-        _print_kept(host, fc, page=page)
     elif not yes and not dry_run:
         if hotspot is None and click.confirm("Open a Wi-Fi hotspot, for the field? (no: keep the current network)"):
             hotspot = click.prompt("Its name", default=socket.gethostname())
@@ -179,7 +179,7 @@ def _agree(*, yes: bool) -> None:
         raise click.Abort
 
 
-def _print_kept(host: Host, fc: str | None, *, page: bool | None) -> None:
+def _print_kept(host: Host, fc: str | None, *, page: bool) -> None:
     hotspot = hotspot_name(host)
     kept = [
         f"flight controller {fc or 'auto'}",

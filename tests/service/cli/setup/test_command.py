@@ -46,7 +46,9 @@ def test_the_pilot_is_asked_once(pi: Pi) -> None:
     again = pi.setup(answers=go)
     assert again.exit_code == 0, again.output
     assert again.output.count("?") == 1  # Make these changes?
-    assert "Set up before: flight controller auto, status page on, a key is required" in again.output
+    before = "Set up before: flight controller auto, status page on, a key is required"
+    assert before in again.output
+    assert before in pi.setup("--dry-run", "--no-page").output
     assert pi.key_file.read_text() == f"{first}\n"
 
 
