@@ -16,7 +16,8 @@
 #   make deb            build the Debian packages for amd64, arm64 and armhf in dist/ (ARCH=arm64: only that one)
 #   make image-check    the first hour in a bare Debian with systemd: install, setup, a verified mission (root)
 #   make release VERSION=0.3.0  cut the changelog, tag, and build everything in dist/0.3.0 with checksums; pushes nothing
-#   make deb-trial      install, use and purge it in a bare Debian with systemd (root; SUITE=trixie: Debian 13)
+#   make deb-trial      install, use and purge it in a bare Debian with systemd (root; SUITE=trixie: Debian 13;
+#                       SUITE=bookworm-to-trixie: after an upgrade of the system)
 #   make lock           pin the newest packages that pyproject.toml allows (needs uv)
 #   make message-table  regenerate protocols/mavlink/message_table.py from pymavlink's definitions
 #   make cli-page       regenerate docs/cli.md

@@ -77,8 +77,11 @@ def root(package: Path, tmp_path: Path) -> Iterator[BareRoot]:
 
 
 def with_version(package: Path, version: str, folder: Path) -> Path:
-    """The package under another version."""
+    """The package under another version, with a module that no other has."""
     with unpacked(package, folder) as control:
+        own = control.parents[1] / f"usr/lib/naze-bridge/lib/python{_OWN}/site-packages/v{version}"
+        own.mkdir()
+        (own / "module.py").touch()
         control.write_text(re.sub(r"^Version: .*", f"Version: {version}", control.read_text(), flags=re.MULTILINE))
     return folder / "repacked.deb"
 
@@ -213,7 +216,8 @@ def test_it_is_installed_used_upgraded_removed_and_purged(package: Path, root: B
     # An upgrade and a downgrade ask no questions and keep the changed configuration and the missions.
     for version in ("99.0", "99.0~dev7"):
         root.put(with_version(package, version, tmp_path), "/root/other.deb")
-        root.run("apt-get install --yes --allow-downgrades /root/other.deb </dev/null")
+        printed = root.run("apt-get install --yes --allow-downgrades /root/other.deb </dev/null")
+        assert "unable to delete" not in printed
         assert version in root.run("dpkg-query --showformat '${Version} ' --show naze-bridge")
         assert 'fc = "sim:"' in root.run("cat /etc/naze-bridge/config.toml")
     root.run(_AS_AFTER_SETUP)
