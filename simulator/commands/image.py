@@ -30,7 +30,7 @@ def read_image(path: Path) -> Image:
         load_native_chip()
     except ImportError as error:  # Unicorn is optional
         raise click.ClickException(
-            "--image needs the emulator: pip install 'naze-bridge[emulator]' (or the package unicorn)"
+            "--image needs the Python package unicorn, which the Debian package lacks: see docs/howto/try-a-mission.md"
         ) from error
     except NativeChipError as error:
         raise click.ClickException(str(error)) from error

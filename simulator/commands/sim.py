@@ -115,7 +115,7 @@ def _address(_: click.Context, __: click.Parameter, value: str | None) -> tuple[
 @click.option(
     "--image",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    help="Emulate the chip and run this firmware (.elf, .hex or .bin). Needs naze-bridge[emulator].",
+    help="Emulate the chip and run this firmware (.elf, .hex or .bin). Needs Unicorn.",
 )
 @click.option("--fly", is_flag=True, help="With --image: put the board into a quadcopter that flies.")
 @click.option(

@@ -4,7 +4,6 @@
 import re
 import shutil
 import signal
-import tomllib
 from collections.abc import Iterator
 from contextlib import ExitStack
 from importlib.util import find_spec
@@ -45,7 +44,7 @@ NOT_RUN = {
     "python examples/zenoh_router.py": "tests/support/zenoh_router.py runs it, for all tests of fleets",
     "python examples/zenoh-tls/make_certificates.py": "tests/support/secured_fleet.py runs it",
     "pip install trustme": "a test dependency",
-    "pip install naze-bridge[emulator]": "needs the package index; the extra is checked",
+    ".venv/bin/python -m pip install unicorn": "a test dependency",
     ".venv/bin/python -m pip wheel": "takes long; tests/packaging/test_debian_package.py builds this wheel",
     "pipx install": "needs the package index",
     "zenohd": "not in Debian; tests use it if $ZENOHD names it",
@@ -190,9 +189,6 @@ def test_a_command_of_another_program_names_what_exists(command: Command) -> Non
     for word in words:
         if word.startswith("examples/"):
             assert (REPOSITORY / word).exists()
-        if word.startswith("naze-bridge["):
-            extras = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]["optional-dependencies"]
-            assert word.removeprefix("naze-bridge[").rstrip("]") in extras
         if program in {"systemctl", "journalctl", "apt"} and word.startswith("naze"):
             unit = word.replace("@*", "@")
             assert (REPOSITORY / "systemd" / (unit if "." in unit else f"{unit}.service")).exists()
