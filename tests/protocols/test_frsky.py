@@ -84,6 +84,13 @@ def test_a_lost_byte_drops_the_whole_group(at: int) -> None:
     assert [report for report in reports if report.voltage_v or report.place_e7] == []
 
 
+@pytest.mark.parametrize(
+    "damaged", [b"\x5e\x06\x08", b"\x5e\x06\x08\x02\x00", b"\x5e\x06\x08\x5d\x5e", b"\x5e\x77\x08\x02"]
+)
+def test_values_before_and_after_a_damaged_one_are_no_group(damaged: bytes) -> None:
+    assert read(TEMPERATURE + damaged + PLACE + NEXT[:1] + NEXT) == []
+
+
 @pytest.mark.parametrize("bit", range(16))
 def test_volts_that_disagree_with_the_cells_are_unknown(bit: int) -> None:
     damaged = bytearray(POWER)

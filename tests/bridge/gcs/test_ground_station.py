@@ -89,3 +89,11 @@ def test_a_gap_in_the_frame_numbers_is_a_lost_frame(numbers: list[int], *, lost:
     for frame in frames[1:]:
         speaker.heard(frame, 0.1)
     assert (speaker.last_lost > first) is lost
+
+
+@pytest.mark.parametrize(("silence_s", "is_late"), [(0.9, True), (1.1, False)])
+def test_an_older_number_after_a_silence_is_that_of_a_restarted_sender(silence_s: float, *, is_late: bool) -> None:
+    speaker = Speaker()
+    for at, number in ((0.0, 9), (silence_s, 0)):
+        speaker.heard(MavlinkFrame(bytes((MAGIC_V2, 0, 0, 0, number, 255, 190, 0, 0, 0))), at)
+    assert speaker.is_late is is_late

@@ -36,6 +36,7 @@ def test_stored_missions_are_read_without_a_daemon(start_in: Starter, tmp_path: 
     assert {words: ask(daemon, "missions", *words).stdout for words in _READING} == with_daemon
     difference = with_daemon["diff", "1", "2"].splitlines()
     assert [line for line in difference if "->" in line and "WAYPOINT" in line]
+    assert [ask(daemon, "missions", "diff", "1", other).returncode for other in ("1", "2")] == [0, 1]
     assert "no daemon answers" in ask(daemon, "missions", "restore", "1").stderr
     restored = ask(daemon, "missions", "restore", "1", "--fc", "sim")
     assert restored.stdout.endswith("ACCEPTED: Mission verified: 5 records\n"), restored

@@ -7,6 +7,7 @@ import pytest
 from structlog.testing import capture_logs
 
 from service.links.port_memory import PORTS_FILE, PortMemory
+from service.machine.state_file import StateFile
 
 
 @pytest.mark.parametrize("content", ["", "[]", '{"others": {}}', '{"flight_controller": "", "others": []}', "\xff"])
@@ -16,3 +17,13 @@ def test_a_damaged_file_is_reported_and_ignored(tmp_path: Path, content: str) ->
         memory = PortMemory(tmp_path)
     assert (memory.flight_controller, memory.others) == ("", {})
     assert [entry["event"] for entry in logged] == ["state.lost"]
+
+
+def test_the_latest_contents_are_loaded_again(tmp_path: Path) -> None:
+    file = StateFile(tmp_path, "numbers.json", "the numbers are forgotten")
+    for number in range(20):
+        file.save([number])
+    file.close()
+    again = StateFile(tmp_path, "numbers.json", "the numbers are forgotten")
+    assert again.load(list) == [19]
+    again.close()

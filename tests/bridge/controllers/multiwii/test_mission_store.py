@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from protocols.mission_item import MissionResult
 from protocols.msp.frame import MspParser
 from protocols.msp.nav import Nav
 from tests.bridge.controllers.nav.test_mission_store import ACCEPTED, DENIED, found, packed, plan
@@ -85,3 +86,32 @@ def test_records_that_a_multiwii_already_holds_are_not_written() -> None:
     assert Upload(station, plan(20)).run() is ACCEPTED
     # Only the return home for the time of the check, and the first record again.
     assert multiwii.writes == written + 2
+
+
+def test_only_some_records_are_read_to_see_that_nobody_changed_the_list() -> None:
+    multiwii = FakeMultiwii()
+    world, station = found(multiwii)
+    assert Upload(station, plan(40)).run() is ACCEPTED
+    world.run(3)
+    world.written.clear()
+    world.run(20)
+    asked = [frame for _, _, data in world.written for frame in MspParser().feed(data) if frame.command == Nav.WP]
+    # Not as many as if all 39 were read each second.
+    assert 20 <= len(asked) < 20 * 39
+
+
+def test_a_record_that_is_not_stored_is_noticed_and_the_old_list_restored() -> None:
+    multiwii = FakeMultiwii()
+    _, station = found(multiwii)
+    assert Upload(station, plan(12)).run() is ACCEPTED
+    refused = packed(plan(20, 3))[8]
+    honest = multiwii.store
+
+    def store(number: int, record: bytes) -> None:
+        if record != refused:
+            honest(number, record)
+
+    multiwii.store = store  # type: ignore[method-assign]
+    assert Upload(station, plan(20, 3)).run() is MissionResult.INVALID
+    assert multiwii.flown == packed(plan(12))
+    assert Download(station).run() == plan(12)

@@ -112,3 +112,17 @@ def test_doctors_verdict_does_not_keep_the_hotspot_closed(
     done = pi.setup("--yes", "--hotspot", "kite", "--password-file", str(password))
     assert done.exit_code == 1
     assert pi.ran[-1].startswith("systemd-run ")
+
+
+def test_a_reboot_is_requested_once_the_console_left_the_uart(pi: Pi) -> None:
+    for path, text in (
+        ("proc/device-tree/model", "Raspberry Pi 4 Model B Rev 1.4\0"),
+        ("boot/firmware/cmdline.txt", "console=serial0,115200 console=tty1 rootwait\n"),
+        ("boot/firmware/config.txt", "[all]\nenable_uart=1\n"),
+    ):
+        (pi.root / path).parent.mkdir(parents=True, exist_ok=True)
+        (pi.root / path).write_text(text)
+    done = pi.setup("--yes")
+    assert done.exit_code == 0, done.output
+    assert "sudo reboot" in done.output
+    assert "sudo reboot" not in pi.setup("--yes").output
