@@ -8,9 +8,8 @@ from typing import NamedTuple
 
 from fastcrc.crc16 import mcrf4xx
 
-from protocols.mavlink.dialect import CRC_EXTRA, Message, messages
+from protocols.mavlink.dialect import CRC_EXTRA, MESSAGE_FORMATS, Message, messages
 from protocols.mavlink.frame import MAGIC_V1, MAGIC_V2, MavlinkFrame
-from protocols.mavlink.message_table import MESSAGE_FORMATS
 from protocols.mission_item import MissionItem, degrees_to_e7
 
 _SIGNED = 0x01

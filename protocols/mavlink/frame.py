@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from fastcrc.crc16 import mcrf4xx
 
-from protocols.mavlink.message_table import MESSAGE_FORMATS
+from protocols.mavlink.dialect import MESSAGE_FORMATS
 
 MAGIC_V1 = 0xFE
 MAGIC_V2 = 0xFD

@@ -1,262 +1,73 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The format of every message that is known to MAVLink. Made by `make message-table`, not by hand."""
+"""Facts about messages that pymavlink's ardupilotmega dialect lacks. Made by `make message-table`, not by hand."""
 
 from protocols.mavlink.message_format import MessageFormat
 
-#: By message id.
-MESSAGE_FORMATS = {
-    0: MessageFormat(50, 9, 9, None, None),  # HEARTBEAT
-    1: MessageFormat(124, 31, 43, None, None),  # SYS_STATUS
-    2: MessageFormat(137, 12, 12, None, None),  # SYSTEM_TIME
-    4: MessageFormat(237, 14, 14, 12, 13),  # PING
-    5: MessageFormat(217, 28, 28, 0, None),  # CHANGE_OPERATOR_CONTROL
-    6: MessageFormat(104, 3, 3, None, None),  # CHANGE_OPERATOR_CONTROL_ACK
-    7: MessageFormat(119, 32, 32, None, None),  # AUTH_KEY
-    11: MessageFormat(89, 6, 6, 4, None),  # SET_MODE
-    20: MessageFormat(214, 20, 20, 2, 3),  # PARAM_REQUEST_READ
-    21: MessageFormat(159, 2, 2, 0, 1),  # PARAM_REQUEST_LIST
-    22: MessageFormat(220, 25, 25, None, None),  # PARAM_VALUE
-    23: MessageFormat(168, 23, 23, 4, 5),  # PARAM_SET
-    24: MessageFormat(24, 30, 52, None, None),  # GPS_RAW_INT
-    25: MessageFormat(23, 101, 101, None, None),  # GPS_STATUS
-    26: MessageFormat(170, 22, 24, None, None),  # SCALED_IMU
-    27: MessageFormat(144, 26, 29, None, None),  # RAW_IMU
-    28: MessageFormat(67, 16, 16, None, None),  # RAW_PRESSURE
-    29: MessageFormat(115, 14, 16, None, None),  # SCALED_PRESSURE
-    30: MessageFormat(39, 28, 28, None, None),  # ATTITUDE
-    31: MessageFormat(246, 32, 48, None, None),  # ATTITUDE_QUATERNION
-    32: MessageFormat(185, 28, 28, None, None),  # LOCAL_POSITION_NED
-    33: MessageFormat(104, 28, 28, None, None),  # GLOBAL_POSITION_INT
-    34: MessageFormat(237, 22, 22, None, None),  # RC_CHANNELS_SCALED
-    35: MessageFormat(244, 22, 22, None, None),  # RC_CHANNELS_RAW
-    36: MessageFormat(222, 21, 37, None, None),  # SERVO_OUTPUT_RAW
-    37: MessageFormat(212, 6, 7, 4, 5),  # MISSION_REQUEST_PARTIAL_LIST
-    38: MessageFormat(9, 6, 7, 4, 5),  # MISSION_WRITE_PARTIAL_LIST
-    39: MessageFormat(254, 37, 38, 32, 33),  # MISSION_ITEM
-    40: MessageFormat(230, 4, 5, 2, 3),  # MISSION_REQUEST
-    41: MessageFormat(28, 4, 4, 2, 3),  # MISSION_SET_CURRENT
-    42: MessageFormat(28, 2, 6, None, None),  # MISSION_CURRENT
-    43: MessageFormat(132, 2, 3, 0, 1),  # MISSION_REQUEST_LIST
-    44: MessageFormat(221, 4, 5, 2, 3),  # MISSION_COUNT
-    45: MessageFormat(232, 2, 3, 0, 1),  # MISSION_CLEAR_ALL
-    46: MessageFormat(11, 2, 2, None, None),  # MISSION_ITEM_REACHED
-    47: MessageFormat(153, 3, 4, 0, 1),  # MISSION_ACK
-    48: MessageFormat(41, 13, 21, 12, None),  # SET_GPS_GLOBAL_ORIGIN
-    49: MessageFormat(39, 12, 20, None, None),  # GPS_GLOBAL_ORIGIN
-    50: MessageFormat(78, 37, 37, 18, 19),  # PARAM_MAP_RC
-    51: MessageFormat(196, 4, 5, 2, 3),  # MISSION_REQUEST_INT
+#: The size in MAVLink 1, by message id, of the dialect's messages that have extension fields in MAVLink 2.
+BASE_SIZES = {
+    1: 31,  # SYS_STATUS
+    24: 30,  # GPS_RAW_INT
+    26: 22,  # SCALED_IMU
+    27: 26,  # RAW_IMU
+    29: 14,  # SCALED_PRESSURE
+    31: 32,  # ATTITUDE_QUATERNION
+    36: 21,  # SERVO_OUTPUT_RAW
+    37: 6,  # MISSION_REQUEST_PARTIAL_LIST
+    38: 6,  # MISSION_WRITE_PARTIAL_LIST
+    39: 37,  # MISSION_ITEM
+    40: 4,  # MISSION_REQUEST
+    42: 2,  # MISSION_CURRENT
+    43: 2,  # MISSION_REQUEST_LIST
+    44: 4,  # MISSION_COUNT
+    45: 2,  # MISSION_CLEAR_ALL
+    47: 3,  # MISSION_ACK
+    48: 13,  # SET_GPS_GLOBAL_ORIGIN
+    49: 12,  # GPS_GLOBAL_ORIGIN
+    51: 4,  # MISSION_REQUEST_INT
+    69: 11,  # MANUAL_CONTROL
+    70: 18,  # RC_CHANNELS_OVERRIDE
+    73: 37,  # MISSION_ITEM_INT
+    77: 3,  # COMMAND_ACK
+    100: 26,  # OPTICAL_FLOW
+    101: 32,  # GLOBAL_VISION_POSITION_ESTIMATE
+    102: 32,  # VISION_POSITION_ESTIMATE
+    103: 20,  # VISION_SPEED_ESTIMATE
+    104: 32,  # VICON_POSITION_ESTIMATE
+    105: 62,  # HIGHRES_IMU
+    107: 64,  # HIL_SENSOR
+    108: 84,  # SIM_STATE
+    113: 36,  # HIL_GPS
+    116: 22,  # SCALED_IMU2
+    124: 35,  # GPS2_RAW
+    129: 22,  # SCALED_IMU3
+    132: 14,  # DISTANCE_SENSOR
+    137: 14,  # SCALED_PRESSURE2
+    138: 36,  # ATT_POS_MOCAP
+    143: 14,  # SCALED_PRESSURE3
+    147: 36,  # BATTERY_STATUS
+    148: 60,  # AUTOPILOT_VERSION
+    149: 30,  # LANDING_TARGET
+    152: 4,  # MEMINFO
+    158: 14,  # MOUNT_STATUS
+    162: 8,  # FENCE_STATUS
+    180: 45,  # CAMERA_FEEDBACK
+    192: 44,  # MAG_CAL_REPORT
+    193: 22,  # EKF_STATUS_REPORT
+    194: 25,  # PID_TUNING
+    225: 65,  # EFI_STATUS
+    232: 63,  # GPS_INPUT
+    242: 52,  # HOME_POSITION
+    243: 53,  # SET_HOME_POSITION
+    253: 51,  # STATUSTEXT
+}
+#: Messages of other dialects, by message id.
+OTHER_FORMATS = {
     53: MessageFormat(3, 5, 5, None, None),  # MISSION_CHECKSUM
-    54: MessageFormat(15, 27, 27, 24, 25),  # SAFETY_SET_ALLOWED_AREA
-    55: MessageFormat(3, 25, 25, None, None),  # SAFETY_ALLOWED_AREA
-    61: MessageFormat(167, 72, 72, None, None),  # ATTITUDE_QUATERNION_COV
-    62: MessageFormat(183, 26, 26, None, None),  # NAV_CONTROLLER_OUTPUT
-    63: MessageFormat(119, 181, 181, None, None),  # GLOBAL_POSITION_INT_COV
-    64: MessageFormat(191, 225, 225, None, None),  # LOCAL_POSITION_NED_COV
-    65: MessageFormat(118, 42, 42, None, None),  # RC_CHANNELS
-    66: MessageFormat(148, 6, 6, 2, 3),  # REQUEST_DATA_STREAM
-    67: MessageFormat(21, 4, 4, None, None),  # DATA_STREAM
-    69: MessageFormat(243, 11, 30, None, None),  # MANUAL_CONTROL
-    70: MessageFormat(124, 18, 38, 16, 17),  # RC_CHANNELS_OVERRIDE
-    73: MessageFormat(38, 37, 38, 32, 33),  # MISSION_ITEM_INT
-    74: MessageFormat(20, 20, 20, None, None),  # VFR_HUD
-    75: MessageFormat(158, 35, 35, 30, 31),  # COMMAND_INT
-    76: MessageFormat(152, 33, 33, 30, 31),  # COMMAND_LONG
-    77: MessageFormat(143, 3, 10, 8, 9),  # COMMAND_ACK
-    81: MessageFormat(106, 22, 22, None, None),  # MANUAL_SETPOINT
-    82: MessageFormat(49, 39, 39, 36, 37),  # SET_ATTITUDE_TARGET
-    83: MessageFormat(22, 37, 37, None, None),  # ATTITUDE_TARGET
-    84: MessageFormat(143, 53, 53, 50, 51),  # SET_POSITION_TARGET_LOCAL_NED
-    85: MessageFormat(140, 51, 51, None, None),  # POSITION_TARGET_LOCAL_NED
-    86: MessageFormat(5, 53, 53, 50, 51),  # SET_POSITION_TARGET_GLOBAL_INT
-    87: MessageFormat(150, 51, 51, None, None),  # POSITION_TARGET_GLOBAL_INT
-    89: MessageFormat(231, 28, 28, None, None),  # LOCAL_POSITION_NED_SYSTEM_GLOBAL_OFFSET
-    90: MessageFormat(183, 56, 56, None, None),  # HIL_STATE
-    91: MessageFormat(63, 42, 42, None, None),  # HIL_CONTROLS
-    92: MessageFormat(54, 33, 33, None, None),  # HIL_RC_INPUTS_RAW
-    93: MessageFormat(47, 81, 81, None, None),  # HIL_ACTUATOR_CONTROLS
-    100: MessageFormat(175, 26, 34, None, None),  # OPTICAL_FLOW
-    101: MessageFormat(102, 32, 117, None, None),  # GLOBAL_VISION_POSITION_ESTIMATE
-    102: MessageFormat(158, 32, 117, None, None),  # VISION_POSITION_ESTIMATE
-    103: MessageFormat(208, 20, 57, None, None),  # VISION_SPEED_ESTIMATE
-    104: MessageFormat(56, 32, 116, None, None),  # VICON_POSITION_ESTIMATE
-    105: MessageFormat(93, 62, 63, None, None),  # HIGHRES_IMU
-    106: MessageFormat(138, 44, 44, None, None),  # OPTICAL_FLOW_RAD
-    107: MessageFormat(108, 64, 65, None, None),  # HIL_SENSOR
-    108: MessageFormat(32, 84, 92, None, None),  # SIM_STATE
-    109: MessageFormat(185, 9, 9, None, None),  # RADIO_STATUS
-    110: MessageFormat(84, 254, 254, 1, 2),  # FILE_TRANSFER_PROTOCOL
-    111: MessageFormat(34, 16, 16, None, None),  # TIMESYNC
-    112: MessageFormat(174, 12, 12, None, None),  # CAMERA_TRIGGER
-    113: MessageFormat(124, 36, 39, None, None),  # HIL_GPS
-    114: MessageFormat(237, 44, 44, None, None),  # HIL_OPTICAL_FLOW
-    115: MessageFormat(4, 64, 64, None, None),  # HIL_STATE_QUATERNION
-    116: MessageFormat(76, 22, 24, None, None),  # SCALED_IMU2
-    117: MessageFormat(128, 6, 6, 4, 5),  # LOG_REQUEST_LIST
-    118: MessageFormat(56, 14, 14, None, None),  # LOG_ENTRY
-    119: MessageFormat(116, 12, 12, 10, 11),  # LOG_REQUEST_DATA
-    120: MessageFormat(134, 97, 97, None, None),  # LOG_DATA
-    121: MessageFormat(237, 2, 2, 0, 1),  # LOG_ERASE
-    122: MessageFormat(203, 2, 2, 0, 1),  # LOG_REQUEST_END
-    123: MessageFormat(250, 113, 113, 0, 1),  # GPS_INJECT_DATA
-    124: MessageFormat(87, 35, 57, None, None),  # GPS2_RAW
-    125: MessageFormat(203, 6, 6, None, None),  # POWER_STATUS
-    126: MessageFormat(220, 79, 79, None, None),  # SERIAL_CONTROL
-    127: MessageFormat(25, 35, 35, None, None),  # GPS_RTK
-    128: MessageFormat(226, 35, 35, None, None),  # GPS2_RTK
-    129: MessageFormat(46, 22, 24, None, None),  # SCALED_IMU3
-    130: MessageFormat(29, 13, 13, None, None),  # DATA_TRANSMISSION_HANDSHAKE
-    131: MessageFormat(223, 255, 255, None, None),  # ENCAPSULATED_DATA
-    132: MessageFormat(85, 14, 39, None, None),  # DISTANCE_SENSOR
-    133: MessageFormat(6, 18, 18, None, None),  # TERRAIN_REQUEST
-    134: MessageFormat(229, 43, 43, None, None),  # TERRAIN_DATA
-    135: MessageFormat(203, 8, 8, None, None),  # TERRAIN_CHECK
-    136: MessageFormat(1, 22, 22, None, None),  # TERRAIN_REPORT
-    137: MessageFormat(195, 14, 16, None, None),  # SCALED_PRESSURE2
-    138: MessageFormat(109, 36, 120, None, None),  # ATT_POS_MOCAP
-    139: MessageFormat(168, 43, 43, 41, 42),  # SET_ACTUATOR_CONTROL_TARGET
-    140: MessageFormat(181, 41, 41, None, None),  # ACTUATOR_CONTROL_TARGET
-    141: MessageFormat(47, 32, 32, None, None),  # ALTITUDE
-    142: MessageFormat(72, 243, 243, None, None),  # RESOURCE_REQUEST
-    143: MessageFormat(131, 14, 16, None, None),  # SCALED_PRESSURE3
-    144: MessageFormat(127, 93, 93, None, None),  # FOLLOW_TARGET
-    146: MessageFormat(103, 100, 100, None, None),  # CONTROL_SYSTEM_STATE
-    147: MessageFormat(154, 36, 54, None, None),  # BATTERY_STATUS
-    148: MessageFormat(178, 60, 78, None, None),  # AUTOPILOT_VERSION
-    149: MessageFormat(200, 30, 60, None, None),  # LANDING_TARGET
-    150: MessageFormat(134, 42, 42, None, None),  # SENSOR_OFFSETS
-    151: MessageFormat(219, 8, 8, 6, 7),  # SET_MAG_OFFSETS
-    152: MessageFormat(208, 4, 8, None, None),  # MEMINFO
-    153: MessageFormat(188, 12, 12, None, None),  # AP_ADC
-    154: MessageFormat(84, 15, 15, 6, 7),  # DIGICAM_CONFIGURE
-    155: MessageFormat(22, 13, 13, 4, 5),  # DIGICAM_CONTROL
-    156: MessageFormat(19, 6, 6, 0, 1),  # MOUNT_CONFIGURE
-    157: MessageFormat(21, 15, 15, 12, 13),  # MOUNT_CONTROL
-    158: MessageFormat(134, 14, 15, 12, 13),  # MOUNT_STATUS
-    160: MessageFormat(78, 12, 12, 8, 9),  # FENCE_POINT
-    161: MessageFormat(68, 3, 3, 0, 1),  # FENCE_FETCH_POINT
-    162: MessageFormat(189, 8, 9, None, None),  # FENCE_STATUS
-    163: MessageFormat(127, 28, 28, None, None),  # AHRS
-    164: MessageFormat(154, 44, 44, None, None),  # SIMSTATE
-    165: MessageFormat(21, 3, 3, None, None),  # HWSTATUS
-    166: MessageFormat(21, 9, 9, None, None),  # RADIO
-    167: MessageFormat(144, 22, 22, None, None),  # LIMITS_STATUS
-    168: MessageFormat(1, 12, 12, None, None),  # WIND
-    169: MessageFormat(234, 18, 18, None, None),  # DATA16
-    170: MessageFormat(73, 34, 34, None, None),  # DATA32
-    171: MessageFormat(181, 66, 66, None, None),  # DATA64
-    172: MessageFormat(22, 98, 98, None, None),  # DATA96
-    173: MessageFormat(83, 8, 8, None, None),  # RANGEFINDER
-    174: MessageFormat(167, 48, 48, None, None),  # AIRSPEED_AUTOCAL
-    175: MessageFormat(138, 19, 19, 14, 15),  # RALLY_POINT
-    176: MessageFormat(234, 3, 3, 0, 1),  # RALLY_FETCH_POINT
-    177: MessageFormat(240, 20, 20, None, None),  # COMPASSMOT_STATUS
-    178: MessageFormat(47, 24, 24, None, None),  # AHRS2
-    179: MessageFormat(189, 29, 29, 26, None),  # CAMERA_STATUS
-    180: MessageFormat(52, 45, 47, 42, None),  # CAMERA_FEEDBACK
-    181: MessageFormat(174, 4, 4, None, None),  # BATTERY2
-    182: MessageFormat(229, 40, 40, None, None),  # AHRS3
-    183: MessageFormat(85, 2, 2, 0, 1),  # AUTOPILOT_VERSION_REQUEST
-    184: MessageFormat(159, 206, 206, 4, 5),  # REMOTE_LOG_DATA_BLOCK
-    185: MessageFormat(186, 7, 7, 4, 5),  # REMOTE_LOG_BLOCK_STATUS
-    186: MessageFormat(72, 29, 29, 0, 1),  # LED_CONTROL
-    191: MessageFormat(92, 27, 27, None, None),  # MAG_CAL_PROGRESS
-    192: MessageFormat(36, 44, 54, None, None),  # MAG_CAL_REPORT
-    193: MessageFormat(71, 22, 26, None, None),  # EKF_STATUS_REPORT
-    194: MessageFormat(98, 25, 33, None, None),  # PID_TUNING
-    195: MessageFormat(120, 37, 37, None, None),  # DEEPSTALL
-    200: MessageFormat(134, 42, 42, 40, 41),  # GIMBAL_REPORT
-    201: MessageFormat(205, 14, 14, 12, 13),  # GIMBAL_CONTROL
-    214: MessageFormat(69, 8, 8, 6, 7),  # GIMBAL_TORQUE_CMD_REPORT
-    215: MessageFormat(101, 3, 3, None, None),  # GOPRO_HEARTBEAT
-    216: MessageFormat(50, 3, 3, 0, 1),  # GOPRO_GET_REQUEST
-    217: MessageFormat(202, 6, 6, None, None),  # GOPRO_GET_RESPONSE
-    218: MessageFormat(17, 7, 7, 0, 1),  # GOPRO_SET_REQUEST
-    219: MessageFormat(162, 2, 2, None, None),  # GOPRO_SET_RESPONSE
     220: MessageFormat(34, 32, 32, None, None),  # NAV_FILTER_BIAS
     221: MessageFormat(71, 42, 42, None, None),  # RADIO_CALIBRATION
     222: MessageFormat(15, 3, 3, None, None),  # UALBERTA_SYS_STATUS
     223: MessageFormat(119, 47, 47, 42, 43),  # COMMAND_INT_STAMPED
     224: MessageFormat(102, 45, 45, 42, 43),  # COMMAND_LONG_STAMPED
-    225: MessageFormat(208, 65, 73, None, None),  # EFI_STATUS
-    226: MessageFormat(207, 8, 8, None, None),  # RPM
-    230: MessageFormat(163, 42, 42, None, None),  # ESTIMATOR_STATUS
-    231: MessageFormat(105, 40, 40, None, None),  # WIND_COV
-    232: MessageFormat(151, 63, 65, None, None),  # GPS_INPUT
-    233: MessageFormat(35, 182, 182, None, None),  # GPS_RTCM_DATA
-    234: MessageFormat(150, 40, 40, None, None),  # HIGH_LATENCY
-    235: MessageFormat(179, 42, 42, None, None),  # HIGH_LATENCY2
-    241: MessageFormat(90, 32, 32, None, None),  # VIBRATION
-    242: MessageFormat(104, 52, 60, None, None),  # HOME_POSITION
-    243: MessageFormat(85, 53, 61, 52, None),  # SET_HOME_POSITION
-    244: MessageFormat(95, 6, 6, None, None),  # MESSAGE_INTERVAL
-    245: MessageFormat(130, 2, 2, None, None),  # EXTENDED_SYS_STATE
-    246: MessageFormat(184, 38, 38, None, None),  # ADSB_VEHICLE
-    247: MessageFormat(81, 19, 19, None, None),  # COLLISION
-    248: MessageFormat(8, 254, 254, 3, 4),  # V2_EXTENSION
-    249: MessageFormat(204, 36, 36, None, None),  # MEMORY_VECT
-    250: MessageFormat(49, 30, 30, None, None),  # DEBUG_VECT
-    251: MessageFormat(170, 18, 18, None, None),  # NAMED_VALUE_FLOAT
-    252: MessageFormat(44, 18, 18, None, None),  # NAMED_VALUE_INT
-    253: MessageFormat(83, 51, 54, None, None),  # STATUSTEXT
-    254: MessageFormat(46, 9, 9, None, None),  # DEBUG
-    256: MessageFormat(71, None, 42, 8, 9),  # SETUP_SIGNING
-    257: MessageFormat(131, None, 9, None, None),  # BUTTON_CHANGE
-    258: MessageFormat(187, None, 232, 0, 1),  # PLAY_TUNE
-    259: MessageFormat(92, None, 237, None, None),  # CAMERA_INFORMATION
-    260: MessageFormat(146, None, 14, None, None),  # CAMERA_SETTINGS
-    261: MessageFormat(179, None, 61, None, None),  # STORAGE_INFORMATION
-    262: MessageFormat(12, None, 23, None, None),  # CAMERA_CAPTURE_STATUS
-    263: MessageFormat(133, None, 255, None, None),  # CAMERA_IMAGE_CAPTURED
-    264: MessageFormat(49, None, 32, None, None),  # FLIGHT_INFORMATION
-    265: MessageFormat(26, None, 20, None, None),  # MOUNT_ORIENTATION
-    266: MessageFormat(193, None, 255, 2, 3),  # LOGGING_DATA
-    267: MessageFormat(35, None, 255, 2, 3),  # LOGGING_DATA_ACKED
-    268: MessageFormat(14, None, 4, 2, 3),  # LOGGING_ACK
-    269: MessageFormat(109, None, 215, None, None),  # VIDEO_STREAM_INFORMATION
-    270: MessageFormat(59, None, 20, None, None),  # VIDEO_STREAM_STATUS
-    271: MessageFormat(22, None, 53, None, None),  # CAMERA_FOV_STATUS
-    275: MessageFormat(126, None, 32, None, None),  # CAMERA_TRACKING_IMAGE_STATUS
-    276: MessageFormat(18, None, 50, None, None),  # CAMERA_TRACKING_GEO_STATUS
-    277: MessageFormat(62, None, 30, None, None),  # CAMERA_THERMAL_RANGE
-    280: MessageFormat(70, None, 33, None, None),  # GIMBAL_MANAGER_INFORMATION
-    281: MessageFormat(48, None, 13, None, None),  # GIMBAL_MANAGER_STATUS
-    282: MessageFormat(123, None, 35, 32, 33),  # GIMBAL_MANAGER_SET_ATTITUDE
-    283: MessageFormat(74, None, 149, None, None),  # GIMBAL_DEVICE_INFORMATION
-    284: MessageFormat(99, None, 32, 30, 31),  # GIMBAL_DEVICE_SET_ATTITUDE
-    285: MessageFormat(137, None, 49, 38, 39),  # GIMBAL_DEVICE_ATTITUDE_STATUS
-    286: MessageFormat(210, None, 57, 50, 51),  # AUTOPILOT_STATE_FOR_GIMBAL_DEVICE
-    287: MessageFormat(1, None, 23, 20, 21),  # GIMBAL_MANAGER_SET_PITCHYAW
-    288: MessageFormat(20, None, 23, 20, 21),  # GIMBAL_MANAGER_SET_MANUAL_CONTROL
-    295: MessageFormat(234, None, 12, None, None),  # AIRSPEED
-    296: MessageFormat(158, None, 41, 36, 37),  # GLOBAL_POSITION_SENSOR
-    299: MessageFormat(19, None, 96, None, None),  # WIFI_CONFIG_AP
-    301: MessageFormat(243, None, 58, None, None),  # AIS_VESSEL
-    310: MessageFormat(28, None, 17, None, None),  # UAVCAN_NODE_STATUS
-    311: MessageFormat(95, None, 116, None, None),  # UAVCAN_NODE_INFO
-    320: MessageFormat(243, None, 20, 2, 3),  # PARAM_EXT_REQUEST_READ
-    321: MessageFormat(88, None, 2, 0, 1),  # PARAM_EXT_REQUEST_LIST
-    322: MessageFormat(243, None, 149, None, None),  # PARAM_EXT_VALUE
-    323: MessageFormat(78, None, 147, 0, 1),  # PARAM_EXT_SET
-    324: MessageFormat(132, None, 146, None, None),  # PARAM_EXT_ACK
-    330: MessageFormat(23, None, 167, None, None),  # OBSTACLE_DISTANCE
-    331: MessageFormat(91, None, 233, None, None),  # ODOMETRY
-    332: MessageFormat(236, None, 239, None, None),  # TRAJECTORY_REPRESENTATION_WAYPOINTS
-    333: MessageFormat(231, None, 109, None, None),  # TRAJECTORY_REPRESENTATION_BEZIER
-    335: MessageFormat(225, None, 24, None, None),  # ISBD_LINK_STATUS
-    339: MessageFormat(199, None, 5, None, None),  # RAW_RPM
-    340: MessageFormat(99, None, 70, None, None),  # UTM_GLOBAL_POSITION
-    345: MessageFormat(209, None, 21, 2, 3),  # PARAM_ERROR
-    350: MessageFormat(232, None, 252, None, None),  # DEBUG_FLOAT_ARRAY
-    360: MessageFormat(11, None, 25, None, None),  # ORBIT_EXECUTION_STATUS
-    370: MessageFormat(75, None, 109, None, None),  # SMART_BATTERY_INFO
-    373: MessageFormat(117, None, 42, None, None),  # GENERATOR_STATUS
-    375: MessageFormat(251, None, 140, None, None),  # ACTUATOR_OUTPUT_STATUS
-    376: MessageFormat(199, None, 8, None, None),  # RELAY_STATUS
-    385: MessageFormat(147, None, 133, 2, 3),  # TUNNEL
-    386: MessageFormat(132, None, 16, 4, 5),  # CAN_FRAME
-    387: MessageFormat(4, None, 72, 4, 5),  # CANFD_FRAME
-    388: MessageFormat(8, None, 37, 32, 33),  # CAN_FILTER_MODIFY
-    390: MessageFormat(156, None, 240, None, None),  # ONBOARD_COMPUTER_STATUS
     397: MessageFormat(182, None, 108, None, None),  # COMPONENT_METADATA
     420: MessageFormat(20, None, 73, 6, 7),  # RADIO_RC_CHANNELS
     435: MessageFormat(134, None, 46, None, None),  # AVAILABLE_MODES
@@ -279,52 +90,6 @@ MESSAGE_FORMATS = {
     8014: MessageFormat(200, None, 14, None, None),  # GSM_LINK_STATUS
     8015: MessageFormat(23, None, 24, None, None),  # SATCOM_LINK_STATUS
     8016: MessageFormat(149, None, 18, None, None),  # SENSOR_AIRFLOW_ANGLES
-    9000: MessageFormat(113, None, 137, None, None),  # WHEEL_DISTANCE
-    9005: MessageFormat(117, None, 34, None, None),  # WINCH_STATUS
-    10001: MessageFormat(209, None, 20, None, None),  # UAVIONIX_ADSB_OUT_CFG
-    10002: MessageFormat(186, None, 41, None, None),  # UAVIONIX_ADSB_OUT_DYNAMIC
-    10003: MessageFormat(4, None, 1, None, None),  # UAVIONIX_ADSB_TRANSCEIVER_HEALTH_REPORT
-    10004: MessageFormat(133, None, 9, None, None),  # UAVIONIX_ADSB_OUT_CFG_REGISTRATION
-    10005: MessageFormat(103, None, 9, None, None),  # UAVIONIX_ADSB_OUT_CFG_FLIGHTID
-    10006: MessageFormat(193, None, 4, None, None),  # UAVIONIX_ADSB_GET
-    10007: MessageFormat(71, None, 17, None, None),  # UAVIONIX_ADSB_OUT_CONTROL
-    10008: MessageFormat(240, None, 14, None, None),  # UAVIONIX_ADSB_OUT_STATUS
-    10151: MessageFormat(195, None, 85, None, None),  # LOWEHEISER_GOV_EFI
-    11000: MessageFormat(134, None, 52, 4, 5),  # DEVICE_OP_READ
-    11001: MessageFormat(15, None, 136, None, None),  # DEVICE_OP_READ_REPLY
-    11002: MessageFormat(234, None, 180, 4, 5),  # DEVICE_OP_WRITE
-    11003: MessageFormat(64, None, 5, None, None),  # DEVICE_OP_WRITE_REPLY
-    11004: MessageFormat(11, None, 232, 8, 9),  # SECURE_COMMAND
-    11005: MessageFormat(93, None, 230, None, None),  # SECURE_COMMAND_REPLY
-    11010: MessageFormat(46, None, 49, None, None),  # ADAP_TUNING
-    11011: MessageFormat(106, None, 44, None, None),  # VISION_POSITION_DELTA
-    11020: MessageFormat(205, None, 16, None, None),  # AOA_SSA
-    11030: MessageFormat(144, None, 44, None, None),  # ESC_TELEMETRY_1_TO_4
-    11031: MessageFormat(133, None, 44, None, None),  # ESC_TELEMETRY_5_TO_8
-    11032: MessageFormat(85, None, 44, None, None),  # ESC_TELEMETRY_9_TO_12
-    11033: MessageFormat(195, None, 37, 16, 17),  # OSD_PARAM_CONFIG
-    11034: MessageFormat(79, None, 5, None, None),  # OSD_PARAM_CONFIG_REPLY
-    11035: MessageFormat(128, None, 8, 4, 5),  # OSD_PARAM_SHOW_CONFIG
-    11036: MessageFormat(177, None, 34, None, None),  # OSD_PARAM_SHOW_CONFIG_REPLY
-    11037: MessageFormat(130, None, 28, None, None),  # OBSTACLE_DISTANCE_3D
-    11038: MessageFormat(47, None, 38, None, None),  # WATER_DEPTH
-    11039: MessageFormat(142, None, 9, None, None),  # MCU_STATUS
-    11040: MessageFormat(132, None, 44, None, None),  # ESC_TELEMETRY_13_TO_16
-    11041: MessageFormat(208, None, 44, None, None),  # ESC_TELEMETRY_17_TO_20
-    11042: MessageFormat(201, None, 44, None, None),  # ESC_TELEMETRY_21_TO_24
-    11043: MessageFormat(193, None, 44, None, None),  # ESC_TELEMETRY_25_TO_28
-    11044: MessageFormat(189, None, 44, None, None),  # ESC_TELEMETRY_29_TO_32
-    11060: MessageFormat(162, None, 78, None, None),  # NAMED_VALUE_STRING
-    12900: MessageFormat(114, None, 44, 0, 1),  # OPEN_DRONE_ID_BASIC_ID
-    12901: MessageFormat(254, None, 59, 30, 31),  # OPEN_DRONE_ID_LOCATION
-    12902: MessageFormat(140, None, 53, 4, 5),  # OPEN_DRONE_ID_AUTHENTICATION
-    12903: MessageFormat(249, None, 46, 0, 1),  # OPEN_DRONE_ID_SELF_ID
-    12904: MessageFormat(77, None, 54, 28, 29),  # OPEN_DRONE_ID_SYSTEM
-    12905: MessageFormat(49, None, 43, 0, 1),  # OPEN_DRONE_ID_OPERATOR_ID
-    12915: MessageFormat(94, None, 249, 0, 1),  # OPEN_DRONE_ID_MESSAGE_PACK
-    12918: MessageFormat(139, None, 51, None, None),  # OPEN_DRONE_ID_ARM_STATUS
-    12919: MessageFormat(7, None, 18, 16, 17),  # OPEN_DRONE_ID_SYSTEM_UPDATE
-    12920: MessageFormat(20, None, 5, None, None),  # HYGROMETER_SENSOR
     17000: MessageFormat(103, None, 179, None, None),  # TEST_TYPES
     17150: MessageFormat(26, None, 33, None, None),  # ARRAY_TEST_0
     17151: MessageFormat(72, None, 16, None, None),  # ARRAY_TEST_1
@@ -334,15 +99,6 @@ MESSAGE_FORMATS = {
     17156: MessageFormat(14, None, 91, None, None),  # ARRAY_TEST_6
     17157: MessageFormat(187, None, 84, None, None),  # ARRAY_TEST_7
     17158: MessageFormat(106, None, 24, None, None),  # ARRAY_TEST_8
-    42000: MessageFormat(227, None, 1, None, None),  # ICAROUS_HEARTBEAT
-    42001: MessageFormat(239, None, 46, None, None),  # ICAROUS_KINEMATIC_BANDS
-    50001: MessageFormat(246, None, 32, None, None),  # CUBEPILOT_RAW_RC
-    50002: MessageFormat(181, None, 246, None, None),  # HERELINK_VIDEO_STREAM_INFORMATION
-    50003: MessageFormat(62, None, 19, None, None),  # HERELINK_TELEM
-    50004: MessageFormat(240, None, 10, 8, 9),  # CUBEPILOT_FIRMWARE_UPDATE_START
-    50005: MessageFormat(152, None, 6, 4, 5),  # CUBEPILOT_FIRMWARE_UPDATE_RESP
-    52000: MessageFormat(13, None, 100, None, None),  # AIRLINK_AUTH
-    52001: MessageFormat(239, None, 1, None, None),  # AIRLINK_AUTH_RESPONSE
     60000: MessageFormat(4, None, 22, 20, 21),  # AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_EXT
     60010: MessageFormat(208, None, 33, None, None),  # STORM32_GIMBAL_MANAGER_INFORMATION
     60011: MessageFormat(183, None, 7, None, None),  # STORM32_GIMBAL_MANAGER_STATUS

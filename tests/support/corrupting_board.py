@@ -4,9 +4,9 @@
 from typing import Any
 
 from protocols.mavlink.codec import FrameWriter, Packed
+from protocols.mavlink.dialect import MESSAGE_FORMATS
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
-from protocols.mavlink.message_table import MESSAGE_FORMATS
 from protocols.msp.frame import MspFrame, MspParser
 from tests.support.fake_controllers import QuietLine
 from tests.support.fuzz_inputs import FuzzInputs

@@ -5,8 +5,8 @@ import random
 from collections.abc import Sequence
 
 from protocols.mavlink.codec import FrameWriter, Packed
+from protocols.mavlink.dialect import MESSAGE_FORMATS
 from protocols.mavlink.dialect import messages as m
-from protocols.mavlink.message_table import MESSAGE_FORMATS
 from protocols.msp.frame import Direction, MspFrame
 
 #: Messages that ground stations send; others are drawn less often.

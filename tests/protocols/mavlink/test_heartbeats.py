@@ -3,6 +3,7 @@
 
 import pytest
 
+from protocols.mavlink.dialect import MESSAGE_FORMATS
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import (
     MavlinkFrame,
@@ -10,7 +11,6 @@ from protocols.mavlink.frame import (
     is_disarmed_heartbeat,
     is_plausible_heartbeat,
 )
-from protocols.mavlink.message_table import MESSAGE_FORMATS
 
 #: Custom mode, type, autopilot, base mode, state, version.
 GOOD = bytes((0, 0, 0, 0, 2, 3, 81, 3, 3))

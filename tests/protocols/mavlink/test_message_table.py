@@ -10,9 +10,8 @@ from pymavlink.dialects.v20 import all as mavlink_2
 
 from generators.message_table import table
 from protocols.mavlink import message_table
-from protocols.mavlink.dialect import Message
+from protocols.mavlink.dialect import MESSAGE_FORMATS, Message
 from protocols.mavlink.frame import MavlinkSplitter
-from protocols.mavlink.message_table import MESSAGE_FORMATS
 
 #: Dialects of autopilots that users may have, in order of precedence for an id.
 DIALECTS = ("common", "ardupilotmega", "all")
