@@ -19,10 +19,10 @@ from pathlib import Path
 
 from benchmarks.figure import Figure, Floor
 from benchmarks.processes import BenchmarkError, Board, DaemonProcess, daemon, logged_at, simulated_naze
+from bridge.fc.profile import Autopilot
 from bridge.fc.states.base import Port, PortOpened
 from bridge.fc.states.searching import SPEEDS, Searching
 from bridge.line.runner import Runner
-from bridge.model.autopilot import Autopilot
 from simulator.board.options import SimOptions
 from tests.support.programs import free_port
 

@@ -24,7 +24,6 @@ from bridge.fc.profile import FlightController, RuleSettings, Spoken
 from bridge.fc.session import FcSession
 from bridge.gcs.ground import FrameListener, Ground
 from bridge.gcs.ground_station import GroundStation
-from bridge.gcs.guard import Guard
 from bridge.gcs.rights import LinkAccess
 from bridge.gcs.routes import Routes
 from bridge.gcs.station import Peer, Severity
@@ -127,7 +126,6 @@ class Bridge:
             {name: replace(access, passes_everything=passes_everything) for name, access in config.links.items()},
             LinkAccess(passes_everything=passes_everything),
         )
-        self._guard = Guard(emit)
         runner = self._runner = Runner()
         session = self._session = FcSession(
             config.speeds,
@@ -194,15 +192,7 @@ class Bridge:
             config.version,
         )
         router = MessageRouter(ground, transfers, parameters, commands, own)
-        self._incoming = Incoming(
-            self._guard,
-            ground,
-            router,
-            parameters,
-            session.send_mavlink,
-            owner.sysid,
-            config.compid,
-        )
+        self._incoming = Incoming(ground, router, parameters, session.send_mavlink, owner.sysid, config.compid, emit)
         #: Served in this order, after the line itself.
         self._parts: tuple[TimedPart, ...] = (
             runner,
@@ -309,7 +299,7 @@ class Bridge:
             ground_stations=len(self._ground.peers()),
             frames_received=self._ground.frames_received,
             bad_frames=self._ground.bad_frames,
-            refused=self._guard.refused,
+            refused=self._incoming.refused,
             refused_by_share=self._sharing.refused,
             fc_bad_checksums=state.bad_checksums or 0,
             fc_requests_lost=None if state.link is None else state.link.requests_lost,

@@ -8,9 +8,8 @@ from typing import Annotated
 
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
 from bridge.controllers.table import PROFILES
-from bridge.fc.profile import Profile
+from bridge.fc.profile import Autopilot, Profile
 from bridge.gcs.rights import LinkAccess
-from bridge.model.autopilot import Autopilot
 from bridge.model.flight_memory import FlightMemory
 from bridge.model.settings import SealMemory, SealsOfThisRun
 

@@ -108,7 +108,7 @@ def test_imports_between_the_simulators_packages_have_no_cycle() -> None:
 
 
 def test_most_modules_have_a_test_file_of_like_name() -> None:
-    """tests/bridge/gcs/test_guard.py tests bridge/gcs/guard.py.
+    """tests/bridge/gcs/test_ground.py tests bridge/gcs/ground.py.
 
     Modules of up to 40 lines may do without, and the simulator, whose parts are tested as whole boards."""
     files = (file for package in PACKAGES.keys() - {"simulator"} for file in (REPOSITORY / package).rglob("[!_]*.py"))

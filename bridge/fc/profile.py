@@ -37,6 +37,17 @@ class Spoken(Enum):
     CLI = "command line"
 
 
+class Autopilot(Enum):
+    """A setting: the sender of MAVLink on the port. AUTO: known from MSP on this port, or from its ids.
+
+    HARAKIRI is translated, OTHER is passed through.
+    """
+
+    AUTO = "auto"
+    HARAKIRI = "harakiri"
+    OTHER = "other"
+
+
 #: Fills the vehicle from the payload of a reply, heard at a time.
 Decoder = Callable[[Vehicle, bytes, "FlightController", float], None]
 

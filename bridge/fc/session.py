@@ -6,16 +6,14 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
-from bridge.fc.profile import FlightController, Profile, Spoken
+from bridge.fc.profile import Autopilot, FlightController, Profile, Spoken
 from bridge.fc.states.base import Closed, Event, Found, Identified, Lost, Port, PortClosed, PortOpened, State
 from bridge.fc.states.cli import Cli
 from bridge.fc.states.frsky import Frsky
-from bridge.fc.states.harakiri_mavlink import HarakiriMavlink
+from bridge.fc.states.mavlink import HarakiriMavlink, PassThrough
 from bridge.fc.states.msp import Identifying, Polling
-from bridge.fc.states.pass_through import PassThrough
 from bridge.fc.states.searching import Searching
 from bridge.line.runner import Runner
-from bridge.model.autopilot import Autopilot
 from bridge.model.events import Emit, FcFound, FcInCommandLine, FcLost, FcSensed, PortLost
 from bridge.model.flight_memory import FlightMemory
 from protocols.mavlink.frame import MavlinkFrame

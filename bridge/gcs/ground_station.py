@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 from bridge.gcs.budget import Budget, HostBudget
 from bridge.gcs.cost import Cost
 from bridge.gcs.message_rates import MessageRates
-from bridge.gcs.recent_texts import RecentTexts
 from bridge.gcs.rights import FrameRefusal, LinkAccess, Standing
 from bridge.gcs.station import RECORDER, Peer, Station
+from bridge.gcs.texts import RecentTexts
 from bridge.model.transfer_memory import TransferMemory
 from protocols.mavlink.codec import FrameWriter
 from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame, MavlinkSplitter

@@ -10,10 +10,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from math import isfinite
-from typing import ClassVar
+from typing import ClassVar, TypeVar
 
-from bridge.line.conversation import Conversation
+from bridge.line.conversation import Conversation, ask, ask_armed, ask_status
 from bridge.settings.board_setting import BoardSetting, SettingTable, Value, ValueKind, shown
+from protocols.msp.frame import Direction, request
+
+T = TypeVar("T")
+_EEPROM_WRITE = 250
+_ACK_SIZE = 2
+#: Their timeouts together exceed the flash time of an STM32H743.
+_ASKS_AFTER_SAVE = 12
 
 
 class Cause(Enum):
@@ -100,6 +107,27 @@ class FcSettings(ABC):
         A value that the board does not take is no refusal here: the table has the old one.
         """
 
-    @abstractmethod
     def save(self) -> Conversation[SettingRefusal | None]:
         """Write the settings in RAM to the board's flash; None if they are stored."""
+        return write_eeprom()
+
+
+def write_eeprom() -> Conversation[SettingRefusal | None]:
+    """EEPROM_WRITE, sent once: some boards answer before they write, some after it, and a write takes up to 2.2 s."""
+    reply = yield from ask(request(_EEPROM_WRITE), _EEPROM_WRITE, _ACK_SIZE, tries=1, exclusive=True)
+    status = yield from ask_status(tries=_ASKS_AFTER_SAVE)
+    if reply is None or status is None:
+        return NO_ANSWER
+    return NOT_SAVED if reply.direction is Direction.ERROR else None
+
+
+def while_disarmed(arm_bit: int | None, conversation: Conversation[T]) -> Conversation[T | SettingRefusal]:
+    """Hold a conversation that changes or saves settings, if STATUS says disarmed now: telemetry may not show it yet.
+
+    arm_bit: see FlightController.
+    """
+    armed = yield from ask_armed(arm_bit)
+    if armed is False:
+        return (yield from conversation)
+    conversation.close()
+    return ARMED if armed else NO_ANSWER

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 from bridge.line.conversation import Conversation, Pause, ask, ask_surely
 from bridge.settings.board_setting import BoardSetting, SettingTable, Value, ValueKind, table_of
-from bridge.settings.eeprom_write import write_eeprom
 from bridge.settings.fc_settings import NO_ANSWER, NOT_TAKEN, FcSettings, SettingRefusal, TableReading, fixed
 from protocols.msp.command_line import is_clean
 from protocols.msp.commands import Msp
@@ -88,9 +87,6 @@ class MspPartSettings(FcSettings):
         if reply is None or not held:
             return NO_ANSWER
         return NOT_TAKEN if reply.direction is Direction.ERROR else table.updated(*self._shown(part, held))
-
-    def save(self) -> Conversation[SettingRefusal | None]:
-        return (yield from write_eeprom())
 
     def _payload(self, command: int) -> Conversation[bytes | None]:
         """The reply's payload, empty if the board does not know the command; None if it does not answer."""

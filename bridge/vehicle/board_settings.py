@@ -23,8 +23,8 @@ from bridge.settings.fc_settings import (
     SettingRefusal,
     fixed,
     out_of_range,
+    while_disarmed,
 )
-from bridge.settings.while_disarmed import while_disarmed
 from bridge.vehicle.setting_clients import Change, Changes, OnChanged, OnTable, TableClients
 from bridge.vehicle.table_reader import TableReader
 

@@ -33,7 +33,7 @@ from bridge.vehicle.set_waypoint import SetWaypoint
 from bridge.vehicle.vehicle_messages import auto_mode
 from protocols.mavlink.command import CommandResult
 from protocols.mavlink.dialect import messages
-from protocols.mavlink.metadata_message import COMPONENT_METADATA
+from protocols.mavlink.missing_messages import COMPONENT_METADATA
 from protocols.mission_item import MissionResult
 
 _MAX_U16, _MAX_I32 = (1 << 16) - 1, (1 << 31) - 1

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Frames from ground stations: checked, then answered by the message router, or passed on to an autopilot. Sans-IO."""
 
+from collections import Counter
 from collections.abc import Callable
 from functools import partial
 from itertools import product
@@ -8,15 +9,19 @@ from itertools import product
 from bridge.gcs.cost import Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import GroundStation
-from bridge.gcs.guard import Guard, denial
 from bridge.gcs.rights import FrameRefusal
 from bridge.gcs.routes import Routes
 from bridge.gcs.station import Peer, Severity, Station
+from bridge.model.events import Emit, GcsRefused
 from bridge.vehicle.message_router import MessageRouter
 from bridge.vehicle.parameters import Parameters
 from protocols.mavlink.codec import MavlinkDecoder
+from protocols.mavlink.command import CommandResult
+from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame
+from protocols.mavlink.ftp import refuse
+from protocols.mission_item import MissionResult
 from protocols.rights.effect import Effect
 from protocols.rights.mavlink import effect_of
 
@@ -24,28 +29,31 @@ from protocols.rights.mavlink import effect_of
 class Incoming:
     """Checks, counts, and answers or passes on every frame from a ground station.
 
-    `routes` is set while an autopilot that represents itself is on the line; frames then go to it unchanged.
+    Refusals are logged once for each station and reason; bridge/gcs/rights.py has their policy. `routes` is set while
+    an autopilot that represents itself is on the line; frames then go to it unchanged.
     """
 
     def __init__(
         self,
-        guard: Guard,
         ground: Ground,
         router: MessageRouter,
         parameters: Parameters,
         send_to_autopilot: Callable[[bytes], None],
         sysid: int,
         compid: int,
+        emit: Emit,
     ) -> None:
-        self._guard = guard
         self._ground = ground
         self._router = router
         self._parameters = parameters
         self._send_to_autopilot = send_to_autopilot
         self._ids = sysid, compid
+        self._emit = emit
         self._our_targets = frozenset(product((0, sysid), (0, compid)))
         self._decoder = MavlinkDecoder()
         self.routes: Routes | None = None
+        #: Refusals by (link, reason).
+        self.refused: Counter[tuple[str, str]] = Counter()
 
     def received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> bool:
         """Handle bytes from a ground station; False if they are dropped. A datagram holds whole frames only."""
@@ -60,9 +68,9 @@ class Incoming:
             effect = effect_of(frame)
             refused = sender.refusal(frame, effect)
             if refused is not None:
-                self._guard.count(refused, sender)
+                self.refused[peer.link, refused.why] += 1
                 if refused.is_forged:
-                    self._guard.report(refused, sender, frame)
+                    self._report(refused, sender, frame)
                     continue
             if not (sender.is_heard or self._ground.admits(sender, now)):
                 return False
@@ -88,7 +96,7 @@ class Incoming:
             refused = sender.passing_refusal(effect)
             if refused is not None:
                 if not sender.is_listener:
-                    self._guard.count(refused, sender)
+                    self.refused[sender.peer.link, refused.why] += 1
                 self._answer_refused(refused, sender, frame)
                 return
         self._ground.record(sender, frame)
@@ -97,7 +105,7 @@ class Incoming:
 
     def _answer_refused(self, refused: FrameRefusal, sender: GroundStation, frame: MavlinkFrame) -> None:
         """Answer a refused frame under the ids that it addressed, if these are the vehicle's."""
-        is_first = self._guard.report(refused, sender, frame)
+        is_first = self._report(refused, sender, frame)
         station = Station(sender.peer, *frame.sender)
         answers = partial(self._ground.to, station)
         is_vehicle = frame.target in self._our_targets
@@ -109,7 +117,7 @@ class Incoming:
         if not (is_vehicle and sender.allows(Cost.ANSWER)):
             return
         message = self._decoder.decode(frame)
-        answer = None if message is None else denial(message, station)
+        answer = None if message is None else _denial(message, station)
         if answer is not None:
             answers(answer)
         elif message is not None and frame.msgid == m.MAVLINK_MSG_ID_PARAM_SET and self.routes is None:
@@ -117,3 +125,29 @@ class Incoming:
             self._parameters.send(station, message.param_id)
         if is_first:
             answers(m.MAVLink_statustext_message(Severity.WARNING, f"Refused: {refused.why}".encode()))
+
+    def _report(self, refused: FrameRefusal, station: GroundStation, frame: MavlinkFrame) -> bool:
+        """Log a connected station's refusal once for each reason; True if it is the first."""
+        if refused.is_routine or refused.why in station.reported:
+            return False
+        station.reported.add(refused.why)
+        name, known = Station(station.peer, *frame.sender), m.mavlink_map.get(frame.msgid)
+        message = str(frame.msgid if known is None else known.msgname)
+        self._emit(GcsRefused(station=str(name), message=message, why=refused.why))
+        return True
+
+
+def _denial(message: Message, station: Station) -> Message | None:
+    """The protocol's own negative reply to a refused message, if there is one."""
+    match message.get_type():
+        case "COMMAND_LONG" | "COMMAND_INT":
+            denied = CommandResult.DENIED
+            return m.MAVLink_command_ack_message(message.command, denied, 0, 0, station.sysid, station.compid)
+        case "MISSION_COUNT" | "MISSION_ITEM" | "MISSION_ITEM_INT" | "MISSION_CLEAR_ALL" | "MISSION_WRITE_PARTIAL_LIST":
+            denied_mission = MissionResult.DENIED
+            return m.MAVLink_mission_ack_message(station.sysid, station.compid, denied_mission, message.mission_type)
+        case "FILE_TRANSFER_PROTOCOL":
+            payload = refuse(message.payload)
+            if payload is not None:
+                return m.MAVLink_file_transfer_protocol_message(0, station.sysid, station.compid, payload)
+    return None

@@ -30,7 +30,7 @@ from bridge.vehicle.telemetry_table import NO_STREAM, TELEMETRY, Row
 from bridge.vehicle.vehicle_messages import Moment
 from protocols.mavlink.codec import pack
 from protocols.mavlink.dialect import Message, messages
-from protocols.mavlink.mode_messages import AVAILABLE_MODES
+from protocols.mavlink.missing_messages import AVAILABLE_MODES
 from protocols.msp.commands import Msp
 from protocols.msp.nav import NavStatus
 from reports.vehicle_groups import Progress

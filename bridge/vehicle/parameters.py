@@ -26,7 +26,7 @@ from protocols.float32 import single
 from protocols.mavlink.codec import pack
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.ftp import FtpSession, file_crc32, is_opening
-from protocols.mavlink.metadata_message import component_metadata
+from protocols.mavlink.missing_messages import component_metadata
 
 _REAL32 = 9
 #: 500 parameters a second for all lists together: a radio at 57600 baud carries as many.

@@ -21,7 +21,7 @@ from bridge.model.vehicle import (
 )
 from bridge.vehicle import vehicle_messages as make
 from protocols.mavlink.dialect import messages as m
-from protocols.mavlink.mode_messages import CURRENT_MODE
+from protocols.mavlink.missing_messages import CURRENT_MODE
 from protocols.msp.commands import Msp
 
 NO_STREAM = -1

@@ -37,7 +37,7 @@ from bridge.model.vehicle import (
     Sticks,
     Vehicle,
 )
-from protocols.mavlink import mode_messages
+from protocols.mavlink import missing_messages
 from protocols.mavlink.codec import pack_payload
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import Command
@@ -213,7 +213,7 @@ def current_mode(at: Moment) -> Message:
     mode = at.need(Mode).mode
     if not isinstance(mode, FlightMode):
         raise Unknown
-    return mode_messages.current_mode(_custom_mode(at.vehicle, mode), _standard_mode(at.vehicle, mode))
+    return missing_messages.current_mode(_custom_mode(at.vehicle, mode), _standard_mode(at.vehicle, mode))
 
 
 def available_modes(vehicle: Vehicle) -> list[Message]:
@@ -223,7 +223,7 @@ def available_modes(vehicle: Vehicle) -> list[Message]:
         modes.setdefault(_custom_mode(vehicle, mode), mode)
     names = {Airframe.FIXED_WING: _PLANE_NAMES, **dict.fromkeys(_ROVERS, _ROVER_NAMES)}.get(vehicle.airframe, {})
     return [
-        mode_messages.available_mode(
+        missing_messages.available_mode(
             index, len(modes), custom_mode, _standard_mode(vehicle, mode), names.get(custom_mode, mode.name)
         )
         for index, (custom_mode, mode) in enumerate(modes.items(), 1)

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The error for an unreadable mission file, and the notes about a readable one."""
+"""Problems in mission files of all formats: the error, the notes about what was fixed, and common checks."""
 
+import math
 from collections.abc import Callable, Iterable
 
-from protocols.file_error import FileError
+from protocols.file_error import FileError, shown
+from protocols.mission_item import degrees_to_e7
 
 
 class MissionFileError(FileError):
@@ -25,6 +27,17 @@ def refuse_other_plans(commands: Iterable[int], name: str) -> None:
         raise MissionFileError(
             name, "", f"this file holds {' and '.join(sorted(kinds))}", "give the mission's own file"
         )
+
+
+def file_degrees_to_e7(degrees: float, field: str, name: str, where: str) -> int | None:
+    """Degrees * 1e7, None for NaN (not given); MissionFileError if out of range.
+
+    The rules treat an infinite coordinate as missing, because a ground station may send it; in a file it is damage.
+    """
+    e7 = degrees_to_e7(degrees)
+    if e7 is None and not math.isnan(degrees):
+        raise MissionFileError(name, where, f"{field} is {shown(degrees)}", "give it in degrees")
+    return e7
 
 
 #: MAV_CMD_NAV_FENCE_... and MAV_CMD_NAV_RALLY_POINT.

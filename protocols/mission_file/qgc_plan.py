@@ -13,8 +13,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from protocols.file_error import shown
-from protocols.mission_file.coordinate import file_degrees_to_e7
-from protocols.mission_file.error import MissionFileError, Note, no_note, refuse_other_plans
+from protocols.mission_file.error import MissionFileError, Note, file_degrees_to_e7, no_note, refuse_other_plans
 from protocols.mission_item import Command, Frame, MissionItem
 
 _PARAM_COUNT = 7

@@ -9,7 +9,7 @@ import pytest
 
 from bridge.vehicle.telemetry_table import NO_STREAM, TELEMETRY, Row
 from protocols.mavlink.dialect import messages as m
-from protocols.mavlink.mode_messages import CURRENT_MODE
+from protocols.mavlink.missing_messages import CURRENT_MODE
 
 PAGE = (Path(__file__).parents[2] / "docs" / "telemetry.md").read_text()
 SECTIONS = re.findall(r"^### ([^\n]*)\n(.*?)(?=^##|\Z)", PAGE, re.MULTILINE | re.DOTALL)
@@ -20,7 +20,7 @@ UNTOLD = {"alt_ellipsoid", "h_acc", "v_acc", "vel_acc", "hdg_acc", "yaw", "id", 
               "mission_mode", "time_usec", "port", "chancount", "name", "value"}  # fmt: skip
 
 
-#: pymavlink lacks CURRENT_MODE (protocols/mavlink/mode_messages.py).
+#: pymavlink lacks CURRENT_MODE (protocols/mavlink/missing_messages.py).
 ROWS = [row for row in TELEMETRY if row.msgid != CURRENT_MODE]
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import pytest
 
 from bridge.fc.states.cli import Cli
-from bridge.fc.states.harakiri_mavlink import HarakiriMavlink
+from bridge.fc.states.mavlink import HarakiriMavlink
 from bridge.fc.states.msp import Identifying, Polling
 from protocols.firmware_image import Image
 from protocols.mavlink.dialect import messages as m

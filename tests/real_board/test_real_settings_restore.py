@@ -4,7 +4,7 @@
 import pytest
 
 from bridge.settings.board_setting import SettingTable, Value, ValueKind
-from bridge.vehicle.settings_restore import RestoreResult
+from bridge.vehicle.local_settings import RestoreResult
 from protocols.firmware_image import Image
 from simulator.emulated_naze.board import EmulatedNaze
 from tests.support.real_bench import Figure

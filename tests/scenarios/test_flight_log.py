@@ -8,7 +8,7 @@ import pytest
 
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkSplitter
-from protocols.mavlink.mode_messages import CURRENT_MODE
+from protocols.mavlink.missing_messages import CURRENT_MODE
 from simulator.board.options import SimOptions, TelemetryProtocol
 from tests.support.world import GroundStation, World
 

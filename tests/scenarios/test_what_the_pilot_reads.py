@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from bridge.controllers.harakiri.arming import arming_blockers
+from bridge.controllers.harakiri.profile import arming_blockers
 from bridge.model.vehicle import Source, Sticks, Vehicle
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m

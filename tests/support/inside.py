@@ -11,7 +11,6 @@ class Inside:
         self.session = bridge._session
         self.runner = bridge._runner
         self.ground = bridge._ground
-        self.guard = bridge._guard
         self.incoming = bridge._incoming
         self.missions = bridge._missions
         self.uploads = bridge._uploads

@@ -6,7 +6,6 @@ Disarmed it speaks MSP. Armed, its setting tele_prot decides: MSP (0), FrSky tel
 
 from dataclasses import replace
 
-from bridge.controllers.harakiri.arming import arming_blockers
 from bridge.controllers.harakiri.check import harakiri_rules
 from bridge.controllers.harakiri.mavlink_missions import HarakiriMavlinkMissions
 from bridge.controllers.harakiri.mavlink_settings import HarakiriMavlinkSettings
@@ -19,9 +18,12 @@ from bridge.fc.profile import FlightController, Profile, Spoken
 from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import BOX_POLL, POLLS
 from bridge.model.airframe import airframe
+from bridge.model.flight_mode import FlightMode
 from bridge.model.refusal import ARMED, Refusal
+from bridge.model.vehicle import Health, Mode, Sticks, Vehicle
 from protocols.mission_item import MissionResult
 from protocols.msp.mission import INFO_SIZE, MissionCommand, decode_info
+from protocols.msp.telemetry import Sensor
 from protocols.rights.msp import Firmware
 
 _FAMILY = "Harakiri"
@@ -33,6 +35,9 @@ _OWN_BOX = "GTUNE"
 
 #: Its own axes are left, forward and up (imu.c).
 _ACC_AXES = ((1, 1), (0, -1), (2, -1))
+_THROTTLE = 2
+#: The highest value of rc_minchk, below which the throttle must be; its default is 1100.
+_SURELY_NOT_LOW_US = 1250
 
 
 def _recognise_patched(board: Interview) -> Conversation[FlightController | None]:
@@ -56,6 +61,21 @@ def _recognise_unpatched(board: Interview) -> Conversation[FlightController | No
     return FlightController(
         UNPATCHED, UNPATCHED.name, airframe(ident.mixer), boxes, version=ident.release, firmware=Firmware.HARAKIRI
     )
+
+
+def arming_blockers(vehicle: Vehicle, now: float) -> tuple[str, ...]:
+    """The reasons that surely prevent arming: it reports none (mw.c, ArmIFpossible).
+
+    An accelerometer that is not calibrated, a scheduled write and the failsafe's delay prevent it, too, unseen.
+    """
+    sticks, mode, health = vehicle.fresh(Sticks, now), vehicle.fresh(Mode, now), vehicle.last(Health)
+    throttle_us = () if sticks is None else sticks.channels_us[_THROTTLE : _THROTTLE + 1]
+    has_baro = health is not None and Sensor.BAROMETER in health.sensors
+    conditions = {
+        "throttle not low": throttle_us and throttle_us[0] >= _SURELY_NOT_LOW_US,
+        "switch BARO off": has_baro and mode is not None and mode.mode is FlightMode.ALT_HOLD,
+    }
+    return tuple(blocker for blocker, holds in conditions.items() if holds)
 
 
 PATCHED = Profile(

@@ -18,7 +18,7 @@ from bridge.missions.fc_mission_store import (
     StoreState,
 )
 from bridge.missions.list_check import MissionRules
-from bridge.settings.eeprom_write import write_eeprom
+from bridge.settings.fc_settings import write_eeprom
 from protocols.mission_item import MissionItem
 from protocols.msp.frame import Direction, request
 from reports.verdict import RecordT

@@ -8,7 +8,6 @@ from bridge.controllers.msp_settings import some_parts
 from bridge.fc.profile import FlightController
 from bridge.line.conversation import Conversation, Pause, ask
 from bridge.settings.board_setting import BoardSetting, SettingTable, Value, ValueKind, table_of
-from bridge.settings.eeprom_write import write_eeprom
 from bridge.settings.fc_settings import (
     NO_ANSWER,
     NOT_TAKEN,
@@ -90,9 +89,6 @@ class InavFcSettings(FcSettings):
         if reply is None or info is None or info.name != setting.name:
             return NO_ANSWER
         return NOT_TAKEN if reply.direction is Direction.ERROR else table.updated(_shown(info))
-
-    def save(self) -> Conversation[SettingRefusal | None]:
-        return (yield from write_eeprom())
 
 
 def read_values(names: Iterable[str]) -> Conversation[dict[str, Value] | None]:

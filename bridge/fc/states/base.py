@@ -13,11 +13,10 @@ from math import inf
 from typing import ClassVar
 
 from bridge.fc.mavlink_telemetry import MavlinkTelemetry
-from bridge.fc.profile import FlightController, Profile, Spoken
+from bridge.fc.profile import Autopilot, FlightController, Profile, Spoken
 from bridge.line.msp_link import MspLink, PendingReplies
 from bridge.line.poll_schedule import PollSchedule
 from bridge.line.runner import Runner
-from bridge.model.autopilot import Autopilot
 from bridge.model.ground_track import GroundTrack
 from bridge.model.vehicle import FlightState, Source, Vehicle
 from protocols.mavlink.frame import MavlinkFrame

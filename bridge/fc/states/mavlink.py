@@ -1,11 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A line that carries MAVLink: common to a Harakiri and to an autopilot that is passed through."""
+"""The states of a line that carries MAVLink: a Harakiri's, which the bridge represents, or an autopilot's own."""
 
 from abc import abstractmethod
 
+from bridge.fc.mavlink_telemetry import MavlinkTelemetry
 from bridge.fc.profile import FlightController
 from bridge.fc.states.base import Event, Found, Lost, Port, State
+from bridge.line.msp_link import PROBE, byte_time_s
+from bridge.model.vehicle import Source
+from protocols.mavlink.codec import FrameWriter, Packed
+from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter, is_autopilot_heartbeat
+from protocols.msp.command_line import HAZARDS, RUN_LENGTH
+from protocols.msp.frame import MspParser
 
 #: Two lost heartbeats.
 _SILENCE_S = 2.5
@@ -16,6 +23,17 @@ _LINE_SILENCE_S = 0.1
 _STEADY_BEATS, _BEAT_S = 5, 0.7
 #: The size of a heartbeat's frame: MAVLink 1, MAVLink 2, and signed.
 _HEARTBEAT_SIZES = (17, 21, 34)
+#: Armed it sends its attitude 30 times a second: when that ends, it has disarmed and changed its speed.
+_ARMED_SILENCE_S = 0.8
+#: Its stream of 1600 bytes a second overruns its own send ring on a slow line, so most frames are torn: before it
+#: counts as lost, this many bytes may pass without a whole one. At 2400 baud whole ones come up to 3.5 s apart. At 1200
+#: baud there is one in 40 s: no deadline would help.
+_BYTES_BEFORE_LOSS = 1000
+#: It is probed for MSP, which it answers again once it is disarmed.
+_PROBE_INTERVAL_S = 1.0
+#: The ids of an ordinary ground station; Harakiri answers any sender.
+_SYSID, _COMPID = 255, 190
+_RUNS = tuple(bytes((hazard,)) * RUN_LENGTH for hazard in sorted(HAZARDS))
 
 
 class MavlinkLine(State):
@@ -89,4 +107,105 @@ class MavlinkLine(State):
             spoken = self.port.mavlink_of(frame)
             if self._beats >= _STEADY_BEATS and spoken is not self._spoken:
                 return Found(spoken, self.speed, f"heard only its heartbeats, {self._beats} in a row", frame)
+        return None
+
+
+class PassThrough(MavlinkLine):
+    """The autopilot gets nothing but the frames of ground stations, and the bridge sends nothing in its name."""
+
+    def __init__(self, port: Port, event: Found, now: float) -> None:
+        super().__init__(port, event, now)
+        if port.telemetry is None or self.controller.profile.family != port.family:
+            port.telemetry = MavlinkTelemetry(port.vehicle, is_harakiri=False)
+        self.telemetry = port.telemetry
+        port.meet(self.controller)
+        assert event.heard is not None
+        self.telemetry.take([event.heard], now)
+
+    def take(self, frames: list[MavlinkFrame], now: float) -> None:
+        """Keep the newest values, and send all frames to the ground stations."""
+        self.telemetry.take(frames, now)
+        self.port.on_mavlink(frames)
+
+
+class HarakiriMavlink(MavlinkLine):
+    """A Harakiri that speaks MAVLink. The bridge represents it, and sends only probes for MSP and mission transfers."""
+
+    def __init__(self, port: Port, event: Found, now: float) -> None:
+        super().__init__(port, event, now)
+        port.telemetry = self._telemetry = MavlinkTelemetry(port.vehicle, is_harakiri=True)
+        port.meet(self.controller)
+        self._msp, self._sender = MspParser(), _HarakiriSender()
+        self._probe_due = now + _PROBE_INTERVAL_S
+        port.runner.mavlink_up(self._send)
+        assert event.heard is not None
+        if event.heard.msgid != messages.MAVLINK_MSG_ID_HEARTBEAT:
+            # Unasked, it sends more than heartbeats only while armed.
+            port.hear_armed(Source.MAVLINK, now)
+        self._telemetry.take([event.heard], now)
+
+    def receive(self, data: bytes, now: float) -> Event | None:
+        if self._msp.feed(data):
+            return Lost("it answers MSP again", (self.speed,))
+        return super().receive(data, now)
+
+    def tick(self, now: float) -> Event | None:
+        """Ask for MSP now and then, but not during a conversation."""
+        event = super().tick(now)
+        if event is None and now >= self._probe_due:
+            self._probe_due = now + _PROBE_INTERVAL_S
+            if not self.port.runner.is_busy:
+                self.port.output.append(PROBE)
+        return event
+
+    @property
+    def due(self) -> float:
+        return min(super().due, self._probe_due)
+
+    def take(self, frames: list[MavlinkFrame], now: float) -> None:
+        """Read its telemetry, and pass the answers of a transfer on."""
+        was_armed = self.port.vehicle.armed
+        self._telemetry.take(frames, now)
+        if was_armed and not self.port.vehicle.armed:
+            self._probe_due = now
+        if self.port.runner.is_busy:
+            for frame in frames:
+                self.port.runner.received_mavlink(frame, now)
+
+    @property
+    def timeout_s(self) -> float:
+        """The silence after which it is lost, s: shorter while armed."""
+        if not self.port.vehicle.armed:
+            return super().timeout_s
+        return _ARMED_SILENCE_S + _BYTES_BEFORE_LOSS * byte_time_s(self.speed)
+
+    def _send(self, packed: Packed) -> bool:
+        """Send a message; False if none of its frames would be free of hazard bytes."""
+        frame = self._sender.frame(packed)
+        if frame is None:
+            return False
+        self.port.output.append(frame)
+        return True
+
+
+class _HarakiriSender:
+    """Makes frames without three equal hazard bytes in a row, also across the boundary to the previous frame.
+
+    Three 0x0D enter the CLI in any protocol; '#' and 'R' count only in AUTOSENSE, but it can fall back to that at any
+    moment. Unlike our MSP extension, MAVLink has no mask: only the sequence number can be chosen, which also changes
+    the CRC. A run within the payload cannot be avoided.
+    """
+
+    def __init__(self) -> None:
+        self._writer = FrameWriter(_SYSID, _COMPID)
+        self._tail = b""
+
+    def frame(self, packed: Packed) -> bytes | None:
+        """A frame that is safe to send now; None if there is none."""
+        for _ in range(256):
+            frame = self._writer.frame(packed, 1)
+            on_wire = self._tail + frame
+            if not any(run in on_wire for run in _RUNS):
+                self._tail = on_wire[1 - RUN_LENGTH :]
+                return frame
         return None

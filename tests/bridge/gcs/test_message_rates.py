@@ -8,7 +8,7 @@ import pytest
 from bridge.gcs.ground import EXPIRY_S
 from bridge.vehicle.telemetry_table import TELEMETRY, Row
 from protocols.mavlink.dialect import Message, messages
-from protocols.mavlink.mode_messages import AVAILABLE_MODES
+from protocols.mavlink.missing_messages import AVAILABLE_MODES
 from protocols.msp.commands import Msp
 from protocols.msp.frame import MspParser
 from tests.support.world import GroundStation, World, ready_world

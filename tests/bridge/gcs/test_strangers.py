@@ -232,7 +232,7 @@ def test_recorded_frames_of_the_pilot_act_once() -> None:
         assert (station := world.inside.ground.station(thief.peer)) is None or station.standing is Standing.LISTENER
     # The world reads by pieces: only whole frames of the pilot count.
     assert bytes(autopilot.received) == once
-    assert {why for _, why in world.inside.guard.refused} == {Check.REPLAYED.value}
+    assert {why for _, why in world.inside.incoming.refused} == {Check.REPLAYED.value}
 
 
 def test_made_up_addresses_cannot_flood_the_log() -> None:
@@ -241,7 +241,7 @@ def test_made_up_addresses_cannot_flood_the_log() -> None:
     for number in range(2000):
         peer = Peer("udp", (f"10.0.{number >> 8}.{number & 255}", 14550))
         world.bridge.gcs_received(peer, frame, world.now + number / 1000, datagram=True)
-    assert world.inside.guard.refused["udp", "not signed"] == 2000
+    assert world.inside.incoming.refused["udp", "not signed"] == 2000
     assert 0 < len(world.events("gcs.refused")) < 20
 
 

@@ -11,10 +11,10 @@ import random
 
 import pytest
 
+from bridge.fc.profile import Autopilot
 from bridge.fc.states.base import Port, PortOpened
 from bridge.fc.states.searching import SPEEDS, Searching
 from bridge.line.runner import Runner
-from bridge.model.autopilot import Autopilot
 from protocols.mavlink.dialect import messages
 from protocols.msp.frame import Direction, MspFrame, request
 

@@ -118,7 +118,7 @@ ANSWERS = ("MISSION_ACK", "COMMAND_ACK", "PARAM_VALUE", "FILE_TRANSFER_PROTOCOL"
 
 
 def refusals(world: World) -> dict[str, int]:
-    return {why: count for (_, why), count in world.inside.guard.refused.items()}
+    return {why: count for (_, why), count in world.inside.incoming.refused.items()}
 
 
 # With a key.

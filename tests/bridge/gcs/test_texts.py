@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A refusal is said once for each attempt."""
 
-from bridge.gcs.recent_texts import RecentTexts
+from bridge.gcs.texts import RecentTexts
 
 
 def test_a_repeated_text_is_new_only_once() -> None:

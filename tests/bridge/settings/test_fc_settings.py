@@ -3,8 +3,7 @@
 import pytest
 
 from bridge.line.conversation import Conversation, Pause, Receive
-from bridge.settings.fc_settings import ARMED, NO_ANSWER, SettingRefusal
-from bridge.settings.while_disarmed import while_disarmed
+from bridge.settings.fc_settings import ARMED, NO_ANSWER, SettingRefusal, while_disarmed
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame
 

@@ -7,7 +7,7 @@ import pytest
 
 from bridge.settings.board_setting import SettingTable, Value
 from bridge.settings.fc_settings import Cause, SettingRefusal
-from bridge.vehicle.settings_restore import RestoreResult, by_parameter, by_setting
+from bridge.vehicle.local_settings import RestoreResult, by_parameter, by_setting
 from protocols.msp.frame import MspParser
 from simulator.board.options import Faults
 from tests.bridge.vehicle.test_board_settings import restart

@@ -5,7 +5,7 @@ import pytest
 from pymavlink.dialects.v20 import development
 
 from protocols.mavlink.codec import FrameWriter, Packed
-from protocols.mavlink.mode_messages import available_mode, current_mode
+from protocols.mavlink.missing_messages import available_mode, current_mode
 
 
 @pytest.mark.parametrize(
