@@ -19,7 +19,6 @@ from typing import NamedTuple, Protocol
 
 from bridge.config import BridgeConfig, PassThroughRule
 from bridge.counters import Counters
-from bridge.fc.actions import FcActions
 from bridge.fc.profile import FlightController, RuleSettings, Spoken
 from bridge.fc.session import FcSession
 from bridge.gcs.ground import FrameListener, Ground
@@ -178,12 +177,10 @@ class Bridge:
         own_parameters = OwnParameters(missions, ground, owner.sysid)
         own_parameters.on_radius_set = self._board_settings.saved_with_mission
         parameters = self._parameters = Parameters(own_parameters, self._board_settings, ground)
-        actions = FcActions(session, missions, runner)
-        self._calibration = Calibration(ground, runner, self._announcer)
+        self._calibration = Calibration(ground, session, missions, self._announcer, self._board_settings)
         commands = CommandService(
             ground,
             own,
-            actions,
             session,
             self._calibration,
             self._board_settings,

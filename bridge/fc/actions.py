@@ -5,19 +5,13 @@ The firmware checks neither whether it is flying nor whether a command is repeat
 for seconds, a flash write for 0.1 s. So STATUS is read twice right before, and the command is sent once.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
-from bridge.fc.session import FcSession
-from bridge.line.conversation import Conversation, LinkLost, Pause, Receive, ask, ask_status, send
-from bridge.line.runner import Runner
-from bridge.missions.mission_service import MissionService
+from bridge.line.conversation import Conversation, Pause, Receive, ask, ask_status, send
 from protocols.msp.commands import Msp, MspAction
 from protocols.msp.frame import Direction, MspFrame, request
 from protocols.msp.telemetry import RAW_IMU_SIZE, STATUS_SIZE, Sensor, decode_raw_imu
-from protocols.rights.effect import Effect
-from protocols.rights.msp import msp_right
 
 _STATUS_CHECKS = 2
 _ASKS_AFTER_ACTION = 12
@@ -62,54 +56,6 @@ class ActionResult(Enum):
 NOT_DONE = frozenset(ActionResult) - {ActionResult.DONE, ActionResult.FREEZES, ActionResult.NO_ANSWER}
 
 
-class FcActions:
-    """Runs one action at a time, and none during a mission transfer."""
-
-    def __init__(self, session: FcSession, missions: MissionService, runner: Runner) -> None:
-        self._session = session
-        self._missions = missions
-        self._runner = runner
-        self._present: FcAction | None = None
-
-    @property
-    def present(self) -> FcAction | None:
-        """The action in progress."""
-        return self._present
-
-    def start(self, action: FcAction, on_done: Callable[[ActionResult], None], now: float) -> None:
-        """Start an action; `on_done` gets the result, possibly before this returns."""
-        controller = self._session.state.controller
-        if controller is None or controller.arm_bit is None:
-            # Without an arm flag it is unknown whether the craft is flying.
-            on_done(ActionResult.NO_LINK)
-            return
-        if msp_right(controller.firmware, action.command, b"").effect is not Effect.CHANGE:
-            on_done(ActionResult.REFUSED)
-            return
-        if self._session.vehicle.armed:
-            on_done(ActionResult.ARMED)
-            return
-        if action is CALIBRATE_ACCELEROMETER and controller.profile.calibrates_six_positions:
-            on_done(ActionResult.SIX_POSITIONS)
-            return
-        if self._runner.needs_line or self._missions.acquire(self) is not None:
-            on_done(ActionResult.OCCUPIED)
-            return
-        self._present = action
-        arm_mask = 1 << controller.arm_bit
-
-        def done(result: ActionResult | LinkLost, _at: float) -> None:
-            self._present = None
-            self._missions.release(self)
-            if isinstance(result, LinkLost):
-                result = ActionResult.NO_ANSWER
-            elif result is ActionResult.DONE and controller.profile.restarts_after_calibration:
-                result = ActionResult.FREEZES
-            on_done(result)
-
-        self._runner.start(_act(action, arm_mask), done, now)
-
-
 def is_level() -> Conversation[bool | None]:
     """True if the accelerometer reads a level craft, as it does right after its calibration; None: no answer."""
     yield Pause(_SETTLED_S)
@@ -124,7 +70,8 @@ def is_level() -> Conversation[bool | None]:
     return max(abs(forward), abs(left)) <= _MAX_TILT * up
 
 
-def _act(action: FcAction, arm_mask: int) -> Conversation[ActionResult]:
+def act(action: FcAction, arm_bit: int) -> Conversation[ActionResult]:
+    arm_mask = 1 << arm_bit
     for _ in range(_STATUS_CHECKS):
         status = yield from ask_status()
         if status is None:

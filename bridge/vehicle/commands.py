@@ -8,14 +8,7 @@ DO_SET_MISSION_CURRENT on an INAV that flies its mission.
 import math
 from collections.abc import Sequence
 
-from bridge.fc.actions import (
-    CALIBRATE_ACCELEROMETER,
-    CALIBRATE_COMPASS,
-    NOT_DONE,
-    ActionResult,
-    FcAction,
-    FcActions,
-)
+from bridge.fc.actions import CALIBRATE_ACCELEROMETER, CALIBRATE_COMPASS, FcAction
 from bridge.fc.profile import Spoken
 from bridge.fc.session import FcSession
 from bridge.gcs.flash_budget import TOO_MANY_WRITES
@@ -93,18 +86,6 @@ _NOT_STORED = {
     Cause.OCCUPIED: CommandResult.TEMPORARILY_REJECTED,
     Cause.LIMIT: CommandResult.TEMPORARILY_REJECTED,
 }
-_OUTCOMES = {
-    ActionResult.DONE: CommandResult.ACCEPTED,
-    ActionResult.FREEZES: CommandResult.ACCEPTED,
-    ActionResult.ARMED: CommandResult.DENIED,
-    ActionResult.NO_LINK: CommandResult.DENIED,
-    ActionResult.OCCUPIED: CommandResult.TEMPORARILY_REJECTED,
-    ActionResult.NO_SENSOR: CommandResult.DENIED,
-    ActionResult.SIX_POSITIONS: CommandResult.UNSUPPORTED,
-    ActionResult.RUNNING: CommandResult.TEMPORARILY_REJECTED,
-    ActionResult.NO_ANSWER: CommandResult.FAILED,
-    ActionResult.REFUSED: CommandResult.UNSUPPORTED,
-}
 
 
 class CommandService:
@@ -114,7 +95,6 @@ class CommandService:
         self,
         ground: Ground,
         vehicle: OwnVehicle,
-        actions: FcActions,
         session: FcSession,
         calibration: Calibration,
         settings: BoardSettings,
@@ -124,7 +104,6 @@ class CommandService:
     ) -> None:
         self._ground = ground
         self._vehicle = vehicle
-        self._actions = actions
         self._session = session
         self._calibration = calibration
         self._settings = settings
@@ -143,16 +122,8 @@ class CommandService:
             self._do_set_current(station, params[0], params[1], now)
         elif action is None:
             self._acknowledge(station, command, self._do(station, command, params, now))
-        elif action in (self._actions.present, self._calibration.action):
-            # Repeated by the user or duplicated by the network.
-            self._acknowledge(station, command, CommandResult.IN_PROGRESS)
-        elif self._calibration.action is not None:
-            self._acted(station, command, action, ActionResult.RUNNING, now)
-        elif not self._ground.allows_write(station, now):
-            self._ground.say(Severity.ERROR, TOO_MANY_WRITES, station)
-            self._acknowledge(station, command, CommandResult.TEMPORARILY_REJECTED)
         else:
-            self._actions.start(action, lambda outcome: self._acted(station, command, action, outcome, now), now)
+            self._calibration.take(station, command, action, now)
 
     def set_current(self, station: Station, seq: int, now: float) -> None:
         """MISSION_SET_CURRENT, which has no acknowledgement."""
@@ -200,22 +171,6 @@ class CommandService:
     def _acknowledge(self, station: Station, command: int, result: CommandResult) -> None:
         ack = messages.MAVLink_command_ack_message(command, result, 0, 0, station.sysid, station.compid)
         self._ground.to(station, ack)
-
-    def _acted(self, station: Station, command: int, action: FcAction, outcome: ActionResult, now: float) -> None:
-        result = _OUTCOMES[outcome]
-        if outcome in NOT_DONE:
-            self._ground.not_written(station)
-        if result is not CommandResult.ACCEPTED:
-            self._ground.say(Severity.ERROR, outcome.value, station)
-            self._acknowledge(station, command, result)
-            return
-        self._ground.say(Severity.NOTICE, action.instruction, station)
-        if outcome is ActionResult.FREEZES:
-            self._ground.say(Severity.NOTICE, outcome.value, station)
-        if command == messages.MAV_CMD_DO_START_MAG_CAL:
-            self._acknowledge(station, command, result)
-        self._calibration.begin(station, command, action, now, restarts=outcome is ActionResult.FREEZES)
-        self._settings.changed_with_others(now)
 
     def _do(self, station: Station, command: int, params: Sequence[float], now: float) -> CommandResult:
         match command:
