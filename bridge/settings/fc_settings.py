@@ -71,13 +71,11 @@ def fixed(setting: BoardSetting, why: str = "") -> SettingRefusal:
 class TableReading:
     """How to read a table.
 
-    pace: the pause in s after this many bytes, which leaves telemetry its share of the line. progress: called with the
-    number of settings read so far. is_doubtful: True if settings may have changed without the bridge since the last
-    reading.
+    pace: the pause in s after this many bytes, which leaves telemetry its share of the line. is_doubtful: True if
+    settings may have changed without the bridge since the last reading.
     """
 
     pace: Callable[[int], float] = lambda _size: 0.0
-    progress: Callable[[int], None] = lambda _count: None
     is_doubtful: bool = True
 
 

@@ -56,7 +56,6 @@ class MspPartSettings(FcSettings):
                 return None
             # Without a payload the board does not have this part.
             found += self._shown(part, payload)
-            reading.progress(len(found))
             yield Pause(reading.pace(2 * len(payload)))
         return table_of(*found)
 

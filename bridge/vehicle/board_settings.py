@@ -133,11 +133,6 @@ class BoardSettings:
         return None if armed is False else _UNREAD
 
     @property
-    def read_so_far(self) -> int | None:
-        """The number of settings read so far while a table is read; None: it is not."""
-        return self._reader.so_far
-
-    @property
     def is_checked(self) -> bool:
         """True if the table was read from this board since anything else may have changed it."""
         is_read = self._read_from is not None and self._read_from is self._fc_settings

@@ -32,8 +32,6 @@ class TableReader:
         self.is_asking = False
         #: When the line has carried the last request.
         self.line_free_at = 0.0
-        #: The number of settings read so far; None: it does not read.
-        self.so_far: int | None = None
 
     @property
     def next_at(self) -> float:
@@ -43,8 +41,7 @@ class TableReader:
     def read_on(self, fc_settings: FcSettings, former: SettingTable | None, is_doubtful: bool, now: float) -> None:
         """Begin to read the table, or go on up to the next pause. former, is_doubtful: see FcSettings.read."""
         if self._reading is None:
-            how = TableReading(self._pace, self._progress, is_doubtful)
-            self._reading, self.so_far = fc_settings.read(former, how), 0
+            self._reading = fc_settings.read(former, TableReading(self._pace, is_doubtful))
         reading, self.is_asking = self._reading, True
 
         def done(result: SettingTable | Pause | LinkLost | None, at: float) -> None:
@@ -70,14 +67,11 @@ class TableReader:
         """Forget the values read so far: they may be out of date."""
         if self._reading is not None and not self.is_asking:
             self._reading.close()
-        self._reading = self.so_far = None
+        self._reading = None
 
     def forget_failures(self) -> None:
         """Another board, or the same again."""
         self._retry_s, self._retry_at = _RETRY_S, 0.0
-
-    def _progress(self, count: int) -> None:
-        self.so_far = count
 
 
 def _up_to_pause(conversation: Conversation[SettingTable | None]) -> Conversation[SettingTable | Pause | None]:

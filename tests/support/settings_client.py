@@ -25,7 +25,7 @@ class SettingsClient:
     @property
     def is_idle(self) -> bool:
         """True while no table is read."""
-        return self._settings.read_so_far is None
+        return self._settings._reader._reading is None
 
     def wait_read(self, seconds: float = 30) -> SettingTable:
         self._world.wait_until(lambda _: self._settings.table is not None, seconds)

@@ -249,7 +249,7 @@ class World:
         settings = self.inside.board_settings
 
         def is_ready(world: World) -> bool:
-            is_idle = not world.bridge.is_busy or settings.read_so_far is not None
+            is_idle = not world.bridge.is_busy or settings._reader._reading is not None
             return world.is_found and is_idle and not world.inside.runner.needs_line
 
         return self.wait_until(is_ready, seconds)

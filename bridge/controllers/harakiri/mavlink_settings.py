@@ -73,7 +73,6 @@ class HarakiriMavlinkSettings(FcSettings):
                     continue
                 count = value.param_count
                 found[value.param_index] = value.param_id, value.param_value
-                reading.progress(len(found))
                 if len(found) >= count:
                     break
                 if len(found) % _AT_ONCE == 0:

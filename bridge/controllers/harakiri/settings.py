@@ -170,7 +170,6 @@ def _read(total: int, reading: TableReading) -> Conversation[list[BoardSetting] 
                 return None
             continue
         found += map(_shown, reply.settings)
-        reading.progress(len(found))
         yield Pause(reading.pace(len(frame) + FRAME_OVERHEAD + len(reply.encode())))
     return found
 

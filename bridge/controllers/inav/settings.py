@@ -65,7 +65,6 @@ class InavFcSettings(FcSettings):
                 info = None if is_past_end else decode_setting_info(reply.payload)
                 if info is not None and info.place == index:
                     found.append(_shown(info))
-                    reading.progress(len(found))
                     break
             else:
                 if is_past_end:  # one error frame alone may be noise

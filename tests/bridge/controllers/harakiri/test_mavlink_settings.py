@@ -212,11 +212,11 @@ def test_arming_ends_the_reading() -> None:
     world, station = armable()
     station.send(m.MAVLink_param_request_list_message(1, 1))
     world.run(8)
-    assert (world.inside.board_settings.read_so_far or 0) > 20
+    assert not SettingsClient(world).is_idle
     world.faults.armed = True
     world.wait_until(lambda w: w.bridge.vehicle.armed is True, 10)
     world.run(2)
-    assert world.inside.board_settings.read_so_far is None
+    assert SettingsClient(world).is_idle
     since = world.now
     world.run(60)
     assert lists_requested(world, since) == 0
