@@ -11,14 +11,13 @@ An autopilot that speaks MAVLink itself is not represented but passed through, b
     FcSession <-> Routes <-> Ground
 """
 
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import count
 from math import inf
 from typing import NamedTuple, Protocol
 
 from bridge.config import BridgeConfig, PassThroughRule
-from bridge.counters import Counters
 from bridge.fc.profile import FlightController, RuleSettings, Spoken
 from bridge.fc.session import FcSession
 from bridge.gcs.ground import FrameListener, Ground
@@ -27,11 +26,13 @@ from bridge.gcs.rights import LinkAccess
 from bridge.gcs.routes import Routes
 from bridge.gcs.station import Peer, Severity
 from bridge.line.conversation import StoreEffect
+from bridge.line.msp_link import RoundTrips
 from bridge.line.runner import Runner
 from bridge.missions.mission_service import NO_LINK, EndingListener, MissionService
 from bridge.missions.place_lists import PlaceLists
 from bridge.model.events import Armed, Disarmed, Emit
 from bridge.model.refusal import ARMED, Refusal
+from bridge.model.settings import SettingsState
 from bridge.model.vehicle import FlightState, Health, MissionLeg, Readiness
 from bridge.sharing.msp_sharing import MspSharing
 from bridge.sharing.program import Program
@@ -68,6 +69,24 @@ class FcOutput(NamedTuple):
     data: Sequence[bytes]
     speed: int | None
     may_gather: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Counters:
+    """Since the start; those of the flight controller since it was found, None without MSP."""
+
+    ground_stations: int
+    #: Frames of ground stations, by link and message id; damaged ones; refused ones, by link and reason.
+    frames_received: Mapping[tuple[str, int], int]
+    bad_frames: int
+    refused: Mapping[tuple[str, str], int]
+    #: Requests of programs on a share, by reason.
+    refused_by_share: Mapping[str, int]
+    fc_bad_checksums: int
+    fc_requests_lost: int | None
+    fc_round_trips: RoundTrips | None
+    firmware_version: tuple[int, int, int] | None
+    settings: SettingsState | None
 
 
 class TimedPart(Protocol):

@@ -3,7 +3,7 @@
 
 from dataclasses import replace
 
-from bridge.controllers.msp_settings import part_settings
+from bridge.controllers.msp_parts import MspPartSettings
 from bridge.controllers.multiwii.profile import CURRENTS_PER_A
 from bridge.fc.interview import Interview
 from bridge.fc.profile import SILENCE_WITH_H7_S, FlightController, Profile, Spoken
@@ -56,7 +56,7 @@ OTHER_MSP = Profile(
     "other",
     recognise=_recognise,
     silence_s=SILENCE_WITH_H7_S,
-    settings=part_settings,
+    settings=MspPartSettings,
 )
 #: The parsers of these act on no byte inside a frame.
 CLEANFLIGHT = replace(OTHER_MSP, accepts_any_byte=True)

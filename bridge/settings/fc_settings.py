@@ -2,7 +2,7 @@
 """The interface between the settings and the flight controllers that have them.
 
 Each kind of flight controller has its own way to read, change and save them: `bridge.controllers.harakiri.settings`,
-`bridge.controllers.inav.settings`, and `bridge.settings.msp_parts` for all others.
+`bridge.controllers.inav.settings`, and `bridge.controllers.msp_parts` for all others.
 """
 
 from abc import ABC, abstractmethod

@@ -59,9 +59,10 @@ class SettingsRequest:
 
 
 class Field(NamedTuple):
-    """One setting in a part's payload: an unsigned number of `size` bytes from `at` on."""
+    """One setting in a part's payload: an unsigned number of `size` bytes from `at` on. group: for the pilot."""
 
     name: str
+    group: str
     at: int
     size: int
 
@@ -150,26 +151,28 @@ def fields(request: SettingsRequest, payload: bytes, names: SettingNames) -> tup
         case Part.PIDS:
             size, letters = request.pid_size, "PIDF"
             found = [
-                Field(f"{name} {letters[at]}", number * size + at, 1)
+                Field(f"{name} {letters[at]}", name, number * size + at, 1)
                 for number, name in enumerate(names.pids[: len(payload) // size])
                 for at in range(size)
             ]
         case Part.MODES if request.command == Msp.MODE_RANGES:
             parts = ("ID", "AUX", "LOW", "HIGH")
             found = [
-                Field(f"MODE{at // RANGE_SIZE + 1} {parts[at % RANGE_SIZE]}", at, 1)
+                Field(f"MODE{at // RANGE_SIZE + 1} {parts[at % RANGE_SIZE]}", "", at, 1)
                 for at in range(len(payload) // RANGE_SIZE * RANGE_SIZE)
             ]
         case Part.MODES:
             size = len(payload) // len(names.boxes) if names.boxes else 0
             found = [
-                Field(f"BOX {name}", at * size, size) for at, name in enumerate(names.boxes if size else ()) if name
+                Field(f"BOX {name}", name, at * size, size)
+                for at, name in enumerate(names.boxes if size else ())
+                if name
             ]
         case Part.RATES | Part.MISC:
             found, at = [], 0
             for label, size in request.layout:
                 if label and at + size <= len(payload):
-                    found.append(Field(label, at, size))
+                    found.append(Field(label, label, at, size))
                 at += size
         case Part.OTHERS:
             found = []
@@ -180,34 +183,12 @@ def changed_names(request: SettingsRequest, before: bytes, after: bytes, names: 
     """The names of the settings in which two replies differ; none if only their sizes do, or no name is known."""
     if len(before) != len(after):
         return ()
-    match request.part:
-        case Part.PIDS:
-            found = _changed_items(before, after, request.pid_size, names.pids)
-        case Part.MODES if request.command == Msp.MODE_RANGES:
-            found = _changed_ranges(before, after, names.boxes_by_id or {})
-        case Part.MODES:
-            size = len(after) // len(names.boxes) if names.boxes else 0
-            found = _changed_items(before, after, size, names.boxes)
-        case Part.RATES | Part.MISC:
-            found = _changed_fields(before, after, request.layout)
-        case Part.OTHERS:
-            return ()
+    if request.command == Msp.MODE_RANGES:
+        found = _changed_ranges(before, after, names.boxes_by_id or {})
+    else:
+        held = fields(request, after, names)
+        found = (field.group for field in held if field.value(before) != field.value(after))
     return tuple(dict.fromkeys(name for name in found if name))
-
-
-def _changed_items(before: bytes, after: bytes, size: int, names: Sequence[str]) -> Iterator[str]:
-    for number, name in enumerate(names if size else ()):
-        place = slice(number * size, (number + 1) * size)
-        if before[place] != after[place]:
-            yield name
-
-
-def _changed_fields(before: bytes, after: bytes, layout: Layout) -> Iterator[str]:
-    at = 0
-    for name, size in layout:
-        if before[at : at + size] != after[at : at + size]:
-            yield name or ""
-        at += size
 
 
 def _changed_ranges(before: bytes, after: bytes, names: Mapping[int, str]) -> Iterator[str]:

@@ -11,7 +11,7 @@ from bridge.controllers.harakiri.mavlink_missions import HarakiriMavlinkMissions
 from bridge.controllers.harakiri.mavlink_settings import HarakiriMavlinkSettings
 from bridge.controllers.harakiri.mission_store import HarakiriMissions
 from bridge.controllers.harakiri.settings import HarakiriFcSettings
-from bridge.controllers.msp_settings import part_settings
+from bridge.controllers.msp_parts import MspPartSettings
 from bridge.fc.interview import Interview
 from bridge.fc.mission_flight import FLIGHT_DECODERS, FLIGHT_POLL
 from bridge.fc.profile import FlightController, Profile, Spoken
@@ -99,7 +99,7 @@ UNPATCHED = Profile(
     polls=(*POLLS, BOX_POLL),
     acc_axes=_ACC_AXES,
     missions=Refusal(MissionResult.UNSUPPORTED, "This Harakiri lacks the mission patch"),
-    settings=part_settings,
+    settings=MspPartSettings,
     restarts_after_calibration=True,
     arming_blockers=arming_blockers,
 )

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from bridge.controllers.harakiri.setting_texts import TEXTS
-from bridge.controllers.msp_settings import part_settings, some_parts
+from bridge.controllers.msp_parts import MspPartSettings
 from bridge.fc.profile import FlightController
 from bridge.line.conversation import Conversation, Pause, ask, ask_surely
 from bridge.settings.board_setting import BoardSetting, SettingTable, Value, ValueKind, table_of
@@ -62,9 +62,9 @@ class HarakiriFcSettings(FcSettings):
     """The settings of one patched Harakiri; a setting's handle is its description there."""
 
     def __init__(self, board: FlightController) -> None:
-        self._modes = some_parts(board, BOXES)
+        self._modes = MspPartSettings(board, BOXES)
         #: For a build with an earlier mission extension.
-        self._parts = part_settings(board)
+        self._parts = MspPartSettings(board)
         self._lists_all: bool | None = None
 
     def read(self, former: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:

@@ -4,7 +4,7 @@
 from collections.abc import Iterable
 from dataclasses import replace
 
-from bridge.controllers.msp_settings import some_parts
+from bridge.controllers.msp_parts import MspPartSettings
 from bridge.fc.profile import FlightController
 from bridge.line.conversation import Conversation, Pause, ask
 from bridge.settings.board_setting import BoardSetting, SettingTable, Value, ValueKind, table_of
@@ -44,7 +44,7 @@ class InavFcSettings(FcSettings):
     """The settings of one INAV; a setting's handle is its type there. Those of profiles are the active one's."""
 
     def __init__(self, board: FlightController) -> None:
-        self._modes = some_parts(board, RANGES)
+        self._modes = MspPartSettings(board, RANGES)
         self._is_read = False
 
     def read(self, former: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:

@@ -3,7 +3,7 @@
 
 from dataclasses import replace
 
-from bridge.controllers.msp_settings import part_settings
+from bridge.controllers.msp_parts import MspPartSettings
 from bridge.controllers.multiwii.mission_store import MultiwiiMissions
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import MULTIWII_CAPACITY, multiwii_profile
@@ -48,7 +48,7 @@ PROFILE = Profile(
     # Its own axes are left, back and up (IMU.cpp).
     acc_axes=((1, -1), (0, -1), (2, -1)),
     missions=lambda board, vehicle, _: MultiwiiMissions(multiwii_profile(board.capacity), board, vehicle),
-    settings=part_settings,
+    settings=MspPartSettings,
     check_kind="multiwii",
     rules=lambda settings: NavRules(multiwii_profile(settings.capacity or MULTIWII_CAPACITY)),
 )

@@ -4,20 +4,20 @@
 A part is always written whole: it is read again right before, so that only one value of it changes.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+from bridge.fc.profile import FlightController
 from bridge.line.conversation import Conversation, Pause, ask, ask_surely
 from bridge.settings.board_setting import BoardSetting, SettingTable, Value, ValueKind, table_of
 from bridge.settings.fc_settings import NO_ANSWER, NOT_TAKEN, FcSettings, SettingRefusal, TableReading, fixed
 from protocols.msp.command_line import is_clean
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, request
-from protocols.msp.settings import RANGE_SIZE, Field, Part, SettingNames, SettingsRequest, fields
+from protocols.msp.settings import RANGE_SIZE, SETTINGS, Field, Part, SettingNames, SettingsRequest, fields
 from protocols.msp.telemetry import decode_box_names
 from protocols.rights.effect import Effect
-from protocols.rights.msp import Firmware, msp_right
+from protocols.rights.msp import msp_right
 
 _ARM = "the arm switch is set with the board's own configurator, a wrong one could arm"
 _PULSE = "disarmed motors get this pulse: set it with the board's own configurator"
@@ -35,15 +35,13 @@ class _Place(NamedTuple):
 
 
 class MspPartSettings(FcSettings):
-    """Some parts of a board's settings. `boxes`: its boxes in the order of BOX."""
+    """Some parts of a board's settings; all that its firmware has, if none is named."""
 
-    def __init__(
-        self, parts: Sequence[SettingsRequest], firmware: Firmware, boxes: Sequence[str], *, accepts_any_byte: bool
-    ) -> None:
-        self._parts = parts
-        self._firmware = firmware
-        self._names = SettingNames(boxes=boxes)
-        self._accepts_any_byte = accepts_any_byte
+    def __init__(self, board: FlightController, *parts: SettingsRequest) -> None:
+        self._parts = parts or SETTINGS[board.firmware]
+        self._firmware = board.firmware
+        self._names = SettingNames(boxes=board.boxes)
+        self._accepts_any_byte = board.profile.accepts_any_byte
 
     def read(self, former: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
         found: list[BoardSetting] = []

@@ -3,7 +3,7 @@
 
 import pytest
 
-from bridge.fc.frsky_telemetry import FrskyTelemetry
+from bridge.fc.states.frsky import FrskyTelemetry
 from bridge.model.vehicle import GlobalPosition, Height, Vehicle
 from protocols.frsky import FrskyReport
 
