@@ -2,7 +2,7 @@
 """A program on a share: its budget and its waiting requests."""
 
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 
 from bridge.gcs.budget import TokenBucket
 from bridge.gcs.cost import Rate
@@ -36,32 +36,26 @@ class WaitingRequest:
         self.asked = request(self.frame.command, self.frame.payload)
 
 
+@dataclass(eq=False)
 class Program:
     """A connected program. `name`: its address, `host`: the part of it without the port.
 
     `send` carries a frame to it, `close` its connection; None over UDP, which has none. `may_write`: it may change
-    something on the flight controller.
+    something on the flight controller. `blocked_until`: nothing is forwarded for it until then.
     """
 
-    def __init__(
-        self,
-        name: str,
-        host: str,
-        send: Callable[[bytes], None],
-        close: Callable[[], None] | None,
-        *,
-        may_write: bool,
-    ) -> None:
-        self.name = name
-        self.host = host
-        self.send = send
-        self.close = close
-        self.may_write = may_write
+    name: str
+    host: str
+    send: Callable[[bytes], None]
+    close: Callable[[], None] | None
+    _: KW_ONLY
+    may_write: bool
+    waiting: list[WaitingRequest] = field(default_factory=list)
+    blocked_until: float = 0.0
+
+    def __post_init__(self) -> None:
         #: Over UDP that of its host: a port more costs nothing there.
-        self.account: Hashable = host if close is None else self
-        self.waiting: list[WaitingRequest] = []
-        #: Nothing is forwarded for it until then.
-        self.blocked_until = 0.0
+        self.account: Hashable = self.host if self.close is None else self
         self._parser = MspParser(takes_low_v2=True)
         self._budget = TokenBucket(_LIMIT)
 

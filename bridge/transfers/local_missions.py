@@ -2,6 +2,7 @@
 """Mission operations for the command line, the status page and zenoh. Sans-IO."""
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from bridge.gcs.ground import Ground
@@ -21,17 +22,15 @@ from reports.verdict import Result, Verdict
 _WOULD_ERASE = Refusal(MissionResult.DENIED, "No item can be stored: this would erase the current mission")
 
 
+@dataclass(frozen=True, slots=True)
 class LocalMissions:
     """Writes, reads and checks whole lists, by the same rules as uploads from ground stations."""
 
-    def __init__(
-        self, missions: MissionService, uploads: MissionUploads, ground: Ground, emit: Emit, incidents: Iterator[int]
-    ) -> None:
-        self._missions = missions
-        self._uploads = uploads
-        self._ground = ground
-        self._emit = emit
-        self._incidents = incidents
+    _missions: MissionService
+    _uploads: MissionUploads
+    _ground: Ground
+    _emit: Emit
+    _incidents: Iterator[int]
 
     @property
     def held(self) -> HeldMission | None:

@@ -217,23 +217,23 @@ class DeliveringUnanswered(Delivering):
     is_awaited = False
 
 
+@dataclass(eq=False)
 class Upload:
     """One ground station's upload of `count` items; a clear has 0.
 
-    `mission_type`: MAV_MISSION_TYPE of the final MISSION_ACK. `number`: of the frame that began it.
+    `mission_type`: MAV_MISSION_TYPE of the final MISSION_ACK. `heard_at`: when its ground station last sent a message
+    of it. `number`: of the frame that began it.
     """
 
-    def __init__(
-        self, station: Station, count: int, incident: str, mission_type: int, now: float, number: int = 0
-    ) -> None:
-        self.station = station
-        self.count = count
-        self.incident = incident
-        self.mission_type = mission_type
-        self.number = number
-        #: When its ground station last sent a message of this upload.
-        self.heard_at = now
-        self.state: UploadState = Waiting(self, Event(), now)
+    station: Station
+    count: int
+    incident: str
+    mission_type: int
+    heard_at: float
+    number: int = 0
+
+    def __post_init__(self) -> None:
+        self.state: UploadState = Waiting(self, Event(), self.heard_at)
 
 
 class Fixed(Enum):

@@ -154,7 +154,7 @@ class BoardSettings:
         The same request of a client that still waits is not repeated, and gets no answer of its own.
         """
         change = Change(name, value, client, on_done)
-        if self._changes.has(change):
+        if change in self._changes:
             return
         refused = self._refusal(name, value)
         if refused is None and not self._changes.has_room_for(change):

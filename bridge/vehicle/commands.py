@@ -7,6 +7,7 @@ DO_SET_MISSION_CURRENT on an INAV that flies its mission.
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from bridge.fc.actions import CALIBRATE_ACCELEROMETER, CALIBRATE_COMPASS, FcAction
 from bridge.fc.profile import Spoken
@@ -88,28 +89,18 @@ _NOT_STORED = {
 }
 
 
+@dataclass(frozen=True, slots=True)
 class CommandService:
-    """Executes commands and acknowledges them. `version`: of the bridge."""
+    """Executes commands and acknowledges them. `_version`: of the bridge."""
 
-    def __init__(
-        self,
-        ground: Ground,
-        vehicle: OwnVehicle,
-        session: FcSession,
-        calibration: Calibration,
-        settings: BoardSettings,
-        parameters: Parameters,
-        set_waypoint: SetWaypoint,
-        version: str,
-    ) -> None:
-        self._ground = ground
-        self._vehicle = vehicle
-        self._session = session
-        self._calibration = calibration
-        self._settings = settings
-        self._parameters = parameters
-        self._set_waypoint = set_waypoint
-        self._version = version
+    _ground: Ground
+    _vehicle: OwnVehicle
+    _session: FcSession
+    _calibration: Calibration
+    _settings: BoardSettings
+    _parameters: Parameters
+    _set_waypoint: SetWaypoint
+    _version: str
 
     def take(self, station: Station, command: int, params: Sequence[float], now: float) -> None:
         """Execute a command and acknowledge it. `params`: param1..param7."""

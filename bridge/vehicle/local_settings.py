@@ -6,7 +6,7 @@ before the save leaves the saved settings as they were.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from bridge.fc.session import FcSession
 from bridge.settings.board_setting import BoardSetting, SettingTable, Value
@@ -126,25 +126,20 @@ class LocalSettings:
             self.plan(wanted, source, planned, now)
 
 
+@dataclass
 class _Restore:
-    """One restore. client: its name in the log."""
+    """One restore. _client: its name in the log."""
 
-    def __init__(
-        self,
-        settings: BoardSettings,
-        plan: RestorePlan,
-        client: str,
-        progress: Callable[[int], None],
-        on_done: Callable[[RestoreResult, float], None],
-    ) -> None:
-        self._settings = settings
-        self._plan = plan
-        self._client = client
-        self._progress = progress
-        self._on_done = on_done
-        self._waiting = [*reversed(plan.changes)]
-        self._changed: list[PlannedChange] = []
-        self._left_out = [*plan.left_out]
+    _settings: BoardSettings
+    _plan: RestorePlan
+    _client: str
+    _progress: Callable[[int], None]
+    _on_done: Callable[[RestoreResult, float], None]
+    _changed: list[PlannedChange] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._waiting = [*reversed(self._plan.changes)]
+        self._left_out = [*self._plan.left_out]
 
     def start(self, now: float) -> None:
         """Set the first value; everything else follows from the board's answers."""

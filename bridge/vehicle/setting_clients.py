@@ -3,7 +3,7 @@
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from bridge.settings.board_setting import BoardSetting, SettingTable, Value
 from bridge.settings.fc_settings import SettingRefusal
@@ -18,23 +18,16 @@ OnChanged = Callable[[BoardSetting | SettingRefusal, float], None]
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """The wish of a client."""
+    """A client's request. Without its callback it equals a repetition of it."""
 
     name: str
     value: Value
     client: str
-    on_done: OnChanged
-
-    def is_like(self, other: "Change") -> bool:
-        return (self.name, self.value, self.client) == (other.name, other.value, other.client)
+    on_done: OnChanged = field(compare=False)
 
 
 class Changes(deque[Change]):
     """The changes that wait, bounded for each client and for all."""
-
-    def has(self, change: Change) -> bool:
-        """True if a client only repeats itself."""
-        return any(change.is_like(each) for each in self)
 
     def has_room_for(self, change: Change) -> bool:
         of_client = sum(each.client == change.client for each in self)
