@@ -11,26 +11,8 @@ from dataclasses import replace
 
 from bridge.fc.mission_flight import flight_report
 from bridge.fc.msp_telemetry import velocity
+from bridge.model import vehicle as v
 from bridge.model.flight_mode import MISSION_BOXES, FlightMode, active_boxes, flight_mode, names_of_active
-from bridge.model.vehicle import (
-    Charge,
-    Fix,
-    FlightState,
-    GlobalPosition,
-    GpsFix,
-    Health,
-    Height,
-    MissionLeg,
-    Mode,
-    Orientation,
-    Power,
-    Pressure,
-    Signal,
-    Source,
-    Sticks,
-    Switches,
-    Vehicle,
-)
 from protocols.mavlink.codec import MavlinkDecoder
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
@@ -63,7 +45,7 @@ class MavlinkTelemetry:
     the launch point in VFR_HUD.alt, where MAVLink has the one above mean sea level. Its rssi is 0..255.
     """
 
-    def __init__(self, vehicle: Vehicle, *, is_harakiri: bool) -> None:
+    def __init__(self, vehicle: v.Vehicle, *, is_harakiri: bool) -> None:
         self._vehicle = vehicle
         self._is_harakiri = is_harakiri
         #: From a Harakiri's heartbeat, with its time; None until one is heard, up to a second after arming.
@@ -148,12 +130,12 @@ class MavlinkTelemetry:
             self._is_level = bool(message.base_mode & m.MAV_MODE_FLAG_STABILIZE_ENABLED), now
             self._hear_harakiri_mode()
         elif message.base_mode & m.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
-            self._vehicle.hear(Mode(now, Source.MAVLINK, str(message.custom_mode)))
-        self._vehicle.hear(FlightState(now, Source.MAVLINK, armed))
+            self._vehicle.hear(v.Mode(now, v.Source.MAVLINK, str(message.custom_mode)))
+        self._vehicle.hear(v.FlightState(now, v.Source.MAVLINK, armed))
 
     def _hear_harakiri_mode(self) -> None:
         """Its heartbeat says only whether it levels itself; the rest follows from the pilot's switches."""
-        switches, sticks = self._vehicle.last(Switches), self._vehicle.last(Sticks)
+        switches, sticks = self._vehicle.last(v.Switches), self._vehicle.last(v.Sticks)
         is_resumed = switches is not None and sticks is None and self._vehicle.flight_mode is not None
         if self._is_level is None or is_resumed:  # just after a restart of the bridge in flight
             return
@@ -166,7 +148,7 @@ class MavlinkTelemetry:
             by_switches = flight_mode(names_of_active(flags, switches.boxes) - MISSION_BOXES)
             if by_switches not in (FlightMode.STABILIZE, FlightMode.HORIZON, FlightMode.ACRO):
                 mode = by_switches
-        self._vehicle.hear(Mode(heard_at, Source.MAVLINK, mode))
+        self._vehicle.hear(v.Mode(heard_at, v.Source.MAVLINK, mode))
 
     def _named_value_int(self, message: Message, now: float) -> None:
         """A Harakiri's report on its mission flight; the records reached have messages of their own."""
@@ -176,12 +158,12 @@ class MavlinkTelemetry:
         before = self._vehicle.last_flight
         reached = before.reached if before is not None and before.number else max((progress.record or 0) - 1, 0)
         report = replace(flight_report(replace(progress, reached=reached), before), way=None)
-        self._vehicle.hear(MissionLeg(now, Source.MAVLINK, report))
+        self._vehicle.hear(v.MissionLeg(now, v.Source.MAVLINK, report))
 
     def _mission_item_reached(self, message: Message, _now: float) -> None:
-        leg, flight = self._vehicle.last(MissionLeg), self._vehicle.last_flight
+        leg, flight = self._vehicle.last(v.MissionLeg), self._vehicle.last_flight
         if leg is not None and flight is not None and flight.number:
-            self._vehicle.hear(MissionLeg(leg.heard_at, leg.source, replace(flight, reached=message.seq)))
+            self._vehicle.hear(v.MissionLeg(leg.heard_at, leg.source, replace(flight, reached=message.seq)))
 
     def _attitude(self, message: Message, now: float) -> None:
         roll, pitch, yaw = map(math.degrees, (message.roll, message.pitch, message.yaw))
@@ -189,45 +171,45 @@ class MavlinkTelemetry:
             return
         if self._is_harakiri:
             self._vehicle.hear_uptime(now, message.time_boot_ms / 1000)
-        health = self._vehicle.last(Health)
+        health = self._vehicle.last(v.Health)
         is_north_known = not self._is_harakiri or (health is not None and Sensor.COMPASS in health.sensors)
         rates = None
         if not self._is_harakiri and math.isfinite(message.rollspeed + message.pitchspeed + message.yawspeed):
             rates = math.degrees(message.rollspeed), math.degrees(message.pitchspeed), math.degrees(message.yawspeed)
-        self._vehicle.hear(Orientation(now, Source.MAVLINK, roll, pitch, yaw % 360, is_north_known, rates))
+        self._vehicle.hear(v.Orientation(now, v.Source.MAVLINK, roll, pitch, yaw % 360, is_north_known, rates))
 
     def _gps_raw_int(self, message: Message, now: float) -> None:
         if message.fix_type == m.GPS_FIX_TYPE_NO_GPS and not self._is_harakiri:
             return
-        fix = Fix(min(max(message.fix_type, Fix.NO_FIX), Fix.THREE_D))
+        fix = v.Fix(min(max(message.fix_type, v.Fix.NO_FIX), v.Fix.THREE_D))
         satellites = _known(message.satellites_visible, _UNKNOWN_U8)
-        if fix is Fix.NO_FIX:
-            self._vehicle.hear(GpsFix(now, Source.MAVLINK, fix, satellites))
+        if fix is v.Fix.NO_FIX:
+            self._vehicle.hear(v.GpsFix(now, v.Source.MAVLINK, fix, satellites))
             return
         speed, course = _scaled(message.vel, 100), _scaled(message.cog, 100)
-        self._vehicle.hear(GpsFix(now, Source.MAVLINK, fix, satellites, speed, course, _scaled(message.eph, 100)))
+        self._vehicle.hear(v.GpsFix(now, v.Source.MAVLINK, fix, satellites, speed, course, _scaled(message.eph, 100)))
         if self._is_harakiri:
             north, east = velocity(speed or 0.0, course)
             self._vehicle.hear(
-                GlobalPosition(now, Source.MAVLINK, message.lat, message.lon, message.alt / 1000, north, east)
+                v.GlobalPosition(now, v.Source.MAVLINK, message.lat, message.lon, message.alt / 1000, north, east)
             )
 
     def _global_position_int(self, message: Message, now: float) -> None:
         north, east, up = message.vx / 100, message.vy / 100, -message.vz / 100
-        self._vehicle.hear(Height(now, Source.MAVLINK, message.relative_alt / 1000, up))
-        gps = self._vehicle.fresh(GpsFix, now)
-        if (message.lat or message.lon) and (gps is None or gps.fix is not Fix.NO_FIX):
+        self._vehicle.hear(v.Height(now, v.Source.MAVLINK, message.relative_alt / 1000, up))
+        gps = self._vehicle.fresh(v.GpsFix, now)
+        if (message.lat or message.lon) and (gps is None or gps.fix is not v.Fix.NO_FIX):
             # Without a fix ArduPilot repeats the last place.
             self._vehicle.hear(
-                GlobalPosition(now, Source.MAVLINK, message.lat, message.lon, message.alt / 1000, north, east)
+                v.GlobalPosition(now, v.Source.MAVLINK, message.lat, message.lon, message.alt / 1000, north, east)
             )
 
     def _vfr_hud(self, message: Message, now: float) -> None:
         if self._is_harakiri and math.isfinite(message.alt) and math.isfinite(message.climb):
-            self._vehicle.hear(Height(now, Source.MAVLINK, message.alt, message.climb))
+            self._vehicle.hear(v.Height(now, v.Source.MAVLINK, message.alt, message.climb))
 
     def _system_time(self, message: Message, now: float) -> None:
-        self._vehicle.hear_gps_time(now, Source.MAVLINK, message.time_unix_usec / 1e6)
+        self._vehicle.hear_gps_time(now, v.Source.MAVLINK, message.time_unix_usec / 1e6)
 
     def _home_position(self, message: Message, _now: float) -> None:
         self._vehicle.hear_home(message.latitude, message.longitude)
@@ -235,19 +217,19 @@ class MavlinkTelemetry:
     def _sys_status(self, message: Message, now: float) -> None:
         well = message.onboard_control_sensors_present & message.onboard_control_sensors_health
         sensors = Sensor(sum(sensor for bit, sensor in _SENSORS.items() if bit & well))
-        self._vehicle.hear(Health(now, Source.MAVLINK, sensors))
+        self._vehicle.hear(v.Health(now, v.Source.MAVLINK, sensors))
         current = None if message.current_battery < 0 else message.current_battery / 100
         voltage = _scaled(message.voltage_battery, 1000) or None
         remaining = None if message.battery_remaining < 0 else min(message.battery_remaining, 100)
-        self._vehicle.hear(Power(now, Source.MAVLINK, voltage, current, remaining_percent=remaining))
+        self._vehicle.hear(v.Power(now, v.Source.MAVLINK, voltage, current, remaining_percent=remaining))
 
     def _battery_status(self, message: Message, now: float) -> None:
         # SYS_STATUS has the voltage of the first battery.
         if message.id == 0 and message.current_consumed >= 0:
-            self._vehicle.hear(Charge(now, Source.MAVLINK, message.current_consumed))
+            self._vehicle.hear(v.Charge(now, v.Source.MAVLINK, message.current_consumed))
 
     def _scaled_pressure(self, message: Message, now: float) -> None:
-        self._vehicle.hear(Pressure(now, Source.MAVLINK, message.press_abs, message.temperature / 100))
+        self._vehicle.hear(v.Pressure(now, v.Source.MAVLINK, message.press_abs, message.temperature / 100))
 
     def _rc_channels(self, message: Message, now: float) -> None:
         if getattr(message, "port", 0):
@@ -258,13 +240,13 @@ class MavlinkTelemetry:
         while channels and not channels[-1]:
             channels.pop()
         if channels:
-            self._vehicle.hear(Sticks(now, Source.MAVLINK, tuple(channels)))
+            self._vehicle.hear(v.Sticks(now, v.Source.MAVLINK, tuple(channels)))
         if self._is_harakiri:
             self._hear_harakiri_mode()
-            if message.rssi or self._vehicle.last(Signal) is not None:
-                self._vehicle.hear(Signal(now, Source.MAVLINK, message.rssi / _HARAKIRI_MAX_RSSI))
+            if message.rssi or self._vehicle.last(v.Signal) is not None:
+                self._vehicle.hear(v.Signal(now, v.Source.MAVLINK, message.rssi / _HARAKIRI_MAX_RSSI))
         elif message.rssi != _UNKNOWN_U8:
-            self._vehicle.hear(Signal(now, Source.MAVLINK, message.rssi / _MAX_RSSI))
+            self._vehicle.hear(v.Signal(now, v.Source.MAVLINK, message.rssi / _MAX_RSSI))
 
 
 def _known(value: int, unknown: int) -> int | None:

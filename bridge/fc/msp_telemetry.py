@@ -5,29 +5,8 @@ import math
 from collections.abc import Mapping
 
 from bridge.fc.profile import Decoder, FlightController
+from bridge.model import vehicle as v
 from bridge.model.flight_mode import ARM_BOX, FAILSAFE_BOX, flight_mode, names_of_active
-from bridge.model.vehicle import (
-    Charge,
-    Fix,
-    FlightState,
-    GlobalPosition,
-    GpsFix,
-    Health,
-    Height,
-    ImuSample,
-    MissionLeg,
-    Mode,
-    Motors,
-    Orientation,
-    Power,
-    Readiness,
-    Reading,
-    Signal,
-    Source,
-    Sticks,
-    Switches,
-    Vehicle,
-)
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame
 from protocols.msp.nav import decode_nav_status
@@ -47,22 +26,22 @@ from protocols.msp.telemetry import (
 )
 
 #: The poll whose reply carries a reading; the others are heard in MAVLink mode only.
-POLL_FOR: Mapping[type[Reading], Msp] = {
-    Orientation: Msp.ATTITUDE,
-    GpsFix: Msp.RAW_GPS,
-    GlobalPosition: Msp.RAW_GPS,
-    Height: Msp.ALTITUDE,
-    FlightState: Msp.STATUS,
-    Mode: Msp.STATUS,
-    Health: Msp.STATUS,
-    Power: Msp.ANALOG,
-    Charge: Msp.ANALOG,
-    Signal: Msp.ANALOG,
-    Sticks: Msp.RC,
-    Motors: Msp.MOTOR,
-    ImuSample: Msp.RAW_IMU,
-    MissionLeg: Msp.NAV_STATUS,
-    Readiness: Msp.INAV_STATUS,
+POLL_FOR: Mapping[type[v.Reading], Msp] = {
+    v.Orientation: Msp.ATTITUDE,
+    v.GpsFix: Msp.RAW_GPS,
+    v.GlobalPosition: Msp.RAW_GPS,
+    v.Height: Msp.ALTITUDE,
+    v.FlightState: Msp.STATUS,
+    v.Mode: Msp.STATUS,
+    v.Health: Msp.STATUS,
+    v.Power: Msp.ANALOG,
+    v.Charge: Msp.ANALOG,
+    v.Signal: Msp.ANALOG,
+    v.Sticks: Msp.RC,
+    v.Motors: Msp.MOTOR,
+    v.ImuSample: Msp.RAW_IMU,
+    v.MissionLeg: Msp.NAV_STATUS,
+    v.Readiness: Msp.INAV_STATUS,
 }
 _MAX_RSSI = 1020
 _STATUS_FLAGS = 32
@@ -72,51 +51,51 @@ _ONE_G = 512
 _RATES_STALE_S = 0.3
 
 
-def hear_msp(vehicle: Vehicle, frame: MspFrame, controller: FlightController, now: float) -> None:
+def hear_msp(vehicle: v.Vehicle, frame: MspFrame, controller: FlightController, now: float) -> None:
     """Take one reply. Errors, replies that are too short and other commands change nothing."""
     decode = controller.profile.decoders.get(frame.command) or _DECODERS.get(frame.command)
     if decode is not None and frame.direction is Direction.REPLY:
         decode(vehicle, frame.payload, controller, now)
 
 
-def _attitude(vehicle: Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
+def _attitude(vehicle: v.Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
     """MSP's pitch is nose-down positive on all firmware."""
     reply = decode_attitude(payload)
     if reply is not None:
-        health = vehicle.last(Health)
+        health = vehicle.last(v.Health)
         has_compass = health is not None and Sensor.COMPASS in health.sensors
         heading_deg = float(reply.heading_deg % 360)
         roll_deg, pitch_deg = reply.roll_ddeg / 10, -reply.pitch_ddeg / 10
         rates = _rates_deg_s(vehicle, now) if controller.profile.has_gyro_deg_s else None
-        vehicle.hear(Orientation(now, Source.MSP, roll_deg, pitch_deg, heading_deg, has_compass, rates))
+        vehicle.hear(v.Orientation(now, v.Source.MSP, roll_deg, pitch_deg, heading_deg, has_compass, rates))
 
 
-def _rates_deg_s(vehicle: Vehicle, now: float) -> tuple[float, float, float] | None:
-    imu = vehicle.fresh(ImuSample, now, _RATES_STALE_S)
+def _rates_deg_s(vehicle: v.Vehicle, now: float) -> tuple[float, float, float] | None:
+    imu = vehicle.fresh(v.ImuSample, now, _RATES_STALE_S)
     if imu is None:
         return None
     forward, left, up = imu.gyro
     return float(forward), -float(left), -float(up)
 
 
-def _raw_gps(vehicle: Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
+def _raw_gps(vehicle: v.Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
     gps = decode_raw_gps(payload)
     if gps is None:
         return
-    fix = Fix.NO_FIX
+    fix = v.Fix.NO_FIX
     if gps.fix:
-        fix = Fix.TWO_D if controller.profile.has_2d_fix and gps.fix == 1 else Fix.THREE_D
-    if fix is Fix.NO_FIX:
-        vehicle.hear(GpsFix(now, Source.MSP, fix, gps.satellites))
+        fix = v.Fix.TWO_D if controller.profile.has_2d_fix and gps.fix == 1 else v.Fix.THREE_D
+    if fix is v.Fix.NO_FIX:
+        vehicle.hear(v.GpsFix(now, v.Source.MSP, fix, gps.satellites))
         return
     speed, course = gps.speed_cms / 100, _course_deg(vehicle, gps)
     hdop = None if gps.hdop_e2 is None else gps.hdop_e2 / 100
-    vehicle.hear(GpsFix(now, Source.MSP, fix, gps.satellites, speed, course, hdop))
+    vehicle.hear(v.GpsFix(now, v.Source.MSP, fix, gps.satellites, speed, course, hdop))
     north, east = velocity(speed, course)
-    vehicle.hear(GlobalPosition(now, Source.MSP, gps.lat_e7, gps.lon_e7, float(gps.altitude_m), north, east))
+    vehicle.hear(v.GlobalPosition(now, v.Source.MSP, gps.lat_e7, gps.lon_e7, float(gps.altitude_m), north, east))
 
 
-def _course_deg(vehicle: Vehicle, gps: RawGps) -> float | None:
+def _course_deg(vehicle: v.Vehicle, gps: RawGps) -> float | None:
     return vehicle.track.course_deg(gps) if gps.course_ddeg is None else gps.course_ddeg / 10 % 360
 
 
@@ -128,88 +107,88 @@ def velocity(speed_m_s: float, course_deg: float | None) -> tuple[float | None, 
     return speed_m_s * math.cos(course), speed_m_s * math.sin(course)
 
 
-def _altitude(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
+def _altitude(vehicle: v.Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
     """A board without a barometer answers zeros, which are no height."""
-    reply, health = decode_altitude(payload), vehicle.last(Health)
+    reply, health = decode_altitude(payload), vehicle.last(v.Health)
     if reply is None or health is None:
         return
     if Sensor.BAROMETER in health.sensors or reply.height_cm or reply.climb_cms:
-        vehicle.hear(Height(now, Source.MSP, reply.height_cm / 100, reply.climb_cms / 100))
+        vehicle.hear(v.Height(now, v.Source.MSP, reply.height_cm / 100, reply.climb_cms / 100))
 
 
-def _status(vehicle: Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
+def _status(vehicle: v.Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
     status = decode_status(payload)
     if status is None:
         return
-    vehicle.hear(Health(now, Source.MSP, status.sensors, status.cycle_time_us, status.i2c_errors))
+    vehicle.hear(v.Health(now, v.Source.MSP, status.sensors, status.cycle_time_us, status.i2c_errors))
     hear_box_flags(vehicle, status.box_flags, controller, now, known=_STATUS_FLAGS)
 
 
-def hear_box_flags(vehicle: Vehicle, flags: int, controller: FlightController, now: float, *, known: int) -> None:
+def hear_box_flags(vehicle: v.Vehicle, flags: int, controller: FlightController, now: float, *, known: int) -> None:
     """Take the flags of the first `known` boxes. A plane's failsafe on INAV is not among the 32 of STATUS."""
-    active, before = names_of_active(flags, controller.boxes), vehicle.last(FlightState)
+    active, before = names_of_active(flags, controller.boxes), vehicle.last(v.FlightState)
     if before is not None and before.is_failsafe and FAILSAFE_BOX in controller.boxes[known:]:
         active.add(FAILSAFE_BOX)
     armed = ARM_BOX in active if ARM_BOX in controller.boxes else None
     if controller.boxes:
-        vehicle.hear(Mode(now, Source.MSP, flight_mode(active)))
+        vehicle.hear(v.Mode(now, v.Source.MSP, flight_mode(active)))
     # While disarmed, the box only means that there is no RC link.
-    vehicle.hear(FlightState(now, Source.MSP, armed, bool(armed) and FAILSAFE_BOX in active))
+    vehicle.hear(v.FlightState(now, v.Source.MSP, armed, bool(armed) and FAILSAFE_BOX in active))
 
 
-def _analog(vehicle: Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
+def _analog(vehicle: v.Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
     """A voltage of 0 is not measured, nor is a current while none was drawn, nor a strength before the first signal."""
     reply = decode_analog(payload)
     if reply is None:
         return
     voltage = reply.battery_v or None
     if reply.current is None or not (reply.current or reply.drawn_mah):
-        vehicle.hear(Power(now, Source.MSP, voltage))
+        vehicle.hear(v.Power(now, v.Source.MSP, voltage))
     else:
         current_a = reply.current / controller.profile.currents_per_a
-        vehicle.hear(Power(now, Source.MSP, voltage, current_a))
-        vehicle.hear(Charge(now, Source.MSP, reply.drawn_mah or 0))
-    if reply.rssi or vehicle.last(Signal) is not None:
-        vehicle.hear(Signal(now, Source.MSP, min(reply.rssi / _MAX_RSSI, 1.0)))
+        vehicle.hear(v.Power(now, v.Source.MSP, voltage, current_a))
+        vehicle.hear(v.Charge(now, v.Source.MSP, reply.drawn_mah or 0))
+    if reply.rssi or vehicle.last(v.Signal) is not None:
+        vehicle.hear(v.Signal(now, v.Source.MSP, min(reply.rssi / _MAX_RSSI, 1.0)))
 
 
-def _rc(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
+def _rc(vehicle: v.Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
     """MSP sends roll, pitch, yaw, throttle, aux."""
     channels = decode_channels(payload)
     if channels is not None:
         roll, pitch, yaw, throttle, *aux = channels
-        vehicle.hear(Sticks(now, Source.MSP, (roll, pitch, throttle, yaw, *aux)))
+        vehicle.hear(v.Sticks(now, v.Source.MSP, (roll, pitch, throttle, yaw, *aux)))
 
 
-def _motor(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
+def _motor(vehicle: v.Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
     outputs = decode_motors(payload)
     if outputs is not None:
-        vehicle.hear(Motors(now, Source.MSP, outputs))
+        vehicle.hear(v.Motors(now, v.Source.MSP, outputs))
 
 
-def _raw_imu(vehicle: Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
+def _raw_imu(vehicle: v.Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
     imu = decode_raw_imu(payload)
     if imu is not None:
         forward, right, down = (round(sign * imu.acc[at] * 1000 / _ONE_G) for at, sign in controller.profile.acc_axes)
-        vehicle.hear(ImuSample(now, Source.MSP, (forward, right, down), imu.gyro, imu.mag))
+        vehicle.hear(v.ImuSample(now, v.Source.MSP, (forward, right, down), imu.gyro, imu.mag))
 
 
-def _box(vehicle: Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
+def _box(vehicle: v.Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
     activation = decode_box_activation(payload, len(controller.boxes))
     if activation is not None:
-        vehicle.hear(Switches(now, Source.MSP, controller.boxes, activation))
+        vehicle.hear(v.Switches(now, v.Source.MSP, controller.boxes, activation))
 
 
-def _wp(vehicle: Vehicle, payload: bytes, _controller: FlightController, _now: float) -> None:
+def _wp(vehicle: v.Vehicle, payload: bytes, _controller: FlightController, _now: float) -> None:
     home = decode_home(payload)
     if home is not None:
         vehicle.hear_home(home.lat_e7, home.lon_e7)
 
 
-def _nav_status(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
+def _nav_status(vehicle: v.Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
     status = decode_nav_status(payload)
     if status is not None:
-        vehicle.hear(MissionLeg(now, Source.MSP, status))
+        vehicle.hear(v.MissionLeg(now, v.Source.MSP, status))
 
 
 _DECODERS: Mapping[int, Decoder] = {

@@ -9,34 +9,12 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import NamedTuple, TypeVar
 
+from bridge.model import vehicle as v
 from bridge.model.airframe import Airframe
 from bridge.model.flight_memory import Home
 from bridge.model.flight_mode import FlightMode
 from bridge.model.ground_track import bearing_deg, distance_m, north_east_m
 from bridge.model.mission_progress import FlownMission, Way
-from bridge.model.vehicle import (
-    STALE_S,
-    Airspeed,
-    Charge,
-    Fix,
-    FlightState,
-    GlobalPosition,
-    GpsFix,
-    Health,
-    Height,
-    ImuSample,
-    Load,
-    MissionLeg,
-    Mode,
-    Motors,
-    Orientation,
-    Power,
-    Pressure,
-    ReadingT,
-    Signal,
-    Sticks,
-    Vehicle,
-)
 from protocols.mavlink import missing_messages
 from protocols.mavlink.codec import pack_payload
 from protocols.mavlink.dialect import Message, messages
@@ -137,7 +115,7 @@ class Moment:
     blockers: the known reasons that prevent arming.
     """
 
-    vehicle: Vehicle
+    vehicle: v.Vehicle
     now: float
     boot_ms: int
     mission: Callable[[], FlownMission] = FlownMission
@@ -146,16 +124,16 @@ class Moment:
     is_lost: bool = False
     blockers: tuple[str, ...] = ()
 
-    def fresh(self, kind: type[ReadingT]) -> ReadingT | None:
+    def fresh(self, kind: type[v.ReadingT]) -> v.ReadingT | None:
         """The latest reading of a kind, unless it is stale."""
         reading = self.vehicle.last(kind)
-        limit_s = self.vehicle.stale_s.get(kind, STALE_S)
+        limit_s = self.vehicle.stale_s.get(kind, v.STALE_S)
         return reading if reading is not None and self.now <= reading.heard_at + limit_s else None
 
-    def need(self, kind: type[ReadingT]) -> ReadingT:
+    def need(self, kind: type[v.ReadingT]) -> v.ReadingT:
         """The latest reading of a kind; Unknown if there is none or it is stale."""
         reading = self.vehicle.last(kind)
-        if reading is None or self.now > reading.heard_at + self.vehicle.stale_s.get(kind, STALE_S):
+        if reading is None or self.now > reading.heard_at + self.vehicle.stale_s.get(kind, v.STALE_S):
             raise Unknown
         return reading
 
@@ -171,7 +149,7 @@ class Moment:
 
     def altitude_m(self) -> float | None:
         """Above mean sea level: home's altitude plus the height above it, finer than the GPS's whole metres."""
-        home, height, position = self.vehicle.home, self.fresh(Height), self.fresh(GlobalPosition)
+        home, height, position = self.vehicle.home, self.fresh(v.Height), self.fresh(v.GlobalPosition)
         if home is None or home.altitude_m is None or height is None:
             return None if position is None else position.altitude_m
         return home.altitude_m + height.height_m
@@ -187,8 +165,8 @@ def heartbeat(at: Moment) -> Message:
     An armed craft on the ground is in STANDBY, as with ArduPilot: QGroundControl takes ACTIVE for flying.
     """
     vehicle = at.vehicle
-    state = vehicle.last(FlightState)
-    last = vehicle.last(Mode)
+    state = vehicle.last(v.FlightState)
+    last = vehicle.last(v.Mode)
     mode = last.mode if last is not None and isinstance(last.mode, FlightMode) else FlightMode.STABILIZE
     base_mode = messages.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED | messages.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
     if mode not in (FlightMode.ACRO, FlightMode.MANUAL):
@@ -210,13 +188,13 @@ def heartbeat(at: Moment) -> Message:
 
 
 def current_mode(at: Moment) -> Message:
-    mode = at.need(Mode).mode
+    mode = at.need(v.Mode).mode
     if not isinstance(mode, FlightMode):
         raise Unknown
     return missing_messages.current_mode(_custom_mode(at.vehicle, mode), _standard_mode(at.vehicle, mode))
 
 
-def available_modes(vehicle: Vehicle) -> list[Message]:
+def available_modes(vehicle: v.Vehicle) -> list[Message]:
     """AVAILABLE_MODES, one message per mode."""
     modes: dict[int, FlightMode] = {}
     for mode in _MODES:
@@ -230,19 +208,19 @@ def available_modes(vehicle: Vehicle) -> list[Message]:
     ]
 
 
-def _custom_mode(vehicle: Vehicle, mode: FlightMode) -> int:
+def _custom_mode(vehicle: v.Vehicle, mode: FlightMode) -> int:
     numbers = _MODES[mode]
     if vehicle.airframe is Airframe.FIXED_WING:
         return numbers.plane
     return numbers.rover if vehicle.airframe in _ROVERS else numbers.copter
 
 
-def auto_mode(vehicle: Vehicle) -> int:
+def auto_mode(vehicle: v.Vehicle) -> int:
     """custom_mode of AUTO."""
     return _custom_mode(vehicle, FlightMode.AUTO)
 
 
-def _standard_mode(vehicle: Vehicle, mode: FlightMode) -> int:
+def _standard_mode(vehicle: v.Vehicle, mode: FlightMode) -> int:
     """MAV_STANDARD_MODE; only copters hold an altitude or a position, only aeroplanes cruise and are launched."""
     is_copter = vehicle.airframe not in (Airframe.FIXED_WING, *_ROVERS)
     is_plane = vehicle.airframe is Airframe.FIXED_WING
@@ -255,7 +233,7 @@ def _standard_mode(vehicle: Vehicle, mode: FlightMode) -> int:
     return _MODES[mode].standard if of_one_kind.get(mode, True) else messages.MAV_STANDARD_MODE_NON_STANDARD
 
 
-def autopilot_version(vehicle: Vehicle, capabilities: int = 0) -> Message:
+def autopilot_version(vehicle: v.Vehicle, capabilities: int = 0) -> Message:
     """AUTOPILOT_VERSION: the firmware's version. `capabilities`: of this flight controller, besides the bridge's."""
     version = int.from_bytes(bytes((*(vehicle.version or _UNKNOWN_VERSION), _OFFICIAL)), "big")
     no_hash = [0] * 8
@@ -278,7 +256,7 @@ def mission_item_reached(seq: int) -> Message:
 
 def attitude(at: Moment) -> Message:
     """ATTITUDE: radians, radians a second."""
-    now = at.need(Orientation)
+    now = at.need(v.Orientation)
     if now.roll_deg is None or now.pitch_deg is None:
         raise Unknown
     heading_deg = (now.heading_deg + 180) % 360 - 180
@@ -290,8 +268,8 @@ def attitude(at: Moment) -> Message:
 
 def gps_raw_int(at: Moment) -> Message:
     """GPS_RAW_INT: degrees * 1e7, mm above mean sea level, cm/s, 0.01 degrees."""
-    gps = at.need(GpsFix)
-    position = at.fresh(GlobalPosition) if gps.fix is not Fix.NO_FIX else None
+    gps = at.need(v.GpsFix)
+    position = at.fresh(v.GlobalPosition) if gps.fix is not v.Fix.NO_FIX else None
     place = 0, 0, 0
     if position is not None and position.altitude_m is not None:
         place = position.lat_e7, position.lon_e7, _fit(round(position.altitude_m * 1000), 32)
@@ -313,14 +291,14 @@ def global_position_int(at: Moment) -> Message:
     Mission Planner shows no other height. So without a fix it carries the last known place, as ArduPilot's does, and
     zeros if there was none, which Mission Planner and QGroundControl ignore.
     """
-    height, place, orientation = at.need(Height), at.vehicle.last(GlobalPosition), at.fresh(Orientation)
+    height, place, orientation = at.need(v.Height), at.vehicle.last(v.GlobalPosition), at.fresh(v.Orientation)
     altitude_m, north_m_s, east_m_s = at.altitude_m(), 0.0, 0.0
-    if (position := at.fresh(GlobalPosition)) is not None:
+    if (position := at.fresh(v.GlobalPosition)) is not None:
         known(altitude_m)
         north_m_s, east_m_s = known(position.north_m_s), known(position.east_m_s)
     elif place is not None:
         # A silent GPS is no lost fix.
-        at.need(GpsFix)
+        at.need(v.GpsFix)
     is_north_known = orientation is not None and orientation.is_north_known
     return messages.MAVLink_global_position_int_message(
         at.boot_ms,
@@ -341,12 +319,12 @@ def vfr_hud(at: Moment) -> Message:
     Without a sensor a copter's airspeed is the ground speed, as with ArduCopter; a plane's is unknown. Heading and
     throttle have no "unknown", so both must be there.
     """
-    orientation, channels_us = at.need(Orientation), at.need(Sticks).channels_us
+    orientation, channels_us = at.need(v.Orientation), at.need(v.Sticks).channels_us
     if len(channels_us) <= _THROTTLE:
         raise Unknown
-    height, gps, altitude_m = at.fresh(Height), at.fresh(GpsFix), at.altitude_m()
+    height, gps, altitude_m = at.fresh(v.Height), at.fresh(v.GpsFix), at.altitude_m()
     speed = math.nan if gps is None or gps.ground_speed_m_s is None else gps.ground_speed_m_s
-    air = at.fresh(Airspeed)
+    air = at.fresh(v.Airspeed)
     airspeed = math.nan if at.vehicle.airframe is Airframe.FIXED_WING else speed
     throttle = (channels_us[_THROTTLE] - _STICK_LOW_US) * 100 // (_STICK_HIGH_US - _STICK_LOW_US)
     return messages.MAVLink_vfr_hud_message(
@@ -365,19 +343,19 @@ def sys_status(at: Moment) -> Message:
     Only what is known is enabled: Mission Planner replaces the line on its HUD by the first enabled sensor that is not
     healthy. A GPS without a 3D fix is not: MAVSDK takes its bit for a good position.
     """
-    health, fresh_health = at.vehicle.last(Health), at.fresh(Health)
+    health, fresh_health = at.vehicle.last(v.Health), at.fresh(v.Health)
     present, unknown, bad = _MOTORS | _PREARM, 0, 0
     if health is not None:
         present |= messages.MAV_SYS_STATUS_SENSOR_3D_GYRO
         for sensor, bit in _SENSORS.items():
             if sensor & health.sensors:
                 present |= bit
-    gps, sticks, signal = at.fresh(GpsFix), at.fresh(Sticks), at.fresh(Signal)
+    gps, sticks, signal = at.fresh(v.GpsFix), at.fresh(v.Sticks), at.fresh(v.Signal)
     if gps is None:
         unknown |= messages.MAV_SYS_STATUS_SENSOR_GPS
-    elif gps.fix is not Fix.THREE_D:
+    elif gps.fix is not v.Fix.THREE_D:
         bad |= messages.MAV_SYS_STATUS_SENSOR_GPS
-    if at.vehicle.last(Sticks) is not None:
+    if at.vehicle.last(v.Sticks) is not None:
         present |= messages.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
         if sticks is None:
             unknown |= messages.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
@@ -390,7 +368,7 @@ def sys_status(at: Moment) -> Message:
     if at.blockers:
         healthy &= ~_PREARM
     voltage, current, remaining = _battery(at)
-    load = at.fresh(Load)
+    load = at.fresh(v.Load)
     return messages.MAVLink_sys_status_message(
         present,
         enabled,
@@ -410,11 +388,11 @@ def sys_status(at: Moment) -> Message:
 
 def battery_status(at: Moment) -> Message:
     """BATTERY_STATUS: mV, the same for each cell (Mission Planner adds them up), cA and mAh."""
-    charge = at.fresh(Charge)
+    charge = at.fresh(v.Charge)
     voltage, current, remaining = _battery(at)
     if voltage == _UNKNOWN_U16:
         raise Unknown
-    power = at.need(Power)
+    power = at.need(v.Power)
     cells = power.cells if power.cells and power.cells <= _MOST_CELLS else 1
     least, more = divmod(voltage, cells)
     voltages = [least + (cell < more) for cell in range(cells)]
@@ -426,7 +404,7 @@ def battery_status(at: Moment) -> Message:
 
 def _battery(at: Moment) -> tuple[int, int, int]:
     """mV, cA and percent."""
-    power = at.fresh(Power)
+    power = at.fresh(v.Power)
     if power is None:
         return _UNKNOWN_U16, -1, -1
     return (
@@ -438,39 +416,39 @@ def _battery(at: Moment) -> tuple[int, int, int]:
 
 def rc_channels(at: Moment) -> Message:
     """RC_CHANNELS: microseconds."""
-    channels = at.need(Sticks).channels_us
+    channels = at.need(v.Sticks).channels_us
     return messages.MAVLink_rc_channels_message(at.boot_ms, len(channels), *_padded(channels, _CHANNELS), _rssi(at))
 
 
 def rc_channels_raw(at: Moment) -> Message:
     """RC_CHANNELS_RAW: the first eight."""
-    channels = _padded(at.need(Sticks).channels_us, _RAW_CHANNELS)
+    channels = _padded(at.need(v.Sticks).channels_us, _RAW_CHANNELS)
     return messages.MAVLink_rc_channels_raw_message(at.boot_ms, 0, *channels, _rssi(at))
 
 
 def raw_imu(at: Moment) -> Message:
     """RAW_IMU: 1/1000 g; gyro and compass in the flight controller's own scale."""
-    imu = at.need(ImuSample)
+    imu = at.need(v.ImuSample)
     acc_mg = (_fit(axis, 16) for axis in imu.acc_mg)
     return messages.MAVLink_raw_imu_message(at.boot_ms * 1000, *acc_mg, *imu.gyro, *imu.mag)
 
 
 def servo_output_raw(at: Moment) -> Message:
     """SERVO_OUTPUT_RAW: the motors, microseconds."""
-    outputs = (*at.need(Motors).outputs_us, *[0] * _RAW_CHANNELS)[:_RAW_CHANNELS]
+    outputs = (*at.need(v.Motors).outputs_us, *[0] * _RAW_CHANNELS)[:_RAW_CHANNELS]
     return messages.MAVLink_servo_output_raw_message(at.boot_ms * 1000 & 0xFFFFFFFF, 0, *outputs)
 
 
 def scaled_pressure(at: Moment) -> Message:
     """SCALED_PRESSURE: hPa, 0.01 degrees Celsius."""
-    pressure = at.need(Pressure)
+    pressure = at.need(v.Pressure)
     temperature = _fit(round(pressure.temperature_c * 100), 16)
     return messages.MAVLink_scaled_pressure_message(at.boot_ms, pressure.absolute_hpa, 0.0, temperature)
 
 
 def attitude_quaternion(at: Moment) -> Message:
     """ATTITUDE_QUATERNION: w, x, y, z."""
-    now = at.need(Orientation)
+    now = at.need(v.Orientation)
     halves = [math.radians(angle) / 2 for angle in (known(now.roll_deg), known(now.pitch_deg), now.heading_deg)]
     (sin_r, sin_p, sin_y), (cos_r, cos_p, cos_y) = map(math.sin, halves), map(math.cos, halves)
     return messages.MAVLink_attitude_quaternion_message(
@@ -485,7 +463,7 @@ def attitude_quaternion(at: Moment) -> Message:
 
 def local_position_ned(at: Moment) -> Message:
     """LOCAL_POSITION_NED: metres from home, m/s."""
-    position, height = at.need(GlobalPosition), at.need(Height)
+    position, height = at.need(v.GlobalPosition), at.need(v.Height)
     north, east = north_east_m(known(at.vehicle.home), position)
     return messages.MAVLink_local_position_ned_message(
         at.boot_ms,
@@ -503,8 +481,8 @@ def nav_controller_output(at: Moment) -> Message:
 
     The way is the board's own, if it reports that.
     """
-    state, height = at.vehicle.last(FlightState), at.fresh(Height)
-    position, now = at.need(GlobalPosition), at.need(Orientation)
+    state, height = at.vehicle.last(v.FlightState), at.fresh(v.Height)
+    position, now = at.need(v.GlobalPosition), at.need(v.Orientation)
     if state is None or not state.armed:
         raise Unknown
     flight = at.vehicle.mission_flight(at.now)
@@ -525,7 +503,7 @@ def nav_controller_output(at: Moment) -> Message:
     return _nav_controller_output(now, Way(distance_m(position, target), bearing_deg(position, target), climb_m))
 
 
-def _nav_controller_output(now: Orientation, way: Way) -> Message:
+def _nav_controller_output(now: v.Orientation, way: Way) -> Message:
     bearing = round((way.bearing_deg + 180) % 360 - 180)
     distance = min(round(way.distance_m), _UNKNOWN_U16)
     return messages.MAVLink_nav_controller_output_message(
@@ -540,7 +518,7 @@ def system_time(at: Moment) -> Message:
 
 def extended_sys_state(at: Moment) -> Message:
     """EXTENDED_SYS_STATE: on the ground while disarmed; armed as a mission flight reports, or by height and speed."""
-    known(at.need(FlightState).armed)
+    known(at.need(v.FlightState).armed)
     return messages.MAVLink_extended_sys_state_message(messages.MAV_VTOL_STATE_UNDEFINED, _landed_state(at))
 
 
@@ -548,10 +526,10 @@ def _landed_state(at: Moment) -> int:
     """MAV_LANDED_STATE; undefined while armed without a height."""
     if not at.vehicle.armed:
         return int(messages.MAV_LANDED_STATE_ON_GROUND)
-    flight = at.vehicle.mission_flight(at.now) if at.vehicle.last(MissionLeg) else None  # most boards report none
+    flight = at.vehicle.mission_flight(at.now) if at.vehicle.last(v.MissionLeg) else None  # most boards report none
     if flight is not None and flight.stage is not None:
         return flight.stage
-    height, gps = at.fresh(Height), at.fresh(GpsFix)
+    height, gps = at.fresh(v.Height), at.fresh(v.GpsFix)
     if height is None:
         return int(messages.MAV_LANDED_STATE_UNDEFINED)
     speed = None if gps is None else gps.ground_speed_m_s
@@ -562,23 +540,23 @@ def _landed_state(at: Moment) -> int:
 
 def cycle_time(at: Moment) -> Message:
     """NAMED_VALUE_INT: the main loop's cycle time, microseconds."""
-    return messages.MAVLink_named_value_int_message(at.boot_ms, b"cycle_us", known(at.need(Health).cycle_time_us))
+    return messages.MAVLink_named_value_int_message(at.boot_ms, b"cycle_us", known(at.need(v.Health).cycle_time_us))
 
 
 def i2c_errors(at: Moment) -> Message:
     """NAMED_VALUE_INT: failed sensor reads since boot."""
-    return messages.MAVLink_named_value_int_message(at.boot_ms, b"i2c_err", known(at.need(Health).i2c_errors))
+    return messages.MAVLink_named_value_int_message(at.boot_ms, b"i2c_err", known(at.need(v.Health).i2c_errors))
 
 
 def home_distance(at: Moment) -> Message:
     """NAMED_VALUE_FLOAT: distance to home, metres."""
-    distance = distance_m(at.need(GlobalPosition), known(at.vehicle.home))
+    distance = distance_m(at.need(v.GlobalPosition), known(at.vehicle.home))
     return messages.MAVLink_named_value_float_message(at.boot_ms, b"home_m", distance)
 
 
 def home_direction(at: Moment) -> Message:
     """NAMED_VALUE_FLOAT: the direction of home, degrees."""
-    direction = bearing_deg(at.need(GlobalPosition), known(at.vehicle.home))
+    direction = bearing_deg(at.need(v.GlobalPosition), known(at.vehicle.home))
     return messages.MAVLink_named_value_float_message(at.boot_ms, b"home_deg", direction)
 
 
@@ -599,7 +577,7 @@ def gps_global_origin(at: Moment) -> Message:
     return messages.MAVLink_gps_global_origin_message(home.lat_e7, home.lon_e7, altitude_mm, at.boot_ms * 1000)
 
 
-def _rates(now: Orientation) -> Iterable[float]:
+def _rates(now: v.Orientation) -> Iterable[float]:
     """Radians a second: roll, pitch, yaw."""
     return _UNKNOWN_RATES if now.rates_deg_s is None else map(math.radians, now.rates_deg_s)
 
@@ -611,7 +589,7 @@ def _padded(channels_us: tuple[int, ...], count: int) -> tuple[int, ...]:
 
 def _rssi(at: Moment) -> int:
     """0..254, or 255: unknown."""
-    signal = at.fresh(Signal)
+    signal = at.fresh(v.Signal)
     return _UNKNOWN_U8 if signal is None else int(signal.strength * _MAX_RSSI)
 
 

@@ -9,27 +9,10 @@ from typing import Any
 from bridge.fc.session import FcSession
 from bridge.gcs.ground import Ground
 from bridge.missions.mission_service import MissionService
+from bridge.model import vehicle as v
 from bridge.model.flight_mode import FlightMode
 from bridge.model.ground_track import bearing_deg, distance_m
 from bridge.model.mission_progress import MissionProgress
-from bridge.model.vehicle import (
-    STALE_S,
-    Charge,
-    Fix,
-    FlightState,
-    GlobalPosition,
-    GpsFix,
-    Health,
-    Height,
-    MissionLeg,
-    Mode,
-    Orientation,
-    Power,
-    Reading,
-    ReadingT,
-    Signal,
-    Sticks,
-)
 from bridge.vehicle.settings_seal import SettingsSeal
 from protocols.msp.telemetry import Sensor
 from reports.vehicle_groups import (
@@ -49,24 +32,24 @@ from reports.vehicle_groups import (
 
 #: The readings of each group, and their poll intervals while the group is watched, seconds. A group is published when
 #: its first reading arrives; when another one does, unless it was published just before; and when one becomes stale.
-_SHOWS: Mapping[Group, Mapping[type[Reading], float]] = {
-    Group.ATTITUDE: {Orientation: 0.1},
-    Group.POSITION: {GlobalPosition: 0.2, Height: 0.2},
-    Group.GPS: {GpsFix: 0.2},
-    Group.BATTERY: {Power: 1.0, Charge: 1.0},
-    Group.RC: {Sticks: 0.5, Signal: 1.0},
-    Group.STATUS: {FlightState: 0.25, Mode: 0.25, Health: 0.25},
+_SHOWS: Mapping[Group, Mapping[type[v.Reading], float]] = {
+    Group.ATTITUDE: {v.Orientation: 0.1},
+    Group.POSITION: {v.GlobalPosition: 0.2, v.Height: 0.2},
+    Group.GPS: {v.GpsFix: 0.2},
+    Group.BATTERY: {v.Power: 1.0, v.Charge: 1.0},
+    Group.RC: {v.Sticks: 0.5, v.Signal: 1.0},
+    Group.STATUS: {v.FlightState: 0.25, v.Mode: 0.25, v.Health: 0.25},
     Group.LINK: {},
 }
 #: By reading: its group, and how long ago the group was last published, seconds, for the reading to publish it again.
-_NEWS_OF: Mapping[type[Reading], tuple[Group, float]] = {
+_NEWS_OF: Mapping[type[v.Reading], tuple[Group, float]] = {
     reading: (group, 0.0 if number == 0 else 1.5 * next(iter(readings.values())))
     for group, readings in _SHOWS.items()
     for number, reading in enumerate(readings)
 }
 #: A reading is fresh up to and including its last moment.
 _SOON_S = 1e-3
-_FIXES = {Fix.NO_FIX: "none", Fix.TWO_D: "2D", Fix.THREE_D: "3D"}
+_FIXES = {v.Fix.NO_FIX: "none", v.Fix.TWO_D: "2D", v.Fix.THREE_D: "3D"}
 
 
 class VehicleReporter:
@@ -78,7 +61,7 @@ class VehicleReporter:
         missions: MissionService,
         ground: Ground,
         settings: SettingsSeal,
-        want: Callable[[Mapping[type[Reading], float]], None],
+        want: Callable[[Mapping[type[v.Reading], float]], None],
         progress: MissionProgress,
     ) -> None:
         self._session = session
@@ -93,13 +76,13 @@ class VehicleReporter:
         self.watched: frozenset[Group] = frozenset()
         self._published_at: dict[Group, float] = {}
         #: The readings that were fresh, and when the first of them becomes stale.
-        self._current: set[type[Reading]] = set()
+        self._current: set[type[v.Reading]] = set()
         self._stale_due = inf
         self._makers: Mapping[Group, Callable[[float], Any]] = {
             group: getattr(self, f"_{group.value}") for group in Group
         }
 
-    def heard(self, news: Collection[type[Reading]], now: float) -> None:
+    def heard(self, news: Collection[type[v.Reading]], now: float) -> None:
         """Note new readings. To be called while groups are watched."""
         for reading in news:
             group, pause_s = _NEWS_OF.get(reading, (Group.LINK, inf))
@@ -117,15 +100,15 @@ class VehicleReporter:
         self._current = {kind for kind, reading in readings.items() if reading is not None}
         self.fresh.update(_NEWS_OF[kind][0] for kind in before - self._current if kind in readings)
         stale_s = self._session.vehicle.stale_s
-        ages = (reading.heard_at + stale_s.get(kind, STALE_S) for kind, reading in readings.items() if reading)
+        ages = (reading.heard_at + stale_s.get(kind, v.STALE_S) for kind, reading in readings.items() if reading)
         due = min(ages, default=inf)
         # A little later: it is fresh until then. One that is heard meanwhile is fresh for STALE_S at least.
-        self._stale_due = due if due == inf else min(due, now + STALE_S) + _SOON_S
+        self._stale_due = due if due == inf else min(due, now + v.STALE_S) + _SOON_S
 
     def watch(self, groups: Iterable[Group]) -> None:
         """Poll for these groups from now on; `take_fresh` returns the updated ones."""
         self.watched = frozenset(groups)
-        wanted: dict[type[Reading], float] = {}
+        wanted: dict[type[v.Reading], float] = {}
         for group in self.watched:
             wanted |= _SHOWS[group]
         self._want(wanted)
@@ -148,7 +131,7 @@ class VehicleReporter:
         mission = None
         if held is not None:
             state, item = None, None
-            if self._fresh(MissionLeg, now) is not None:
+            if self._fresh(v.MissionLeg, now) is not None:
                 state, item = self._progress.progress.text, self._missions.seq_of(self._progress.number) or None
             mission = MissionIdentity(held.identity.count, f"{held.identity.checksum:08x}", state, item)
         settings = None
@@ -157,7 +140,7 @@ class VehicleReporter:
         groups = {group.value: self.group(group, now) for group in Group}
         return VehicleReport(**groups, last_heard=self._last_heard(now), mission=mission, settings=settings)
 
-    def _fresh(self, kind: type[ReadingT], now: float) -> ReadingT | None:
+    def _fresh(self, kind: type[v.ReadingT], now: float) -> v.ReadingT | None:
         return self._session.vehicle.fresh(kind, now)
 
     def _age_s(self, group: Group, now: float) -> float | None:
@@ -171,7 +154,7 @@ class VehicleReporter:
 
     def _last_heard(self, now: float) -> LastHeard:
         vehicle = self._session.vehicle
-        state, mode, place = vehicle.last(FlightState), vehicle.last(Mode), vehicle.last(GlobalPosition)
+        state, mode, place = vehicle.last(v.FlightState), vehicle.last(v.Mode), vehicle.last(v.GlobalPosition)
         return LastHeard(
             armed=None if state is None else state.armed,
             armed_age_s=None if state is None else _age_s(state.heard_at, now),
@@ -183,7 +166,7 @@ class VehicleReporter:
         )
 
     def _attitude(self, now: float) -> Attitude:
-        attitude, age_s = self._fresh(Orientation, now), self._age_s(Group.ATTITUDE, now)
+        attitude, age_s = self._fresh(v.Orientation, now), self._age_s(Group.ATTITUDE, now)
         if attitude is None:
             return Attitude(age_s=age_s)
         heading_deg = _direction(attitude.heading_deg) if attitude.is_north_known else None
@@ -191,7 +174,7 @@ class VehicleReporter:
 
     def _position(self, now: float) -> Position:
         home = self._session.vehicle.home
-        here, height = self._fresh(GlobalPosition, now), self._fresh(Height, now)
+        here, height = self._fresh(v.GlobalPosition, now), self._fresh(v.Height, now)
         return Position(
             lat_deg=None if here is None else here.lat_e7 / 1e7,
             lon_deg=None if here is None else here.lon_e7 / 1e7,
@@ -208,13 +191,13 @@ class VehicleReporter:
         )
 
     def _gps(self, now: float) -> Gps:
-        gps, age_s = self._fresh(GpsFix, now), self._age_s(Group.GPS, now)
+        gps, age_s = self._fresh(v.GpsFix, now), self._age_s(Group.GPS, now)
         if gps is None:
             return Gps(age_s=age_s)
         return Gps(_FIXES[gps.fix], gps.satellites, gps.hdop, gps.ground_speed_m_s, _direction(gps.course_deg), age_s)
 
     def _battery(self, now: float) -> Battery:
-        power, charge = self._fresh(Power, now), self._fresh(Charge, now)
+        power, charge = self._fresh(v.Power, now), self._fresh(v.Charge, now)
         return Battery(
             voltage_v=None if power is None else power.voltage_v,
             current_a=None if power is None else power.current_a,
@@ -225,7 +208,7 @@ class VehicleReporter:
         )
 
     def _rc(self, now: float) -> Rc:
-        sticks, signal = self._fresh(Sticks, now), self._fresh(Signal, now)
+        sticks, signal = self._fresh(v.Sticks, now), self._fresh(v.Signal, now)
         return Rc(
             channels_us=None if sticks is None else sticks.channels_us,
             rssi_percent=None if signal is None else round(signal.strength * 100, 1),
@@ -233,7 +216,7 @@ class VehicleReporter:
         )
 
     def _status(self, now: float) -> Status:
-        state, mode, health = self._fresh(FlightState, now), self._fresh(Mode, now), self._fresh(Health, now)
+        state, mode, health = self._fresh(v.FlightState, now), self._fresh(v.Mode, now), self._fresh(v.Health, now)
         return Status(
             armed=None if state is None else state.armed,
             mode=_mode_name(mode),
@@ -261,7 +244,7 @@ def _age_s(heard_at: float, now: float) -> float:
     return max(round(now - heard_at, 1), 0.0)
 
 
-def _mode_name(mode: Mode | None) -> str | None:
+def _mode_name(mode: v.Mode | None) -> str | None:
     if mode is None:
         return None
     return mode.mode.name if isinstance(mode.mode, FlightMode) else mode.mode
