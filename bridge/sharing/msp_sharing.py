@@ -9,6 +9,8 @@ program is disconnected, because programs misread MSP's error reply: INAV Config
 
 from collections import Counter, deque
 from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
 from math import inf
 
 from bridge.fc.profile import FlightController
@@ -43,38 +45,31 @@ _CLOCK = frozenset((247, 0x1002))
 _NO_REPLY = "no reply from the flight controller"
 
 
+@dataclass(eq=False)
 class MspSharing:
-    """`tell` sends a text to all ground stations.
+    """`_tell` sends a text to all ground stations.
 
     `refused`: requests that were refused or not answered in time, by reason.
     """
 
-    def __init__(
-        self,
-        session: FcSession,
-        runner: Runner,
-        missions: MissionService,
-        emit: Emit,
-        tell: Callable[[str], None],
-    ) -> None:
-        self._session = session
-        self._runner = runner
-        self._missions = missions
-        self._emit = emit
-        self._tell = tell
-        self._programs: deque[Program] = deque()  # the next one to have a request forwarded first
-        self._total = Shares(_TOTAL)
-        self._forwarded: WaitingRequest | None = None
-        #: When the line has carried the last forwarded request and its reply.
-        self._free_at = 0.0
-        self._stopped = False
-        self._reported: dict[tuple[str, bool], float] = {}  # by host and kind of request, the oldest first
-        self._reports = TokenBucket(_REPORTS)
-        self.refused: Counter[str] = Counter()
-        #: Called after a request that may have changed settings.
-        self.on_change: Callable[[float], None] = lambda _now: None
-        #: The time of the next `tick`; infinity while no request waits.
-        self.due = inf
+    _session: FcSession
+    _runner: Runner
+    _missions: MissionService
+    _emit: Emit
+    _tell: Callable[[str], None]
+    _programs: deque[Program] = field(default_factory=deque)  # the next one to have a request forwarded first
+    _total: Shares = field(default_factory=partial(Shares, _TOTAL))
+    _forwarded: WaitingRequest | None = None
+    #: When the line has carried the last forwarded request and its reply.
+    _free_at: float = 0.0
+    _stopped: bool = False
+    _reported: dict[tuple[str, bool], float] = field(default_factory=dict)  # by host and kind, the oldest first
+    _reports: TokenBucket = field(default_factory=partial(TokenBucket, _REPORTS))
+    refused: Counter[str] = field(default_factory=Counter)
+    #: Called after a request that may have changed settings.
+    on_change: Callable[[float], None] = lambda _now: None
+    #: The time of the next `tick`; infinity while no request waits.
+    due: float = inf
 
     def join(self, program: Program) -> None:
         self._programs.append(program)

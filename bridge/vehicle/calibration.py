@@ -6,6 +6,7 @@ calibration and then restarts. A Harakiri does nothing else meanwhile, so its si
 """
 
 import math
+from dataclasses import dataclass
 from math import inf
 
 from bridge.fc.actions import (
@@ -58,29 +59,23 @@ _OUTCOMES = {
 }
 
 
+@dataclass(eq=False)
 class Calibration:
     """The calibration in progress, at most one at a time."""
 
-    def __init__(
-        self,
-        ground: Ground,
-        session: FcSession,
-        missions: MissionService,
-        announcer: LinkAnnouncer,
-        settings: BoardSettings,
-    ) -> None:
-        self._ground = ground
-        self._session = session
-        self._missions = missions
-        self._announcer = announcer
-        self._settings = settings
-        #: The time of the next `tick`; infinity while none runs.
-        self.due = inf
-        self._action: FcAction | None = None
-        #: The one that the flight controller is being asked for.
-        self._asked_for: FcAction | None = None
-        self._restarts = False
-        self._began_at = self._acknowledge_at = 0.0
+    _ground: Ground
+    _session: FcSession
+    _missions: MissionService
+    _announcer: LinkAnnouncer
+    _settings: BoardSettings
+    #: The time of the next `tick`; infinity while none runs.
+    due: float = inf
+    _action: FcAction | None = None
+    #: The one that the flight controller is being asked for.
+    _asked_for: FcAction | None = None
+    _restarts: bool = False
+    _began_at: float = 0.0
+    _acknowledge_at: float = 0.0
 
     def take(self, station: Station, command: int, action: FcAction, now: float) -> None:
         """Execute a command of a ground station, and acknowledge it."""

@@ -7,7 +7,7 @@ flights is noticed, too.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
 
@@ -37,45 +37,37 @@ _MOST_TEXT = 99
 _UID_SIZE = 12
 
 
+@dataclass(eq=False)
 class SettingsSeal:
     """Starts a reading at `due` if the craft is disarmed and the line idle.
 
-    `is_transferring`: True while a mission is received or written.
+    `_is_transferring`: True while a mission is received or written.
     """
 
-    def __init__(
-        self,
-        session: FcSession,
-        missions: MissionService,
-        ground: Ground,
-        emit: Emit,
-        memory: SealMemory,
-        is_transferring: Callable[[], bool],
-    ) -> None:
-        self._session = session
-        self._missions = missions
-        self._ground = ground
-        self._emit = emit
-        self._memory = memory
-        self._is_transferring = is_transferring
-        self._controller: FlightController | None = None
-        self._board: BoardId | None = None
-        #: Commands that this board answered, and those that it did not.
-        self._known: set[int] = set()
-        self._unknown: set[int] = set()
-        #: True if the settings were changed through the bridge since the last reading.
-        self._is_ours = False
-        self._is_reading = False
-        #: The text for ground stations that connect later.
-        self._told = ""
-        #: Called when it is known which board was found.
-        self.on_identified: Callable[[BoardId], None] = lambda _board: None
-        #: Called when settings have changed without the bridge.
-        self.on_found_change: Callable[[float], None] = lambda _now: None
-        #: None until the settings of a board were read; those of a lost board stay.
-        self.state: SettingsState | None = None
-        #: The time of the next `tick`, monotonic s.
-        self.due = inf
+    _session: FcSession
+    _missions: MissionService
+    _ground: Ground
+    _emit: Emit
+    _memory: SealMemory
+    _is_transferring: Callable[[], bool]
+    _controller: FlightController | None = None
+    _board: BoardId | None = None
+    #: Commands that this board answered, and those that it did not.
+    _known: set[int] = field(default_factory=set)
+    _unknown: set[int] = field(default_factory=set)
+    #: True if the settings were changed through the bridge since the last reading.
+    _is_ours: bool = False
+    _is_reading: bool = False
+    #: The text for ground stations that connect later.
+    _told: str = ""
+    #: Called when it is known which board was found.
+    on_identified: Callable[[BoardId], None] = lambda _board: None
+    #: Called when settings have changed without the bridge.
+    on_found_change: Callable[[float], None] = lambda _now: None
+    #: None until the settings of a board were read; those of a lost board stay.
+    state: SettingsState | None = None
+    #: The time of the next `tick`, monotonic s.
+    due: float = inf
 
     def found(self, controller: FlightController | None, now: float) -> None:
         """Follow another flight controller; None: it was lost."""

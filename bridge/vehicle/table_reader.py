@@ -2,6 +2,7 @@
 """Reads a board's settings in the background: one request at a time, so that others can use the line in between."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from bridge.line.conversation import Conversation, LinkLost, Pause
 from bridge.line.runner import Runner
@@ -12,26 +13,21 @@ from bridge.settings.fc_settings import FcSettings, TableReading
 _RETRY_S, _MOST_RETRY_S = 0.3, 60.0
 
 
+@dataclass(eq=False)
 class TableReader:
-    """pace: see TableReading. on_pause: called between two requests; on_end: with the table, None after a failure."""
+    """_pace: see TableReading. _on_pause: called between requests; _on_end: with the table, None after a failure."""
 
-    def __init__(
-        self,
-        runner: Runner,
-        pace: Callable[[int], float],
-        on_pause: Callable[[float], None],
-        on_end: Callable[[SettingTable | None, float], None],
-    ) -> None:
-        self._runner = runner
-        self._pace = pace
-        self._on_pause = on_pause
-        self._on_end = on_end
-        self._reading: Conversation[SettingTable | None] | None = None
-        self._retry_s, self._retry_at = _RETRY_S, 0.0
-        #: True while one of its requests is on the line.
-        self.is_asking = False
-        #: When the line has carried the last request.
-        self.line_free_at = 0.0
+    _runner: Runner
+    _pace: Callable[[int], float]
+    _on_pause: Callable[[float], None]
+    _on_end: Callable[[SettingTable | None, float], None]
+    _reading: Conversation[SettingTable | None] | None = None
+    _retry_s: float = _RETRY_S
+    _retry_at: float = 0.0
+    #: True while one of its requests is on the line.
+    is_asking: bool = False
+    #: When the line has carried the last request.
+    line_free_at: float = 0.0
 
     @property
     def next_at(self) -> float:

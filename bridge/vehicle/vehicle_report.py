@@ -2,6 +2,7 @@
 """The vehicle in published groups (reports.vehicle_groups): for zenoh, the status page and the command line."""
 
 from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass, field
 from functools import cache
 from math import inf
 from typing import Any
@@ -52,32 +53,26 @@ _SOON_S = 1e-3
 _FIXES = {v.Fix.NO_FIX: "none", v.Fix.TWO_D: "2D", v.Fix.THREE_D: "3D"}
 
 
+@dataclass(eq=False)
 class VehicleReporter:
-    """Makes groups on request. `want` sets the poll interval of each reading, seconds."""
+    """Makes groups on request. `_want` sets the poll interval of each reading, seconds."""
 
-    def __init__(
-        self,
-        session: FcSession,
-        missions: MissionService,
-        ground: Ground,
-        settings: SettingsSeal,
-        want: Callable[[Mapping[type[v.Reading], float]], None],
-        progress: MissionProgress,
-    ) -> None:
-        self._session = session
-        self._missions = missions
-        self._ground = ground
-        self._settings = settings
-        self._want = want
-        self._progress = progress
-        #: Groups updated since the last `take_fresh`; some may no longer be watched.
-        self.fresh: set[Group] = set()
-        #: The groups in use: they are polled, and `take_fresh` returns the updated ones.
-        self.watched: frozenset[Group] = frozenset()
-        self._published_at: dict[Group, float] = {}
-        #: The readings that were fresh, and when the first of them becomes stale.
-        self._current: set[type[v.Reading]] = set()
-        self._stale_due = inf
+    _session: FcSession
+    _missions: MissionService
+    _ground: Ground
+    _settings: SettingsSeal
+    _want: Callable[[Mapping[type[v.Reading], float]], None]
+    _progress: MissionProgress
+    #: Groups updated since the last `take_fresh`; some may no longer be watched.
+    fresh: set[Group] = field(default_factory=set)
+    #: The groups in use: they are polled, and `take_fresh` returns the updated ones.
+    watched: frozenset[Group] = frozenset()
+    _published_at: dict[Group, float] = field(default_factory=dict)
+    #: The readings that were fresh, and when the first of them becomes stale.
+    _current: set[type[v.Reading]] = field(default_factory=set)
+    _stale_due: float = inf
+
+    def __post_init__(self) -> None:
         self._makers: Mapping[Group, Callable[[float], Any]] = {
             group: getattr(self, f"_{group.value}") for group in Group
         }
