@@ -88,7 +88,6 @@ class FcSession:
         self._handle(PortOpened(), now)
 
     def closed(self, now: float, why: str | None) -> None:
-        """The port is gone; `why` is None if the bridge closed it itself."""
         if isinstance(self.state, Closed):
             return
         self._handle(PortClosed(why), now)

@@ -25,7 +25,6 @@ class TokenBucket:
         self._counted_at = 0.0
 
     def has(self, now: float) -> bool:
-        """True if one more is allowed now."""
         self._used = max(0.0, self._used - max(0.0, now - self._counted_at) * self.rate.per_s)
         self._counted_at = now
         return self._used + 1.0 <= self.rate.burst
@@ -35,7 +34,6 @@ class TokenBucket:
         self._used += amount
 
     def take(self, now: float) -> bool:
-        """Count one if it is allowed."""
         if not self.has(now):
             return False
         self._used += 1.0
@@ -65,7 +63,6 @@ class Budget:
         self._buckets = _Buckets()
 
     def allows(self, cost: Cost, now: float) -> bool:
-        """Count work; False if it exceeds the limit."""
         return self._buckets[cost].take(now)
 
 

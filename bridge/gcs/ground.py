@@ -67,7 +67,6 @@ class Ground:
         self.flash = FlashBudget()
         self._datagrams: list[tuple[Peer, bytes]] = []
         self._text_id = 0
-        #: The time of the next `tick`.
         self.due = inf
         #: Texts for each newcomer, about problems that began before it connected.
         self.notices: list[str] = []
@@ -136,7 +135,6 @@ class Ground:
             self._unheard[peer] = self._made(peer)
 
     def tick(self, now: float) -> None:
-        """Forget silent stations."""
         latest: dict[tuple[str, tuple[int, int]], float] = {}
         for peer, station in self._heard.items():
             for ids, speaker in station.speakers.items():
@@ -318,7 +316,6 @@ class Ground:
             self._send(receiver, receiver.writer, together)
 
     def mission_ack(self, station: Station, result: MissionResult, mission_type: int = 0) -> None:
-        """Send a MISSION_ACK."""
         self.to(station, messages.MAVLink_mission_ack_message(station.sysid, station.compid, result, mission_type))
 
     def refuse(self, station: Station, refusal: Refusal, mission_type: int = 0) -> None:
@@ -386,7 +383,6 @@ class Ground:
         self._say(severity, text, [reader for reader in stations if not reader.is_listener])
 
     def say_to_others(self, severity: Severity, text: str, station: Station) -> None:
-        """Show a text on all ground stations but one."""
         self._say(severity, text, [reader for reader in self._readers_of_texts() if reader.peer != station.peer])
 
     def _say(self, severity: Severity, text: str, stations: Sequence[GroundStation]) -> None:

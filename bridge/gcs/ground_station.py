@@ -195,7 +195,6 @@ class GroundStation:
 
     @property
     def is_steady(self) -> bool:
-        """True if the station has been heard for a while."""
         return self._beats >= _STEADY_BEATS
 
     def joins(self) -> None:

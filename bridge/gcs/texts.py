@@ -39,7 +39,6 @@ class RecentTexts:
         self._sent: dict[str, float] = {}  # oldest first
 
     def is_new(self, text: str, now: float) -> bool:
-        """True if the text is new in this attempt."""
         sent_at = self._sent.pop(text, None)
         self._sent[text] = now
         if len(self._sent) > _MAX_TEXTS:

@@ -170,7 +170,6 @@ class MissionService:
         self.is_settled = False
 
     def settings_changed(self) -> None:
-        """The board's own settings may have changed."""
         if not isinstance(self.fc_store, Refusal):
             self.fc_store.settings_changed()
 
@@ -319,7 +318,6 @@ class MissionService:
         return delivery
 
     def _held_now(self, arrived: ArrivedMission, identity: ListIdentity) -> HeldMission:
-        """The list that was just written."""
         verdict, before = arrived.verdict, self.held
         sent_seqs = {} if before is None or before.identity != identity else {**before.sent_seqs}
         sent_seqs.pop(arrived.sender, None)

@@ -37,7 +37,6 @@ class PlaceLists(MissionService):
     def deliver(
         self, arrived: ArrivedMission, progress: PushProgress = lambda _records: None, *, is_kept: bool = True
     ) -> Conversation[DeliveryResult]:
-        """Write the list and verify it."""
         verdict, fc_store = arrived.verdict, self.fc_store
         if verdict.result is Result.REJECTED:
             return DeliveryResult(verdict.ack, verdict.findings[-1].text(), None)

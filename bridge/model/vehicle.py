@@ -368,7 +368,6 @@ class Vehicle:
             self.hear(GpsTime(now, source, unix_s))
 
     def fresh(self, kind: type[ReadingT], now: float, stale_s: float | None = None) -> ReadingT | None:
-        """The latest reading of a kind, unless it is stale."""
         reading = self.last(kind)
         limit_s = self.stale_s.get(kind, STALE_S) if stale_s is None else stale_s
         return reading if reading is not None and now <= reading.heard_at + limit_s else None

@@ -92,7 +92,6 @@ class SettingTable:
         return found
 
     def updated(self, *settings: BoardSetting) -> "SettingTable":
-        """The table with other values."""
         return replace(self, settings={**self.settings, **{setting.name: setting for setting in settings}})
 
     def differences(self, later: "SettingTable") -> tuple[str, ...]:
@@ -102,7 +101,6 @@ class SettingTable:
 
 
 def table_of(*settings: BoardSetting, is_complete: bool = True) -> SettingTable:
-    """A table of settings in this order."""
     return SettingTable({setting.name: setting for setting in settings}, is_complete)
 
 

@@ -79,7 +79,6 @@ class MspSharing:
             self._programs.remove(program)
 
     def received(self, program: Program, data: bytes, now: float) -> None:
-        """Take bytes of a program."""
         if program not in self._programs:
             return
         taken = program.take(data, now) if self._total.left(now) > self._total.used(program.account) else None

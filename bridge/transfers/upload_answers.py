@@ -114,7 +114,6 @@ class UploadAnswers:
             answer.again = [again for again in answer.again if again[1] is not None]
 
     def tick(self, now: float) -> None:
-        """Send what is due."""
         if now < self.due:
             return
         # A station may have left, or begun another upload.

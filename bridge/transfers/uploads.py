@@ -85,7 +85,6 @@ class MissionUploads:
 
     @property
     def receiving(self) -> MissionTransfer | None:
-        """The upload that receives items."""
         for upload in self._queue.within(Receiving):
             received = len(upload.state.received)
             return MissionTransfer(str(upload.station), TransferStep.RECEIVING, received, upload.count)
@@ -128,7 +127,6 @@ class MissionUploads:
         self._begin(station, 0, now, mission_type)
 
     def item(self, station: Station, item: MissionItem, speaker: Speaker, now: float) -> None:
-        """MISSION_ITEM or MISSION_ITEM_INT."""
         upload = self._find(station, now)
         if upload is None:
             self.answers.late_item(station, item.seq, now, is_lost=not self._queue.uploads)

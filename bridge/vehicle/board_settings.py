@@ -85,7 +85,6 @@ class BoardSettings:
         self.on_table: Callable[[SettingTable, float], None] = lambda _table, _now: None
         self.on_saved: Callable[[], None] = lambda: None
         self.on_change: Callable[[float], None] = lambda _now: None
-        #: The time of the next `tick`, monotonic s.
         self.due = inf
 
     # The board.

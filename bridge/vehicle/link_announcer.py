@@ -41,7 +41,6 @@ class LinkAnnouncer:
         self._known: str | None = None
         self._was_found = was_found
         self._silent_since: float | None = now
-        #: The time of the next `tick`.
         self.due = now + (_LOST_S if was_found else _NOT_FOUND_S)
         #: No loss is reported until then: the silence was asked for.
         self._quiet_until = -inf

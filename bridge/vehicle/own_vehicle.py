@@ -76,7 +76,6 @@ class OwnVehicle:
         self.arming_reasons = ArmingReasons(session, announcer, ground)
         self._unix_time_s = unix_time_s
         self._started_at = now
-        #: The time of the next `tick`.
         self.due = self._second_ends = now
         #: The messages that any ground station wants, by the reading that triggers them.
         self._rows: dict[type[Reading] | None, list[Row]] = {}

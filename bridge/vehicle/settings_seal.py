@@ -66,7 +66,6 @@ class SettingsSeal:
     on_found_change: Callable[[float], None] = lambda _now: None
     #: None until the settings of a board were read; those of a lost board stay.
     state: SettingsState | None = None
-    #: The time of the next `tick`, monotonic s.
     due: float = inf
 
     def found(self, controller: FlightController | None, now: float) -> None:

@@ -125,7 +125,6 @@ class Moment:
     blockers: tuple[str, ...] = ()
 
     def fresh(self, kind: type[v.ReadingT]) -> v.ReadingT | None:
-        """The latest reading of a kind, unless it is stale."""
         reading = self.vehicle.last(kind)
         limit_s = self.vehicle.stale_s.get(kind, v.STALE_S)
         return reading if reading is not None and self.now <= reading.heard_at + limit_s else None

@@ -101,7 +101,6 @@ class VehicleReporter:
         self._stale_due = due if due == inf else min(due, now + v.STALE_S) + _SOON_S
 
     def watch(self, groups: Iterable[Group]) -> None:
-        """Poll for these groups from now on; `take_fresh` returns the updated ones."""
         self.watched = frozenset(groups)
         wanted: dict[type[v.Reading], float] = {}
         for group in self.watched:

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""INAV's own telemetry over MSP v2 (src/main/fc/fc_msp.c; layouts seen on INAV 9.1.0's simulator)."""
+"""INAV's own telemetry over MSP v2 (src/main/fc/fc_msp.c; layouts seen on INAV 9.1.0's simulator).
+
+A payload that is too short gives None.
+"""
 
 import struct
 from dataclasses import dataclass
@@ -73,7 +76,6 @@ class InavAnalog:
 
 
 def decode_inav_status(payload: bytes) -> InavStatus | None:
-    """Decode MSP2_INAV_STATUS; None if it is too short."""
     if len(payload) < _STATUS.size:
         return None
     cycle_us, i2c_errors, sensors, load, _, flags, box_flags = _STATUS.unpack_from(payload)
@@ -82,7 +84,6 @@ def decode_inav_status(payload: bytes) -> InavStatus | None:
 
 
 def decode_inav_analog(payload: bytes) -> InavAnalog | None:
-    """Decode MSP2_INAV_ANALOG; None if it is too short."""
     if len(payload) < _ANALOG.size:
         return None
     battery, volts, current, _, drawn, _, _, percent, rssi = _ANALOG.unpack_from(payload)
@@ -90,12 +91,12 @@ def decode_inav_analog(payload: bytes) -> InavAnalog | None:
 
 
 def decode_airspeed(payload: bytes) -> int | None:
-    """Decode MSP2_INAV_AIR_SPEED: cm/s; None if it is too short."""
+    """Decode MSP2_INAV_AIR_SPEED: cm/s."""
     return int(_AIRSPEED.unpack_from(payload)[0]) if len(payload) >= _AIRSPEED.size else None
 
 
 def decode_rtc(payload: bytes) -> float | None:
-    """Decode MSP_RTC: UTC, seconds since 1970, 0 until INAV has it from its GPS; None if it is too short."""
+    """Decode MSP_RTC: UTC, seconds since 1970, 0 until INAV has it from its GPS."""
     if len(payload) < _RTC.size:
         return None
     seconds, millis = _RTC.unpack_from(payload)
@@ -103,5 +104,5 @@ def decode_rtc(payload: bytes) -> float | None:
 
 
 def decode_platform(payload: bytes) -> int | None:
-    """The platform type in MSP2_INAV_MIXER; None if it is too short."""
+    """The platform type in MSP2_INAV_MIXER."""
     return payload[_PLATFORM_AT] if len(payload) > _PLATFORM_AT else None

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """INAV's safehomes, landing approaches and geozones over MSP v2 (src/main/fc/fc_msp.c).
 
-Approaches exist from 7.1 on, geozones from 8.0 on.
+Approaches exist from 7.1 on, geozones from 8.0 on. A cut reply gives None.
 """
 
 import struct
@@ -152,7 +152,6 @@ def empty_geozone(number: int) -> bytes:
 
 
 def decode_safehome(payload: bytes) -> Safehome | None:
-    """Read a reply; None if it is cut."""
     if len(payload) < SAFEHOME_SIZE:
         return None
     number, enabled, lat_e7, lon_e7 = _SAFEHOME.unpack_from(payload)
@@ -160,7 +159,6 @@ def decode_safehome(payload: bytes) -> Safehome | None:
 
 
 def decode_approach(payload: bytes) -> FwApproach | None:
-    """Read a reply; None if it is cut."""
     if len(payload) < APPROACH_SIZE:
         return None
     number, approach_cm, ground_cm, right, *headings, above_sea = _APPROACH.unpack_from(payload)
@@ -168,7 +166,6 @@ def decode_approach(payload: bytes) -> FwApproach | None:
 
 
 def decode_geozone(payload: bytes) -> GeozoneHead | None:
-    """Read a reply; None if it is cut."""
     if len(payload) < GEOZONE_SIZE:
         return None
     number, kind, shape, lowest, highest, above_sea, action, vertices = _GEOZONE.unpack_from(payload)
@@ -176,7 +173,7 @@ def decode_geozone(payload: bytes) -> GeozoneHead | None:
 
 
 def decode_vertex(payload: bytes) -> tuple[Corner, int] | None:
-    """Read a reply: the place and, of a circle, its radius in cm; None if it is cut."""
+    """Read a reply: the place and, of a circle, its radius in cm."""
     if len(payload) < _VERTEX.size:
         return None
     _, _, lat_e7, lon_e7 = _VERTEX.unpack_from(payload)

@@ -117,7 +117,6 @@ class HarakiriCheck(ListCheck):
         )
 
     def _refuse(self, item: MissionItem, rule: CommandRule | None) -> RejectingFinding | None:
-        """The rejection of the list because of this item, if any."""
         if item.seq == 0 and item.command != Command.NAV_WAYPOINT:
             return reject(MissionResult.INVALID, item, "command", "must be a WAYPOINT")
         if rule is None:

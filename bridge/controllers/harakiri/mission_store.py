@@ -107,7 +107,6 @@ class HarakiriMissions(HarakiriStore):
         return self.info.wp_radius_cm
 
     def report(self) -> Conversation[StoreReport | None]:
-        """Ask the flight controller for its state; None if it does not answer."""
         info = yield from self._read_info()
         if info is None:
             return None

@@ -61,7 +61,6 @@ class MavlinkLine(State):
         return self._take(self._splitter.feed(data), now)
 
     def tick(self, now: float) -> Event | None:
-        """Notice silence."""
         event = None
         if self._splitter.is_waiting and now >= self._last_byte_at + _LINE_SILENCE_S:
             # Frames may be hidden behind a false header.
@@ -123,7 +122,6 @@ class PassThrough(MavlinkLine):
         self.telemetry.take([event.heard], now)
 
     def take(self, frames: list[MavlinkFrame], now: float) -> None:
-        """Keep the newest values, and send all frames to the ground stations."""
         self.telemetry.take(frames, now)
         self.port.on_mavlink(frames)
 
@@ -163,7 +161,6 @@ class HarakiriMavlink(MavlinkLine):
         return min(super().due, self._probe_due)
 
     def take(self, frames: list[MavlinkFrame], now: float) -> None:
-        """Read its telemetry, and pass the answers of a transfer on."""
         was_armed = self.port.vehicle.armed
         self._telemetry.take(frames, now)
         if was_armed and not self.port.vehicle.armed:
@@ -174,7 +171,6 @@ class HarakiriMavlink(MavlinkLine):
 
     @property
     def timeout_s(self) -> float:
-        """The silence after which it is lost, s: shorter while armed."""
         if not self.port.vehicle.armed:
             return super().timeout_s
         return _ARMED_SILENCE_S + _BYTES_BEFORE_LOSS * byte_time_s(self.speed)
