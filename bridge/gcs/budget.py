@@ -56,9 +56,6 @@ class _Buckets(dict[Cost, TokenBucket]):
 class Budget:
     """The limits of one ground station."""
 
-    #: False while it is a part of the total.
-    is_own = True
-
     def __init__(self) -> None:
         self._buckets = _Buckets()
 
@@ -72,7 +69,6 @@ class HostBudget(Budget):
     def __init__(self, hosts: "HostBudgets") -> None:
         super().__init__()
         self._hosts = hosts
-        self.is_own = False
         #: The number of its connected stations that have proven nothing.
         self.stations = 0
         self.is_steady = False
@@ -95,9 +91,13 @@ class HostBudget(Budget):
         bucket.spend()
         return True
 
-    def has_seat(self, *, is_own: bool) -> None:
-        """The host was given a seat, or has lost it."""
-        self.is_own = is_own
+    @property
+    def is_own(self) -> bool:
+        """False while it is a part of the total."""
+        return self.seat is not None
+
+    def sits(self, seat: TokenBucket) -> None:
+        self.seat = seat
         for cost, bucket in self._buckets.items():
             bucket.rate = LIMITS[cost].each
 
@@ -152,11 +152,11 @@ class HostBudgets:
         if not self.free_seats and latest is not None:
             self.take_seat(latest)
         if self.free_seats:
-            host.seat = min(self.free_seats, key=lambda seat: seat.used)
-            self.free_seats.remove(host.seat)
+            seat = min(self.free_seats, key=lambda seat: seat.used)
+            self.free_seats.remove(seat)
+            host.sits(seat)
             self._seated.append(host)
             self.without_seat -= 1
-            host.has_seat(is_own=True)
 
     def take_seat(self, host: HostBudget) -> None:
         """Free the seat of a host, if it has one."""
@@ -165,4 +165,3 @@ class HostBudgets:
             self._seated.remove(host)
             self.without_seat += 1
             host.seat = None
-            host.has_seat(is_own=False)

@@ -2,7 +2,6 @@
 """One ground station, from its arrival to its departure. Sans-IO."""
 
 from collections import defaultdict
-from collections.abc import Iterable
 from math import inf
 from typing import TYPE_CHECKING
 
@@ -10,7 +9,7 @@ from bridge.gcs.budget import Budget, HostBudget
 from bridge.gcs.cost import Cost
 from bridge.gcs.message_rates import MessageRates
 from bridge.gcs.rights import FrameRefusal, LinkAccess, Standing
-from bridge.gcs.station import RECORDER, Peer, Station
+from bridge.gcs.station import RECORDER, Peer
 from bridge.gcs.texts import RecentTexts
 from bridge.model.transfer_memory import TransferMemory
 from protocols.mavlink.codec import FrameWriter
@@ -229,10 +228,6 @@ class GroundStation:
         if host is not None and not (host.is_steady and host.is_own):
             host.stays()
         return is_new
-
-    def senders(self) -> Iterable[Station]:
-        """The stations heard from there; several behind a radio or a router."""
-        return (Station(self.peer, *ids) for ids in self.speakers)
 
     # Sending.
 

@@ -32,9 +32,6 @@ class Places:
         self._hosts: Counter[Hashable] = Counter()
         self._turned_away = array("I")
 
-    def __len__(self) -> int:
-        return len(self.stations)
-
     def has_room_for(self, peer: Peer) -> bool:
         """False if there is no free place, and a newcomer is heard for the first time."""
         if not self._is_full(peer.host):

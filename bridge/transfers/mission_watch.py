@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Watches for mission changes by others than the bridge, and settles interrupted writes. Sans-IO."""
 
-from dataclasses import dataclass
 from math import inf
 
 from bridge.gcs.ground import Ground
@@ -9,20 +8,13 @@ from bridge.gcs.station import Severity
 from bridge.line.conversation import Conversation, LinkLost, conclude, find_pending, recall
 from bridge.missions.fc_mission_store import Loading
 from bridge.missions.mission_service import NO_LINK, HeldMission, MissionService
-from bridge.model.events import Emit, MissionChangedOnBoard
+from bridge.model.events import Emit, Level, MissionChangedOnBoard
 from bridge.model.mission_log import Outcome
 from bridge.model.refusal import Refusal
 
-
-@dataclass(frozen=True, slots=True)
-class MissionChange:
-    """A change of the flight controller's list that no ground station requested, as text for the pilot."""
-
-    text: str
-    is_warning: bool = False
-
-
-_NOT_LOADED = MissionChange("No mission is loaded: disarm to load the saved one", is_warning=True)
+#: A change of the flight controller's list that no ground station requested, as text for the pilot.
+MissionChange = tuple[Severity, str]
+_NOT_LOADED = (Severity.WARNING, "No mission is loaded: disarm to load the saved one")
 
 
 class MissionWatch:
@@ -83,11 +75,10 @@ class MissionWatch:
         if is_loaded:
             is_ours = (yield from recall(held.identity)) is not None
             again = "loaded again" if is_ours else "loaded, not written by naze-bridge"
-            return MissionChange(f"Saved mission {again}: {held.identity.count} records")
+            return Severity.NOTICE, f"Saved mission {again}: {held.identity.count} records"
         if before is not None and before.identity == held.identity:
             return None
-        text = f"Mission on the flight controller changed: {held.identity.count} records"
-        return MissionChange(text, is_warning=True)
+        return Severity.WARNING, f"Mission on the flight controller changed: {held.identity.count} records"
 
     def _settle(self, held: HeldMission) -> Conversation[MissionChange | None]:
         """Conclude the pending missions by the list found; returns the text about the newest for the pilot."""
@@ -106,13 +97,14 @@ class MissionWatch:
             if mission.number is not None:
                 yield from conclude(mission.number, outcome, text)
             if mission.identity is not None:
-                news = MissionChange(text, is_warning=not has_arrived)
+                news = Severity.NOTICE if has_arrived else Severity.WARNING, text
         return news
 
     def _caught_up(self, news: MissionChange | LinkLost | None, now: float) -> None:
         assert self._began_at is not None
         self.due, self._began_at = max(now, self._began_at + self._missions.watch_s), None
-        if not isinstance(news, MissionChange):
-            return
-        self._ground.say(Severity.WARNING if news.is_warning else Severity.NOTICE, news.text)
-        self._emit(MissionChangedOnBoard(level="warning" if news.is_warning else "info", detail=news.text))
+        if isinstance(news, tuple):
+            severity, text = news
+            self._ground.say(severity, text)
+            level: Level = "warning" if severity is Severity.WARNING else "info"
+            self._emit(MissionChangedOnBoard(level=level, detail=text))

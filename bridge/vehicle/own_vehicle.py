@@ -383,7 +383,7 @@ class OwnVehicle:
         held = self._missions.on_board
         if station is None or held is None or not held.sent_seqs:
             return ()
-        known = (held.sent_seqs.get(sender.identity) for sender in station.senders())
+        known = (held.sent_seqs.get(Station(station.peer, *ids).identity) for ids in station.speakers)
         return next(filter(None, known), ())
 
     def _announce_home(self, now: float) -> None:
