@@ -25,7 +25,6 @@ from bridge.gcs.ground_station import GroundStation
 from bridge.gcs.rights import LinkAccess
 from bridge.gcs.routes import Routes
 from bridge.gcs.station import Peer, Severity
-from bridge.line.conversation import StoreEffect
 from bridge.line.msp_link import RoundTrips
 from bridge.line.runner import Runner
 from bridge.missions.mission_service import NO_LINK, EndingListener, MissionService
@@ -230,8 +229,12 @@ class Bridge:
         self.displaced = ground.displaced
         #: Other programs, on a share.
         self.program_joined, self.program_left = self._sharing.join, self._sharing.leave
-        #: The store's work, in order.
-        self.store_effects = runner.store_effects
+        #: Shows a text to each ground station that connects from now on.
+        self.notify = ground.notices.append
+        #: The store's work, in order, and its replies.
+        self.store_effects, self.store_answered = runner.store_effects, runner.store_answered
+        #: Ends the running conversation cleanly.
+        self.abort = runner.stop
         self.report, self.group, self.take_fresh = self._reporter.whole, self._reporter.group, self._reporter.take_fresh
 
     # The flight controller's side.
@@ -285,10 +288,6 @@ class Bridge:
             for uploads in self._all_uploads:
                 uploads.peer_gone(peer, now)
 
-    def notify(self, text: str) -> None:
-        """Show a text to each ground station that connects from now on."""
-        self._ground.notices.append(text)
-
     # Other programs, on a share.
 
     def program_received(self, program: Program, data: bytes, now: float) -> None:
@@ -336,13 +335,6 @@ class Bridge:
         self._has_line_changed = True
         self._runner.reset(now)
         self._session.restart(why, now)
-
-    def abort(self, now: float) -> None:
-        """End the running conversation cleanly."""
-        self._runner.stop(now)
-
-    def store_answered(self, effect: StoreEffect, answer: object, now: float) -> None:
-        self._runner.store_answered(effect, answer, now)
 
     @property
     def due(self) -> float:

@@ -60,11 +60,15 @@ class MavlinkTelemetry:
             m.MAVLINK_MSG_ID_GPS_RAW_INT: self._gps_raw_int,
             m.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self._global_position_int,
             m.MAVLINK_MSG_ID_VFR_HUD: self._vfr_hud,
-            m.MAVLINK_MSG_ID_HOME_POSITION: self._home_position,
+            m.MAVLINK_MSG_ID_HOME_POSITION: lambda message, _: vehicle.hear_home(
+                message.latitude, message.longitude
+            ),
             m.MAVLINK_MSG_ID_SCALED_PRESSURE: self._scaled_pressure,
             m.MAVLINK_MSG_ID_RC_CHANNELS: self._rc_channels,
             m.MAVLINK_MSG_ID_RC_CHANNELS_RAW: self._rc_channels,
-            m.MAVLINK_MSG_ID_SYSTEM_TIME: self._system_time,
+            m.MAVLINK_MSG_ID_SYSTEM_TIME: lambda message, now: vehicle.hear_gps_time(
+                now, v.Source.MAVLINK, message.time_unix_usec / 1e6
+            ),
         }
         if is_harakiri:
             self._readers |= {
@@ -207,12 +211,6 @@ class MavlinkTelemetry:
     def _vfr_hud(self, message: Message, now: float) -> None:
         if self._is_harakiri and math.isfinite(message.alt) and math.isfinite(message.climb):
             self._vehicle.hear(v.Height(now, v.Source.MAVLINK, message.alt, message.climb))
-
-    def _system_time(self, message: Message, now: float) -> None:
-        self._vehicle.hear_gps_time(now, v.Source.MAVLINK, message.time_unix_usec / 1e6)
-
-    def _home_position(self, message: Message, _now: float) -> None:
-        self._vehicle.hear_home(message.latitude, message.longitude)
 
     def _sys_status(self, message: Message, now: float) -> None:
         well = message.onboard_control_sensors_present & message.onboard_control_sensors_health

@@ -21,28 +21,24 @@ class TokenBucket:
 
     def __init__(self, rate: Rate) -> None:
         self.rate = rate
-        self._used = 0.0
+        #: The uses not yet regained at the last call of `has`.
+        self.used = 0.0
         self._counted_at = 0.0
 
     def has(self, now: float) -> bool:
-        self._used = max(0.0, self._used - max(0.0, now - self._counted_at) * self.rate.per_s)
+        self.used = max(0.0, self.used - max(0.0, now - self._counted_at) * self.rate.per_s)
         self._counted_at = now
-        return self._used + 1.0 <= self.rate.burst
+        return self.used + 1.0 <= self.rate.burst
 
     def spend(self, amount: float = 1.0) -> None:
         """Count one; a negative amount takes it back."""
-        self._used += amount
+        self.used += amount
 
     def take(self, now: float) -> bool:
         if not self.has(now):
             return False
-        self._used += 1.0
+        self.used += 1.0
         return True
-
-    @property
-    def used(self) -> float:
-        """The uses not yet regained at the last call of `has`."""
-        return self._used
 
 
 class _Buckets(dict[Cost, TokenBucket]):

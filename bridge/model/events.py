@@ -9,14 +9,8 @@ Level = Literal["debug", "info", "warning", "error"]
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True)
-class _Event:
-    """Makes each kind of event below a dataclass."""
-
-    def __init_subclass__(cls) -> None:
-        dataclass(frozen=True, kw_only=True)(cls)
-
-
-class BridgeEvent(_Event):
+@dataclass(frozen=True, kw_only=True)
+class BridgeEvent:
     """An event. Its log line has its name, its level, and its fields as facts, with the unit in the key.
 
     >>> FcLost(why="no answer for 3 s", speed_baud=115200, incident="link-3").facts()
@@ -27,6 +21,10 @@ class BridgeEvent(_Event):
 
     name_in_log: ClassVar[str]
     level: Level = "info"
+
+    def __init_subclass__(cls) -> None:
+        """Each kind of event below is a dataclass, too."""
+        dataclass(frozen=True, kw_only=True)(cls)
 
     def facts(self) -> dict[str, object]:
         facts = vars(self).copy()

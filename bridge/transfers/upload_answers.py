@@ -149,7 +149,7 @@ class UploadAnswers:
         if answer is not None:
             if answer.is_refusal or seq == answer.count - 1:
                 self._ground.mission_ack(station, answer.ack, self._mission_type)
-        elif is_lost and not any(self._at(where, now) for where in self._ground.elsewhere(station)):
+        elif is_lost and not any(self.last_at(where, now) for where in self._ground.elsewhere(station)):
             self._ground.say(Severity.ERROR, _UNKNOWN_UPLOAD.text, station)
             self.end(station, _UNKNOWN_UPLOAD.ack, 0, now)
 
@@ -165,14 +165,10 @@ class UploadAnswers:
         """The ground station has begun a new upload."""
         self._memory(station).final_ack = None
 
-    def was_said_to(self, station: Station, now: float) -> bool:
-        """True if the station was answered at this address."""
-        return self._at(station, now) is not None
-
     def _memory(self, station: Station) -> TransferMemory:
         return self._ground.speaker(station).transfers[self._mission_type]
 
-    def _at(self, station: Station, now: float) -> FinalAck | None:
+    def last_at(self, station: Station, now: float) -> FinalAck | None:
         """The last answer to a ground station at its present address."""
         answer = self._memory(station).final_ack
         return answer if answer is not None and now <= answer.until else None
@@ -180,4 +176,4 @@ class UploadAnswers:
     def _to(self, station: Station, now: float) -> FinalAck | None:
         """The last answer to a ground station, at its current or previous address."""
         before = (at for at in self._ground.elsewhere(station) if self._ground.has_moved(at, station, now))
-        return next((answer for at in (station, *before) if (answer := self._at(at, now)) is not None), None)
+        return next((answer for at in (station, *before) if (answer := self.last_at(at, now)) is not None), None)

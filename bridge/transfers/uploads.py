@@ -357,7 +357,7 @@ class MissionUploads:
             if upload.station == station:
                 return upload
         found = None
-        if not self.answers.was_said_to(station, now):
+        if self.answers.last_at(station, now) is None:
             for upload in self._queue.uploads:
                 if self._ground.has_moved(upload.station, station, now):
                     before, after = str(upload.station), str(station)
@@ -372,7 +372,7 @@ class MissionUploads:
         return [
             where
             for where in self._ground.moved_to(upload.station, now)
-            if self._queue.of(where) is None and not self.answers.was_said_to(where, now)
+            if self._queue.of(where) is None and self.answers.last_at(where, now) is None
         ]
 
     def _answer(self, upload: Upload, ack: MissionResult, now: float) -> None:

@@ -3,6 +3,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 from bridge.controllers.harakiri.rules import (
     CRUISE,
@@ -44,14 +45,11 @@ class HarakiriRules:
     is_single_precision: the list is written over its MAVLink, which moves places a little.
     """
 
+    has_home: ClassVar[bool] = True
     capacity: int = USUAL_CAPACITY
     wp_radius_cm: int = USUAL_WP_RADIUS_CM
     takeoff_max_m: int = TAKEOFF_MAX_M
     is_single_precision: bool = False
-
-    @property
-    def has_home(self) -> bool:
-        return True
 
     @property
     def max_items(self) -> int:
