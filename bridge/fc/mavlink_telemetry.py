@@ -60,9 +60,7 @@ class MavlinkTelemetry:
             m.MAVLINK_MSG_ID_GPS_RAW_INT: self._gps_raw_int,
             m.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self._global_position_int,
             m.MAVLINK_MSG_ID_VFR_HUD: self._vfr_hud,
-            m.MAVLINK_MSG_ID_HOME_POSITION: lambda message, _: vehicle.hear_home(
-                message.latitude, message.longitude
-            ),
+            m.MAVLINK_MSG_ID_HOME_POSITION: lambda message, _: vehicle.hear_home(message.latitude, message.longitude),
             m.MAVLINK_MSG_ID_SCALED_PRESSURE: self._scaled_pressure,
             m.MAVLINK_MSG_ID_RC_CHANNELS: self._rc_channels,
             m.MAVLINK_MSG_ID_RC_CHANNELS_RAW: self._rc_channels,
