@@ -64,10 +64,10 @@ def _attitude(vehicle: v.Vehicle, payload: bytes, controller: FlightController, 
     if reply is not None:
         health = vehicle.last(v.Health)
         has_compass = health is not None and Sensor.COMPASS in health.sensors
-        heading_deg = float(reply.heading_deg % 360)
-        roll_deg, pitch_deg = reply.roll_ddeg / 10, -reply.pitch_ddeg / 10
+        roll_ddeg, pitch_ddeg, heading_deg = reply
+        angles_deg = roll_ddeg / 10, -pitch_ddeg / 10, float(heading_deg % 360)
         rates = _rates_deg_s(vehicle, now) if controller.profile.has_gyro_deg_s else None
-        vehicle.hear(v.Orientation(now, v.Source.MSP, roll_deg, pitch_deg, heading_deg, has_compass, rates))
+        vehicle.hear(v.Orientation(now, v.Source.MSP, *angles_deg, has_compass, rates))
 
 
 def _rates_deg_s(vehicle: v.Vehicle, now: float) -> tuple[float, float, float] | None:
@@ -112,8 +112,9 @@ def _altitude(vehicle: v.Vehicle, payload: bytes, _controller: FlightController,
     reply, health = decode_altitude(payload), vehicle.last(v.Health)
     if reply is None or health is None:
         return
-    if Sensor.BAROMETER in health.sensors or reply.height_cm or reply.climb_cms:
-        vehicle.hear(v.Height(now, v.Source.MSP, reply.height_cm / 100, reply.climb_cms / 100))
+    height_cm, climb_cm_s = reply
+    if Sensor.BAROMETER in health.sensors or height_cm or climb_cm_s:
+        vehicle.hear(v.Height(now, v.Source.MSP, height_cm / 100, climb_cm_s / 100))
 
 
 def _status(vehicle: v.Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
@@ -182,7 +183,7 @@ def _box(vehicle: v.Vehicle, payload: bytes, controller: FlightController, now: 
 def _wp(vehicle: v.Vehicle, payload: bytes, _controller: FlightController, _now: float) -> None:
     home = decode_home(payload)
     if home is not None:
-        vehicle.hear_home(home.lat_e7, home.lon_e7)
+        vehicle.hear_home(*home)
 
 
 def _nav_status(vehicle: v.Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:

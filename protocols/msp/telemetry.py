@@ -85,25 +85,6 @@ class RawGps(NamedTuple):
     hdop_e2: int | None = None
 
 
-class AttitudeReply(NamedTuple):
-    """MSP_ATTITUDE: roll and pitch in 0.1 degrees, heading in degrees.
-
-    Right wing down and nose down are positive on all firmware; Harakiri's and baseflight's heading is -180..180, the
-    others' 0..360.
-    """
-
-    roll_ddeg: int
-    pitch_ddeg: int
-    heading_deg: int
-
-
-class AltitudeReply(NamedTuple):
-    """MSP_ALTITUDE: estimated height above the launch point in cm, climb in cm/s."""
-
-    height_cm: int
-    climb_cms: int
-
-
 class Analog(NamedTuple):
     """MSP_ANALOG: receiver strength 0..1023; mAh drawn and current (0.01 A, on MultiWii 0.1 A) where they are sent.
 
@@ -114,13 +95,6 @@ class Analog(NamedTuple):
     rssi: int
     drawn_mah: int | None = None
     current: int | None = None
-
-
-class HomePoint(NamedTuple):
-    """MSP_WP number 0: home, degrees * 1e7; 0 or 190 degrees if unknown."""
-
-    lat_e7: int
-    lon_e7: int
 
 
 def decode_ident(payload: bytes) -> Ident | None:
@@ -163,12 +137,18 @@ def decode_raw_gps(payload: bytes) -> RawGps | None:
     return RawGps(fix, satellites, lat, lon, altitude, speed, course, hdop)
 
 
-def decode_attitude(payload: bytes) -> AttitudeReply | None:
-    return AttitudeReply(*_ATTITUDE.unpack_from(payload)) if len(payload) >= _ATTITUDE.size else None
+def decode_attitude(payload: bytes) -> tuple[int, int, int] | None:
+    """Read MSP_ATTITUDE: roll and pitch in 0.1 degrees, heading in degrees.
+
+    Right wing down and nose down are positive on all firmware; Harakiri's and baseflight's heading is -180..180, the
+    others' 0..360.
+    """
+    return _ATTITUDE.unpack_from(payload) if len(payload) >= _ATTITUDE.size else None
 
 
-def decode_altitude(payload: bytes) -> AltitudeReply | None:
-    return AltitudeReply(*_ALTITUDE.unpack_from(payload)) if len(payload) >= _ALTITUDE.size else None
+def decode_altitude(payload: bytes) -> tuple[int, int] | None:
+    """Read MSP_ALTITUDE: estimated height above the launch point in cm, climb in cm/s."""
+    return _ALTITUDE.unpack_from(payload) if len(payload) >= _ALTITUDE.size else None
 
 
 def decode_analog(payload: bytes) -> Analog | None:
@@ -185,12 +165,15 @@ def decode_analog(payload: bytes) -> Analog | None:
     return Analog(battery_cv / 100, rssi, drawn, current)
 
 
-def decode_home(payload: bytes) -> HomePoint | None:
-    """Read MSP_WP number 0. In the 21 bytes of INAV and MultiWii NAV an action follows the number."""
+def decode_home(payload: bytes) -> tuple[int, int] | None:
+    """Read MSP_WP number 0: home, degrees * 1e7; 0 or 190 degrees if unknown.
+
+    In the 21 bytes of INAV and MultiWii NAV an action follows the number.
+    """
     if len(payload) < _WP.size or payload[0] != 0:
         return None
     has_action = len(payload) >= _NAV_WP_SIZE
-    return HomePoint(*_PLACE.unpack_from(payload, 2 if has_action else 1))
+    return _PLACE.unpack_from(payload, 2 if has_action else 1)
 
 
 def decode_box_names(payload: bytes) -> tuple[str, ...]:
