@@ -29,7 +29,8 @@ _AUTOPILOT_AT, _NO_AUTOPILOT = 5, bytes((m.MAV_AUTOPILOT_INVALID,))
 _UNKNOWN_U16, _UNKNOWN_U8 = 0xFFFF, 0xFF
 _MAX_RSSI, _HARAKIRI_MAX_RSSI = 254, 255
 _STICKS, _CHANNELS = 4, 18
-_SENSORS = {
+#: MAV_SYS_STATUS_SENSOR bits.
+SENSORS = {
     m.MAV_SYS_STATUS_SENSOR_3D_ACCEL: Sensor.ACCELEROMETER,
     m.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE: Sensor.BAROMETER,
     m.MAV_SYS_STATUS_SENSOR_3D_MAG: Sensor.COMPASS,
@@ -212,7 +213,7 @@ class MavlinkTelemetry:
 
     def _sys_status(self, message: Message, now: float) -> None:
         well = message.onboard_control_sensors_present & message.onboard_control_sensors_health
-        sensors = Sensor(sum(sensor for bit, sensor in _SENSORS.items() if bit & well))
+        sensors = Sensor(sum(sensor for bit, sensor in SENSORS.items() if bit & well))
         self._vehicle.hear(v.Health(now, v.Source.MAVLINK, sensors))
         current = None if message.current_battery < 0 else message.current_battery / 100
         voltage = _scaled(message.voltage_battery, 1000) or None

@@ -1,33 +1,31 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A calibration from its start to its result, in the words that Mission Planner and QGroundControl wait for. Sans-IO.
 
+The firmware checks neither whether it is flying nor whether a command is repeated (serial.c): a calibration stalls it
+for seconds, a flash write for 0.1 s. So STATUS is read twice right before, and the command is sent once.
+
 No firmware reports the result over MSP. A calibrated accelerometer reads a level craft; a Harakiri stores a compass
 calibration and then restarts. A Harakiri does nothing else meanwhile, so its silence is not reported as a loss.
 """
 
 import math
 from dataclasses import dataclass
+from enum import Enum
 from math import inf
 
-from bridge.fc.actions import (
-    CALIBRATE_ACCELEROMETER,
-    CALIBRATE_COMPASS,
-    NOT_DONE,
-    ActionResult,
-    FcAction,
-    act,
-    is_level,
-)
 from bridge.fc.session import FcSession
 from bridge.gcs.flash_budget import TOO_MANY_WRITES
 from bridge.gcs.ground import Ground
 from bridge.gcs.station import Severity, Station
-from bridge.line.conversation import LinkLost
+from bridge.line.conversation import Conversation, LinkLost, Pause, Receive, ask, ask_status, send
 from bridge.missions.mission_service import MissionService
 from bridge.vehicle.board_settings import BoardSettings
 from bridge.vehicle.link_announcer import LinkAnnouncer
 from protocols.mavlink.command import CommandResult
 from protocols.mavlink.dialect import messages as m
+from protocols.msp.commands import Msp, MspAction
+from protocols.msp.frame import Direction, MspFrame, request
+from protocols.msp.telemetry import RAW_IMU_SIZE, STATUS_SIZE, Sensor, decode_raw_imu
 from protocols.rights.effect import Effect
 from protocols.rights.msp import msp_right
 
@@ -45,18 +43,50 @@ _SHORTEST_COMPASS_S = 45.0
 _LONGEST_S = 360.0
 _COMPASS, _ONE_COMPASS = 0, 1 << 0
 _UNKNOWN = math.nan
-_OUTCOMES = {
-    ActionResult.DONE: CommandResult.ACCEPTED,
-    ActionResult.FREEZES: CommandResult.ACCEPTED,
-    ActionResult.ARMED: CommandResult.DENIED,
-    ActionResult.NO_LINK: CommandResult.DENIED,
-    ActionResult.OCCUPIED: CommandResult.TEMPORARILY_REJECTED,
-    ActionResult.NO_SENSOR: CommandResult.DENIED,
-    ActionResult.SIX_POSITIONS: CommandResult.UNSUPPORTED,
-    ActionResult.RUNNING: CommandResult.TEMPORARILY_REJECTED,
-    ActionResult.NO_ANSWER: CommandResult.FAILED,
-    ActionResult.REFUSED: CommandResult.UNSUPPORTED,
-}
+_STATUS_CHECKS = 2
+_ASKS_AFTER_ACTION = 12
+#: After a restart the first readings may still settle.
+_SETTLED_S, _LEVEL_CHECKS, _LEVEL_INTERVAL_S = 1.0, 5, 0.1
+#: Of 1 g: 3 degrees. An uncalibrated sensor is off by as much.
+_MAX_TILT = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class FcAction:
+    """A calibration. `needs`: the sensor. A Harakiri does nothing else until it is done, and then restarts.
+
+    instruction: for the pilot.
+    """
+
+    command: MspAction
+    needs: Sensor
+    instruction: str
+
+
+CALIBRATE_ACCELEROMETER = FcAction(MspAction.ACC_CALIBRATION, Sensor.ACCELEROMETER, "Keep the craft level and still")
+CALIBRATE_COMPASS = FcAction(MspAction.MAG_CALIBRATION, Sensor.COMPASS, "Turn the craft about all axes")
+
+
+class ActionResult(Enum):
+    """The result of an action: the text for the pilot (at most 50 characters), and the acknowledgement."""
+
+    def __init__(self, text: str, ack: CommandResult) -> None:
+        self.text, self.ack = text, ack
+
+    DONE = "Done", CommandResult.ACCEPTED
+    FREEZES = "Calibrating: it restarts when done (up to 5 min)", CommandResult.ACCEPTED
+    ARMED = "Armed: disarm first", CommandResult.DENIED
+    NO_LINK = "No MSP link to the flight controller", CommandResult.DENIED
+    OCCUPIED = "Wait for the mission transfer to end", CommandResult.TEMPORARILY_REJECTED
+    NO_SENSOR = "The flight controller has no such sensor", CommandResult.DENIED
+    SIX_POSITIONS = "Six positions: calibrate with INAV Configurator", CommandResult.UNSUPPORTED
+    RUNNING = "A calibration is running", CommandResult.TEMPORARILY_REJECTED
+    NO_ANSWER = "No answer from the flight controller", CommandResult.FAILED
+    REFUSED = "Not supported by the flight controller", CommandResult.UNSUPPORTED
+
+
+#: Without an answer it may be done.
+_NOT_DONE = frozenset(ActionResult) - {ActionResult.DONE, ActionResult.FREEZES, ActionResult.NO_ANSWER}
 
 
 @dataclass(eq=False)
@@ -115,22 +145,22 @@ class Calibration:
             self._asked(station, command, action, result, now)
 
         self._asked_for = action
-        self._missions.runner.start(act(action, controller.arm_bit), done, now)
+        self._missions.runner.start(_act(action, controller.arm_bit), done, now)
         return None
 
     def _asked(self, station: Station, command: int, action: FcAction, outcome: ActionResult, now: float) -> None:
         """The flight controller has begun, or the reason why it has not is known."""
-        result = _OUTCOMES[outcome]
-        if outcome in NOT_DONE:
+        result = outcome.ack
+        if outcome in _NOT_DONE:
             self._ground.not_written(station)
         if result is not CommandResult.ACCEPTED:
-            self._ground.say(Severity.ERROR, outcome.value, station)
+            self._ground.say(Severity.ERROR, outcome.text, station)
             self._acknowledge(station, command, result)
             return
         self._ground.say(Severity.NOTICE, action.instruction, station)
         self._restarts = outcome is ActionResult.FREEZES
         if self._restarts:
-            self._ground.say(Severity.NOTICE, outcome.value, station)
+            self._ground.say(Severity.NOTICE, outcome.text, station)
         if command == m.MAV_CMD_DO_START_MAG_CAL:
             self._acknowledge(station, command, result)
         self._station, self._command, self._action = station, command, action
@@ -180,7 +210,7 @@ class Calibration:
             is_stored = not self._restarts or elapsed_s >= _SHORTEST_COMPASS_S
             self._end("" if is_stored else "it was interrupted", now)
         else:
-            self._missions.runner.start(is_level(), self._looked, now)
+            self._missions.runner.start(_is_level(), self._looked, now)
 
     def _looked(self, level: bool | LinkLost | None, now: float) -> None:
         if level is True:
@@ -224,3 +254,40 @@ class Calibration:
 
     def _acknowledge(self, station: Station, command: int, result: CommandResult) -> None:
         self._ground.to(station, m.MAVLink_command_ack_message(command, result, 0, 0, station.sysid, station.compid))
+
+
+def _is_level() -> Conversation[bool | None]:
+    """True if the accelerometer reads a level craft, as it does right after its calibration; None: no answer."""
+    yield Pause(_SETTLED_S)
+    forward = left = up = 0
+    for _ in range(_LEVEL_CHECKS):
+        reply = yield from ask(request(Msp.RAW_IMU), Msp.RAW_IMU, RAW_IMU_SIZE)
+        imu = None if reply is None else decode_raw_imu(reply.payload)
+        if imu is None:
+            return None
+        forward, left, up = (total + value for total, value in zip((forward, left, up), imu.acc, strict=True))
+        yield Pause(_LEVEL_INTERVAL_S)
+    return max(abs(forward), abs(left)) <= _MAX_TILT * up
+
+
+def _act(action: FcAction, arm_bit: int) -> Conversation[ActionResult]:
+    arm_mask = 1 << arm_bit
+    for _ in range(_STATUS_CHECKS):
+        status = yield from ask_status()
+        if status is None:
+            return ActionResult.NO_ANSWER
+        if status.box_flags & arm_mask:
+            return ActionResult.ARMED
+        if action.needs & ~status.sensors:
+            return ActionResult.NO_SENSOR
+    awaited = frozenset((action.command,))
+    asked = send(request(action.command), action.command, 0, exclusive=True)
+    reply: MspFrame | None = yield Receive(awaited, asked)
+    asks = 0
+    while reply is None and asks < _ASKS_AFTER_ACTION:
+        # A flash write may still stall it. It replies in order: STATUS first means that the action's reply is lost.
+        asks += 1
+        reply = yield Receive(awaited | {Msp.STATUS}, send(request(Msp.STATUS), Msp.STATUS, STATUS_SIZE))
+    if reply is None or reply.command != action.command:
+        return ActionResult.NO_ANSWER
+    return ActionResult.DONE if reply.direction is Direction.REPLY else ActionResult.REFUSED

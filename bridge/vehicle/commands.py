@@ -9,7 +9,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from bridge.fc.actions import CALIBRATE_ACCELEROMETER, CALIBRATE_COMPASS, FcAction
 from bridge.fc.profile import Spoken
 from bridge.fc.session import FcSession
 from bridge.gcs.flash_budget import TOO_MANY_WRITES
@@ -20,7 +19,7 @@ from bridge.model.refusal import Refusal
 from bridge.model.vehicle import MissionLeg, Switches
 from bridge.settings.fc_settings import Cause, SettingRefusal
 from bridge.vehicle.board_settings import BoardSettings
-from bridge.vehicle.calibration import Calibration
+from bridge.vehicle.calibration import CALIBRATE_ACCELEROMETER, CALIBRATE_COMPASS, Calibration, FcAction
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.parameters import Parameters
 from bridge.vehicle.set_waypoint import SetWaypoint

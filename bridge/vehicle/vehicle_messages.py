@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import NamedTuple, TypeVar
 
+from bridge.fc.mavlink_telemetry import SENSORS
 from bridge.model import vehicle as v
 from bridge.model.airframe import Airframe
 from bridge.model.flight_memory import Home
@@ -19,7 +20,6 @@ from protocols.mavlink import missing_messages
 from protocols.mavlink.codec import pack_payload
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import Command
-from protocols.msp.telemetry import Sensor
 from reports.vehicle_groups import Progress
 from reports.verdict import SentSeqs
 
@@ -54,13 +54,6 @@ _ROVER_NAMES = {0: "MANUAL", 1: "ACRO"}
 #: Modes in which the craft steers itself.
 _GUIDED = (FlightMode.LOITER, FlightMode.CRUISE, FlightMode.RTL, FlightMode.AUTO, FlightMode.LAUNCH)
 _ROVERS = (Airframe.ROVER, Airframe.BOAT)
-_SENSORS = {
-    Sensor.ACCELEROMETER: messages.MAV_SYS_STATUS_SENSOR_3D_ACCEL,
-    Sensor.BAROMETER: messages.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE,
-    Sensor.COMPASS: messages.MAV_SYS_STATUS_SENSOR_3D_MAG,
-    Sensor.GPS: messages.MAV_SYS_STATUS_SENSOR_GPS,
-    Sensor.SONAR: messages.MAV_SYS_STATUS_SENSOR_LASER_POSITION,
-}
 #: Without motor outputs Mission Planner shows a safety switch that is on.
 _MOTORS = messages.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
 _PREARM = messages.MAV_SYS_STATUS_PREARM_CHECK
@@ -346,7 +339,7 @@ def sys_status(at: Moment) -> Message:
     present, unknown, bad = _MOTORS | _PREARM, 0, 0
     if health is not None:
         present |= messages.MAV_SYS_STATUS_SENSOR_3D_GYRO
-        for sensor, bit in _SENSORS.items():
+        for bit, sensor in SENSORS.items():
             if sensor & health.sensors:
                 present |= bit
     gps, sticks, signal = at.fresh(v.GpsFix), at.fresh(v.Sticks), at.fresh(v.Signal)

@@ -7,8 +7,8 @@ from functools import partial
 
 import pytest
 
-from bridge.fc.actions import ActionResult
 from bridge.missions.mission_service import NO_LINK
+from bridge.vehicle.calibration import ActionResult
 from bridge.vehicle.commands import _REFUSED
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.frame import MspParser
@@ -69,7 +69,7 @@ def test_an_action_is_done_once_on_the_ground(
     world.run(0.6)
     assert results(station) == [IN_PROGRESS]
     assert done(world) == [action]
-    assert station.texts()[-1] == ActionResult.FREEZES.value
+    assert station.texts()[-1] == ActionResult.FREEZES.text
     world.run(20)
     # The board restarts after a calibration and is found again.
     assert world.naze.counters.resets == (action == 205)
@@ -122,7 +122,7 @@ def test_nothing_is_done_while_armed(command: int, params: tuple[float, ...], ac
     station.send(long(command, params))
     world.run(0.5)
     assert results(station) == [DENIED]
-    assert station.texts() == [ActionResult.ARMED.value]
+    assert station.texts() == [ActionResult.ARMED.text]
     assert done(world) == []
 
 
@@ -148,7 +148,7 @@ def test_without_a_flight_controller_an_action_is_denied() -> None:
         world.run(0.1)
     assert results(station) == [DENIED] * len(ALL)
     # The text of the refusal is not repeated.
-    assert station.texts() == [ActionResult.NO_LINK.value]
+    assert station.texts() == [ActionResult.NO_LINK.text]
 
 
 def test_on_unknown_firmware_an_action_is_unsupported() -> None:
@@ -181,7 +181,7 @@ def test_an_action_on_a_board_that_falls_silent_fails_and_is_not_repeated() -> N
     world.run(3)
     assert hung
     assert results(station) == [FAILED]
-    assert station.texts()[0] == ActionResult.NO_ANSWER.value
+    assert station.texts()[0] == ActionResult.NO_ANSWER.text
     world.faults.hang = False
     world.run(30)
     assert done(world) == [205]
@@ -213,7 +213,7 @@ def test_no_action_runs_during_a_mission_transfer() -> None:
     station.send(long(*COMPASS[:2]))
     world.run(0.05)
     assert results(station) == [TEMPORARILY_REJECTED]
-    assert station.texts() == [ActionResult.OCCUPIED.value]
+    assert station.texts() == [ActionResult.OCCUPIED.text]
     world.wait_until(lambda _: bool(outcome), 5)
     assert outcome[0][0].text.startswith("Mission verified")
     assert done(world) == []
@@ -225,7 +225,7 @@ def test_calibrating_a_missing_sensor_is_denied(monkeypatch: pytest.MonkeyPatch)
     station.send(long(*COMPASS[:2]))
     world.run(0.3)
     assert results(station) == [DENIED]
-    assert station.texts() == [ActionResult.NO_SENSOR.value]
+    assert station.texts() == [ActionResult.NO_SENSOR.text]
     assert done(world) == []
 
 
@@ -267,7 +267,7 @@ def test_no_other_command_reaches_the_flight_controller() -> None:
 
 
 def test_every_text_fits_a_statustext() -> None:
-    texts = [*_REFUSED.values(), *(outcome.value for outcome in ActionResult)]
+    texts = [*_REFUSED.values(), *(outcome.text for outcome in ActionResult)]
     assert max(map(len, texts)) <= 50
     assert all(text.isascii() for text in texts)
 
