@@ -59,7 +59,9 @@ def read_tlog(data: bytes, msgids: Container[int] | None = None) -> Iterator[Tlo
         end = _frame_end(data, start)
         if end is None:
             at += 1
-        elif msgids is not None and _msgid(data, start) not in msgids and _begins(data, end + STAMP_SIZE):
+        elif (
+            msgids is not None and MavlinkFrame(data[start:end]).msgid not in msgids and _begins(data, end + STAMP_SIZE)
+        ):
             at = end
         elif (frame := whole_frame(data[start:end])) is None:
             at += 1
@@ -90,10 +92,6 @@ def _frame_end(data: bytes, start: int) -> int | None:
     signature = _SIGNATURE_SIZE if header == _HEADERS[MAGIC_V2] and data[start + 2] & _SIGNED else 0
     end = start + header + data[start + 1] + _CRC_SIZE + signature
     return None if end > len(data) else end
-
-
-def _msgid(data: bytes, start: int) -> int:
-    return data[start + 5] if data[start] == MAGIC_V1 else int.from_bytes(data[start + 7 : start + 10], "little")
 
 
 def _begins(data: bytes, start: int) -> bool:

@@ -83,7 +83,9 @@ def read_capture(data: bytes) -> list[UartEvent]:
     for line in _LINE.finditer(data):
         if line["mark"]:
             if events:
-                _end(events)
+                last = events[-1]
+                if last.action is not UartAction.CLOSE:
+                    events.append(UartEvent(last.at, last.speed, UartAction.CLOSE, text="the recording ended"))
                 began_at = events[-1].at + _PAUSE_S
             first_at = None
             continue
@@ -96,12 +98,6 @@ def read_capture(data: bytes) -> list[UartEvent]:
         if event is not None:
             events.append(event)
     return events
-
-
-def _end(events: list[UartEvent]) -> None:
-    last = events[-1]
-    if last.action is not UartAction.CLOSE:
-        events.append(UartEvent(last.at, last.speed, UartAction.CLOSE, text="the recording ended"))
 
 
 def _event(line: re.Match[bytes], at: float) -> UartEvent | None:

@@ -133,8 +133,8 @@ class HarakiriMissions(HarakiriStore):
                     begun = yield from self._begin(wanted)
                     self._may_be_stored = begun.status is ReplyStatus.SAME
                     if begun.status is ReplyStatus.SAME:
-                        unchanged = yield from self._is_stored(records)
-                        if unchanged:
+                        # An equal checksum is no proof of the same list.
+                        if (yield from self.pull()) == tuple(records):
                             return PushResult(None, unchanged=True)
                         continue
                     yield from self._transfer(packed, wanted, begun, progress)
@@ -294,11 +294,6 @@ class HarakiriMissions(HarakiriStore):
         if info is None:
             return PushFailure.UNCERTAIN
         return None if info.stored == wanted else failure
-
-    def _is_stored(self, records: Sequence[WpRecord]) -> Conversation[bool]:
-        """Compare record by record: an equal checksum is no proof of the same list."""
-        held = yield from self.pull()
-        return held == tuple(records)
 
     def _read(self, info: Info) -> Conversation[tuple[WpRecord, ...] | None]:
         """Read all records with two requests in flight, each repeated until it is answered."""
