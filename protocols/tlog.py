@@ -59,11 +59,11 @@ def read_tlog(data: bytes, msgids: Container[int] | None = None) -> Iterator[Tlo
         end = _frame_end(data, start)
         if end is None:
             at += 1
-        elif (
-            msgids is not None and MavlinkFrame(data[start:end]).msgid not in msgids and _begins(data, end + STAMP_SIZE)
-        ):
+            continue
+        frame = MavlinkFrame(data[start:end])
+        if msgids is not None and frame.msgid not in msgids and _begins(data, end + STAMP_SIZE):
             at = end
-        elif (frame := whole_frame(data[start:end])) is None:
+        elif whole_frame(frame.raw) is None:
             at += 1
         else:
             yield TlogRecord(first_stamp_us(data[at:start]), frame)

@@ -10,7 +10,7 @@ from collections import OrderedDict
 from collections.abc import Hashable
 from math import inf
 
-from bridge.gcs.cost import FLASH_PROVEN, FLASH_RESERVE, LIMITS, SEATS, Cost, Rate
+from bridge.gcs.cost import FLASH_PROVEN, FLASH_RESERVE, SEATS, Cost, Rate
 
 #: Hosts that are remembered after their stations have left: a new connection does not renew a budget.
 _MAX_HOSTS = 1024
@@ -45,7 +45,7 @@ class _Buckets(dict[Cost, TokenBucket]):
     """One for each cost, made when it is first needed."""
 
     def __missing__(self, cost: Cost) -> TokenBucket:
-        bucket = self[cost] = TokenBucket(LIMITS[cost].each)
+        bucket = self[cost] = TokenBucket(cost.each)
         return bucket
 
 
@@ -75,12 +75,12 @@ class HostBudget(Budget):
         self.wrote_at = -inf
 
     def allows(self, cost: Cost, now: float) -> bool:
-        bucket, limit = self._buckets[cost], LIMITS[cost]
+        bucket = self._buckets[cost]
         if self.is_own:
             return bucket.take(now)
         parts, total = max(self._hosts.without_seat, 1), self._hosts.totals[cost]
         bucket.rate = Rate(
-            min(limit.total.per_s / parts, limit.each.per_s), min(max(limit.total.burst / parts, 1.0), limit.each.burst)
+            min(cost.total.per_s / parts, cost.each.per_s), min(max(cost.total.burst / parts, 1.0), cost.each.burst)
         )
         if not (bucket.has(now) and total.take(now)):
             return False
@@ -95,7 +95,7 @@ class HostBudget(Budget):
     def sits(self, seat: TokenBucket) -> None:
         self.seat = seat
         for cost, bucket in self._buckets.items():
-            bucket.rate = LIMITS[cost].each
+            bucket.rate = cost.each
 
     def join(self, *, may_sit: bool) -> None:
         """A station without proven rights has connected. The host takes a seat if one is free."""
@@ -127,7 +127,7 @@ class HostBudgets:
         self.free_seats = [TokenBucket(FLASH_RESERVE) for _ in range(SEATS)]
         #: The number of connected hosts that share the totals.
         self.without_seat = 0
-        self.totals = {cost: TokenBucket(limit.total) for cost, limit in LIMITS.items()}
+        self.totals = {cost: TokenBucket(cost.total) for cost in Cost}
         self._seated: list[HostBudget] = []
         self._hosts: OrderedDict[Hashable, HostBudget] = OrderedDict()  # the one asked for least recently first
 

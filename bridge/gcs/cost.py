@@ -5,7 +5,8 @@ Each limit is far above a ground station's needs and far below a load that would
 """
 
 from dataclasses import dataclass
-from enum import IntEnum, auto
+from enum import IntEnum
+from typing import Self
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +18,7 @@ class Rate:
 
 
 class Cost(IntEnum):  # hashed for each datagram: as an int, in C
-    """The limited kinds of work.
+    """The limited kinds of work. Two limits: for a station or host with its own budget, and for all others together.
 
     RECEIVED: a datagram or a read from a connection.
     ARRIVAL: a new peer, which costs greetings and a log entry.
@@ -33,42 +34,27 @@ class Cost(IntEnum):  # hashed for each datagram: as an int, in C
     RECORDED: a ground station's frame in the telemetry log, whose space is mostly for the flight itself.
     """
 
-    RECEIVED = auto()
-    ARRIVAL = auto()
-    ANSWER = auto()
-    LIST = auto()
-    TRANSFER = auto()
-    TEXT = auto()
-    UPLOAD = auto()
-    BOARD = auto()
-    PASSED = auto()
-    COPIED = auto()
-    STORED = auto()
-    RECORDED = auto()
-
-
-@dataclass(frozen=True, slots=True)
-class Limit:
-    """`each`: for a station or host with its own budget (bridge.gcs.budget). `total`: for all the others together."""
-
     each: Rate
     total: Rate
 
+    def __new__(cls, each: Rate, total: Rate) -> Self:
+        cost = int.__new__(cls, len(cls.__members__))
+        cost._value_, cost.each, cost.total = int(cost), each, total
+        return cost
 
-LIMITS = {
-    Cost.RECEIVED: Limit(Rate(1500, 3000), Rate(15000, 15000)),
-    Cost.ARRIVAL: Limit(Rate(5, 32), Rate(50, 200)),
-    Cost.ANSWER: Limit(Rate(50, 600), Rate(500, 3000)),
-    Cost.LIST: Limit(Rate(1 / 2, 10), Rate(2, 40)),
-    Cost.TRANSFER: Limit(Rate(1000, 2000), Rate(1000, 8000)),
-    Cost.TEXT: Limit(Rate(5, 200), Rate(10, 300)),
-    Cost.UPLOAD: Limit(Rate(10, 50), Rate(10, 400)),
-    Cost.BOARD: Limit(Rate(4, 20), Rate(10, 40)),
-    Cost.PASSED: Limit(Rate(200, 600), Rate(200, 600)),
-    Cost.COPIED: Limit(Rate(150, 300), Rate(150, 300)),
-    Cost.STORED: Limit(Rate(1 / 10, 20), Rate(1 / 5, 40)),
-    Cost.RECORDED: Limit(Rate(50, 400), Rate(100, 800)),
-}
+    RECEIVED = Rate(1500, 3000), Rate(15000, 15000)
+    ARRIVAL = Rate(5, 32), Rate(50, 200)
+    ANSWER = Rate(50, 600), Rate(500, 3000)
+    LIST = Rate(1 / 2, 10), Rate(2, 40)
+    TRANSFER = Rate(1000, 2000), Rate(1000, 8000)
+    TEXT = Rate(5, 200), Rate(10, 300)
+    UPLOAD = Rate(10, 50), Rate(10, 400)
+    BOARD = Rate(4, 20), Rate(10, 40)
+    PASSED = Rate(200, 600), Rate(200, 600)
+    COPIED = Rate(150, 300), Rate(150, 300)
+    STORED = Rate(1 / 10, 20), Rate(1 / 5, 40)
+    RECORDED = Rate(50, 400), Rate(100, 800)
+
 
 #: Hosts with a budget of their own.
 SEATS = 16

@@ -27,14 +27,8 @@ class InavType(IntEnum):
     STRING = 6
 
 
-_VALUES = {
-    InavType.UINT8: struct.Struct("<B"),
-    InavType.INT8: struct.Struct("<b"),
-    InavType.UINT16: struct.Struct("<H"),
-    InavType.INT16: struct.Struct("<h"),
-    InavType.UINT32: struct.Struct("<I"),
-    InavType.FLOAT: struct.Struct("<f"),
-}
+#: By type, but for texts.
+_VALUES = [struct.Struct(f"<{letter}") for letter in "BbHhIf"]
 
 
 class InavSetting(NamedTuple):

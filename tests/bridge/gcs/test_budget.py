@@ -5,7 +5,7 @@ import gc
 from collections import Counter
 
 from bridge.gcs.budget import Budget, HostBudget, HostBudgets
-from bridge.gcs.cost import LIMITS, SEATS, Cost
+from bridge.gcs.cost import SEATS, Cost
 from protocols.mavlink.dialect import messages as m
 from protocols.msp.frame import MspParser
 from tests.support.world import GroundStation, ready_world
@@ -36,10 +36,9 @@ def test_hosts_without_a_seat_share_the_total_in_equal_parts() -> None:
     hosts = HostBudgets()
     crowd = [host(hosts, number) for number in range(20)]
     for cost in Cost:
-        limit = LIMITS[cost]
         parts = [spent(one, cost) for one in crowd]
-        assert sum(parts) <= max(limit.total.burst, len(crowd))
-        assert min(parts) >= min(max(1, int(limit.total.burst / 20)), int(limit.each.burst)), cost
+        assert sum(parts) <= max(cost.total.burst, len(crowd))
+        assert min(parts) >= min(max(1, int(cost.total.burst / 20)), int(cost.each.burst)), cost
 
 
 def test_a_crowd_uses_up_neither_a_seat_nor_the_budget_of_a_proven_station() -> None:
@@ -50,14 +49,14 @@ def test_a_crowd_uses_up_neither_a_seat_nor_the_budget_of_a_proven_station() -> 
     for cost in Cost:
         for stranger in crowd:
             spent(stranger, cost)
-        assert spent(pilot, cost) == LIMITS[cost].each.burst
-        assert spent(Budget(), cost) == LIMITS[cost].each.burst
+        assert spent(pilot, cost) == cost.each.burst
+        assert spent(Budget(), cost) == cost.each.burst
 
 
 def test_a_host_that_comes_back_has_the_budget_that_it_left() -> None:
     hosts = HostBudgets()
     stranger = host(hosts, 1)
-    assert spent(stranger, Cost.BOARD) == LIMITS[Cost.BOARD].each.burst
+    assert spent(stranger, Cost.BOARD) == Cost.BOARD.each.burst
     stranger.leave()
     assert spent(host(hosts, 1), Cost.BOARD) == 0
 
@@ -110,7 +109,7 @@ def test_a_flood_of_counts_is_not_logged() -> None:
     for number in range(2000):
         world.after(number / 500, lambda: station.send(m.MAVLink_mission_count_message(1, 1, 999)))
     world.run(5)
-    limit = LIMITS[Cost.UPLOAD].each
+    limit = Cost.UPLOAD.each
     assert limit.burst / 2 < len(world.events("mission.refused")) <= limit.burst + limit.per_s * 5
     assert {ack.type for ack in station.messages("MISSION_ACK")} == {m.MAV_MISSION_DENIED}
     assert "Too many uploads: wait a few seconds" in station.texts()
