@@ -68,7 +68,7 @@ class HostBudget(Budget):
         #: The number of its connected stations that have proven nothing.
         self.stations = 0
         self.is_steady = False
-        #: The reserve of writes to the flash that belongs to its seat.
+        #: The reserve of writes to the flash that belongs to its seat; None: without one, it has a part of the total.
         self.seat: TokenBucket | None = None
         #: The writes of its stations that have proven their rights.
         self.proven_writes = TokenBucket(FLASH_PROVEN)
@@ -76,7 +76,7 @@ class HostBudget(Budget):
 
     def allows(self, cost: Cost, now: float) -> bool:
         bucket = self._buckets[cost]
-        if self.is_own:
+        if self.seat is not None:
             return bucket.take(now)
         parts, total = max(self._hosts.without_seat, 1), self._hosts.totals[cost]
         bucket.rate = Rate(
@@ -86,11 +86,6 @@ class HostBudget(Budget):
             return False
         bucket.spend()
         return True
-
-    @property
-    def is_own(self) -> bool:
-        """False while it is a part of the total."""
-        return self.seat is not None
 
     def sits(self, seat: TokenBucket) -> None:
         self.seat = seat

@@ -183,7 +183,7 @@ class GroundStation:
     @property
     def has_own_budget(self) -> bool:
         """True if strangers cannot use up the station's limits."""
-        return self._own_budget is not None or (self.is_heard and self.host is not None and self.host.is_own)
+        return self._own_budget is not None or (self.is_heard and self.host is not None and self.host.seat is not None)
 
     def allows(self, cost: Cost, now: float | None = None) -> bool:
         """Count work caused by the last message of the station, or at `now`; False if it exceeds the limit."""
@@ -225,7 +225,7 @@ class GroundStation:
         if self._beats < _STEADY_BEATS and now >= self._beat_at + _BEAT_S:
             self._beats, self._beat_at = self._beats + 1, now
         host = self.host if self.standing is Standing.OPEN and self._beats >= _STEADY_BEATS else None
-        if host is not None and not (host.is_steady and host.is_own):
+        if host is not None and not (host.is_steady and host.seat is not None):
             host.stays()
         return is_new
 

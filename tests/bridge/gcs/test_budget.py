@@ -67,11 +67,11 @@ def test_a_seat_is_free_again_when_its_host_has_left() -> None:
     late = host(hosts, 99, may_sit=True)
     for one in (*seated, late):
         one.stays()
-    assert [late.is_own] == [False]
+    assert [late.seat] == [None]
     seated[3].leave()
     late.stays()
-    assert late.is_own
-    assert [one.is_own for one in seated].count(True) == SEATS - 1
+    assert late.seat is not None
+    assert sum(one.seat is not None for one in seated) == SEATS - 1
     assert hosts.without_seat == 0
 
 
@@ -80,8 +80,8 @@ def test_made_up_hosts_lose_their_seats_to_one_that_stays() -> None:
     made_up = [host(hosts, number, may_sit=True) for number in range(30)]
     pilot = host(hosts, 99, may_sit=True)
     pilot.stays()
-    assert [one.is_own for one in made_up] == [True] * (SEATS - 1) + [False] * 15
-    assert pilot.is_own
+    assert [one.seat is not None for one in made_up] == [True] * (SEATS - 1) + [False] * 15
+    assert pilot.seat is not None
     assert hosts.without_seat == 15
 
 
