@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """All ground stations, and the queue of datagrams to them. Sans-IO."""
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf
 
@@ -29,6 +29,8 @@ _STILL_S = 1.0
 #: The interval between searches for silent stations.
 _EXPIRY_INTERVAL_S = 1.0
 _MAX_TEXT_ID = 0xFFFF
+#: Mission Planner, QGroundControl, MAVSDK and MAVProxy read several frames in a datagram; MAVROS cuts at 296 bytes.
+MAX_DATAGRAM_SIZE = 280
 
 #: A frame listener: called with all frames to and from ground stations, each once.
 FrameListener = Callable[[Sequence[bytes]], None]
@@ -65,7 +67,8 @@ class Ground:
         self._places: dict[tuple[str, bool], Places] = {}
         self.hosts = HostBudgets()
         self.flash = FlashBudget()
-        self._datagrams: list[tuple[Peer, bytes]] = []
+        #: Frames to be sent.
+        self._outgoing: defaultdict[GroundStation, list[bytes]] = defaultdict(list)
         self._text_id = 0
         self.due = inf
         #: Texts for each newcomer, about problems that began before it connected.
@@ -305,8 +308,12 @@ class Ground:
     # Sent to them.
 
     def take_datagrams(self) -> list[tuple[Peer, bytes]]:
-        """The datagrams to send, in order; each holds whole frames."""
-        datagrams, self._datagrams = self._datagrams, []
+        """The datagrams to send; each holds whole frames. Those of one station are in order."""
+        datagrams: list[tuple[Peer, bytes]] = []
+        for station, frames in self._outgoing.items():
+            for datagram in _in_datagrams(frames) if len(frames) > 1 else frames:
+                datagrams.append((station.peer, datagram))  # noqa: PERF401
+        self._outgoing.clear()
         return datagrams
 
     def to(self, station: Station, *together: Message) -> None:
@@ -331,7 +338,7 @@ class Ground:
         version, frames = receiver.frame_version, []
         for message in together:  # a loop: a comprehension is a call
             frames.append(writer.frame(pack(message), version))  # noqa: PERF401
-        self._datagrams.append((receiver.peer, b"".join(frames)))
+        self._outgoing[receiver] += frames
         if self.on_frames is not _drop and not receiver.is_listener:
             self.on_frames(frames)
 
@@ -349,7 +356,7 @@ class Ground:
             if station.peer is RECORDER:
                 is_logged = True
             else:
-                self._datagrams.append((station.peer, frame))
+                self._outgoing[station].append(frame)
         if frame is not None and is_logged:
             self.on_frames([frame])
 
@@ -365,7 +372,7 @@ class Ground:
             frames = [station.writer.frame(packed, version) for version in ((2,) if station.reads_v2_only else (2, 1))]
             logged = logged or frames[0]
             if station.peer is not RECORDER:
-                self._datagrams += [(station.peer, frame) for frame in frames]
+                self._outgoing[station] += frames
         if logged is not None:
             self.on_frames([logged])
 
@@ -406,12 +413,26 @@ class Ground:
     def _readers_of_texts(self) -> list[GroundStation]:
         return [station for station in self.everyone() if not station.is_listener]
 
-    def forward(self, datagrams: Sequence[bytes], stations: Iterable[GroundStation]) -> None:
-        """Send datagrams of one or more whole frames unchanged."""
+    def forward(self, frames: Sequence[bytes], stations: Iterable[GroundStation]) -> None:
+        """Send whole frames unchanged."""
         for station in stations:
-            for datagram in datagrams:
-                self._datagrams.append((station.peer, datagram))
+            self._outgoing[station] += frames
 
 
 def _drop(_frames: Sequence[bytes]) -> None:
     """The frame listener of a bridge without a log."""
+
+
+def _in_datagrams(frames: Sequence[bytes]) -> list[bytes]:
+    """Join frames into datagrams of at most 280 bytes: the cost is per datagram, not per byte."""
+    joined = b"".join(frames)
+    if len(joined) <= MAX_DATAGRAM_SIZE:
+        return [joined]
+    datagrams: list[bytes] = []
+    start = end = 0
+    for frame in frames:
+        if end + len(frame) > start + MAX_DATAGRAM_SIZE:
+            datagrams.append(joined[start:end])
+            start = end
+        end += len(frame)
+    return [*datagrams, joined[start:]]

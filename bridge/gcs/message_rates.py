@@ -67,9 +67,11 @@ def share_out(stations: Sequence["GroundStation"], *, in_flight: bool) -> None:
         rates.shortest_s = 0.0 if in_flight or station.is_heard else _UNHEARD_S
 
 
-def fastest_s(stations: Sequence["GroundStation"], defaults_s: Mapping[int, float]) -> dict[int, float]:
+def fastest_s(stations: Sequence["GroundStation"], defaults_s: Mapping[int, float]) -> Mapping[int, float]:
     """The shortest interval for each message."""
     special = [station.rates for station in stations if not station.rates.is_default]
+    if stations and not special:
+        return defaults_s
     others = [MessageRates()] if len(special) < len(stations) else []
     return {
         msgid: min((rates.interval_s(msgid, default_s) for rates in special + others), default=inf)

@@ -15,8 +15,6 @@ from bridge.gcs.ground_station import GroundStation
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame
 
-#: Mission Planner, QGroundControl, MAVSDK and MAVProxy read several frames in a datagram; MAVROS cuts at 296 bytes.
-MAX_DATAGRAM_SIZE = 280
 #: Messages remembered that have no target: all of one dialect from a few components.
 _MAX_KINDS = 1024
 #: Stations without their own budget that get a datagram of telemetry, if more than 16 are connected.
@@ -101,7 +99,7 @@ class Routes:
         stations = self._ground.everyone()
         if len(stations) > SEATS and _HEARTBEAT not in (MavlinkFrame(raw).msgid for raw in frames):
             stations = self._with_some_others(stations)
-        self._ground.forward(in_datagrams(frames), stations)
+        self._ground.forward(frames, stations)
 
     def _with_some_others(self, stations: Sequence[GroundStation]) -> list[GroundStation]:
         """The stations with their own budget, and a few of the others in turn: a crowd does not multiply the load."""
@@ -109,18 +107,3 @@ class Routes:
         others = [station for station in stations if not station.has_own_budget]
         self._turn = (self._turn + _OTHERS) % max(len(others), 1)
         return own + (others[self._turn :] + others[: self._turn])[:_OTHERS]
-
-
-def in_datagrams(frames: Sequence[bytes]) -> list[bytes]:
-    """Join frames that arrived together into datagrams of at most 280 bytes: the cost is per datagram, not per byte."""
-    joined = b"".join(frames)
-    if len(joined) <= MAX_DATAGRAM_SIZE:
-        return [joined]
-    datagrams: list[bytes] = []
-    start = end = 0
-    for frame in frames:
-        if end + len(frame) > start + MAX_DATAGRAM_SIZE:
-            datagrams.append(joined[start:end])
-            start = end
-        end += len(frame)
-    return [*datagrams, joined[start:]]

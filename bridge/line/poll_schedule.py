@@ -37,8 +37,9 @@ _FOLLOWED_SHARE = 0.1
 _FOLLOWED_FOR_S = 3.0
 #: A reply is current for one interval, or for this long.
 _CURRENT_S = 1.0
-#: Requests due within this time go out together: every wake-up costs CPU time.
-_GATHER_S = 0.01
+#: Together with one that is due, polls are sent that will be due within this part of their interval, and this time:
+#: every wake-up costs CPU time. At the default rates all others join ATTITUDE.
+_EARLY, _EARLIEST_S = 0.2, 0.04
 #: A lost reply reduces all rates by a tenth, each received one restores a little: 1 % losses change nothing, 10 % halve
 #: the rates.
 _LOSS_FACTOR = 0.9
@@ -97,6 +98,7 @@ class _Slot:
     wanted_s: float = inf
     followed_until: float = -inf
     interval_s: float = inf
+    early_s: float = 0.0
     asked_at: float = -inf
     due: float = -inf
     is_asked: bool = False
@@ -125,6 +127,7 @@ class _Slot:
 
     def set_interval(self, interval_s: float) -> None:
         self.interval_s = interval_s
+        self.early_s = min(interval_s * _EARLY, _EARLIEST_S)
         self.due = inf if interval_s == inf else self.asked_at + interval_s
 
     def asked(self, now: float) -> None:
@@ -215,17 +218,18 @@ class PollSchedule:
         return 0.0 if slot is None or slot.wanted_s == inf else self._interval(slot, self._line_scale)
 
     def ask(self, link: MspLink, now: float, *, beside_missions: bool) -> None:
-        """Send the requests that are due, as far as the link has room."""
+        """Send the requests that are due, and those nearly due with them, as far as the link has room."""
         self._look_at(link, beside_missions, now)
-        self._asked_at = limit = now
-        soon = now + _GATHER_S
-        near = [slot for slot in self._slots.values() if slot.due <= soon]
-        while near and now >= self._free_at:
-            room = link.room
-            ready = [slot for slot in near if slot.may_be_asked_at(link, room) <= limit]
-            if not ready:
+        self._asked_at = now
+        slots = self._slots.values()
+        if min(map(_DUE, slots), default=inf) > now:
+            return
+        room = link.room
+        for slot in sorted([slot for slot in slots if slot.due - slot.early_s <= now], key=_DUE):
+            if now < self._free_at:
                 return
-            slot = max(ready, key=lambda slot: (now - slot.asked_at) / slot.interval_s)
+            if slot.may_be_asked_at(link, room) > now + slot.early_s:
+                continue
             if slot.is_asked:
                 slot.misses += 1
                 if slot.backoff > 1:
@@ -235,8 +239,7 @@ class PollSchedule:
             slot.asked(now)
             self._free_at = max(self._free_at, now - _BURST_S) + slot.cost / self._budget
             link.send(slot.request, now)
-            limit = soon
-            near = [slot for slot in near if slot.due <= soon]
+            room = link.room
 
     def answered(self, frame: MspFrame) -> None:
         """Take a reply to a command that is polled."""

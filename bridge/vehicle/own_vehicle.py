@@ -54,6 +54,7 @@ _ALL_STREAMS = messages.MAV_DATA_STREAM_ALL
 _ROWS = {row.msgid: row for row in TELEMETRY}
 _DEFAULTS_S = {row.msgid: row.interval_s for row in TELEMETRY}
 _HOME = (make.home_position, make.gps_global_origin)
+_POLLS = (*set(POLL_FOR.values()), Msp.FLIGHT)
 _SYS_STATUS = _ROWS[messages.MAVLINK_MSG_ID_SYS_STATUS]
 
 
@@ -84,6 +85,8 @@ class OwnVehicle:
         self.capabilities: Callable[[], int] = lambda: 0
         self._announced_home: Home | None = None
         self._also_wanted: Mapping[type[Reading], float] = {}
+        #: The intervals of the messages and readings that `_rows` and the polls follow.
+        self._wishes: tuple[Mapping[int, float], Mapping[type[Reading], float]] = {}, {}
         self._newcomers_due = inf
         self._polls_set_at, self._polls_due = -inf, inf
         #: Armed, mode, failsafe and lost as last announced.
@@ -264,19 +267,21 @@ class OwnVehicle:
     def _set_polls(self, everyone: Sequence[GroundStation]) -> None:
         """Set each poll to the highest rate requested."""
         self._polls_due = inf
-        wanted: dict[Msp, float] = {}
-        for reading, interval_s in self._also_wanted.items():
-            _want(wanted, POLL_FOR.get(reading), interval_s)
-        self._rows = {}
-        intervals_s = fastest_s(everyone, _DEFAULTS_S)
-        for row in TELEMETRY:
-            interval_s = intervals_s[row.msgid]
-            if interval_s < inf:
-                for trigger in row.readings:
-                    self._rows.setdefault(trigger, []).append(row)
-            _want(wanted, row.poll, interval_s)
         polls = self._session.polls
-        polls.want(wanted)
+        wishes = fastest_s(everyone, _DEFAULTS_S), self._also_wanted
+        if wishes != self._wishes:
+            self._wishes = intervals_s, also_wanted = wishes
+            wanted: dict[Msp, float] = {}
+            for reading, interval_s in also_wanted.items():
+                _want(wanted, POLL_FOR.get(reading), interval_s)
+            self._rows = {}
+            for row in TELEMETRY:
+                interval_s = intervals_s[row.msgid]
+                if interval_s < inf:
+                    for trigger in row.readings:
+                        self._rows.setdefault(trigger, []).append(row)
+                _want(wanted, row.poll, interval_s)
+            polls.want(wanted)
         is_polled = self._session.state.link is not None
         self._session.vehicle.stale_s = _stale_ages_s(polls.line_interval_s) if is_polled else {}
 
@@ -398,9 +403,10 @@ class OwnVehicle:
 
 def _stale_ages_s(line_interval_s: Callable[[Msp], float]) -> dict[type[Reading], float]:
     """The maximum ages of readings that the line is too slow to poll every second."""
-    intervals = {reading: line_interval_s(poll) for reading, poll in POLL_FOR.items()}
-    intervals[MissionLeg] = max(intervals[MissionLeg], line_interval_s(Msp.FLIGHT))  # a Harakiri's
-    return {reading: STALE_S * interval_s for reading, interval_s in intervals.items() if interval_s > 1.0}
+    slow = {poll: interval_s for poll in _POLLS if (interval_s := line_interval_s(poll)) > 1.0}
+    if Msp.FLIGHT in slow:  # a Harakiri's
+        slow[Msp.NAV_STATUS] = max(slow[Msp.FLIGHT], slow.get(Msp.NAV_STATUS, 0.0))
+    return {reading: STALE_S * slow[poll] for reading, poll in POLL_FOR.items() if poll in slow}
 
 
 def _want(wanted: dict[Msp, float], poll: Msp | None, interval_s: float) -> None:

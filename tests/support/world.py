@@ -26,9 +26,8 @@ from bridge.fc.states.cli import Cli
 from bridge.fc.states.mavlink import MavlinkLine
 from bridge.fc.states.msp import Polling
 from bridge.fc.states.searching import SPEEDS
-from bridge.gcs.ground import FrameListener
+from bridge.gcs.ground import MAX_DATAGRAM_SIZE, FrameListener
 from bridge.gcs.rights import LinkAccess
-from bridge.gcs.routes import MAX_DATAGRAM_SIZE
 from bridge.gcs.station import Peer
 from bridge.line.conversation import Conclude, FindPending, NoteReader, Recall, Save, StoreEffect
 from bridge.model.events import BridgeEvent, Level

@@ -8,7 +8,7 @@ from fastcrc.crc16 import mcrf4xx
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.gcs.ground import EXPIRY_S
+from bridge.gcs.ground import EXPIRY_S, MAX_DATAGRAM_SIZE
 from bridge.gcs.ground_station import GroundStation as GcsStation
 from bridge.gcs.message_rates import share_out, take_due
 from bridge.gcs.places import MAX_PEERS
@@ -16,6 +16,7 @@ from bridge.gcs.rights import LinkAccess
 from bridge.gcs.station import Peer, Severity
 from bridge.gcs.texts import split_text
 from protocols.mavlink.dialect import CRC_EXTRA, Message, messages
+from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mission_item import MissionResult
 from tests.support.conversations import Upload, waypoints
 from tests.support.world import GroundStation, World, ready_world
@@ -125,6 +126,24 @@ def test_the_heartbeat_reflects_the_flight_controller_and_arming() -> None:
     assert beat.system_status == m.MAV_STATE_ACTIVE
     assert beat.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED
     assert station.texts() == ["Found Harakiri with the mission extension"]
+
+
+def test_messages_of_one_moment_share_datagrams() -> None:
+    """Up to 280 bytes, in order; MAVROS cuts longer ones."""
+    world = ready_world()
+    station = GroundStation(world)
+    station.send(gcs_heartbeat())
+    world.run(5)
+    ground = world.inside.ground
+    ground.take_datagrams()
+    values = [m.MAVLink_named_value_int_message(0, b"number", number) for number in range(1, 21)]
+    for value in values:
+        ground.broadcast(value)
+    datagrams = [data for peer, data in ground.take_datagrams() if peer == station.peer]
+    assert all(len(data) <= MAX_DATAGRAM_SIZE for data in datagrams)
+    assert len(datagrams) <= 3
+    frames = MavlinkSplitter().feed(b"".join(datagrams))
+    assert [frame.payload[4] for frame in frames] == [value.value for value in values]
 
 
 def test_a_station_silent_for_a_minute_gets_no_more_messages() -> None:

@@ -80,6 +80,16 @@ def test_everything_is_polled_at_the_start() -> None:
     assert set(asked) == {poll.command for poll in POLLS if poll.needed_s < inf}
 
 
+def test_slower_polls_go_out_with_the_fastest() -> None:
+    line = Line()
+    line.schedule.want({Msp.ATTITUDE: 0.04, Msp.RAW_GPS: 0.2, Msp.ALTITUDE: 0.2, Msp.MOTOR: 0.5, Msp.RC: 0.5})
+    line.run(5)
+    before = len(line.asked)
+    asked = line.run(20)
+    assert len({at for at, _ in line.asked[before:]}) <= 26 * 20
+    assert [round(asked[command] / 20) for command in (Msp.ATTITUDE, Msp.RAW_GPS, Msp.MOTOR)] == [25, 5, 2]
+
+
 def test_a_refused_poll_is_tried_twice_per_flight_controller() -> None:
     line = Line(answer=lambda command: -1 if command == Msp.WP else REPLY_PAYLOADS[command])
     assert line.run(60)[Msp.WP] == 2
