@@ -62,12 +62,13 @@ from reports.vehicle_groups import Group
 class FcOutput(NamedTuple):
     """For the flight controller's port: the bytes to write, in order, and the speed it must have, None if it has none.
 
-    `may_gather`: so much is read that waiting a little for more saves time.
+    `may_gather`: so much is read that waiting a little for more saves time. `asks`: a reply to this must not wait.
     """
 
     data: Sequence[bytes]
     speed: int | None
     may_gather: bool
+    asks: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -261,9 +262,11 @@ class Bridge:
             return None
         state = self._session.state
         self._has_line_changed, self._line_due = False, state.due
-        output = FcOutput([*self._session.output], state.speed, self.is_passing_through)
+        data = [*self._session.output]
         self._session.output.clear()
-        return output
+        # Heartbeats and other broadcasts are not replied to.
+        asks = not self.is_passing_through or any(MavlinkFrame(frame).has_target_field for frame in data)
+        return FcOutput(data, state.speed, self.is_passing_through, asks)
 
     @property
     def fc_trouble(self) -> str:

@@ -130,7 +130,7 @@ class FcConnection:
             data = b"".join(output.data)
             if self.capture is not None:
                 self.capture.note(UartAction.WRITE, self._speed, data)
-            self._port.write(data)
+            self._port.write(data, asks=output.asks)
             self._traffic.pieces_sent += 1
             self._traffic.bytes_sent += len(data)
 

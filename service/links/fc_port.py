@@ -25,11 +25,17 @@ _RETRY_S = 0.25
 _IN_USE_RETRY_S = 2.0
 #: Unsent bytes above this are dropped: ground stations can send faster than a UART.
 _MAX_UNSENT = 8192
-#: At this rate, reads are gathered: a delay of 2 ms costs the pilot less than so many wake-ups cost the CPU. Timers
-#: round up to whole ms.
-_MANY_READS = 100
-_RATE_WINDOW_S = 0.1
-_GATHER_S = 0.0019
+#: So many reads within a window are gathered from then on, several a wake-up: telemetry that is a few ms older costs
+#: the pilot less than the wake-ups cost the CPU. Timers round up to whole ms.
+_MANY_READS, _RATE_WINDOW_S = 25, 0.25
+_GATHERED = 4
+_SHORTEST_DELAY_S, _LONGEST_DELAY_S = 0.0019, 0.0119
+#: Larger reads are not gathered: they need few wake-ups anyway.
+_LARGE_READ = 512
+#: The part of the rate at the start of gathering within which its delay still fits.
+_SAME_RATE = (0.75, 1.5)
+#: After a request, replies are read without delay for this long.
+_REPLIES_S = 0.25
 
 _log = structlog.get_logger()
 
@@ -70,13 +76,15 @@ class FcPort:
         self.trouble = ""
         #: Bytes dropped because the line was too slow.
         self.dropped_bytes = 0
-        #: Reads may be delayed by a few ms at high rates, because no reply is pending.
+        #: Reads may be delayed by a few ms, unless a reply is pending.
         self.may_gather = False
         self._gathering: asyncio.TimerHandle | None = None
+        self._gathers_from = 0.0
+        self._delay_s = 0.0
         self._window_began = 0.0
         self._window_bytes = 0  # received before it
         self._next_look = _MANY_READS
-        self._gather_above = 0.0  # bytes in a window
+        self._bytes_per_s = 0.0  # when gathering began
 
     async def run(self) -> None:
         """Open the port and keep reopening it; cancel to end."""
@@ -137,10 +145,13 @@ class FcPort:
         except DEVICE_ERRORS as error:
             self._shut(str(error))
 
-    def write(self, data: bytes) -> None:
-        """Write without blocking; the rest is sent when the port is writable."""
+    def write(self, data: bytes, *, asks: bool = False) -> None:
+        """Write without blocking; the rest is sent when the port is writable. `asks`: a reply is expected."""
         if self._device is None:
             return
+        if asks and self.may_gather:
+            self._gathers_from = self._loop.time() + _REPLIES_S
+            self._read_at_once()
         if self._unsent:
             if len(self._unsent) + len(data) > _MAX_UNSENT:
                 self.dropped_bytes += len(data)
@@ -173,24 +184,31 @@ class FcPort:
             self._on_data(data)
         if self._traffic.pieces_received >= self._next_look:
             # The clock is read only now: at each read it would cost too much.
-            now = self._loop.time()
-            if self.may_gather and self._device is not None and now < self._window_began + _RATE_WINDOW_S:
-                self._loop.remove_reader(self._descriptor)
-                self._gather_above = 0.75 * (self._traffic.bytes_received - self._window_bytes)
-                self._gathering = self._loop.call_later(_GATHER_S, self._gather)
-            self._begin_window(now)
+            self._judge_rate(self._loop.time())
+
+    def _judge_rate(self, now: float) -> None:
+        """Begin to gather if there were many small reads in a short time."""
+        window_s, size = now - self._window_began, self._traffic.bytes_received - self._window_bytes
+        self._begin_window(now)
+        is_busy = window_s < _RATE_WINDOW_S and size < _MANY_READS * _LARGE_READ
+        if is_busy and self.may_gather and self._device is not None and now >= self._gathers_from:
+            self._loop.remove_reader(self._descriptor)
+            delay_s = _GATHERED * window_s / _MANY_READS
+            self._delay_s = min(max(delay_s, _SHORTEST_DELAY_S), _LONGEST_DELAY_S)
+            self._bytes_per_s = size / window_s
+            self._gathering = self._loop.call_later(self._delay_s, self._gather)
 
     def _gather(self) -> None:
-        """Read what arrived during the delay, and repeat until the rate drops."""
+        """Read what arrived during the delay, and repeat until the rate changes."""
         data = self._read()
         if self._device is None:
             return
-        self._gathering = self._loop.call_later(_GATHER_S, self._gather)
+        self._gathering = self._loop.call_later(self._delay_s, self._gather)
         now = self._loop.time()
-        if now >= self._window_began + _RATE_WINDOW_S:
-            if self._traffic.bytes_received - self._window_bytes < self._gather_above or not self.may_gather:
-                self._stop_gathering()
-                self._loop.add_reader(self._descriptor, self._readable)
+        if (window_s := now - self._window_began) >= _RATE_WINDOW_S:
+            least, most = (self._bytes_per_s * window_s * part for part in _SAME_RATE)
+            if not (self.may_gather and least <= self._traffic.bytes_received - self._window_bytes <= most):
+                self._read_at_once()
             self._begin_window(now)
         if data:
             self._on_data(data)
@@ -199,6 +217,11 @@ class FcPort:
         self._window_began = now
         self._window_bytes = self._traffic.bytes_received
         self._next_look = self._traffic.pieces_received + _MANY_READS
+
+    def _read_at_once(self) -> None:
+        if self._gathering is not None:
+            self._stop_gathering()
+            self._loop.add_reader(self._descriptor, self._readable)
 
     def _stop_gathering(self) -> None:
         if self._gathering is not None:

@@ -51,6 +51,9 @@ class Line:
         self._task = asyncio.get_running_loop().create_task(self.port.run())
         return self.port
 
+    def is_gathering(self) -> bool:
+        return self.port._gathering is not None
+
     async def stop(self) -> None:
         self._task.cancel()
         await asyncio.wait([self._task])
@@ -126,10 +129,26 @@ async def test_reads_are_batched_only_at_high_rates(line: Line) -> None:
         # At a lower rate each frame is read on arrival.
         sent = await line.feed(sent, 50, 50)
         await line.has_come(sent)
-        await until_async(lambda: port._gathering is None, "the end of gathering")
+        await until_async(lambda: not line.is_gathering(), "the end of gathering")
     assert line.numbers() == list(range(sent))
     assert line.lost == []
     assert line.opened == 1
+    await line.stop()
+
+
+async def test_gathering_ends_when_a_reply_is_expected(line: Line) -> None:
+    port = line.start()
+    await until_async(lambda: line.opened, "the port")
+    port.may_gather = True
+    sent = 0
+    while not line.is_gathering():
+        sent = await line.feed(sent, 100, 1_000)
+    port.write(b"a heartbeat")
+    assert line.is_gathering()
+    port.write(b"a request", asks=True)
+    assert not line.is_gathering()
+    sent = await line.feed(sent, 30, 1_000)
+    await line.has_come(sent)
     await line.stop()
 
 
@@ -138,7 +157,7 @@ async def test_a_port_that_falls_silent_during_batched_reads_is_not_lost(line: L
     await until_async(lambda: line.opened, "the port")
     port.may_gather = True
     sent = await line.feed_until_gathered()
-    await until_async(lambda: port._gathering is None, "the end of gathering")
+    await until_async(lambda: not line.is_gathering(), "the end of gathering")
     await line.feed(sent, 1, 50)
     await line.has_come(sent + 1)
     assert (line.lost, line.opened) == ([], 1)

@@ -152,6 +152,23 @@ def test_frames_from_ground_stations_arrive_unchanged() -> None:
     assert one.messages() == []
 
 
+def test_only_a_frame_with_a_target_asks_for_a_reply() -> None:
+    """Heartbeats must not end the gathering of reads every second."""
+    world, _, (station, *_) = passing()
+    asks = []
+    for message in (
+        mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3),
+        mavlink.MAVLink_param_request_list_message(1, 1),
+    ):
+        frame = bytes(message.pack(mavlink.MAVLink(None, srcSystem=station.sysid, srcComponent=station.compid)))
+        world.bridge.gcs_received(station.peer, frame, world.now, datagram=True)
+        output = world.bridge.take_fc_output()
+        assert output is not None
+        assert output.data == [frame]
+        asks.append(output.asks)
+    assert asks == [False, True]
+
+
 def test_an_addressed_frame_goes_only_to_its_target() -> None:
     world, autopilot, (one, other) = passing()
     autopilot.send(mavlink.MAVLink_mission_ack_message(255, 190, 0, 0))
