@@ -5,16 +5,18 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.line import Line
-from benchmarks.processes import ROOT, daemon, running
+from benchmarks.processes import ROOT, BenchmarkError, daemon, running
 
 OURS, FLOOR, MAVPROXY, MAVP2P = "naze-bridge", "C floor", "MAVProxy", "mavp2p"
 MAVLINK_ROUTER = "mavlink-router"
+_OTHERS = {FLOOR, MAVLINK_ROUTER, MAVP2P, MAVPROXY}
 _SPEED = 57600
 _MAVPROXY = Path(sys.executable).parent / "mavproxy.py"
 #: Starts a forwarder in a folder, on a line; yields its process id.
@@ -29,8 +31,27 @@ class Forwarder:
     start: _Start
 
 
-def forwarders() -> list[Forwarder]:
-    """The forwarders on this machine: the floor needs cc, MAVProxy comes with `make test`'s dependencies.
+def usable_forwarders() -> list[Forwarder]:
+    """Ours, and the others that work on this machine; prints which do not, and why."""
+    installed = {each.name: each for each in _installed()}
+    for name in sorted(_OTHERS - installed.keys()):
+        print(f"  without {name}: not installed")
+    for name in sorted(installed.keys() & _OTHERS):
+        try:
+            with (
+                tempfile.TemporaryDirectory() as folder,
+                closing(Line()) as line,
+                installed[name].start(Path(folder), line),
+            ):
+                line.warm_up()
+        except (BenchmarkError, OSError, subprocess.CalledProcessError) as error:
+            print(f"  without {name}: {error}")
+            del installed[name]
+    return [*installed.values()]
+
+
+def _installed() -> list[Forwarder]:
+    """The floor needs cc, MAVProxy comes with `make test`'s dependencies.
 
     mavlink-router and mavp2p are looked for as $MAVLINK_ROUTERD and $MAVP2P, and on the path.
     """

@@ -14,7 +14,7 @@ from random import Random
 
 from benchmarks.damage import Damage, damaged_stream
 from benchmarks.figure import Figure
-from benchmarks.forwarders import OURS, Forwarder, forwarders
+from benchmarks.forwarders import OURS, Forwarder, usable_forwarders
 from benchmarks.line import Line
 from protocols.mavlink.dialect import messages
 
@@ -27,7 +27,7 @@ _PAYLOAD_SIZE = 29
 
 def measure() -> list[Figure]:
     """Send the same streams through all forwarders on this machine."""
-    return [figure for forwarder in forwarders() for figure in _figures(forwarder)]
+    return [figure for forwarder in usable_forwarders() for figure in _figures(forwarder)]
 
 
 def _figures(forwarder: Forwarder) -> Iterator[Figure]:

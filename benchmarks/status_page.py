@@ -20,7 +20,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from benchmarks.figure import Figure, Floor
-from benchmarks.idle import cpu_percent, listener, resident_mb, udpout
+from benchmarks.idle import cpu_percents, listener, resident_mb, udpout
 from benchmarks.missions import random_mission
 from benchmarks.processes import ENVIRONMENT, ROOT, daemon, simulated_naze
 from service.daemon.client import ask_daemon
@@ -45,7 +45,7 @@ def measure() -> list[Figure]:
         bridge = stack.enter_context(daemon(folder, board.link, udpout(ground), "--config", str(config)))
         bridge.wait_for_event("fc.found")
         bridge.wait_for_event("web.listening")
-        percent = cpu_percent(bridge.pid)
+        (percent,) = cpu_percents(bridge.pid)
         resident = resident_mb(bridge.pid)
         state_dir = folder / "state"
         quiet = _pushes_ms(state_dir)

@@ -24,7 +24,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from benchmarks.figure import Figure, Floor
-from benchmarks.idle import cpu_percent, listener, udpout
+from benchmarks.idle import cpu_percents, listener, udpout
 from benchmarks.processes import cpu_s, daemon, floor_program, simulated_naze
 from bridge.bridge import Bridge
 from bridge.config import BridgeConfig
@@ -78,7 +78,7 @@ def _cpu(folder: Path) -> Figure:
     ):
         process.wait_for_event("fc.found")
         request_rates(ground)
-        percent = cpu_percent(process.pid)
+        (percent,) = cpu_percents(process.pid)
     return Figure(f"daemon at {POLLS_HZ} polls a second, CPU of one core", percent, "%", None, 5.0)
 
 
@@ -188,8 +188,8 @@ def _noise() -> list[Figure]:
         bridge.fc_received(chance.randbytes(_CHUNK_BYTES), now)
         bridge.tick(now)
         bridge.take_fc_output()
-        kinds = [MavlinkSplitter().feed(frame)[0].msgid for _, frame in bridge.take_datagrams()]
-        false_frames += sum(msgid == messages.MAVLINK_MSG_ID_ATTITUDE for msgid in kinds)
+        frames = MavlinkSplitter().feed(b"".join(data for _, data in bridge.take_datagrams()))
+        false_frames += sum(frame.msgid == messages.MAVLINK_MSG_ID_ATTITUDE for frame in frames)
         if number % (chunks // _SAMPLES) == 0:
             memory.append(tracemalloc.get_traced_memory()[0])
         bridge.gcs_received(ground, _frame(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3)), now, datagram=True)
