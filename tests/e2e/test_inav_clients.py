@@ -14,6 +14,7 @@ from bridge.missions.list_check import check_list
 from protocols.mission_item import Command, Frame
 from protocols.msp.nav import NavRecord
 from reports.verdict import Verdict
+from simulator.inav.boxes import BOXES, NAV_WP
 from tests.e2e.test_mavsdk import fields, pressed_again, raw_items, refusal_of, vehicle_at
 from tests.support.benches import Bench, Starter
 from tests.support.mavproxy import MavProxy
@@ -117,6 +118,26 @@ async def test_mavsdk_writes_and_reads_a_fence_and_rally_points(inav: Bench) -> 
     assert [[fields(item) for item in items] for items in read] == [
         [stored_fields(i) for i in as_items(p)] for p in (fence, rally)
     ]
+
+
+async def test_mavsdk_and_mission_planner_set_the_waypoint_in_flight(inav: Bench) -> None:
+    """MAVSDK waits for a MISSION_CURRENT with that item; Mission Planner's window hangs until any comes."""
+    planner = inav.mission_planner()
+    async with vehicle_at(inav.daemon.port) as vehicle:
+        missions = MissionRawAsync(vehicle)
+        plan = raw_items([HOME, *(waypoint(number, p2=0.0) for number in range(1, 5))])
+        await pressed_again(lambda: missions.upload_mission(plan), lambda: None)
+        with ExitStack() as landing:
+            for end in ("armed 0", "boxes 0"):
+                landing.callback(inav.board.set, end)
+            inav.board.set("armed 1")
+            planner.wait_for_armed(True)
+            inav.board.set(f"boxes {1 << BOXES['9.1.0'].index(NAV_WP)}")
+            planner.wait_for_text("TO WP 1/4")
+            await pressed_again(lambda: missions.set_current_mission_item(3), lambda: None)
+            planner.wait_for_text("TO WP 3/4")
+            assert planner.set_current(4) == 1
+            planner.wait_for_text("TO WP 4/4")
 
 
 def test_mavproxy_loads_lists_and_clears_120_records(inav: Bench, tmp_path: Path) -> None:
