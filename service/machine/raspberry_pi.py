@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Raspberry Pi models: the device of the UART on GPIO 14 and 15, and the config.txt line that enables it."""
 
+import re
 from dataclasses import dataclass
 
 from service.machine.host import Host
@@ -36,3 +37,9 @@ def boot_file(host: Host, name: str) -> str | None:
     """Path of config.txt or cmdline.txt; None if there is none."""
     paths = [f"{folder}/{name}" for folder in BOOT_FOLDERS]
     return next((path for path in paths if host.path(path).exists()), None)
+
+
+def wifi_country(host: Host) -> str | None:
+    """The country, such as "DE", that raspi-config has set; without one the radio is blocked."""
+    found = re.search(r"cfg80211\.ieee80211_regdom=([A-Z]{2})", host.read(boot_file(host, "cmdline.txt") or ""))
+    return found and found[1]

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from payloads.mission_data import Json
 from service.cli.doctor.checked import Checked, Grade
-from service.cli.doctor.flight_controller import check_flight_controller
+from service.cli.doctor.flight_controller import check_daemons, check_flight_controller
 from service.cli.doctor.machine import check_clock, check_database, check_disk, check_power, check_versions
 from service.cli.doctor.network import check_keys, check_ports, check_wifi
 from service.cli.doctor.port import (
@@ -23,7 +23,6 @@ from service.cli.doctor.port import (
     check_port,
     holder_of_port,
 )
-from service.cli.doctor.running import check_daemons, check_running
 from service.cli.doctor.zenoh import check_zenoh
 from service.daemon.client import ControlError
 from service.machine.host import Host
@@ -54,15 +53,7 @@ def examine(
     yield from results
     is_free = not any(found.grade is Grade.PROBLEM for found in results)
     is_free = is_free and all(holder_of_port(host, port) is None for port in ports)
-    heard: list[Json] = [] if running is None else [running]
-
-    def ask_and_keep() -> Json:
-        heard.append(ask_port())
-        return heard[-1]
-
-    yield from check_flight_controller(fc, running, ask_and_keep if is_free else None, source)
-    for status in heard:
-        yield from check_running(status)
+    yield from check_flight_controller(fc, running, ask_port if is_free else None, source)
     yield from check_wifi(host, settings.gcs)
     yield from check_ports(host, settings.gcs)
     yield from check_keys(settings.access)

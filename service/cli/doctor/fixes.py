@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The remedies that the status page's "Fix it" carries out, as changes of setup: its undo reverts them, too."""
 
-import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +9,7 @@ from service.cli.setup.answers import SetupChoices, earlier_choices
 from service.cli.setup.change import Change, Run, Step
 from service.cli.setup.steps import console_steps, settings_steps, uart_steps
 from service.machine.host import Host
-from service.machine.raspberry_pi import boot_file
+from service.machine.raspberry_pi import wifi_country
 from service.settings.config_files import PAGE_FILE, SETUP_FILE
 
 #: Returns None where this machine lacks something that the remedy needs.
@@ -67,6 +66,5 @@ def stop_modem_manager(_host: Host) -> Step:
 
 
 def unblock_wifi(host: Host) -> Step | None:
-    if re.search(r"cfg80211\.ieee80211_regdom=[A-Z]{2}", host.read(boot_file(host, "cmdline.txt") or "")) is None:
-        return None  # without a country the radio is blocked again
-    return Step("switch the Wi-Fi on", [Run(("rfkill", "unblock", "wlan"))])
+    step = Step("switch the Wi-Fi on", [Run(("rfkill", "unblock", "wlan"))])
+    return step if wifi_country(host) else None  # without a country the radio is blocked again

@@ -1,38 +1,49 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The check of the flight controller: asks a running daemon, else listens on the port."""
+"""Checks of the flight controller: its reply to a daemon or to doctor itself, and the troubles in a daemon's status."""
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterator
 
+from bridge.controllers.harakiri.profile import UNPATCHED
 from bridge.fc.states.base import Closed
 from bridge.fc.states.cli import Cli
 from payloads.mission_data import Json
+from protocols.mavlink.signing import Check
 from service.cli.doctor.checked import Checked, note, ok, problem
-from service.cli.doctor.fixes import set_fc
+from service.cli.doctor.fixes import restart_service, set_fc, stop_programs
 from service.cli.doctor.port import fc_remedy
 from service.daemon.client import ControlError
+from service.machine.host import Host, Process
+from service.machine.package import page
 from service.settings.addresses import FcAddress, SerialFc
 
 _WIRING = "is it powered? TX goes to RX, RX to TX, GND to GND; a Naze's USB socket is empty; MSP is on at this UART"
 
 _AGAIN = "after that, run `sudo naze-bridge doctor` again"
+#: Damaged replies a minute. A good wire has none for hours.
+_MOST_DAMAGED = 6
+_LEAST_DAMAGED = 10
+_UNIT = "/naze-bridge.service"
+_REFUSED = re.compile(r"(\d+) x (.*) \((.*)\)")
 
 
 def check_flight_controller(
     fc: FcAddress, running: Json | None, ask_port: Callable[[], Json] | None, source: str = ""
 ) -> list[Checked]:
-    """Find the flight controller.
+    """Find the flight controller, and the troubles that its line and its stations have.
 
     `running`: a daemon's status; `ask_port` returns one or raises ControlError. `source`: where `fc` is set.
     """
     if running is not None:
-        return [ok("daemon", "running"), _who(fc, running, source)]
+        return [ok("daemon", "running"), _who(fc, running, source), *check_running(running)]
     if ask_port is None:
         remedy = "fix its port first, then run `sudo naze-bridge doctor`"
         return [note("flight controller", f"{fc} was not checked", remedy)]
     try:
-        return [_who(fc, ask_port(), source)]
+        status = ask_port()
     except ControlError as error:
         return [problem("flight controller", str(error), _AGAIN if str(error) == Cli.trouble else _WIRING)]
+    return [_who(fc, status, source), *check_running(status)]
 
 
 def _who(fc: FcAddress, status: Json, source: str) -> Checked:
@@ -60,3 +71,55 @@ def _silent(fc: FcAddress, status: Json, source: str) -> Checked:
         return problem("flight controller", found, remedy, set_fc(fc.path, source))
     remedy = "is MSP on at this UART, and nothing else (GPS, receiver)? Is TX on RX only, with GND at both ends?"
     return problem("flight controller", found, remedy)
+
+
+def check_running(status: Json) -> Iterator[Checked]:
+    """Yield a finding for each trouble in the daemon's status. It may be of doctor's own bridge."""
+    if status["flight_controller"] == UNPATCHED.name:
+        remedy = f"telemetry works; for missions flash the patch: {page('docs/howto/flash-the-patch.md')}"
+        yield note("missions", "this Harakiri has no mission extension, so it stores none", remedy)
+    yield from _line(status)
+    yield from _refused(status)
+    if status.get("store_trouble"):
+        remedy = "see disk and missions below; then: sudo systemctl restart naze-bridge"
+        found = f"the daemon cannot store missions: {status['store_trouble']}"
+        yield problem("store", found, remedy, restart_service)
+
+
+def _line(status: Json) -> Iterator[Checked]:
+    damaged, found_s = status.get("bad_checksums") or 0, status.get("found_s")
+    if found_s is None or damaged < _LEAST_DAMAGED or damaged * 60 < _MOST_DAMAGED * found_s:
+        return
+    remedy = "shorten the wires, keep them away from motors and regulators, connect GND at both ends, check 3.3 V"
+    yield problem("line", f"{damaged} damaged replies in {found_s / 60:.0f} min", remedy)
+
+
+def _refused(status: Json) -> Iterator[Checked]:
+    for text in status.get("refused", ()):
+        found = _REFUSED.fullmatch(text)
+        if found is None:
+            continue
+        count, why, link = found.groups()
+        if why in (Check.UNSIGNED.value, Check.WRONG.value):
+            remedy = (
+                f"enter the key in the ground station ({page('docs/signing.md')}); "
+                "sudo naze-bridge setup --new-key makes a new one and shows it"
+            )
+            yield note("key", f"{count} requests on {link} were refused: {why}", remedy)
+
+
+def check_daemons(host: Host) -> Checked | None:
+    """Check that no two daemons have the same port open: they take each other's replies from it."""
+    daemons = [each for each in host.processes() if each.is_naze_bridge and "run" in each.arguments]
+    by_port: dict[str, list[Process]] = {}
+    for daemon in daemons:
+        for port in host.ports_of(daemon):
+            by_port.setdefault(port, []).append(daemon)
+    port, rivals = next(((port, found) for port, found in by_port.items() if len(found) > 1), ("", []))
+    if not rivals:
+        return None
+    rivals.sort(key=lambda each: _UNIT not in host.read(f"/proc/{each.pid}/cgroup"))  # the service first: it stays
+    pids = [str(each.pid) for each in rivals]
+    remedy = f"stop all but one: sudo kill {' '.join(pids[1:])}"
+    found = f"{len(pids)} daemons have {port} open (pids {', '.join(pids)})"
+    return problem("daemon", found, remedy, stop_programs(*(each.pid for each in rivals[1:])))

@@ -9,12 +9,12 @@ from inspect import signature
 from typing import BinaryIO
 
 from payloads.mission_data import Json
-from service.cli.setup.change import Machine, Step
+from service.cli.setup.change import Machine, Step, later
 from service.cli.setup.undo import UndoLog
 from service.machine.host import Host
 
-#: A timer's default accuracy is a minute. The reply must arrive at the page before what ends the connection.
-_LATER = ("systemd-run", "--quiet", "--collect", "--on-active=2", "--timer-property=AccuracySec=100ms")
+#: The reply must arrive at the page before what ends the connection.
+DELAY_S = 2
 _UNIT = ("naze-bridge", "naze-bridge.service")
 _ENDING = ("restart", "try-restart", "disable", "stop")
 
@@ -29,7 +29,7 @@ class DeferredRestarts(Machine):
     def run(self, command: Sequence[str], timeout_s: float = 60) -> str:
         ends_bridge = command[0] == "systemctl" and command[1] in _ENDING and command[-1] in _UNIT
         ends_pi = tuple(command) == ("systemctl", "reboot")
-        return super().run((*_LATER, *command) if ends_bridge or ends_pi else command, timeout_s)
+        return super().run(later(command, DELAY_S) if ends_bridge or ends_pi else command, timeout_s)
 
 
 @dataclass(frozen=True, slots=True)

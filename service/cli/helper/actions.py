@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The actions of the helper. Each recomputes what it changes from this machine; a request can only choose."""
 
-import re
 from collections.abc import Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -23,7 +22,7 @@ from service.cli.setup.undo import forget_last, undo_steps
 from service.daemon.client import STATUS, ask_daemon
 from service.machine.helper_socket import MAX_PACKAGE
 from service.machine.package import version
-from service.machine.raspberry_pi import boot_file, pi_model
+from service.machine.raspberry_pi import pi_model, wifi_country
 from service.settings.addresses import AddressError, parse_fc
 from service.settings.load import SERVICE_CONFIG, SERVICE_STATE
 from service.settings.passphrase import new_passphrase
@@ -35,7 +34,6 @@ def overview(pi: ThisPi) -> Json:
     """The answers to setup so far, the settings, and what can be undone. Changes nothing."""
     host = pi.host
     earlier = earlier_choices(host)
-    country = re.search(r"cfg80211\.ieee80211_regdom=([A-Z]{2})", host.read(boot_file(host, "cmdline.txt") or ""))
     model = pi_model(host)
     return {
         "is_set_up": earlier is not None,
@@ -43,7 +41,7 @@ def overview(pi: ThisPi) -> Json:
         "has_key": bool(current_key(host)),
         "hotspot": hotspot_name(host),
         "hotspot_is_open": hotspot_is_open(host),
-        "country": country and country[1],
+        "country": wifi_country(host),
         "name": host.read("/etc/hostname").strip(),
         "model": None if model is None else model.name,
         "can_undo": bool(undo_steps(host)[0]),

@@ -11,8 +11,8 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from service.cli.helper.action import HelperRefusal, ThisPi
-from service.cli.setup.change import Machine, Run, SetupError, WriteFile
+from service.cli.helper.action import DELAY_S, HelperRefusal, ThisPi
+from service.cli.setup.change import Machine, Run, SetupError, WriteFile, later
 from service.daemon.client import STATUS, ControlError, ask_daemon
 from service.machine.host import Host
 
@@ -92,9 +92,8 @@ def version_of(path: Path, machine: Machine) -> str | None:
 
 def start_update(pi: ThisPi, package: str) -> None:
     """Install a checked package in a process of its own, after the reply."""
-    unit = ("systemd-run", "--quiet", "--collect", "--unit=naze-bridge-update", "--on-active=2")
     program = (sys.executable, "-I", "-m", "service.cli.helper.packages", package)
-    Machine(pi.host).carry_out(Run((*unit, "--timer-property=AccuracySec=100ms", *program)))
+    Machine(pi.host).carry_out(Run(later(program, DELAY_S, "naze-bridge-update")))
 
 
 def update_outcome(host: Host) -> str:

@@ -13,7 +13,7 @@ import uuid
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from service.cli.setup.change import Change, Machine, RemoveFile, Run, SetupError, Step, WriteFile
+from service.cli.setup.change import Change, Machine, RemoveFile, Run, SetupError, Step, WriteFile, later
 from service.machine.captive_portal import HOTSPOT_CARD, dnsmasq_text
 from service.machine.host import Host
 
@@ -64,10 +64,9 @@ def hotspot_steps(host: Host, hotspot: tuple[str, str] | None) -> Iterator[Step]
 
 def switch_step(*, is_on: bool) -> Step:
     """Open or close the hotspot of an earlier setup, in a process of its own."""
-    unit = ("systemd-run", "--quiet", "--collect", f"--unit={CONNECTION}", f"--on-active={_DELAY_S}")
-    command = (*unit, "--timer-property=AccuracySec=100ms", sys.executable, "-I", "-m", "service.cli.setup.hotspot")
+    program = (sys.executable, "-I", "-m", "service.cli.setup.hotspot", *(() if is_on else (_CLOSE,)))
     purpose = f"{'open' if is_on else 'close'} the hotspot"
-    return Step(purpose, [Run(command if is_on else (*command, _CLOSE))], cuts_network=True)
+    return Step(purpose, [Run(later(program, _DELAY_S, CONNECTION))], cuts_network=True)
 
 
 def hotspot_is_open(host: Host) -> bool:

@@ -20,7 +20,7 @@ from service.cli.setup.change import Change, RemoveFile, Run, Step, WriteFile
 from service.cli.setup.hotspot import captive_steps, hotspot_steps
 from service.cli.setup.state_folder import other_devices
 from service.machine.host import Host
-from service.machine.raspberry_pi import boot_file, pi_model
+from service.machine.raspberry_pi import boot_file, pi_model, wifi_country
 
 _AVAHI_FILE = "/etc/avahi/services/naze-bridge.service"
 _OTHERS_FILE = "/etc/udev/rules.d/59-naze-bridge-others.rules"
@@ -97,7 +97,7 @@ def _is_on(text: str, line: str) -> bool:
 
 def _country(host: Host, answers: SetupChoices) -> Iterator[Step]:
     if answers.country is not None and host.path("/usr/bin/raspi-config").exists():
-        if f"cfg80211.ieee80211_regdom={answers.country}" in host.read(boot_file(host, "cmdline.txt") or ""):
+        if wifi_country(host) == answers.country:
             return
         command = ("raspi-config", "nonint", "do_wifi_country", answers.country)
         yield Step(f"set the Wi-Fi country to {answers.country}", [Run(command)])
