@@ -4,7 +4,7 @@
 The path of a sample from the UART:
     Daemon.flush -> Node.telemetry -> Publisher.put -> zenoh
 Anything that may wait takes the session's thread:
-    Daemon._log_event -> Node.event -> SessionThread -> zenoh
+    Daemon._happened -> Node.happened -> SessionThread -> zenoh
     zenoh -> Queries -> Answers or CommandQueries -> DaemonApi -> Question -> SessionThread -> zenoh
 """
 

@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The simulated boards other than the Naze."""
+"""`naze-bridge sim --kind`: the simulated boards other than the Naze."""
 
+import asyncio
+from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
+from simulator.board.memory_file import open_memory
 from simulator.board.msp_board import MspBoard
 from simulator.board.msp_firmware import BootFirmware
 from simulator.board.msp_options import MspOptions
 from simulator.board.options import Faults
 from simulator.board.telemetry_only import BASEFLIGHT, BETAFLIGHT, TelemetryFirmware
+from simulator.commands.run_board import Running, run_board
 from simulator.inav.firmware import InavFirmware
 from simulator.inav.mission import EEPROM_SIZE
 from simulator.inav.places import PLACES_SIZE
@@ -22,6 +27,7 @@ _FIRMWARE: dict[str, BootFirmware] = {
     "baseflight": partial(TelemetryFirmware, BASEFLIGHT),
 }
 KINDS = tuple(_FIRMWARE)
+_NAMES = {"inav": "INAV", "multiwii": "MultiWii", "betaflight": "Betaflight", "baseflight": "baseflight"}
 
 
 def new_eeprom(kind: str, options: MspOptions) -> bytearray:
@@ -38,3 +44,14 @@ def make_board(
     if eeprom is None:
         eeprom = memoryview(new_eeprom(kind, options))
     return MspBoard(_FIRMWARE[kind], eeprom, options, faults)
+
+
+def run_other_board(kind: str, options: MspOptions, faults: Faults, running: Running, state: Path | None) -> None:
+    """Run one until Ctrl-C. `state`: the file with its EEPROM."""
+    if running.tcp:
+        # A socket is served at once, with the ring of INAV's own simulator.
+        options = replace(options, baud=None, ring_size=2048, serial_task_ms=0.01)
+    eeprom = open_memory(state, bytes(new_eeprom(kind, options)), "name another file") if state else None
+    board = make_board(kind, options, faults, eeprom)
+    name = f"INAV {options.version}" if kind == "inav" else _NAMES[kind]
+    asyncio.run(run_board(board, name, running, lambda: board.is_alive))

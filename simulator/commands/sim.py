@@ -12,9 +12,8 @@ from simulator.board.flash import ERASED
 from simulator.board.memory_file import open_memory
 from simulator.board.msp_options import MspOptions
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol, Tree
-from simulator.commands.fc_kinds import KINDS
+from simulator.commands.fc_kinds import KINDS, run_other_board
 from simulator.commands.image import run_image
-from simulator.commands.other_boards import run_other_board
 from simulator.commands.play import play_capture
 from simulator.commands.run_board import Running, run_board
 from simulator.commands.stick_script import read_script
