@@ -106,7 +106,7 @@ def route(method: str, path: str, handler: Handler, *checks: Callable[[Request],
 def _check_body(request: Request, max_body: int) -> None:
     length = request.headers.get("content-length", "0")
     # h11 has checked that it is a number; int() of a very long one is slow.
-    if "transfer-encoding" in request.headers or len(length) > len(str(MAX_FILE)) or int(length) > max_body:
+    if "transfer-encoding" in request.headers or len(length) > len(str(max_body)) or int(length) > max_body:
         limit = f"at most {max_body >> 10} KiB" if max_body else "no data"
         raise HTTPException(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"This request may carry {limit}.")
 

@@ -27,6 +27,7 @@ _LONGEST_S = 180.0
         ("x.elf", PATCHED, "not an ELF file"),
         ("x.bin", stand_in(patched=False), "without the mission patch"),
         ("x.bin", PATCHED.ljust(PROGRAM_END + 1, b"\0"), "too large"),
+        ("x.elf", bytes(1_000_001), "not an ELF file"),
     ],
 )
 def test_a_wrong_image_is_refused(lasting_web: WebBench, name: str, body: bytes, why: str) -> None:
