@@ -26,7 +26,7 @@ from tests.support.walks import TracedDaemon, WakeUp, Walk, measure, run_traced
 CEILINGS = {
     "attitude": Walk(calls=44, returns=13, files=20),
     "item": Walk(calls=66, returns=24, files=16),
-    "ack": Walk(calls=496, returns=252, files=40),
+    "ack": Walk(calls=494, returns=250, files=40),
     "arming": Walk(calls=77, returns=23, files=26),
 }
 #: A walk may be this much shorter than its ceiling.
