@@ -227,7 +227,7 @@ class FleetFolder:
 
 
 def _member(data: Any) -> Member:
-    """Formerly only the role was kept. ValueError, LookupError."""
+    """Older files hold only the role. ValueError, LookupError."""
     if isinstance(data, str):
         return Member(Role(data))
     sysid = data.get("sysid")
@@ -255,7 +255,7 @@ def _check_member(name: str) -> None:
     if name.lower() in _RESERVED:
         raise EnrolmentError(f"{name!r} is the name of the fleet's own files: choose another name")
     if ":" in name or name.startswith((".", "-")):
-        raise EnrolmentError(f"the name is {name!r}, but must be without a colon, and without a dot or dash in front")
+        raise EnrolmentError(f"the name is {name!r}, but must not contain a colon or begin with a dot or dash")
 
 
 def access_control(prefix: str, members: Mapping[str, Role], *, by_certificate: bool) -> Json:

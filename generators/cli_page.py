@@ -90,7 +90,7 @@ def _section(name: str, context: click.Context, own: Sequence[Option], shared: S
             formatter.write_dl(own)
     if shared != ["--help"]:
         formatter.write_paragraph()
-        formatter.write_text(f"Common options: {', '.join(shared[:-1])}")
+        formatter.write_text(f"Also {', '.join(shared[:-1])}.")
     if context.parent is None and isinstance(context.command, click.Group):
         context.command.format_commands(context, formatter)
     arguments = context.command.collect_usage_pieces(context)[1:]  # the first is [OPTIONS]

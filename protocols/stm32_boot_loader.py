@@ -2,7 +2,7 @@
 """The boot loader in the ROM of an STM32F103, on USART1 with even parity (ST's application notes AN3155 and AN2606).
 
 A dialogue is a generator: it yields each Exchange with the board, and is sent the received bytes. The boot loader has
-no timeout: after a broken-off command it waits for the rest of it, which `synchronise` takes into account.
+no timeout: after an incomplete command it waits for the rest of it, which `synchronise` takes into account.
 
 >>> def chip() -> Dialogue[int]:
 ...     yield from synchronise(1.0)

@@ -40,7 +40,7 @@ class FcSession:
 
     `on_change` is called with each flight controller that is found, and with None when it is lost or cannot be used.
     `on_mavlink` gets its MAVLink frames. `incidents`: numbers for the ids of related log lines. `flight`: of the craft
-    that a former bridge left armed.
+    that a previous bridge left armed.
     """
 
     def __init__(

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads and rewrites a Naze32's flash through its boot loader.
 
-Only pages that differ are erased and written, so a broken-off flash is resumed by doing it again. Page 0 is erased
+Only pages that differ are erased and written, so repeating an interrupted flash resumes it. Page 0 is erased
 first, and its first bytes, the stack pointer and the start address, are written last: half a program never runs.
 """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The flight controller's settings: their seal, and what changed without the bridge."""
+"""The flight controller's settings: their seal, and changes made outside the bridge."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -58,7 +58,7 @@ class SettingsChange:
 
 @dataclass(frozen=True, slots=True)
 class SettingsState:
-    """`change`: the last one without the bridge, while this board was connected; None: there was none."""
+    """`change`: the last one made outside the bridge, while this board was connected; None: there was none."""
 
     board: BoardId
     seal: Seal

@@ -282,7 +282,7 @@ class Vehicle:
         )
 
     def resume(self, memory: FlightMemory) -> None:
-        """Continue a flight that a former bridge has seen. Readings that contradict it undo this."""
+        """Continue a flight that a previous bridge has seen. Readings that contradict it undo this."""
         self.airframe, self.version, self._cells = memory.airframe, memory.version, memory.cells
         self.home, self.is_home_settled = memory.home, memory.home is not None
         self.armed_at, self._is_resumed = memory.armed_at, True

@@ -4,7 +4,7 @@
 A reply that is known costs the line nothing, in flight and during a mission transfer, too. The others are requested
 one at a time, for each program in turn, by a disarmed craft only, and when no poll is due. They use the part of the
 line that telemetry leaves, while no mission needs it. A request that cannot be answered yet waits. After 3 s its
-program is disconnected, because programs misread MSP's error reply: INAV Configurator takes it for success.
+program is disconnected, because programs misread MSP's error reply: INAV Configurator mistakes it for success.
 """
 
 from collections import Counter, deque

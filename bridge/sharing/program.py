@@ -54,7 +54,7 @@ class Program:
     blocked_until: float = 0.0
 
     def __post_init__(self) -> None:
-        #: Over UDP that of its host: a port more costs nothing there.
+        #: Over UDP that of its host: another port costs nothing there.
         self.account: Hashable = self.host if self.close is None else self
         self._parser = MspParser(takes_low_v2=True)
         self._budget = TokenBucket(_LIMIT)

@@ -101,7 +101,7 @@ class ArrivingList:
     """A list of `count` items; each is checked once all items before it are here.
 
     If one of its sender's frames was lost since the first item, that may have been the MISSION_COUNT of another list:
-    most stations answer the request for an item of the former list with one of their new list. So all items are
+    most stations answer the request for an item of the previous list with one of their new list. So all items are
     requested a second time before the last one, and after it if a frame was lost just before it. Mission Planner does
     not go back, but it begins each list with item 0; its items that were not requested give it away: "Write Fast" sends
     them in bursts, and "Write" repeats its present item if another one is requested.

@@ -132,7 +132,7 @@ class MissionUploads:
             self.answers.late_item(station, item.seq, now, is_lost=not self._queue.uploads)
             return
         if speaker.is_late and speaker.is_older(upload.number):
-            # Delayed by the network: an item of the former list.
+            # Delayed by the network: an item of the previous list.
             return
         upload.heard_at, state = now, upload.state
         if not isinstance(state, Receiving):

@@ -39,7 +39,7 @@ class ArmingReasons:
         if lines == self._told and now < self._told_at + _RENEWED_S:
             return
         if self._told and not lines:
-            # Otherwise the former reason would stand for 10 s in Mission Planner, for 35 s in QGroundControl.
+            # Otherwise the previous reason would stay for 10 s in Mission Planner, for 35 s in QGroundControl.
             self._ground.say(Severity.INFO, _PREFIX + "ready")
         self._told, self._told_at = lines, now
         for line in lines:

@@ -182,7 +182,7 @@ class _Restore:
             self._stop(f"the save failed ({refusal.text})", now)
         else:
             # Also if the firmware has corrected a value after the save.
-            self._end(f"Not known to be saved: {refusal.text}. The board has its former settings or the new ones", now)
+            self._end(f"Not known to be saved: {refusal.text}. The board has its old or its new settings", now)
 
     def _verified(self, table: SettingTable | SettingRefusal, now: float) -> None:
         if isinstance(table, SettingRefusal) or not self._settings.is_checked:

@@ -33,7 +33,7 @@ _REAL32 = 9
 _EACH, _INTERVAL_S = 10, 0.02
 #: QGroundControl repeats its request after 5 s, Mission Planner after 4 s.
 _LIST_WITHIN_S = 3.5
-#: Above, REAL32 has no place for every whole number.
+#: Above this, REAL32 cannot represent every whole number.
 _MOST_EXACT = 2**24
 _ERRORS = {
     Cause.OUT_OF_RANGE: messages.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE,
@@ -123,7 +123,7 @@ class Parameters:
             return
         self._files.show(self._values(), self._named)
         if is_opening(payload):
-            # What was changed without the bridge follows as PARAM_VALUE.
+            # Changes that were not made through the bridge follow as PARAM_VALUE.
             self._settings.current(lambda _table, _at: None, now, _LIST_WITHIN_S)
         for number, answer in enumerate(dialogue.session.answer(payload)):
             if number and not self._ground.allows(station, Cost.ANSWER):
@@ -196,7 +196,7 @@ class Parameters:
             self.send(station, name)
 
     def _refuse(self, station: Station, name: str, refused: SettingRefusal) -> None:
-        """Tell the reason, then the value in force. PARAM_ERROR, which MAVLink 1 lacks, spares MAVSDK a wait."""
+        """Send the reason, then the value in force. PARAM_ERROR, which MAVLink 1 lacks, spares MAVSDK a wait."""
         self._ground.say(Severity.ERROR, refused.text, station)
         self._error(station, name, _ERRORS.get(refused.cause, messages.MAV_PARAM_ERROR_PERMISSION_DENIED))
         self.send(station, name)

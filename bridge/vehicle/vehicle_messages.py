@@ -58,7 +58,7 @@ _ROVERS = (Airframe.ROVER, Airframe.BOAT)
 _MOTORS = messages.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
 _PREARM = messages.MAV_SYS_STATUS_PREARM_CHECK
 #: There is no fence, but without this bit MAVProxy reports "fence breach".
-_NEVER_ILL = messages.MAV_SYS_STATUS_GEOFENCE
+_ALWAYS_HEALTHY = messages.MAV_SYS_STATUS_GEOFENCE
 
 _CAPABILITIES = (
     messages.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT
@@ -364,7 +364,7 @@ def sys_status(at: Moment) -> Message:
     return messages.MAVLink_sys_status_message(
         present,
         enabled,
-        healthy | _NEVER_ILL,
+        healthy | _ALWAYS_HEALTHY,
         0 if load is None else round(load.cpu_load * 1000),
         voltage,
         current,

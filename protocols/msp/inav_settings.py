@@ -80,7 +80,7 @@ def pack_value(kind: InavType, value: float | str) -> bytes:
 
 
 def decode_setting_info(payload: bytes) -> InavSetting | None:
-    """Read a reply to COMMON_SETTING_INFO; None if it is cut, or has an unknown type."""
+    """Read a reply to COMMON_SETTING_INFO; None if it is truncated, or has an unknown type."""
     name, rest = _take_text(payload)
     if not name or rest is None or len(rest) < _DETAILS.size:
         return None
@@ -108,7 +108,7 @@ def decode_setting_info(payload: bytes) -> InavSetting | None:
 
 
 def decode_value(kind: InavType, data: bytes) -> float | str | None:
-    """The value in a reply; None if it is cut."""
+    """The value in a reply; None if it is truncated."""
     if kind is InavType.STRING:
         return data.partition(b"\0")[0].decode("ascii", "replace")
     if len(data) < _VALUES[kind].size:

@@ -122,7 +122,7 @@ class FlightProgress:
 
 
 def decode_flight(payload: bytes) -> FlightProgress | None:
-    """Read a reply; None if it is cut, an error, or of another version."""
+    """Read a reply; None if it is truncated, an error, or of another version."""
     if len(payload) < _REPLY.size:
         return None
     status, version, flags, state, reason, _, record, reached, count, distance, bearing, height_error, state_ms = (

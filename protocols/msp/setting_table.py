@@ -132,7 +132,7 @@ def encode_save(checksum: int) -> bytes:
 
 
 def decode_settings(payload: bytes) -> SettingsReply | None:
-    """Read a reply with settings; None if it is cut, or has an unknown status or type."""
+    """Read a reply with settings; None if it is truncated, or has an unknown status or type."""
     if len(payload) < _HEADER.size or payload[0] > max(ReplyStatus):
         return None
     status, first = _HEADER.unpack_from(payload)

@@ -45,7 +45,7 @@ def firmware() -> None:
 def flash(client: BridgeClient, image: Path, battery: bool) -> None:
     """Flash IMAGE (.hex, .bin or .elf): a Harakiri with the mission patch, for a Naze32.
 
-    The former flash is stored as a backup first. Everything written is read back, and the new firmware must answer.
+    The previous flash is stored as a backup first. Everything written is read back, and the new firmware must answer.
     After an interruption run the same command again. Exit code 1: refused or failed, 2: IMAGE is unreadable.
     """
     try:

@@ -34,7 +34,7 @@ FIRMWARE_FOLDER = "firmware"
 _USB_V = 5.5
 #: For bridging the boot pads and switching the power off and on.
 _BY_HAND_S = 90.0
-#: After `flash`, or for a boot loader left by a broken-off flash.
+#: After `flash`, or for a boot loader left by an interrupted flash.
 _BOOT_LOADER_S = 5.0
 #: A whole chip takes 60 s; the port comes back after this time in any case.
 _LONGEST_S = 600.0
@@ -86,7 +86,7 @@ class FirmwareApi:
         backup = await self._flash(image, is_running, progress)
         proof = await self._proof(None if is_backup else PATCHED.name)
         restored = "" if is_backup else await self._restore_settings(backup.with_suffix(".txt"))
-        text = f"{proof}; the flash was verified. {restored}Backup of the former flash: {backup}"
+        text = f"{proof}; the flash was verified. {restored}Backup of the previous flash: {backup}"
         return {"text": text, "backup": str(backup), "seconds": round(self._loop.time() - began, 1)}
 
     def _check_board(self, with_battery: bool) -> bool:
@@ -148,7 +148,7 @@ class FirmwareApi:
         except (BootLoaderError, CommandLineError, FlashingError, PortError) as error:
             _log.warning("firmware.failed", why=str(error))
             if is_changed:
-                raise ControlError(f"The flash broke off: {error}. {_AGAIN}") from error
+                raise ControlError(f"Flashing was interrupted: {error}. {_AGAIN}") from error
             raise ControlError(f"Nothing was changed: {error}") from error
         _log.info("firmware.written", backup=str(backup))
         return backup
@@ -196,7 +196,7 @@ class FirmwareApi:
         )
 
     async def _proof(self, wanted: str | None) -> str:
-        """What runs now; ControlError if it is not `wanted`, or nothing answers."""
+        """The running firmware; ControlError if it is not `wanted`, or nothing answers."""
         for _ in range(int(_PROOF_S / _LOOK_S)):
             if (found := self._daemon.report().link.flight_controller) is not None:
                 if wanted in (None, found):

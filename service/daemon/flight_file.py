@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keeps the flight memory in the state directory, so that a daemon that restarts in flight continues without a seam."""
+"""Keeps the flight memory in the state directory, so that a daemon that restarts in flight continues seamlessly."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -32,7 +32,7 @@ class FlightFile:
         self.saved: FlightMemory | None = None
 
     def load(self, now: float) -> FlightMemory | None:
-        """The craft that the former daemon left armed, if it counts; `now`: monotonic seconds."""
+        """The craft that the previous daemon left armed, if it counts; `now`: monotonic seconds."""
         if self._file is not None:
             self.saved = self._file.load(lambda kept: self._read(kept, now))
             if self.saved is not None:

@@ -151,7 +151,7 @@ class PiControl:
 
     def _check_changeable(self) -> None:
         check_disarmed(self._daemon)
-        # A restart would break off the flash.
+        # A restart would interrupt flashing.
         if self._daemon.fc.is_lent:
             raise HTTPException(HTTPStatus.CONFLICT, _FLASHING)
 

@@ -117,7 +117,7 @@ class SessionThread:
                     session.close()  # type: ignore[no-untyped-call]  # else its token would count as another bridge
                     raise
             except Exception as error:
-                # Also an error in a declaration: a thread that ends here would end zenoh without a word.
+                # Also an error in a declaration: a thread that ends here would end zenoh silently.
                 self._complain("zenoh.not_open", error)
             else:
                 self._complaint = ""

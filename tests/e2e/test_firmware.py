@@ -52,7 +52,7 @@ def test_the_patch_is_flashed_after_a_backup_and_must_answer(flashing: FlashingB
     status, said = flashing.flash("flash", str(flashing.image), "--battery")
     assert status == 0, said
     assert said.startswith(
-        "Harakiri with the mission extension runs; the flash was verified. Backup of the former flash:"
+        "Harakiri with the mission extension runs; the flash was verified. Backup of the previous flash:"
     )
     assert flashing.controller == "Harakiri with the mission extension"
     (backup,) = flashing.backups

@@ -53,7 +53,7 @@ def enter(bench: RealBench) -> tuple[DialogueBench, str]:
 
 
 def flash(program: bytes, mark: Callable[[str], None] = lambda _: None) -> Dialogue[bytes]:
-    """Flash, and start the program. Returns the former flash."""
+    """Flash, and start the program. Returns the previous flash."""
 
     def progress(step: str, _done: int, _total: int) -> None:
         mark(step)

@@ -23,7 +23,7 @@ A = MissionResult
 _COUNT = 6
 OLD_RECORDS = records_of(waypoints(15, seed=777))
 OLD_FLASH = flash_holding(OLD_RECORDS)
-#: MAVProxy repeats nothing; MAVSDK does not repeat its MISSION_COUNT after a request for an item of the former list.
+#: MAVProxy repeats nothing; MAVSDK does not repeat its MISSION_COUNT after a request for an item of the previous list.
 _REPEATING = [PlannerUpload, QgcUpload, StubbornUpload]
 _KINDS = [*_REPEATING, MavsdkUpload, MavproxyUpload]
 

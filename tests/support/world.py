@@ -200,7 +200,7 @@ class World:
         self._flush()
 
     def restart_bridge(self, away_s: float = 2.0, *, flight: bool = True) -> None:
-        """Kill the bridge, and start another one after `away_s`, with the flight that the former one left."""
+        """Kill the bridge, and start another one after `away_s`, with the flight that the previous one left."""
         left = self.bridge.flight if flight else None
         self._plugged = False
         self._start_bridge()

@@ -63,7 +63,7 @@ class HarakiriMavlinkSettings(FcSettings):
         count = _MOST
         for number in range(_LISTS):
             is_safe: bool = yield Transmit(_REQUEST)
-            # Values of a list that a mission has broken off, or of one that is being sent already.
+            # Values of a list that a mission has interrupted, or of one that is being sent already.
             for _ in range(count if is_safe else 0):
                 frame: MavlinkFrame | None = yield Await(frozenset((_VALUE,)), _SILENCE_S)
                 if frame is None:

@@ -68,7 +68,7 @@ class HarakiriFcSettings(FcSettings):
         self._lists_all: bool | None = None
 
     def read(self, former: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
-        """The values of the former table if their checksum is still the board's: then that is three requests."""
+        """The values of the previous table if their checksum is still the board's: then that is three requests."""
         if self._lists_all is None:
             reply = yield from ask_surely(TABLE_REQUEST, SettingCommand.SETTING, _TABLE_SIZE)
             if reply is None:

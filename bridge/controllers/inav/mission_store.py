@@ -63,7 +63,7 @@ _MAX_READS = 2
 _SETTING_SIZE = 1
 _RC_SIZE = 68
 #: With the throttle low, pitch and roll high for 0.4 s to 0.8 s, by receiver, INAV loads the saved missions
-#: (rc_controls.c). Its own thresholds are settings; a reading too many does no harm.
+#: (rc_controls.c). Its own thresholds are settings; an extra reading is harmless.
 _LOW_US, _HIGH_US = 1300, 1700
 _LOADED_AFTER_S = 0.8
 

@@ -48,7 +48,7 @@ class InavFcSettings(FcSettings):
         self._is_read = False
 
     def read(self, former: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
-        """The former table if it was read from this board and nothing can have changed since: INAV has no checksum."""
+        """The last table if it was read from this board and nothing can have changed since: INAV has no checksum."""
         if self._is_read and not reading.is_doubtful:
             return former
         found: list[BoardSetting] = []

@@ -232,7 +232,7 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
         return None
 
     def _has_same_records(self, known: tuple[NavRecord, ...]) -> Conversation[bool]:
-        """Compare the next records, and those that would show that a former list is back."""
+        """Compare the next records, and those that would show that a previous list is back."""
         self._watch(known)
         count = min(ceil(len(known) / _CHECKS), _MOST_COMPARED)
         following = [(self._compared + step) % len(known) + 1 for step in range(count)]

@@ -106,7 +106,7 @@ class MspLine(State):
             return Found(self.port.mavlink_of(heard), self.speed, "heard where MSP was answered before", heard)
         # At a much lower speed than the telemetry's, the port reads only a few wrong bytes, or none.
         why = "the incoming data is no longer MSP" if self._is_foreign() else f"no answer for {self._silence_s()} s"
-        # A board that was armed at the speed of FrSky telemetry has disarmed, and is back at its former, good speed.
+        # A board that was armed at the speed of FrSky telemetry has disarmed, and is back at its previous, good speed.
         has_disarmed = self.speed == FRSKY_SPEED and self.port.vehicle.armed
         return Lost(why, () if has_disarmed else _ARMED_SPEEDS, self.unanswered())
 

@@ -102,9 +102,9 @@ def update_outcome(host: Host) -> str:
 
 
 def update(package: Path, host: Host, machine: Machine, sleep: Callable[[float], None] = time.sleep) -> str:
-    """Install the package; if the bridge does not run with it, return to the former one. Returns the outcome."""
+    """Install the package; if the bridge does not run with it, return to the previous one. Returns the outcome."""
     was_running = _answers()
-    # Moved first, because it may be the former one.
+    # Moved first, because it may be the previous one.
     installing, kept = package.rename(host.path(f"{_FOLDER}/installing.deb")), host.path(PREVIOUS)
     version, former = version_of(installing, machine), pack_installed(kept, host, machine)
     try:

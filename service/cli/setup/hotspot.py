@@ -2,7 +2,7 @@
 """The Wi-Fi hotspot: a NetworkManager connection, opened by a process of its own.
 
 Opening it ends the Wi-Fi connection over which setup may be run. So setup reports everything first and then starts
-this module as a transient unit: `python -m service.cli.setup.hotspot`. If no device joins in time, the former network
+this module as a transient unit: `python -m service.cli.setup.hotspot`. If no device joins in time, the previous network
 returns.
 """
 
@@ -157,7 +157,7 @@ def _return_to(former: str | None, machine: Machine) -> str:
     if former is None:
         return "there was no other network"
     machine.run(("nmcli", "connection", "up", former))
-    return "back on the former network"
+    return "back on the previous network"
 
 
 def _has_neighbour(host: Host) -> bool:

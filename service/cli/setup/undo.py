@@ -108,5 +108,5 @@ def _commands(kept: list[_Setup]) -> Iterator[str]:
 
 
 def _write(machine: Machine, kept: list[_Setup]) -> None:
-    # Secret: it may hold a former key.
+    # Secret: it may hold a previous key.
     machine.carry_out(WriteFile(UNDO_FILE, json.dumps(kept[-_MOST_KEPT:], indent=1) + "\n", secret=True))

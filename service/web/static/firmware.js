@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A firmware image: chosen, then flashed by the Pi. The form stays, so that a broken-off flash is resumed with one press.
+// A firmware image: chosen, then flashed by the Pi. The form stays, so that an interrupted flash is resumed with one press.
 import { tell } from "./daemon.js";
 import { byId, make } from "./dom.js";
 import { writeForm } from "./write_form.js";

@@ -175,7 +175,7 @@ def test_an_upload_restarted_from_a_new_address_replaces_the_old_one() -> None:
 
 
 def test_a_restarted_station_is_not_asked_for_items_of_its_former_list() -> None:
-    """Its item 0 would complete the former list of one item, and its own list would get that list's refusal."""
+    """Its item 0 would complete the previous list of one item, and its own list would get that list's refusal."""
     world = ready_world()
     roamer = Roamer(world)
     former = Upload(roamer.station, PLAN[:1])

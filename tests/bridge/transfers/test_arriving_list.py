@@ -34,7 +34,7 @@ def test_two_lists_are_never_mixed_if_a_burst_loses_its_first_item() -> None:
 @pytest.mark.parametrize("answered", [8, 18])
 @pytest.mark.parametrize("repeat", [0.0, 1.0])
 def test_two_lists_are_never_mixed_if_a_request_is_on_its_way(repeat: float, answered: int) -> None:
-    """MAVProxy answers the request for an item of the former list with one of the new list, which has the same home."""
+    """MAVProxy answers the request for an item of the old list with one of the new list, which has the same home."""
     world, station = holding()
     station.radio = Radio(repeat=repeat, delay_s=0.05)
     former = Upload(station, waypoints(20, 1))
@@ -161,7 +161,7 @@ def test_a_delayed_message_count_does_not_begin_the_list_again() -> None:
 
 
 def test_two_lists_are_never_mixed_if_the_only_count_is_lost() -> None:
-    """MAVProxy sends it once, and answers the former list's repeated request with its present list's item."""
+    """MAVProxy sends it once, and answers the previous list's repeated request with its present list's item."""
     world, station = holding()
     former, items = waypoints(9, 1), [*waypoints(1, 1), *waypoints(9, 2)[1:]]
     receiving(world, station, former, 4)

@@ -94,7 +94,7 @@ def test_without_a_device_the_former_network_returns(pi: FaultyMachine) -> None:
     manager = NetworkManager(pi)
     slept: list[float] = []
     told = open_hotspot(pi, manager, slept.append)
-    assert told == f"no device joined the hotspot within {JOIN_S} s; back on the former network"
+    assert told == f"no device joined the hotspot within {JOIN_S} s; back on the previous network"
     assert manager.active == "home-uuid"
     assert sum(slept) == JOIN_S
     assert not pi.path(HOTSPOT_FILE).exists()
@@ -102,7 +102,7 @@ def test_without_a_device_the_former_network_returns(pi: FaultyMachine) -> None:
 
 def test_a_hotspot_that_cannot_open_leaves_the_former_network(pi: FaultyMachine) -> None:
     manager = NetworkManager(pi, radio_works=False)
-    assert open_hotspot(pi, manager, lambda _: None).endswith("no radio; back on the former network")
+    assert open_hotspot(pi, manager, lambda _: None).endswith("no radio; back on the previous network")
     assert manager.active == "home-uuid"
 
 
