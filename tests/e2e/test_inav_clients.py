@@ -18,10 +18,15 @@ from simulator.inav.boxes import BOXES, NAV_WP
 from tests.e2e.test_mavsdk import fields, pressed_again, raw_items, refusal_of, vehicle_at
 from tests.support.benches import Bench, Starter
 from tests.support.mavproxy import MavProxy
+from tests.support.mission_planner import MissionPlanner, UploadFailed
 from tests.support.plan import HOME, PlanRow, as_items, stored_fields, waypoint
 from tests.support.programs import until
 
 RULES = NavRules(inav_profile())
+#: Anticlockwise, as INAV stores it.
+_CORNERS = ((45.380, 8.470), (45.380, 8.480), (45.390, 8.480), (45.390, 8.470))
+FENCE = [PlanRow(5001, *corner, 0.0, p1=4.0) for corner in _CORNERS] + [PlanRow(5004, 45.385, 8.475, 0.0, p1=75.5)]
+RALLY = [PlanRow(5100, 45.381 + place / 1000, 8.471, 0.0) for place in range(3)]
 
 
 def nav_plan(records: int) -> list[PlanRow]:
@@ -102,13 +107,39 @@ async def written_again(write: Callable[[], Awaitable[None]]) -> None:
     await write()
 
 
+@pytest.mark.parametrize(("tab", "plan"), [(1, FENCE), (2, RALLY)])
+def test_mission_planners_tabs_write_read_and_clear(inav: Bench, tab: int, plan: list[PlanRow]) -> None:
+    with MissionPlanner(inav.daemon.address) as planner:
+        planner.connect()
+        planner.write([HOME, waypoint(1)])
+        planner.tab = tab
+        for rows in (plan, plan[: 4 if tab == 1 else 2], []):
+            planner.write(rows)
+            planner.after_write()
+            sent = [row.as_sent(seq, use_int=True) for seq, row in enumerate(rows)]
+            assert [fields(item) for item in planner.read()] == [stored_fields(item) for item in sent]
+        planner.tab = 0
+        assert len(planner.read()) == 2
+
+
+def test_mission_planner_shows_that_a_version_without_geozones_has_no_fence(start: Starter) -> None:
+    board = start.board("--kind", "inav", "--inav-version", "7.1.2", tcp=True)
+    daemon = start.daemon(board.fc)
+    daemon.wait()
+    with MissionPlanner(daemon.address) as planner:
+        planner.connect()
+        planner.tab = 1
+        with pytest.raises(UploadFailed, match="Fence mission items not supported"):
+            planner.write(FENCE)
+        planner.tab = 2
+        planner.write(RALLY)
+        assert len(planner.read()) == len(RALLY)
+
+
 async def test_mavsdk_writes_and_reads_a_fence_and_rally_points(inav: Bench) -> None:
-    corners = ((45.380, 8.470), (45.380, 8.480), (45.390, 8.480), (45.390, 8.470))
-    fence = [PlanRow(5001, *corner, 0.0, p1=4.0) for corner in corners] + [PlanRow(5004, 45.385, 8.475, 0.0, p1=75.5)]
-    rally = [PlanRow(5100, 45.381 + place / 1000, 8.471, 0.0) for place in range(3)]
     async with vehicle_at(inav.daemon.port) as vehicle:
         missions = MissionRawAsync(vehicle)
-        lists = [raw_items(plan) for plan in (fence, rally)]
+        lists = [raw_items(plan) for plan in (FENCE, RALLY)]
         for kind, items in enumerate(lists, 1):
             for item in items:
                 item.mission_type = kind
@@ -116,7 +147,7 @@ async def test_mavsdk_writes_and_reads_a_fence_and_rally_points(inav: Bench) -> 
         await written_again(lambda: missions.upload_rally_points(lists[1]))
         read = await missions.download_geofence(), await missions.download_rallypoints()
     assert [[fields(item) for item in items] for items in read] == [
-        [stored_fields(i) for i in as_items(p)] for p in (fence, rally)
+        [stored_fields(i) for i in as_items(p)] for p in (FENCE, RALLY)
     ]
 
 

@@ -12,6 +12,7 @@ import struct
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from types import TracebackType
 from typing import Any, Self
 
@@ -20,7 +21,7 @@ from pymavlink.mavftp import MAVFTP
 
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.ftp import FtpOp
-from protocols.mission_item import MissionResult
+from protocols.mission_item import Frame, MissionResult
 from tests.support.mission_planner_screen import MissionPlannerScreen
 from tests.support.plan import PlanRow
 from tests.support.programs import TIMEOUT_S
@@ -29,6 +30,8 @@ SYSID, COMPID = 255, 190
 _DATAGRAM_SIZE = 2048
 _NAK, _READ_SIZE = 129, 110
 _INT_CAPABILITY = messages.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+_FENCE_CAPABILITY = messages.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+_TABS = ("MISSION", "FENCE", "RALLY")
 #: Its requests at the first heartbeat: stream and rate.
 _STREAMS = ((2, 2), (6, 2), (10, 4), (11, 4), (12, 2), (1, 2), (3, 2))
 
@@ -77,6 +80,8 @@ class MissionPlanner:
         self._heartbeat_due = time.monotonic()
         self.vehicle: tuple[int, int] | None = None
         self.capabilities = 0
+        #: MAV_MISSION_TYPE of the tab that is open: its buttons write and read that list.
+        self.tab = 0
         #: The parameters as a file; None: it requested them one by one.
         self.file_of_parameters: bytes | None = None
         self.parameters: dict[str, float] = {}
@@ -345,7 +350,10 @@ class MissionPlanner:
     # -- writing ---------------------------------------------------------------------------------------------
 
     def write(self, rows: Sequence[PlanRow], *, use_int: bool = True) -> None:
-        """Its Write button; rows[0] is home. UploadFailed is the dialogue its user would see."""
+        """Its Write button; rows[0] of a mission is home. UploadFailed is the dialogue its user would see."""
+        self._check_tab()
+        if self.tab == messages.MAV_MISSION_TYPE_FENCE:
+            rows = [replace(row, frame=Frame.GLOBAL) for row in rows]
         self._start_upload(len(rows))
         self.write_rest(rows, 0, use_int=use_int)
 
@@ -354,7 +362,8 @@ class MissionPlanner:
         while at < len(rows):
             result = self._write_item(rows, at, use_int)
             if result is MissionResult.ERROR:
-                self.send(messages.MAVLink_mission_write_partial_list_message(*self._target, at, len(rows)))
+                partial = messages.MAVLink_mission_write_partial_list_message(*self._target, at, len(rows), self.tab)
+                self.send(partial)
                 result = self._write_item(rows, at, use_int)
             if result is MissionResult.NO_SPACE:
                 raise UploadFailed("Upload failed, please reduce the number of wp's", result)
@@ -363,7 +372,7 @@ class MissionPlanner:
             if result is MissionResult.INVALID_SEQUENCE:
                 at = self._requested_seq(at) - 1
             elif result is not MissionResult.ACCEPTED:
-                raise UploadFailed(f"Upload MISSION failed {result.name}", result)
+                raise UploadFailed(f"Upload {_TABS[self.tab]} failed {result.name}", result)
             at += 1
         self._send_ack()
 
@@ -444,7 +453,7 @@ class MissionPlanner:
         """MISSION_COUNT, 700 ms x 4. A request for item 0 or 1 means "continue", and so does ANY ack."""
         self._discard()
         for _ in range(4):
-            self.send(messages.MAVLink_mission_count_message(*self._target, count, 0))
+            self.send(messages.MAVLink_mission_count_message(*self._target, count, self.tab))
             for message in self._packets(0.7):
                 if message.get_type() in ("MISSION_REQUEST", "MISSION_REQUEST_INT"):
                     if self._is_for_me(message) and message.seq in (0, 1):
@@ -460,7 +469,9 @@ class MissionPlanner:
         # While sending MISSION_ITEM_INT it does not understand MISSION_REQUEST_INT.
         understood = ("MISSION_REQUEST",) if use_int else ("MISSION_REQUEST", "MISSION_REQUEST_INT")
         for _ in range(11):
-            self.send(message_of(*self._target, at))
+            item = message_of(*self._target, at)
+            item.mission_type = self.tab
+            self.send(item)
             for message in self._packets(0.45):
                 if message.get_type() == "MISSION_ACK" and self._is_for_me(message):
                     return MissionResult(message.type)
@@ -479,12 +490,18 @@ class MissionPlanner:
         return at + 1
 
     def _send_ack(self) -> None:
-        self.send(messages.MAVLink_mission_ack_message(*self._target, 0, 0))
+        self.send(messages.MAVLink_mission_ack_message(*self._target, 0, self.tab))
+
+    def _check_tab(self) -> None:
+        """Before it writes or reads (mav_mission.cs)."""
+        if self.tab == messages.MAV_MISSION_TYPE_FENCE and not self.capabilities & _FENCE_CAPABILITY:
+            raise UploadFailed("Fence mission items not supported, please use legacy geofence")
 
     # -- reading ---------------------------------------------------------------------------------------------
 
     def read(self) -> list[Message]:
         """Its Read button: REQUEST_LIST 700 ms x 7, then item by item. It ignores MISSION_ACK errors."""
+        self._check_tab()
         items = [self.read_item(seq) for seq in range(self.read_count())]
         self._send_ack()
         return items
@@ -494,7 +511,7 @@ class MissionPlanner:
         as_int = bool(self.capabilities & _INT_CAPABILITY)
         m = messages
         request = (m.MAVLink_mission_request_int_message if as_int else m.MAVLink_mission_request_message)(
-            *self._target, seq, 0
+            *self._target, seq, self.tab
         )
         for _ in range(6):
             self.send(request)
@@ -507,7 +524,7 @@ class MissionPlanner:
 
     def read_count(self) -> int:
         for _ in range(7):
-            self.send(messages.MAVLink_mission_request_list_message(*self._target, 0))
+            self.send(messages.MAVLink_mission_request_list_message(*self._target, self.tab))
             for message in self._packets(0.7):
                 if message.get_type() == "MISSION_COUNT" and self._is_for_me(message):
                     count: int = message.count

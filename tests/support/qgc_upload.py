@@ -80,11 +80,14 @@ class FatedLink:
 class QgcUpload:
     """Each request restarts its timer of 1.5 s; it announces the list again only until item 0 is requested.
 
-    The final MISSION_ACK is never asked for again. `send` puts a message on the link.
+    The final MISSION_ACK is never asked for again. Messages of another mission type are not looked at. `send` puts a
+    message on the link.
     """
 
-    def __init__(self, clock: Clock, send: Callable[[Message], None], items: Sequence[MissionItem]) -> None:
-        self._clock, self._send, self._items = clock, send, items
+    def __init__(
+        self, clock: Clock, send: Callable[[Message], None], items: Sequence[MissionItem], mission_type: int = 0
+    ) -> None:
+        self._clock, self._send, self._items, self._mission_type = clock, send, items, mission_type
         self.result: MissionResult | None = None
         self.gave_up = False
         self._requested: set[int] = set()
@@ -96,12 +99,12 @@ class QgcUpload:
         return self.gave_up or self.result is not None
 
     def received(self, message: Message) -> None:
-        if self.is_over:
+        if self.is_over or getattr(message, "mission_type", self._mission_type) != self._mission_type:
             return
         match message.get_type():
             case "MISSION_REQUEST":
                 self._requested.add(message.seq)
-                self._send(item_message(message.seq, self._items[message.seq]))
+                self._send(item_message(message.seq, self._items[message.seq], mission_type=self._mission_type))
                 self._wait()
             case "MISSION_ACK" if message.type != MissionResult.INVALID_SEQUENCE:
                 self.result = MissionResult(message.type)
@@ -109,7 +112,7 @@ class QgcUpload:
                 self.gave_up = self.result is MissionResult.ACCEPTED and len(self._requested) < len(self._items)
 
     def _announce(self) -> None:
-        self._send(count_message(len(self._items)))
+        self._send(count_message(len(self._items), self._mission_type))
         self._wait()
 
     def _wait(self) -> None:

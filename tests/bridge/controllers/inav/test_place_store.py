@@ -16,6 +16,7 @@ from simulator.inav.places import GEOZONE, SAFEHOME, SET_FEATURE, SET_GEOZONE
 from tests.bridge.controllers.inav.test_mission_store import ACCEPTED, board_with
 from tests.bridge.controllers.nav.test_mission_store import plan
 from tests.support.conversations import Download, Upload, clear_message
+from tests.support.qgc_upload import FatedLink, QgcStation, QgcUpload
 from tests.support.world import GroundStation, World
 
 FENCE, RALLY, ALL = 1, 2, 255
@@ -58,6 +59,18 @@ def test_a_list_is_written_read_and_survives_a_restart(kind: int, items: list[Mi
     world.run(5)
     assert read(station, kind) == numbered(items)
     assert Download(station).run()[1:] == []
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_qgroundcontrol_uploads_mission_fence_and_rally_points_over_a_lossy_link(seed: int) -> None:
+    """One after the other, as its Upload button does; each list takes only the messages of its own type."""
+    _, world, station = board_with()
+    qgc = QgcStation(world, FatedLink(world, seed, loss=0.05), "qgc")
+    for kind, items in ((0, plan(4)), (FENCE, FENCE_ITEMS), (RALLY, RALLY_ITEMS)):
+        upload = qgc.upload = QgcUpload(world, qgc.send, items, kind)
+        world.run_until(lambda _, upload=upload: upload.is_over, 60)  # type: ignore[misc]
+        assert (upload.result, upload.gave_up) == (ACCEPTED, False)
+    assert (read(station, FENCE), read(station, RALLY)) == (numbered(FENCE_ITEMS), numbered(RALLY_ITEMS))
 
 
 def test_unchanged_lists_are_not_written_again() -> None:
