@@ -373,3 +373,12 @@ def test_an_autopilot_with_all_ids_does_not_fill_the_memory() -> None:
     routes = world.inside.incoming.routes
     assert routes is not None
     assert len(routes._for_all) <= 1024
+
+
+def test_frames_that_arrive_together_share_a_datagram() -> None:
+    world, autopilot, stations = passing()
+    together = autopilot.pack(mavlink.MAVLink_attitude_message(1, 0, 0, 0, 0, 0, 0)) + autopilot.pack(
+        mavlink.MAVLink_vfr_hud_message(1, 1, 1, 1, 1, 1)
+    )
+    world.bridge.fc_received(together, world.now)
+    assert list(world.bridge.take_datagrams()) == [(station.peer, together) for station in stations]
