@@ -96,3 +96,15 @@ def test_a_vehicle_at_the_first_speed_ends_the_listening() -> None:
 
 def test_unknown_data_is_listened_to_at_every_speed() -> None:
     assert listen({1: b""}) == ("", list(LISTENING_SPEEDS))
+
+
+def test_each_speed_is_listened_to_for_the_same_time() -> None:
+    listener = PortListener(0.0)
+    ends = []
+    while not listener.is_done:
+        ends.append(listener.ends)
+        listener.receive(bytes(range(256)))
+        listener.tick(listener.ends - 0.001)
+        assert listener.ends == ends[-1]
+        listener.tick(listener.ends)
+    assert ends == pytest.approx([ends[0] * (number + 1) for number in range(len(LISTENING_SPEEDS))])

@@ -6,6 +6,8 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 from tests.support.programs import REPOSITORY, TIMEOUT_S
 
 BEGIN = """
@@ -40,6 +42,18 @@ log.info("gcs.found", station="two")
         "gcs.found",
     ]
     assert (events[21]["of"], events[21]["times"], events[21]["level"]) == ("gcs.found", 30, "warning")
+
+
+def test_the_journal_gets_each_line_with_its_priority(monkeypatch: pytest.MonkeyPatch) -> None:
+    """sd-daemon(3): <4> is a warning. The journal has its own times."""
+    monkeypatch.setenv("JOURNAL_STREAM", "8:1")
+    printed = run('log.warning("fc.lost"); log.info("fc.found", speed=115200)').stderr
+    priorities, lines = zip(*((line[:3], json.loads(line[3:])) for line in printed.splitlines()), strict=True)
+    assert priorities == ("<4>", "<6>")
+    assert lines == (
+        {"event": "fc.lost", "level": "warning"},
+        {"event": "fc.found", "level": "info", "speed": 115200},
+    )
 
 
 def test_a_line_longer_than_the_pipe_neither_blocks_nor_damages_others() -> None:
