@@ -24,10 +24,11 @@ def tiles() -> Iterator[TileServer]:
 
 
 class Fetch:
-    """Runs requests for the tiles of zoom 1 and 2, and returns the last report."""
+    """Runs requests for the tiles of zoom 1 and 2, and returns the last report; `reports` has all."""
 
     def __init__(self, folder: Path, capture: pytest.CaptureFixture[str]) -> None:
         self.folder = folder
+        self.reports: list[dict[str, Any]] = []
         self._capture = capture
 
     def run(self, tiles: TileServer, most_bytes: int = 1 << 20) -> dict[str, Any]:
@@ -36,8 +37,8 @@ class Fetch:
             for zoom in (1, 2)
         ]
         TileFetch(FetchRequest(f"http://{tiles.host}", "naze-bridge/test", str(self.folder), most_bytes, levels)).run()
-        report: dict[str, Any] = json.loads(self._capture.readouterr().out.splitlines()[-1])
-        return report
+        self.reports = [json.loads(line) for line in self._capture.readouterr().out.splitlines()]
+        return self.reports[-1]
 
 
 @pytest.fixture
@@ -52,6 +53,17 @@ def test_tiles_are_kept_and_not_fetched_again(tiles: TileServer, fetch: Fetch) -
     assert (fetch.folder / "1-0-1").read_bytes() == plain()
     fetch.run(tiles)
     assert len(tiles.asked) == 8
+
+
+def test_progress_is_reported_while_tiles_arrive(
+    tiles: TileServer, fetch: Fetch, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tile_fetch, "_REPORT_S", 0)
+    fetch.run(tiles)
+    assert [(report["done"], report["end"]) for report in fetch.reports] == [
+        *((number, None) for number in range(1, 9)),
+        (8, ""),
+    ]
 
 
 def test_an_expired_tile_is_fetched_again(tiles: TileServer, fetch: Fetch) -> None:

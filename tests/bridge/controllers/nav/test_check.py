@@ -148,6 +148,13 @@ def test_an_rtl_as_first_item_leaves_nothing_to_fly() -> None:
     assert verdict_on(RTL, WP, WP).ack is MissionResult.INVALID
 
 
+def test_only_a_multiwii_flies_home_at_the_height_of_an_rtl() -> None:
+    at_20_m = replace(RTL, alt_m=20.0)
+    assert findings_for(WP, at_20_m) == [(2, "alt_m", 20, 0)]
+    assert findings_for(WP, at_20_m, rules=MULTIWII) == []
+    assert [kept(WP, at_20_m, rules=rules)[1].alt_cm for rules in (INAV, MULTIWII)] == [0, 2000]
+
+
 def test_an_unused_height_may_have_any_value() -> None:
     for unused in (item(C.NAV_ROI, alt_m=math.nan), replace(RTL, alt_m=math.nan)):
         assert len(kept(WP, unused, *((WP,) if unused.command == C.NAV_ROI else ()))) >= 2
