@@ -2,6 +2,7 @@
 """The installed naze-bridge: its version, and the location of its documentation on this machine."""
 
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 _INSTALLED = Path("/usr/share/doc/naze-bridge")
@@ -37,4 +38,8 @@ def version(package: str = "naze-bridge") -> str:
 def _metadata_of(package: str) -> Path | None:
     """The folder with a package's metadata, found as by importlib.metadata, whose import takes 1.4 MB."""
     folders = f"{package.replace('-', '_')}-*.dist-info"
-    return next((found for entry in sys.path for found in Path(entry).glob(folders)), None)
+    for entry in sys.path:
+        with suppress(OSError):  # a failing disk must not prevent the start
+            if (found := next(Path(entry).glob(folders), None)) is not None:
+                return found
+    return None

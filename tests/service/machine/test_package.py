@@ -18,6 +18,14 @@ def test_a_package_that_is_not_installed_has_no_version() -> None:
     assert version("no-such-package") == "unknown"
 
 
+def test_a_failing_disk_hides_the_version_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(_path: Path) -> None:
+        raise OSError
+
+    monkeypatch.setattr("os.scandir", fail)
+    assert version() == "unknown"
+
+
 def test_an_address_is_shown_once_the_project_is_published(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = tmp_path / "naze_bridge-9.8.7.dist-info"
     folder.mkdir()
