@@ -28,10 +28,8 @@ _MAX_UNSENT = 8192
 #: So many reads within a window are gathered from then on, several a wake-up: telemetry that is a few ms older costs
 #: the pilot less than the wake-ups cost the CPU. Timers round up to whole ms.
 _MANY_READS, _RATE_WINDOW_S = 25, 0.25
-_GATHERED = 4
+_GATHERED, _GATHERED_SIZE = 4, 1024
 _SHORTEST_DELAY_S, _LONGEST_DELAY_S = 0.0019, 0.0119
-#: Larger reads are not gathered: they need few wake-ups anyway.
-_LARGE_READ = 512
 #: The part of the rate at the start of gathering within which its delay still fits.
 _SAME_RATE = (0.75, 1.5)
 #: After a request, replies are read without delay for this long.
@@ -187,13 +185,13 @@ class FcPort:
             self._judge_rate(self._loop.time())
 
     def _judge_rate(self, now: float) -> None:
-        """Begin to gather if there were many small reads in a short time."""
+        """Begin to gather if there were many reads in a short time."""
         window_s, size = now - self._window_began, self._traffic.bytes_received - self._window_bytes
         self._begin_window(now)
-        is_busy = window_s < _RATE_WINDOW_S and size < _MANY_READS * _LARGE_READ
+        is_busy = window_s < _RATE_WINDOW_S
         if is_busy and self.may_gather and self._device is not None and now >= self._gathers_from:
             self._loop.remove_reader(self._descriptor)
-            delay_s = _GATHERED * window_s / _MANY_READS
+            delay_s = window_s * min(_GATHERED / _MANY_READS, _GATHERED_SIZE / size)
             self._delay_s = min(max(delay_s, _SHORTEST_DELAY_S), _LONGEST_DELAY_S)
             self._bytes_per_s = size / window_s
             self._gathering = self._loop.call_later(self._delay_s, self._gather)
