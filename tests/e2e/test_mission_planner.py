@@ -59,7 +59,7 @@ def assert_reads(planner: MissionPlanner, plan: Sequence[PlanRow], *, use_int: b
 def test_every_request_while_connecting_is_answered(shared: Bench) -> None:
     planner = shared.mission_planner()
     planner.wait_for_vehicle()
-    planner.listen(3.0)  # until the settings are read there is no file
+    shared.daemon.ask({"do": "settings"})  # until they are read there is no file of parameters
     planner.connect()
     assert planner.vehicle == (1, 1)
     assert planner.unacked_commands == []
