@@ -160,7 +160,7 @@ class GroundStation:
         return FrameRefusal(why, effect in _ROUTINE)
 
     def passing_refusal(self, effect: Effect) -> FrameRefusal | None:
-        """The reason for not passing an accepted frame to an autopilot that speaks MAVLink itself."""
+        """The reason for not passing an accepted frame to an autopilot that speaks MAVLink itself; for Set WP, too."""
         if effect in self.rights.autopilot:
             return None
         if self.is_listener:

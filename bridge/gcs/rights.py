@@ -33,8 +33,8 @@ class Rights(NamedTuple):
 
 _ALL = tuple(effect for effect in Effect if effect is not Effect.KEY)
 _NO_COMMANDS = Effect.READ, Effect.DIALOGUE, Effect.RATE, Effect.CHANGE
-#: The own vehicle itself refuses to arm, to restart, and to move except by Set WP, which needs the right to write;
-#: other stations hear what concerns only themselves.
+#: The own vehicle itself refuses to arm, to restart, and to move except by Set WP, which needs the right to move an
+#: autopilot; other stations hear what concerns only themselves.
 RIGHTS: Mapping[Standing, Rights] = {
     Standing.LISTENER: Rights((Effect.READ, Effect.DIALOGUE), (Effect.READ,), ()),
     Standing.OPEN: Rights(_ALL, _NO_COMMANDS, (*_NO_COMMANDS, Effect.REPORT)),

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Set WP: the item that an armed craft flies to, on boards that have a request for that (INAV). Sans-IO.
 
-Nothing else that a ground station sends changes a flight. It takes the right to write a mission.
+Nothing else that a ground station sends changes a flight. It takes the right to move a passed-through autopilot, which
+a station on an open link does not have.
 """
 
 from collections.abc import Callable
@@ -15,6 +16,7 @@ from bridge.model.refusal import Refusal
 from bridge.vehicle.own_vehicle import OwnVehicle
 from protocols.mavlink.command import command_name
 from protocols.mission_item import MissionResult
+from protocols.rights.effect import Effect
 
 
 def _denied(text: str) -> Refusal:
@@ -77,6 +79,9 @@ class SetWaypoint:
         self._missions.run(store.fly_to(held.records, number), ended, now)
 
     def _obstacle(self, station: Station) -> Refusal | None:
+        heard = self._ground.station(station.peer)
+        if heard is not None and (refused := heard.passing_refusal(Effect.MOVE)) is not None:
+            return _denied(refused.why)
         if not self._missions.vehicle.armed:
             return _NOT_FLOWN
         if self._present is not None or self._missions.runner.needs_line:

@@ -276,7 +276,7 @@ _INAV: Rights = {
         FWUPDT_ROLLBACK_EXEC=0x2037, GPS_UBLOX_COMMAND=0x2050,
         SET_CRUISE_HEADING=0x2223, SET_AUX_RC=0x2230, RX_BIND=0x3001,
     ),
-    # The one move that the bridge itself sends, for a station that may write missions.
+    # The one move that the bridge itself sends, over a link with a key or writers.
     0x2221: MspRight("INAV_SET_WP_INDEX", Effect.MOVE, (1,)),
     **_refused(INAV_LOGIC_CONDITIONS=0x2022),
 }  # fmt: skip

@@ -69,7 +69,9 @@ def inav(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
     with ExitStack() as stack:
         start = Starter(tmp_path_factory.mktemp("inav"), stack)
         board = start.board("--kind", "inav", tcp=True)
-        daemon = start.daemon(board.fc)
+        settings = start.directory / "config.toml"
+        settings.write_text('pass_through = "everything"\n')  # for Set WP over an open link
+        daemon = start.daemon(board.fc, options=("--config", str(settings)))
         daemon.wait()
         yield Bench(board, daemon, stack)
         stats = board.stats()

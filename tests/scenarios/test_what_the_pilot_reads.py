@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from bridge.controllers.harakiri.profile import arming_blockers
+from bridge.gcs.rights import LinkAccess
 from bridge.model.vehicle import Source, Sticks, Vehicle
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
@@ -49,7 +50,8 @@ def on_the_ground(**options: Any) -> tuple[World, GroundStation, Screens]:
 
 def inav(blockers: int = 0) -> tuple[World, GroundStation, Screens]:
     faults = Faults(boxes=0, arming_blockers=blockers)
-    world = World(speeds=(115200,), peer=make_board("inav", MspOptions(), faults))
+    proven = {"udp": LinkAccess(may_write=lambda _peer: True)}  # an open link must not set the waypoint
+    world = World(speeds=(115200,), peer=make_board("inav", MspOptions(), faults), links=proven)
     world.faults = faults
     return world, *connected(world)
 

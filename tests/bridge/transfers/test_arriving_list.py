@@ -244,8 +244,9 @@ def test_duplicates_from_the_network_do_not_multiply_requests() -> None:
     station.send(count_message(len(items)))
     world.run(10)
     assert world.stored == records_of(items)
-    # Only the duplicates that the link itself adds.
-    assert len(requested(station)) <= 1.4 * len(items)
+    # Frames that overtake one another may look lost, then the list is read twice. If each duplicate caused another
+    # request, there would be 45 times as many.
+    assert len(requested(station)) <= 4 * len(items)
 
 
 def test_an_item_beyond_the_list_is_an_invalid_sequence_and_the_transfer_continues() -> None:

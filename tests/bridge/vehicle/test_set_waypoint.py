@@ -51,12 +51,16 @@ MISSION = [
 ]
 
 
+#: An open link steers nothing.
+LINKS = {"udp": LinkAccess(may_write=lambda _peer: True)}
+
+
 class Flight:
     """A simulated INAV that flies MISSION, to its first leg."""
 
     def __init__(self, items: Sequence[MissionItem] = MISSION, *, links: Any = None, **options: Any) -> None:
         self.board: MspBoard = make_board("inav", MspOptions(**options), Faults(boxes=0))
-        self.world = World(speeds=(115200,), peer=self.board, links=links)
+        self.world = World(speeds=(115200,), peer=self.board, links=LINKS if links is None else links)
         self.world.wait_ready(10)
         self.world.run(2)
         self.station = GroundStation(self.world)
@@ -259,6 +263,16 @@ def test_the_item_has_the_number_of_the_list_that_the_station_sent() -> None:
     assert "Set WP: item 4 (DO_JUMP) is not flown to" in reader.texts()
 
 
+def test_a_station_on_an_open_link_may_write_but_sets_no_waypoint() -> None:
+    flight = Flight(links={})
+    assert Upload(flight.station, MISSION).run() is MissionResult.ACCEPTED
+    flight.begin()
+    flight.ask(set_current(3))
+    flight.ask(long(3))
+    assert (results(flight.station), flight.sent(), flight.number) == ([DENIED], [], 1)
+    assert "Set WP: open link; see pass_through in settings" in flight.station.texts()
+
+
 def test_a_station_that_may_only_read_sets_no_waypoint() -> None:
     def may_write(peer: Peer) -> bool:
         return peer.key == "pilot"
@@ -277,7 +291,7 @@ def test_a_station_that_may_only_read_sets_no_waypoint() -> None:
 def test_without_a_known_mission_nothing_is_sent() -> None:
     inav = FakeInav(drop=lambda frame: "request" if frame.command == Nav.WP else "")
     inav.records, inav.is_valid, inav.armed = [FAKE], True, True
-    world = World(speeds=(115200,), peer=inav)
+    world = World(speeds=(115200,), peer=inav, links=LINKS)
     world.wait_until(lambda world: world.is_found, 10)
     world.run(1)
     station = GroundStation(world)
