@@ -80,7 +80,9 @@ class SetWaypoint:
 
     def _obstacle(self, station: Station) -> Refusal | None:
         heard = self._ground.station(station.peer)
-        if heard is not None and (refused := heard.passing_refusal(Effect.MOVE)) is not None:
+        if heard is None:
+            return _BUSY
+        if (refused := heard.passing_refusal(Effect.MOVE)) is not None:
             return _denied(refused.why)
         if not self._missions.vehicle.armed:
             return _NOT_FLOWN
