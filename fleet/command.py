@@ -52,7 +52,7 @@ for _command in (push_mission, verify_mission, fleet_settings, fleet_logs, enrol
 def list_vehicles(as_json: bool, limit: int | None, conditions: list[Condition], **where: Any) -> None:
     """Show which vehicles are alive, and their state.
 
-    Exit code 0, even if there are none; 1: a vehicle, or the router, does not answer, or cannot be reached.
+    Exit code 0 even if there are none; 1: a vehicle or the router does not answer.
     """
     with fleet_session(where) as (session, prefix), fleet_session(where) as (second, _):
         found = matching(everyone := roll_call(session, prefix, second), conditions)
@@ -103,8 +103,7 @@ def pull_missions(path: Path | None, names: tuple[str, ...], as_json: bool, **wh
     """Read the missions of vehicles' flight controllers: of all that are alive, or of those named.
 
     PATH is a folder, in which each vehicle's mission becomes NAME.waypoints; for one named vehicle it may be a file, or
-    - for standard output. Without it the missions are shown. Exit code 0: all were read, 1: one was not, or cannot be
-    written.
+    - for standard output. Without it the missions are shown. Exit code 1: one was not read, or cannot be written.
     """
     to_output = path == _STANDARD_OUTPUT
     if to_output and (len(names) != 1 or as_json):

@@ -29,8 +29,7 @@ def fleet_logs(vehicle: str, names: tuple[str, ...], folder: Path, rate: float, 
     """List a vehicle's telemetry logs, or fetch those named.
 
     The vehicle must accept commands. A fetch that was interrupted continues where it stopped: run it again. Each log
-    becomes a file whose name begins with the vehicle's. Exit code 0: done, 1: a log does not exist, the vehicle does
-    not answer, or the folder cannot be written.
+    becomes a file whose name begins with the vehicle's.
     """
     with fleet_session(where) as (session, prefix):
         chosen(alive(session, prefix), (vehicle,), prefix)

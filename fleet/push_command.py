@@ -78,8 +78,8 @@ def push_mission(
 ) -> None:
     """Write a mission file to vehicles, each by its own rules, and verify it there.
 
-    A vehicle that fails does not stop the others, unless --staged. Exit code 0: all hold it (--dry-run: all would
-    accept it), 1: one does not, or did not answer, 2: the file is unreadable.
+    A vehicle that fails does not stop the others, unless --staged. Exit code 1: one does not hold it (--dry-run: would
+    not accept it), or did not answer.
     """
     require_choice(names, to_all)
     mission, item_count = _read(file)
@@ -106,7 +106,7 @@ def verify_mission(
 ) -> None:
     """Compare the missions on vehicles with a file, by checksum, as stored under each vehicle's rules.
 
-    Exit code 0: all hold it, 1: one does not, or did not answer, 2: the file is unreadable.
+    Exit code 1: one does not hold it, or did not answer.
     """
     require_choice(names, to_all)
     mission, _ = _read(file)

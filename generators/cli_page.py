@@ -2,7 +2,6 @@
 """The reference page of the command line, docs/cli.md: the --help text of each command (`make cli-page`)."""
 
 import sys
-import textwrap
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
@@ -10,20 +9,11 @@ import click
 
 from service.cli.main import main
 
-EXIT_CODES = ", ".join(
-    (
-        "0 done",
-        "1 refused or failed",
-        "2 wrong usage or an unreadable file",
-        "74 the output cannot be written",
-        "130 interrupted.",
-    )
-)
 _WIDTH = 100
-_HEAD = f"""\
+_HEAD = """\
 # The command line
 
-{textwrap.fill(f"From the `--help` text of every command. Common exit codes: {EXIT_CODES}", _WIDTH)}
+From the `--help` text of every command.
 """
 #: An option of so many commands is explained once.
 _COMMON = 4

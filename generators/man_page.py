@@ -3,7 +3,7 @@
 
 import sys
 
-from generators.cli_page import EXIT_CODES, helps
+from generators.cli_page import helps
 from service.cli.main import main
 from service.machine.package import version
 
@@ -16,9 +16,7 @@ Sits on a Raspberry Pi between a Naze32 with Harakiri (or INAV, MultiWii) and Mi
 MAVProxy. Missions are checked, written to the flight controller and verified there.
 First steps: sudo naze-bridge setup.
 """
-_TAIL = f"""\
-.SH EXIT STATUS
-{EXIT_CODES}
+_TAIL = """\
 .SH FILES
 .TP
 /etc/naze-bridge/config.toml

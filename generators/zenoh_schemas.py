@@ -76,7 +76,7 @@ _SUMMARY_FIELDS = {
 }
 _WHAT = {
     "state": "The whole vehicle: the newest values of every group.",
-    "overview": "The state in 80 bytes, for programs that watch thousands of vehicles: always CBOR, all numbers whole. "
+    "overview": "The state in 80 bytes, for programs that watch thousands of vehicles: always CBOR, whole numbers. "
     "null: not known, or stale.",
     "event": "An event, as in the daemon's log.",
     "history": "The reply to a query about a time range.",
@@ -115,8 +115,8 @@ def schemas() -> dict[str, Json]:
         "time_source": {
             "type": "string",
             "description": "gps: from the flight controller's 3D fix (an autopilot's SYSTEM_TIME, INAV's MSP_RTC), "
-            "which corrects time_s if the Pi's clock is off by more than 0.5 s; ntp: the clock was set over the "
-            "network since the start; pi: neither, it may be hours off",
+            "used if the Pi's clock is off by more than 0.5 s; ntp: the clock was set over the network since the "
+            "start; pi: neither, it may be hours off",
         },
         **_fields(VehicleReport),
     }
@@ -150,20 +150,19 @@ def schemas() -> dict[str, Json]:
         "events": {
             "type": "array",
             "items": _object(_ENVELOPE | {"seq": number} | made["event"]),
-            "description": "oldest first, the newest 2,000; from before the daemon's start only vehicle.armed, "
-            "vehicle.disarmed and gcs.text, out of the telemetry logs",
+            "description": "oldest first, the newest 2,000; from before the daemon's start vehicle.armed, "
+            "vehicle.disarmed and gcs.text, from the telemetry logs",
         },
         **missions,
         "positions": {
             "type": "array",
             "items": _object({"time_s": _ENVELOPE["time_s"]} | place),
-            "description": "if asked for: where the vehicle flew, from the telemetry logs, spread evenly over the "
-            "range, at most one a second",
+            "description": "if asked for: from the telemetry logs, spread evenly over the range, at most one a second",
         },
         "logs_from_s": {
             "type": ["number", "null"],
-            "description": "the time from which the telemetry logs were read, newest first; null: none was. Reading "
-            "stops after 5 s, or sooner if other queries wait: if this is later than the start of the range, ask for a "
+            "description": "the time from which the telemetry logs were read; null: none was. Reading, newest first, "
+            "stops after 5 s, or sooner if other queries wait: if this is later than the range's start, ask for a "
             "shorter one",
         },
     }

@@ -51,12 +51,12 @@ class Position:
     altitude_m: Annotated[float | None, "above the sea, by GPS"] = None
     height_m: Annotated[float | None, "above the launch point, estimated by the flight controller"] = None
     climb_m_s: Annotated[float | None, "upwards is positive"] = None
-    north_m_s: Annotated[float | None, "speed over ground, northward part"] = None
-    east_m_s: Annotated[float | None, "speed over ground, eastward part"] = None
-    home_lat_deg: Annotated[float | None, "home: where the vehicle was armed; before that, its current position"] = None
-    home_lon_deg: Annotated[float | None, "home: where the vehicle was armed; before that, its current position"] = None
-    home_distance_m: Annotated[float | None, "distance to home"] = None
-    home_direction_deg: Annotated[float | None, "direction of home, clockwise from north"] = None
+    north_m_s: Annotated[float | None, "speed over ground"] = None
+    east_m_s: Annotated[float | None, "speed over ground"] = None
+    home_lat_deg: Annotated[float | None, "the place of arming; before that, the current position"] = None
+    home_lon_deg: Annotated[float | None, "the place of arming; before that, the current position"] = None
+    home_distance_m: float | None = None
+    home_direction_deg: Annotated[float | None, "clockwise from north"] = None
     age_s: Age = None
 
 
@@ -65,10 +65,10 @@ class Gps:
     """The satellite receiver's status."""
 
     fix: Annotated[str | None, "none, 2D or 3D"] = None
-    satellites: Annotated[int | None, "satellites used"] = None
+    satellites: Annotated[int | None, "used"] = None
     hdop: Annotated[float | None, "horizontal dilution of precision"] = None
     ground_speed_m_s: Annotated[float | None, "speed over ground"] = None
-    course_deg: Annotated[float | None, "direction of the movement, clockwise from north"] = None
+    course_deg: Annotated[float | None, "of the movement, clockwise from north"] = None
     age_s: Age = None
 
 
@@ -89,7 +89,7 @@ class Rc:
     """Input from the pilot's transmitter."""
 
     channels_us: Annotated[tuple[int, ...] | None, "pulse widths: roll, pitch, throttle, yaw, then aux 1.."] = None
-    rssi_percent: Annotated[float | None, "strength of the received signal"] = None
+    rssi_percent: Annotated[float | None, "signal strength"] = None
     age_s: Age = None
 
 
@@ -104,7 +104,7 @@ class Status:
     ] = None
     sensors: Annotated[tuple[str, ...] | None, "sensors on board that respond"] = None
     cycle_time_us: Annotated[int | None, "main loop time"] = None
-    i2c_errors: Annotated[int | None, "I2C errors since its start"] = None
+    i2c_errors: Annotated[int | None, "since its start"] = None
     age_s: Age = None
 
 
@@ -114,7 +114,7 @@ class Link:
 
     state: Annotated[str, "no port, searching, identifying, MSP, MAVLink or FrSky"]
     flight_controller: Annotated[str | None, "its name"] = None
-    speed_baud: Annotated[int | None, "speed of the port"] = None
+    speed_baud: Annotated[int | None, "of the port"] = None
     round_trip_ms: Annotated[float | None, "from a request to its reply"] = None
     requests_lost: Annotated[int | None, "requests without a reply since it was found"] = None
     bad_checksums: Annotated[int | None, "damaged replies since it was found"] = None
@@ -144,10 +144,9 @@ class MissionIdentity:
     checksum: Annotated[str, "CRC-32 over the records, 8 hexadecimal digits"]
     state: Annotated[
         str | None,
-        "not started, active, paused or complete; null: the flight controller does not report it (a Harakiri without "
-        "mission flight)",
+        "not started, active, paused or complete; null: not reported (by a Harakiri without mission flight)",
     ] = None
-    item: Annotated[int | None, "the item that is flown, as read back; null: none, or not reported"] = None
+    item: Annotated[int | None, "the item being flown, as read back; null: none, or not reported"] = None
 
 
 @dataclass(frozen=True, slots=True)

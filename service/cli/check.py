@@ -121,8 +121,7 @@ def check(
 
     Files: QGC WPL 110 (.waypoints), QGroundControl .plan, Mission Planner .mission.
 
-    Nothing is sent anywhere. Exit code 0: every file would be accepted, 3: one would erase the mission, 1: one would be
-    rejected, 2: one is unreadable.
+    Nothing is sent anywhere. Exit code 1: a file would be rejected, 3: one would erase the mission.
     """
     try:
         limit_m = takeoff_limit_m() if takeoff_max_m is None else takeoff_max_m

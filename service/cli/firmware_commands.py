@@ -46,7 +46,7 @@ def flash(client: BridgeClient, image: Path, battery: bool) -> None:
     """Flash IMAGE (.hex, .bin or .elf): a Harakiri with the mission patch, for a Naze32.
 
     The previous flash is stored as a backup first. Everything written is read back, and the new firmware must answer.
-    After an interruption run the same command again. Exit code 1: refused or failed, 2: IMAGE is unreadable.
+    After an interruption run the same command again.
     """
     try:
         program = parse_image(read_file(image, FirmwareFileError), shown_path(image)).program
@@ -64,10 +64,7 @@ def flash(client: BridgeClient, image: Path, battery: bool) -> None:
 @click.option("--battery", is_flag=True, help="Write even if the board measures a battery.")
 @bridge_options
 def restore(client: BridgeClient, backup: Path, battery: bool) -> None:
-    """Write BACKUP, the whole flash as `flash` stored it: firmware, settings and missions.
-
-    Exit code 1: refused or failed, 2: BACKUP is unreadable.
-    """
+    """Write BACKUP, the whole flash as `flash` stored it: firmware, settings and missions."""
     try:
         contents = read_file(backup, FirmwareFileError)
         check_backup(contents)

@@ -75,7 +75,7 @@ def fly(
 
     Needs a TestCode3 with mission flight (docs/howto/try-a-mission.md). Nothing is sent to a real craft.
 
-    Exit code 0: the list was flown as it says, 1: it was not, 2: the file or the image cannot be used.
+    Exit code 1: the mission was not flown as the file says.
     """
     records = _records(file)
     try:

@@ -29,8 +29,8 @@ _STANDARD_OUTPUT = Path("-")
 def push(client: BridgeClient, file: Path, erase: bool) -> None:
     """Write a mission file to the flight controller and verify it there.
 
-    Exit code 0: verified, 1: refused or failed (the old mission is kept), 2: the file is unreadable, 3: no item of it
-    can be stored, and the mission was not erased.
+    Exit code 1: refused or failed, the old mission is kept; 3: no item of the file can be stored, and the mission was
+    not erased.
     """
     try:
         items = load_mission(file)
@@ -57,8 +57,7 @@ def pull(client: BridgeClient, file: Path | None, with_others: bool) -> None:
 
     FILE is written as QGC WPL 110, or as a QGroundControl plan if its name ends with .plan; - is standard output.
 
-    With --all, further missions go to FILE-2, FILE-3 and so on. Exit code 0: read, 1: there is no link, or FILE cannot
-    be written.
+    With --all, further missions go to FILE-2, FILE-3 and so on.
     """
     if client.as_json and file == _STANDARD_OUTPUT:
         raise click.UsageError("the file and --json cannot both go to standard output: omit one of them")

@@ -62,10 +62,7 @@ def get_setting(client: BridgeClient, name: str) -> None:
 @click.argument("value")
 @bridge_options
 def set_setting(client: BridgeClient, name: str, value: str) -> None:
-    """Change the setting NAME to VALUE, until the flight controller's power is off.
-
-    Exit code 1: refused.
-    """
+    """Change the setting NAME to VALUE, until the flight controller's power is off."""
     changed = client.ask({"do": "set-setting", "name": name, "value": value})
     client.show(changed, lambda: say(changed["text"]))
 
@@ -109,7 +106,7 @@ def restore(client: BridgeClient, source: str, dry_run: bool) -> None:
     """Write the settings of SOURCE to the flight controller, save them, and verify them.
 
     SOURCE is a .param file or the number of a backup. Everything that differs is shown first, and in a terminal you are
-    asked. Exit code 0: the flight controller holds all settings of SOURCE, 1: it does not, 2: SOURCE is unreadable.
+    asked. Exit code 1: the flight controller does not hold all settings of SOURCE.
     """
     values, board = _source(client, source)
     request: Json = {"do": "plan-settings", "values": dict(values), "board": board}

@@ -35,7 +35,7 @@ _COLOURS = {Grade.OK: "green", Grade.NOTE: "yellow", Grade.PROBLEM: "red"}
 def doctor(fc: str | None, config: Path | None, state_dir: Path | None, as_json: bool) -> None:
     """Diagnose problems of this machine, each with its remedy.
 
-    Changes nothing, and does not disturb a running daemon. Exit code 0: no problem, 1: a problem was found.
+    Changes nothing, and does not disturb a running daemon. Exit code 1: a problem was found.
     """
     if not diagnose(fc, config, state_dir, as_json=as_json):
         raise SystemExit(1)

@@ -62,8 +62,8 @@ def setup(
 ) -> None:
     """Set this Raspberry Pi up: UART, settings, Wi-Fi, status page, service.
 
-    May be run again at any time: earlier answers are kept, and an option changes one. Exit code 0: done, 1: a change
-    failed, or doctor found a problem.
+    May be run again at any time: earlier answers are kept, and an option changes one. Exit code 1: a change failed, or
+    doctor found a problem.
     """
     if not (yes or dry_run or is_root()):
         fail(_NEEDS_ROOT)  # before its questions
