@@ -20,6 +20,8 @@ _OLD, _NEW = waypoints(20), waypoints(60, seed=1)
 #: Time to read the list, with default telemetry.
 _SETTLED_S = 2.0
 _BOOT_S = 20.0
+#: A byte at 115200 baud.
+_BYTE_S = 10 / 115200
 _SLOW_BAUD = 2400
 _LONGEST_SEARCH_S = 10.0
 _FOUND_WITHIN_S = 8.0
@@ -40,36 +42,41 @@ def station(world: World) -> GroundStation:
     return GroundStation(world)
 
 
-def is_written(naze: EmulatedNaze) -> Callable[[World], bool]:
-    """The last records are being programmed, eight half-words each, and COMMIT is in the receive ring."""
-    enough = naze.flash_operations + 8 * (len(_NEW) - 5)
-    return lambda _: naze.flash_operations >= enough
+def reach_last_records(world: World) -> None:
+    """Until the last records are being programmed, eight half-words each, with COMMIT in the receive ring."""
+    enough = world.naze.flash_operations + 8 * (len(_NEW) - 5)
+    world.wait_until(lambda world: world.naze.flash_operations >= enough, 5)
 
 
-def is_stored(naze: EmulatedNaze) -> Callable[[World], bool]:
-    """The seal is programmed, but the reply not yet sent."""
-    return lambda _: len(naze.stored_records) == len(_NEW)
+def reach_seal(world: World) -> None:
+    """Until the seal is programmed: the reply to COMMIT follows in 1.3 ms, less than the board's usual step."""
+    reach_last_records(world)
+    deadline = world.now + 1
+    while len(world.naze.stored_records) != len(_NEW):
+        assert world.now < deadline
+        world.run(_BYTE_S)
 
 
 @pytest.mark.parametrize(
-    ("moment", "last_word", "stored"),
+    ("reach_moment", "last_word", "stored"),
     [
-        (is_written, "The mission did not arrive: old mission kept, write it again", _OLD),
-        (is_stored, f"The mission did arrive: {len(_NEW)} records", _NEW),
+        (reach_last_records, "The mission did not arrive: old mission kept, write it again", _OLD),
+        (reach_seal, f"The mission did arrive: {len(_NEW)} records", _NEW),
     ],
 )
 def test_an_upload_interrupted_by_a_reset_is_settled(
     world: World,
     station: GroundStation,
     figure: Figure,
-    moment: Callable[[EmulatedNaze], Callable[[World], bool]],
+    reach_moment: Callable[[World], None],
     last_word: str,
     stored: list[MissionItem],
 ) -> None:
     assert Upload(station, _OLD).run() is MissionResult.ACCEPTED
     world.run(_SETTLED_S)
     ended = world.push(_NEW)
-    world.wait_until(moment(world.naze), 5)
+    reach_moment(world)
+    assert not ended
     world.naze.reset(world.now)
     began = world.now
     world.wait_until(lambda _: "The mission did" in joined_texts(station), _BOOT_S)
