@@ -182,8 +182,11 @@ class Bridge:
         #: Missions, for the same.
         self.missions = LocalMissions(missions, self._uploads, ground, emit, incidents)
         self._watch = MissionWatch(missions, ground, emit)
-        self._fences = PlaceLists(messages.MAV_MISSION_TYPE_FENCE, "Fence", self.vehicle, runner)
-        self._rally = PlaceLists(messages.MAV_MISSION_TYPE_RALLY, "Rally points", self.vehicle, runner)
+        fence, rally = messages.MAV_MISSION_TYPE_FENCE, messages.MAV_MISSION_TYPE_RALLY
+        # The check of a mission uses them, too.
+        changed = missions.settings_changed
+        self._fences = PlaceLists(fence, "Fence", self.vehicle, runner, changed)
+        self._rally = PlaceLists(rally, "Rally points", self.vehicle, runner, changed)
         transfers = {
             messages.MAV_MISSION_TYPE_MISSION: Transfers(missions, self._uploads, MissionDownloads(missions, ground))
         }

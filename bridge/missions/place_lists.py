@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fences and rally points: lists like missions, but the board's configuration holds them, and the Pi stores no copy."""
 
+from collections.abc import Callable
 from typing import Any
 
 from bridge.line.conversation import Conversation
@@ -19,12 +20,14 @@ NO_PLACES = Refusal(MissionResult.UNSUPPORTED, "No fences or rally points: only 
 
 
 class PlaceLists(MissionService):
-    """The lists of one type; name: for texts."""
+    """The lists of one type; name: for texts. on_change: called when the board's list may have changed."""
 
-    def __init__(self, mission_type: int, name: str, vehicle: Vehicle, runner: Runner) -> None:
+    def __init__(
+        self, mission_type: int, name: str, vehicle: Vehicle, runner: Runner, on_change: Callable[[], None]
+    ) -> None:
         super().__init__(vehicle, runner, lambda _mission, _delivery: None)
         self.mission_type = mission_type
-        self._name = name
+        self._name, self._on_change = name, on_change
         self.fc_store, self.are_stored = NO_PLACES, False
 
     def use(self, store: AnyFcMissionStore | Refusal, now: float, *, is_same_board: bool) -> None:
@@ -43,6 +46,7 @@ class PlaceLists(MissionService):
         if isinstance(fc_store, Refusal):
             return DeliveryResult(fc_store.ack, fc_store.text, None)
         result = yield from fc_store.push(verdict.records, progress)
+        self._on_change()
         if result.failure is not None:
             return DeliveryResult(MissionResult.DENIED, f"{self._name}: {result.failure.value}", None)
         self.held = HeldMission(identify(verdict.records), verdict.records, verdict.items)

@@ -14,7 +14,7 @@ from protocols.msp.frame import request
 FEATURE = 36
 FEATURE_SIZE = 4
 GEOZONE_FEATURE = 1 << 4
-SAFEHOME, SET_SAFEHOME, FW_APPROACH = 0x2038, 0x2039, 0x204A
+SAFEHOME, SET_SAFEHOME, FW_APPROACH, SET_FW_APPROACH = 0x2038, 0x2039, 0x204A, 0x204B
 GEOZONE, SET_GEOZONE, GEOZONE_VERTEX, SET_GEOZONE_VERTEX = 0x2210, 0x2211, 0x2212, 0x2213
 #: MAX_SAFE_HOMES, MAX_GEOZONES_IN_CONFIG, MAX_VERTICES_IN_CONFIG; a circle takes two vertices.
 SAFEHOMES, GEOZONES, VERTICES = 8, 63, 126
@@ -25,20 +25,9 @@ _VERTEX = struct.Struct("<BBii")
 _RADIUS = struct.Struct("<i")
 SAFEHOME_SIZE, APPROACH_SIZE, GEOZONE_SIZE = _SAFEHOME.size, _APPROACH.size, _GEOZONE.size
 VERTEX_SIZE = _VERTEX.size + _RADIUS.size
-#: Of the first mission in INAV's store; before it are those of the safehomes.
+#: Those of the safehomes, then those of the missions in INAV's store, from MISSION_APPROACH on.
+APPROACHES = 17
 MISSION_APPROACH = SAFEHOMES
-
-
-class Safehome(NamedTuple):
-    """A place to return to instead of home; degrees * 1e7. number: from 0."""
-
-    number: int
-    enabled: bool
-    lat_e7: int
-    lon_e7: int
-
-    def pack(self) -> bytes:
-        return _SAFEHOME.pack(*self)
 
 
 class FwApproach(NamedTuple):
@@ -48,16 +37,43 @@ class FwApproach(NamedTuple):
     """
 
     number: int
-    approach_cm: int
-    ground_cm: int
-    turns_right: bool
-    headings: tuple[int, int]
-    is_above_sea: bool
+    approach_cm: int = 0
+    ground_cm: int = 0
+    turns_right: bool = False
+    headings: tuple[int, int] = (0, 0)
+    is_above_sea: bool = False
+
+    @property
+    def is_empty(self) -> bool:
+        return self == FwApproach(self.number)
+
+    def pack(self) -> bytes:
+        return _APPROACH.pack(*self[:4], *self.headings, self.is_above_sea)
 
     def directions(self) -> tuple[int, ...]:
         """In which it may land, degrees; empty: INAV does not use this approach."""
         found = [way for each in self.headings if each for way in ((abs(each),) if each < 0 else (each, each + 180))]
         return tuple(dict.fromkeys(each % 360 for each in found))
+
+
+class Safehome(NamedTuple):
+    """A place to return to instead of home; degrees * 1e7. number: from 0, its approach's, too.
+
+    approach: None if the version has none, or if it was not read.
+    """
+
+    number: int
+    enabled: bool
+    lat_e7: int
+    lon_e7: int
+    approach: FwApproach | None = None
+
+    def pack(self) -> bytes:
+        """The payload of SET_SAFEHOME, which also erases the approach."""
+        return _SAFEHOME.pack(*self[:4])
+
+    def emptied(self) -> "Safehome":
+        return Safehome(self.number, False, 0, 0, self.approach and FwApproach(self.number))
 
 
 class FenceAction(IntEnum):

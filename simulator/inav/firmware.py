@@ -11,7 +11,7 @@ from simulator.board.flight import FIELD_ALTITUDE_M, FlightState
 from simulator.board.msp_firmware import Boot, MspFirmware, PortHabits
 from simulator.board.msp_port import error, reply
 from simulator.board.msp_sensors import DRAWN_MAH, RSSI, MspCommand, SensorReplies
-from simulator.board.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
+from simulator.board.nav_waypoint import FLAG_LAST, WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
 from simulator.board.waypoint_craft import WaypointCraft
 from simulator.inav.boxes import ANGLE, ARM, BOXES, NAMES, NAV_ALTHOLD, NAV_RTH, NAV_WP, PLANE_BOXES
 from simulator.inav.mission import CAPACITY, EEPROM_SIZE, FAKE, InavMission
@@ -253,8 +253,10 @@ class InavFirmware(MspFirmware):
         if len(payload) != WAYPOINT_SIZE:
             return error(MspCommand.SET_WP)
         closed = self._navigation.is_in_mission if self._version >= (8, 0, 0) else self.armed
+        number, waypoint = unpack_waypoint(payload)
+        self._places.waypoint_set(number, is_last=waypoint.flag == FLAG_LAST)
         if not closed:
-            self._mission.write(*unpack_waypoint(payload))
+            self._mission.write(number, waypoint)
         return reply(MspCommand.SET_WP)
 
     def _waypoint(self, payload: bytes) -> bytes:

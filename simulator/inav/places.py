@@ -53,8 +53,17 @@ class InavPlaces:
             self._tables.append([rest[at * size : (at + 1) * size] for at in range(count)])
             rest = rest[count * size :]
         self._safehomes, self._approaches, self._zones, self._vertices = self._tables
+        self._missions = 0
         self._zones_in_force = [*self._zones] if self._features & _GEOZONE_FEATURE else []
         self._vertices_in_force = [_VERTEX.unpack(vertex) for vertex in self._vertices if vertex != _FREE]
+
+    def waypoint_set(self, number: int, *, is_last: bool) -> None:
+        """SET_WP erases the approach of a mission, counted from the boot; past the last approach it erases all."""
+        self._missions = 0 if number == 0 else (self._missions + is_last) % 256
+        erased = (_SAFEHOMES + self._missions) % 256
+        numbers = (erased,) if erased < _APPROACHES else range(_APPROACHES)
+        for each in numbers:
+            self._approaches[each] = bytes(_APPROACH_SIZE)
 
     def save(self) -> None:
         content = b"".join(map(b"".join, self._tables))

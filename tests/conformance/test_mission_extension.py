@@ -314,7 +314,7 @@ def test_malformed_requests_change_nothing(fc: Companion) -> None:
 
 def test_other_commands_are_left_to_the_firmware(fc: Companion) -> None:
     assert fc.device.request(189, b"") is None
-    assert fc.device.request(197, b"") is None
+    assert fc.device.request(199, b"") is None
 
 
 def begin_until_refused(fc: Companion) -> tuple[int, ReplyStatus]:

@@ -10,9 +10,10 @@ from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from typing import Any
 
+from bridge.controllers.inav.approaches import approach_text
 from bridge.controllers.inav.zone_check import judge_zones
 from bridge.controllers.nav.judgement import Departure, Judgement
-from bridge.model.ground_track import distance_m
+from bridge.model.ground_track import Place, distance_m
 from protocols.inav_dump import SavedSettings
 from protocols.msp.inav_places import FwApproach, Geozone, Safehome
 from protocols.msp.nav import FLY_HOME, LEGS, NavAction, NavRecord
@@ -55,7 +56,7 @@ class InavLimits:
     Their defaults are INAV's; 0 turns the first, nav_max_altitude and nav_wp_enforce_altitude off.
     vbat_warning_cell_voltage: 0.01 V. zones: those in force; none without the feature GEOZONE. cell_voltage: of the
     battery, as last heard. selected: the mission that was selected, from 1, if there are several. approach: an
-    aeroplane's to the LAND of the first mission, where the new list is stored; None before 7.1.
+    aeroplane's to the LAND of the new list; None before 7.1.
     """
 
     nav_wp_max_safe_distance: int = 100
@@ -88,7 +89,8 @@ class InavLimits:
             if record.action == NavAction.RTH:
                 yield from self._return(place, record, highest_cm, departure)
             if record.action == NavAction.LAND and self.is_aeroplane:
-                yield self._landing(place)
+                name = f"FW approach {self.approach.number} has no heading" if self.approach else _NO_APPROACHES
+                yield _landing(place, self.approach, "", "here", name)
             if record.action not in LEGS:
                 continue
             height_cm = _above_home_cm(record, departure)
@@ -126,27 +128,31 @@ class InavLimits:
             yield Judgement(place, "p1", why, News.NOTICE)
         if rth.p1 and self.nav_rth_allow_landing == RthAllowLanding.NEVER:
             yield Judgement(place, "p1", "lands, although nav_rth_allow_landing is NEVER", News.NOTICE)
-        if self.safehome_usage_mode != SafehomeUsageMode.RTH:
-            return
         for start in departure.places[:1]:
-            near = [(distance_m(start, each), each.number) for each in self.safehomes if each.enabled]
-            metres, number = min(near, default=(0.0, 0))
-            if near and metres * 100 <= self.safehome_max_distance:
+            near = self._near_safehome(start)
+            returns_there = self.safehome_usage_mode == SafehomeUsageMode.RTH
+            if near and returns_there:
                 limit = f"safehome_max_distance is {self.safehome_max_distance / 100:g} m"
-                yield Judgement(place, "p1", f"returns to safehome {number}, {metres:.0f} m from home ({limit})")
+                metres = distance_m(start, near)
+                yield Judgement(place, "p1", f"returns to safehome {near.number}, {metres:.0f} m from home ({limit})")
+            if rth.p1 and self.is_aeroplane:
+                yield self._landing_after_return(place, near, returns_there=returns_there)
 
-    def _landing(self, place: int) -> Judgement:
-        """Items have no place for an approach: a second height, two headings, a circuit (docs/inav.md)."""
-        approach = self.approach
-        directions = approach.directions() if approach else ()
-        if approach is None or not directions:
-            name = f"FW approach {approach.number} has no heading" if approach else "no FW approach before INAV 7.1"
-            return Judgement(place, "command", f"circles down here and lands in any direction ({name})")
-        level = "sea level" if approach.is_above_sea else "home"
-        heights = f"from {approach.approach_cm / 100:g} m to the ground at {approach.ground_cm / 100:g} m above {level}"
-        headings = " or ".join(map(str, directions))
-        why = f"lands by FW approach {approach.number}: heading {headings}, {heights}"
-        return Judgement(place, "command", why, News.NOTICE)
+    def _near_safehome(self, start: Place) -> Safehome | None:
+        """The one that INAV chooses where it is armed."""
+        on = [each for each in self.safehomes if each.enabled]
+        nearest = min(on, key=lambda each: distance_m(start, each), default=None)
+        is_near = nearest is not None and distance_m(start, nearest) * 100 <= self.safehome_max_distance
+        return nearest if is_near else None
+
+    def _landing_after_return(self, place: int, near: Safehome | None, *, returns_there: bool) -> Judgement:
+        """INAV lands by the approach of the nearest safehome, and there, even if it returns to home."""
+        if near is None:
+            why = f"no safehome within safehome_max_distance, {self.safehome_max_distance / 100:g} m"
+            return _landing(place, None, "", "at home", why)
+        name = f"FW approach {near.number} has no heading" if near.approach else _NO_APPROACHES
+        there = f"at safehome {near.number}"
+        return _landing(place, near.approach, f"{there} ", there if returns_there else "at home", name)
 
     def _of_the_board(self) -> Iterable[Judgement]:
         if self.selected > 1:
@@ -157,6 +163,14 @@ class InavLimits:
             yield Judgement(None, "", f"Battery at {self.cell_voltage:.2f} V per cell, {warns}")
 
 
+def _landing(place: int, approach: FwApproach | None, where: str, otherwise: str, without: str) -> Judgement:
+    """Items have no place for an approach: a second height, two headings, a circuit (docs/inav.md)."""
+    if approach and approach.directions():
+        return Judgement(place, "command", f"lands {where}by {approach_text(approach)}", News.NOTICE)
+    return Judgement(place, "command", f"circles down {otherwise} and lands in any direction ({without})")
+
+
+_NO_APPROACHES = "no FW approach before INAV 7.1"
 _CHOICES: Mapping[str, type[IntEnum]] = {
     "nav_rth_alt_mode": RthAltMode,
     "nav_rth_allow_landing": RthAllowLanding,

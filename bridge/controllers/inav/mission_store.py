@@ -10,10 +10,11 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import chain
 
+from bridge.controllers.inav.approaches import read_approaches, write_approaches
 from bridge.controllers.inav.fly_to import FLOWN_TO, fly_to
 from bridge.controllers.inav.geozones import has_zones, read_zones_in_force
 from bridge.controllers.inav.limits import SETTING_NAMES, InavLimits
-from bridge.controllers.inav.safehomes import read_safehomes
+from bridge.controllers.inav.safehomes import read_safehomes, with_approaches
 from bridge.controllers.inav.settings import read_values
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.items import item_seqs
@@ -36,13 +37,7 @@ from bridge.model.refusal import Refusal
 from bridge.model.vehicle import Power, Vehicle
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, request
-from protocols.msp.inav_places import (
-    APPROACH_SIZE,
-    FW_APPROACH,
-    MISSION_APPROACH,
-    decode_approach,
-    encode_read_approach,
-)
+from protocols.msp.inav_places import APPROACHES, MISSION_APPROACH, FwApproach
 from protocols.msp.nav import (
     INFO_SIZE,
     LOAD_REQUEST,
@@ -86,6 +81,9 @@ class InavMissions(NavMissions, FliesToItems):
     _are_limits_doubtful = True
     #: A board that does not answer about them is asked again only at the next upload.
     _are_limits_silent = False
+    #: All of the board's landing approaches, as last read, and as they are to be after the Write.
+    _approaches: tuple[FwApproach, ...] = ()
+    _wanted_approaches: tuple[FwApproach, ...] = ()
 
     def __init__(self, profile: NavProfile, controller: FlightController, vehicle: Vehicle) -> None:
         super().__init__(profile, controller, vehicle)
@@ -109,6 +107,7 @@ class InavMissions(NavMissions, FliesToItems):
         """Write the list, with the other missions behind it, and verify it."""
         result = yield from super().push(records, progress)
         if result.failure is None:
+            self._approaches = self._wanted_approaches
             self._stored = self._store_content(records or NOTHING)
             self.others = self._kept
         return result
@@ -199,9 +198,16 @@ class InavMissions(NavMissions, FliesToItems):
     def _rules(self) -> NavRules:
         limits = self._limits
         if limits is not None:
-            power, selected = self._vehicle.last(Power), self._seen[1] if self._seen and self.others else 1
+            power = self._vehicle.last(Power)
             cell_v = power.voltage_v / power.cells if power and power.voltage_v and power.cells else None
-            limits = replace(limits, cell_voltage=cell_v, selected=selected)
+            approaches = self._moved_approaches()
+            limits = replace(
+                limits,
+                cell_voltage=cell_v,
+                selected=self._selected,
+                safehomes=with_approaches(limits.safehomes, approaches),
+                approach=approaches[MISSION_APPROACH] if approaches else None,
+            )
         return NavRules(replace(self._profile, limits=limits), self._known or (), self.others)
 
     def _read_limits(self) -> Conversation[None]:
@@ -211,16 +217,33 @@ class InavMissions(NavMissions, FliesToItems):
         values = yield from read_values(SETTING_NAMES)
         safehomes = (yield from read_safehomes()) if values else ()
         zones = (yield from read_zones_in_force()) if values and self._has_zones else ()
-        approach = (yield from _ask_approach()) if values and self._is_aeroplane else b""
-        if values is None or safehomes is None or zones is None or approach is None:
+        approaches = (yield from read_approaches(range(APPROACHES))) if values else ()
+        if values is None or safehomes is None or zones is None or approaches is None:
             self._are_limits_doubtful = self._are_limits_silent = True
         elif values:
+            self._approaches = approaches
             limits = InavLimits(safehomes=safehomes, zones=zones, is_aeroplane=self._is_aeroplane)
-            self._limits = replace(limits, approach=decode_approach(approach)).with_settings(values)
+            self._limits = limits.with_settings(values)
+
+    @property
+    def _selected(self) -> int:
+        """The number of the mission that the new list replaces, from 1."""
+        return self._seen[1] if self._seen and self.others else 1
+
+    def _moved_approaches(self) -> tuple[FwApproach, ...]:
+        """Each mission keeps its approach; the new list, which is stored first, gets that of the one it replaces."""
+        others = [number for number in range(1, len(self.others) + 2) if number != self._selected]
+        approaches = [*self._approaches]
+        for place, number in enumerate((self._selected, *others[: len(self._kept)]), MISSION_APPROACH):
+            before = MISSION_APPROACH + number - 1
+            if max(place, before) < len(approaches):
+                approaches[place] = self._approaches[before]._replace(number=place)
+        return tuple(approaches)
 
     def _store_content(self, records: Mission) -> Mission:
         """SAVE selects the first mission, so the new one goes there."""
         self._kept = self.others[: len(self.others) - len(self.erased_by(records))]
+        self._wanted_approaches = self._moved_approaches()
         return (*records, *chain.from_iterable(self._kept))
 
     def _order(self, wanted: Mission) -> list[tuple[int, NavRecord]]:
@@ -232,6 +255,8 @@ class InavMissions(NavMissions, FliesToItems):
             raise PushFailed(PushFailure.NO_ANSWER)
         if not info.is_valid or info.count != count:
             raise PushFailed(PushFailure.REFUSED, is_final=False)
+        if not (yield from write_approaches(self._wanted_approaches, self._approaches)):
+            raise PushFailed(PushFailure.NO_ANSWER, is_final=False)
 
     def _keep(self) -> Conversation[None]:
         """SAVE, then verify again: the flight controller stalls during SAVE, and may have restarted."""
@@ -261,6 +286,12 @@ class InavMissions(NavMissions, FliesToItems):
         self._seen = yield from self._look()
 
     def _confirm(self, before: Mission | None) -> Conversation[Mission | None]:
+        if self._is_aeroplane or not all(each.is_empty for each in self._approaches):
+            # Another client may have set one since.
+            approaches = yield from read_approaches(range(APPROACHES))
+            if approaches is None:
+                raise PushFailed(PushFailure.NO_ANSWER)
+            self._approaches = approaches
         if (yield from self._is_unchanged((yield from self._look()))):
             return before
         # Another client has written or loaded a list since: its other missions must be kept, too.
@@ -272,17 +303,19 @@ class InavMissions(NavMissions, FliesToItems):
         """Make it LOAD the saved missions; if that is not the old list, write that one again."""
         if self._vehicle.armed:
             return False
+        self._wanted_approaches = self._approaches
         with suppress(LinkLost):
             yield from ask(LOAD_REQUEST, Nav.LOAD, 0)
             loaded = yield from self.pull()
             if loaded == before and (loaded or self.others):
-                return True
+                return (yield from write_approaches(self._approaches, self._approaches))
         return (yield from super()._restore(before))
 
     def _restore_at_once(self, before: Mission | None) -> Conversation[bool]:
         """Make it LOAD the saved missions: the old list, unless another client wrote one without saving it."""
         with suppress(LinkLost):
             yield from ask(LOAD_REQUEST, Nav.LOAD, 0, tries=1)
+            yield from write_approaches(self._approaches, self._approaches)
             return bool(before) and (yield from self._is_unchanged((yield from self._look())))
         return False
 
@@ -299,12 +332,6 @@ class InavMissions(NavMissions, FliesToItems):
     def _info(self, *, tries: int = 3) -> Conversation[NavInfo | None]:
         reply = yield from ask(request(Nav.GETINFO), Nav.GETINFO, INFO_SIZE, tries=tries)
         return None if reply is None else decode_info(reply.payload)
-
-
-def _ask_approach() -> Conversation[bytes | None]:
-    """The payload, empty from a version before 7.1; None: it does not answer."""
-    reply = yield from ask(encode_read_approach(MISSION_APPROACH), FW_APPROACH, APPROACH_SIZE)
-    return None if reply is None else reply.payload
 
 
 def _is_load_gesture(channels_us: Sequence[int]) -> bool:

@@ -48,10 +48,10 @@ class InavPlaceStore(FcMissionStore[RecordT]):
     def push(self, records: tuple[RecordT, ...], progress: PushProgress) -> Conversation[PushResult]:
         """Write what differs, read all of it back, and save it."""
         try:
-            wanted = self._whole(records)
             before = self._known if self._known is not None else (yield from self.pull())
             if before is None or (yield from ask_armed(self._arm_bit)) is not False:
                 return PushResult(PushFailure.PLACES_KEPT)
+            wanted = self._whole(records)
             if before == wanted and not self._is_unsaved:
                 return PushResult(None, unchanged=True)
             self._is_unsaved = True

@@ -4,21 +4,29 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from bridge.controllers.inav.approaches import approach_text, read_approaches, write_approaches
 from bridge.controllers.inav.place_store import InavPlaceStore, take
 from bridge.line.conversation import Conversation, ask
 from bridge.missions.list_check import ListCheck, missing_coordinate, refuse_frame, refuse_position
+from bridge.model.ground_track import distance_m
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
 from protocols.msp.inav_places import (
     SAFEHOME,
     SAFEHOME_SIZE,
     SAFEHOMES,
     SET_SAFEHOME,
+    FwApproach,
     Safehome,
     decode_safehome,
     encode_read_safehome,
 )
 from reports.finding import DROPPED, Finding, News, RejectingFinding, reject
 from reports.verdict import CLEARED_LIST, Result, Verdict
+
+#: A place that moves this far keeps its landing approach: on the same field, its headings and heights still fit.
+_SAME_RUNWAY_M = 100
+#: Items as floats are up to 0.9 m off.
+_NOT_MOVED_M = 1.0
 
 
 def read_safehomes() -> Conversation[tuple[Safehome, ...] | None]:
@@ -34,14 +42,21 @@ def read_safehomes() -> Conversation[tuple[Safehome, ...] | None]:
     return tuple(found)
 
 
+def with_approaches(safehomes: Sequence[Safehome], approaches: Sequence[FwApproach]) -> tuple[Safehome, ...]:
+    """Each safehome's approach has its number; a version without approaches has none."""
+    return tuple(each._replace(approach=approaches[each.number]) if approaches else each for each in safehomes)
+
+
 class InavSafehomes(InavPlaceStore[Safehome]):
-    """Writing one also resets its landing approach, so those that are unchanged keep their number."""
+    """Writing a safehome erases its landing approach, which is then written again."""
 
     def pull(self) -> Conversation[tuple[Safehome, ...] | None]:
-        found = yield from read_safehomes()
-        if found is not None:
-            self._known = found
-        return found
+        safehomes = yield from read_safehomes()
+        approaches = yield from read_approaches(range(SAFEHOMES))
+        if safehomes is None or approaches is None:
+            return None
+        self._known = with_approaches(safehomes, approaches)
+        return self._known
 
     def items(self, records: Sequence[Safehome], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
         return rally_items(records)
@@ -50,13 +65,15 @@ class InavSafehomes(InavPlaceStore[Safehome]):
         return RallyRules(self._known or ())
 
     def _whole(self, records: tuple[Safehome, ...]) -> tuple[Safehome, ...]:
-        return records or tuple(Safehome(number, False, 0, 0) for number in range(SAFEHOMES))
+        return records or tuple(each.emptied() for each in self._known or ())
 
     def _write(self, wanted: tuple[Safehome, ...], held: tuple[Safehome, ...]) -> Conversation[bool]:
         for new, old in zip(wanted, held, strict=False):
-            if new != old and not (yield from take(SET_SAFEHOME, new.pack())):
+            if new.pack() != old.pack() and not (yield from take(SET_SAFEHOME, new.pack())):
                 return False
-        return True
+        approaches = [(new.approach, old.approach) for new, old in zip(wanted, held, strict=False)]
+        pairs = [(new, old) for new, old in approaches if new is not None and old is not None]
+        return (yield from write_approaches([new for new, _ in pairs], [old for _, old in pairs]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,23 +117,46 @@ class RallyCheck(ListCheck):
             return CLEARED_LIST
         off = sum(not each.enabled and bool(each.lat_e7 or each.lon_e7) for each in self._former)
         if off:
-            why = f"Safehomes that were off are erased: {off}"
-            self._findings.append(Finding(None, "count", None, None, why, news=News.WARNING))
-        slots: dict[int, tuple[int, int]] = {}
+            self._say(f"Safehomes that were off are erased: {off}", News.WARNING)
+        records = self._fill()
+        findings = tuple(self._findings)
+        return Verdict(Result.ACCEPTED, MissionResult.ACCEPTED, records, rally_items(records), findings)
+
+    def _fill(self) -> tuple[Safehome, ...]:
+        """A place that is a safehome stays; one near a vanished one replaces it, and keeps its landing approach."""
+        former = {each.number: each for each in self._former}
+        filled: dict[int, Safehome] = {}
         ahead = [*self._places]
         for each in self._former:
             if each.enabled and (each.lat_e7, each.lon_e7) in ahead:
-                slots[each.number] = each.lat_e7, each.lon_e7
-                ahead.remove(slots[each.number])
-        free = (number for number in range(SAFEHOMES) if number not in slots)
-        slots.update(zip(free, ahead, strict=False))
-        empty = Safehome(0, False, 0, 0)
-        records = tuple(
-            Safehome(number, True, *slots[number]) if number in slots else empty._replace(number=number)
-            for number in range(SAFEHOMES)
-        )
-        findings = tuple(self._findings)
-        return Verdict(Result.ACCEPTED, MissionResult.ACCEPTED, records, rally_items(records), findings)
+                filled[each.number] = each
+                ahead.remove((each.lat_e7, each.lon_e7))
+        for each in self._former:
+            approach = each.approach
+            if each.number in filled or approach is None or not approach.directions():
+                continue
+            moved = min((_moved(each, place) for place in ahead), key=lambda to: distance_m(each, to), default=None)
+            if moved is not None and each.enabled and (metres := distance_m(each, moved)) <= _SAME_RUNWAY_M:
+                filled[each.number] = moved
+                ahead.remove((moved.lat_e7, moved.lon_e7))
+                if metres >= _NOT_MOVED_M:
+                    kept = f"Safehome {each.number} moved {metres:.0f} m and keeps its {approach_text(approach)}"
+                    self._say(kept, News.NOTICE)
+            elif each.lat_e7 or each.lon_e7:
+                lost = f"Safehome {each.number} was deleted or moved over {_SAME_RUNWAY_M} m, and lost its"
+                self._say(f"{lost} {approach_text(approach)}", News.WARNING)
+        for number in range(SAFEHOMES):
+            if number not in filled:
+                empty = former.get(number, Safehome(number, False, 0, 0)).emptied()
+                filled[number] = _moved(empty, ahead.pop(0)) if ahead else empty
+        return tuple(filled[number] for number in range(SAFEHOMES))
+
+    def _say(self, why: str, news: News) -> None:
+        self._findings.append(Finding(None, "count", None, None, why, news=news))
+
+
+def _moved(safehome: Safehome, place: tuple[int, int]) -> Safehome:
+    return safehome._replace(enabled=True, lat_e7=place[0], lon_e7=place[1])
 
 
 def rally_items(safehomes: Sequence[Safehome]) -> tuple[MissionItem, ...]:

@@ -25,6 +25,8 @@ from tests.support.settings_client import SettingsClient
 NORTH = 8983
 LAND = item(Command.NAV_LAND)
 APPROACH = FwApproach(8, 5000, 350, turns_right=False, headings=(90, -10), is_above_sea=False)
+BY_APPROACH_3 = "FW approach 3: heading 90 or 270 or 10, from 50 m to the ground at 3.5 m above home"
+NO_SAFEHOME = "circles down at home and lands in any direction (no safehome within safehome_max_distance, 200 m)"
 NEAR, FAR = replace(WP, lat_e7=LAT + NORTH // 2), replace(WP, lat_e7=LAT + 2 * NORTH)
 
 
@@ -125,6 +127,64 @@ def test_how_an_aeroplane_lands_is_named(approach: FwApproach | None, news: str)
     there = replace(LAND, lat_e7=LAT + NORTH)
     assert texts(WP, there, is_aeroplane=True, approach=approach) == [f"WP 2: {news}"]
     assert texts(WP, there, approach=approach) == []
+
+
+@pytest.mark.parametrize(
+    ("safehome", "limits", "news"),
+    [
+        (
+            None,
+            {},
+            [NO_SAFEHOME],
+        ),
+        (
+            Safehome(3, True, LAT + 3 * NORTH, LON, APPROACH._replace(number=3)),
+            {},
+            [NO_SAFEHOME],
+        ),
+        (
+            Safehome(3, True, LAT + NORTH, LON),
+            {},
+            [
+                "returns to safehome 3, 100 m from home (safehome_max_distance is 200 m)",
+                "circles down at safehome 3 and lands in any direction (no FW approach before INAV 7.1)",
+            ],
+        ),
+        (
+            Safehome(3, True, LAT + NORTH, LON, FwApproach(3)),
+            {},
+            [
+                "returns to safehome 3, 100 m from home (safehome_max_distance is 200 m)",
+                "circles down at safehome 3 and lands in any direction (FW approach 3 has no heading)",
+            ],
+        ),
+        (
+            Safehome(3, True, LAT + NORTH, LON, APPROACH._replace(number=3)),
+            {},
+            [
+                "returns to safehome 3, 100 m from home (safehome_max_distance is 200 m)",
+                f"lands at safehome 3 by {BY_APPROACH_3}",
+            ],
+        ),
+        (
+            Safehome(3, True, LAT + NORTH, LON, APPROACH._replace(number=3)),
+            {"safehome_usage_mode": SafehomeUsageMode.OFF},
+            [f"lands at safehome 3 by {BY_APPROACH_3}"],
+        ),
+        (
+            Safehome(3, True, LAT + NORTH, LON, FwApproach(3)),
+            {"safehome_usage_mode": SafehomeUsageMode.OFF},
+            ["circles down at home and lands in any direction (FW approach 3 has no heading)"],
+        ),
+    ],
+)
+def test_how_an_aeroplane_lands_after_its_return_is_named(
+    safehome: Safehome | None, limits: dict[str, Any], news: list[str]
+) -> None:
+    limits = {"safehomes": (safehome,) if safehome else (), **limits}
+    assert texts(WP, RTL_LANDS, is_aeroplane=True, **limits) == [f"WP 2: {each}" for each in news]
+    assert not any("lands" in text and "FW" in text for text in texts(WP, RTL_LANDS, **limits))
+    assert not any("FW" in text for text in texts(WP, RTL, is_aeroplane=True, **limits))
 
 
 def test_an_aeroplanes_approach_is_read_and_its_mission_loaded_because_only_then_inav_uses_it() -> None:

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""An INAV's landing approaches: SET_WP and SET_SAFEHOME erase them, and the bridge writes them again."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from protocols.mission_item import Command, MissionResult
+from protocols.msp.frame import Direction, MspFrame
+from protocols.msp.inav_places import (
+    APPROACHES,
+    FW_APPROACH,
+    MISSION_APPROACH,
+    SET_FW_APPROACH,
+    SET_SAFEHOME,
+    FwApproach,
+    decode_approach,
+)
+from simulator.board.msp_board import MspBoard
+from simulator.board.options import Faults
+from simulator.inav.firmware import InavFirmware
+from simulator.inav.places import InavPlaces
+from tests.bridge.controllers.inav.test_mission_store import ACCEPTED, board_with
+from tests.bridge.controllers.inav.test_place_store import RALLY, RALLY_ITEMS, place, read
+from tests.bridge.controllers.nav.test_mission_store import plan
+from tests.bridge.controllers.nav.test_stored_missions import Bench
+from tests.support.conversations import Upload
+from tests.support.nav_lists import HOME, LAT, LON, RTL_LANDS, WP
+
+_PLANE = 1
+
+
+def places_of(board: MspBoard) -> InavPlaces:
+    assert isinstance(board._firmware, InavFirmware)
+    return board._firmware._places
+
+
+def approach(number: int) -> FwApproach:
+    return FwApproach(number, 4000 + number, 100, headings=(-90, 0))
+
+
+def set_approaches(board: MspBoard, *numbers: int) -> None:
+    for number in numbers:
+        places_of(board).answer(SET_FW_APPROACH, approach(number).pack())
+
+
+def approaches_of(board: MspBoard) -> list[FwApproach | None]:
+    return [decode_approach(places_of(board).answer(FW_APPROACH, bytes((n,))) or b"") for n in range(APPROACHES)]
+
+
+@pytest.mark.parametrize("platform", [0, _PLANE])
+def test_writes_of_missions_keep_all_approaches_and_save_them(platform: int) -> None:
+    """The platform is that of the active profile: a VTOL may be a copter when it is written to."""
+    board, world, station = board_with(version="9.1.0", platform=platform)
+    set_approaches(board, *range(APPROACHES))
+    world.inside.missions.settings_changed()
+    for size in range(3, 15):
+        assert Upload(station, plan(size)).run() is ACCEPTED
+        assert approaches_of(board) == [approach(number) for number in range(APPROACHES)]
+    board.power_off(world.now)
+    board.power_on_booted(world.now)
+    world.run(1)
+    assert approaches_of(board) == [approach(number) for number in range(APPROACHES)]
+
+
+def test_an_approach_that_another_client_has_set_since_is_kept() -> None:
+    board, _, station = board_with(version="9.1.0", platform=_PLANE)
+    assert Upload(station, plan(3)).run() is ACCEPTED
+    set_approaches(board, MISSION_APPROACH)
+    assert Upload(station, plan(4)).run() is ACCEPTED
+    assert approaches_of(board)[MISSION_APPROACH] == approach(MISSION_APPROACH)
+
+
+def refusing(answer: Callable[[int, bytes, float], bytes | None], refused: int) -> Callable[..., bytes | None]:
+    def answer_or_refuse(command: int, payload: bytes, now: float) -> bytes | None:
+        if command == refused:
+            return MspFrame(Direction.ERROR, command, b"", is_v2=True).encode()
+        return answer(command, payload, now)
+
+    return answer_or_refuse
+
+
+def test_a_mission_is_not_saved_without_its_approach(monkeypatch: pytest.MonkeyPatch) -> None:
+    board, _, station = board_with(version="9.1.0", platform=_PLANE)
+    set_approaches(board, MISSION_APPROACH)
+    places_of(board).save()
+    firmware = board._firmware
+    monkeypatch.setattr(firmware, "answer", refusing(firmware.answer, SET_FW_APPROACH))  # type: ignore[union-attr]
+    assert Upload(station, plan(3)).run() is MissionResult.DENIED
+    assert firmware.stored == []  # type: ignore[union-attr]
+
+
+def test_each_mission_in_the_store_keeps_its_approach_when_its_number_changes() -> None:
+    bench = Bench(4, 6, 9, faults=Faults(boxes=0, selected_mission=2))
+    bench.faults.selected_mission = 0
+    first, second, third = range(MISSION_APPROACH, MISSION_APPROACH + 3)
+    set_approaches(bench.board, first, second, third)
+    bench.world.inside.missions.settings_changed()
+    assert Upload(bench.station, plan(21, 7)).run() is ACCEPTED
+    assert approaches_of(bench.board)[first : third + 1] == [
+        approach(second)._replace(number=first),
+        approach(first)._replace(number=second),
+        approach(third),
+    ]
+
+
+def test_rally_points_keep_their_approaches_in_any_order_and_when_they_move_a_little() -> None:
+    board, _, station = board_with(version="9.1.0")
+    assert Upload(station, RALLY_ITEMS, mission_type=RALLY).run() is ACCEPTED
+    set_approaches(board, 0, 1, 2)
+    first, second, third = RALLY_ITEMS
+    moved = replace(first, lat_e7=LAT + 12000)
+    assert Upload(station, [third, moved, second], mission_type=RALLY).run() is ACCEPTED
+    assert approaches_of(board)[:4] == [approach(0), approach(1), approach(2), FwApproach(3)]
+    assert [item.lat_e7 for item in read(station, RALLY)] == [moved.lat_e7, second.lat_e7, third.lat_e7]
+    assert "Safehome 0 moved 22 m and keeps its FW approach 0: heading 90" in " ".join(station.texts())
+
+
+def test_a_deleted_or_distant_rally_points_approach_is_named_and_not_inherited() -> None:
+    board, _, station = board_with(version="9.1.0")
+    assert Upload(station, RALLY_ITEMS, mission_type=RALLY).run() is ACCEPTED
+    set_approaches(board, 0, 1)
+    new = [*RALLY_ITEMS[1:], place(Command.RALLY_POINT, 700)]
+    assert Upload(station, new, mission_type=RALLY).run() is ACCEPTED
+    assert approaches_of(board)[:2] == [FwApproach(0), approach(1)]
+    lost = "Safehome 0 was deleted or moved over 100 m, and lost its FW approach 0: heading 90, from 40 m"
+    assert lost in " ".join(station.texts())
+
+
+def test_an_approach_of_a_place_that_is_no_rally_point_is_cleared() -> None:
+    board, _, station = board_with(version="9.1.0")
+    set_approaches(board, 0, 5)
+    assert Upload(station, RALLY_ITEMS, mission_type=RALLY).run() is ACCEPTED
+    assert approaches_of(board)[:6] == [FwApproach(number) for number in range(6)]
+
+
+def test_a_rally_point_that_is_refused_leaves_the_old_ones_with_their_approaches(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    board, _, station = board_with(version="9.1.0")
+    assert Upload(station, RALLY_ITEMS, mission_type=RALLY).run() is ACCEPTED
+    set_approaches(board, 0, 1, 2)
+    firmware, refusals = board._firmware, [True]
+    answer = firmware.answer  # type: ignore[union-attr]
+
+    def refusing_third(command: int, payload: bytes, now: float) -> bytes | None:
+        if command == SET_SAFEHOME and payload[0] == 2 and refusals:
+            refusals.pop()
+            return MspFrame(Direction.ERROR, command, b"", is_v2=True).encode()
+        return answer(command, payload, now)
+
+    monkeypatch.setattr(firmware, "answer", refusing_third)
+    new = [place(Command.RALLY_POINT, north) for north in (2000, 3000, 4000)]
+    assert Upload(station, new, mission_type=RALLY).run() is MissionResult.DENIED
+    assert "the old ones are kept" in " ".join(station.texts())
+    assert approaches_of(board)[:3] == [approach(0), approach(1), approach(2)]
+
+
+def test_an_aeroplanes_return_names_the_approach_of_rally_points_written_since_the_last_mission() -> None:
+    _, _, station = board_with(version="9.1.0", platform=_PLANE)
+    there = replace(WP, lat_e7=LAT + 5000, lon_e7=LON)
+    assert Upload(station, [HOME, there, RTL_LANDS]).run() is ACCEPTED
+    assert "circles down at home and lands in any direction (no safehome within" in " ".join(station.texts())
+    rally = replace(RALLY_ITEMS[0], lat_e7=there.lat_e7, lon_e7=there.lon_e7)
+    assert Upload(station, [rally], mission_type=RALLY).run() is ACCEPTED
+    assert Upload(station, [HOME, there, RTL_LANDS]).run() is ACCEPTED
+    assert "circles down at safehome 0 and lands in any direction (FW approach 0 has no" in " ".join(station.texts())
