@@ -2,7 +2,7 @@
 """Mission Planner's Write and Read of 146 items through `fleet mavlink`: `python -m benchmarks.far_mission [RTT_MS]`.
 
 The vehicle is a real daemon with a simulated Naze, behind a proxy that delays every byte to and from the router by half
-the round trip. The ground station behaves like Mission Planner and is beside the relay.
+the round trip. The ground station behaves like Mission Planner and is next to the relay.
 """
 
 import asyncio

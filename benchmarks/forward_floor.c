@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The least that passing MAVLink on can cost: read, split, check the CRC, one sendto a frame.
+/* The lowest cost of passing MAVLink on: read, split, check the CRC, one sendto a frame.
  *
  * forward_floor TTY PORT: frames of MAVLink 2 go from a terminal in raw mode to a UDP port of the loopback. Only the
  * two messages of the benchmark are known.

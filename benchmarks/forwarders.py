@@ -53,7 +53,7 @@ def usable_forwarders() -> list[Forwarder]:
 def _installed() -> list[Forwarder]:
     """The floor needs cc, MAVProxy comes with `make test`'s dependencies.
 
-    mavlink-router and mavp2p are looked for as $MAVLINK_ROUTERD and $MAVP2P, and on the path.
+    mavlink-router and mavp2p are found as $MAVLINK_ROUTERD and $MAVP2P, or on the path.
     """
     found = [Forwarder(OURS, _naze_bridge)]
     if _MAVPROXY.exists():

@@ -83,7 +83,7 @@ def _over_a_uart() -> list[Figure]:
         Figure(f"{name}, median", statistics.median(times) * 1000, "ms", floor, 1.15, times_floor=True),
         Figure(f"{name}, worst", max(times) * 1000, "ms", floor),
         Figure(
-            "a bare loop on that line: what line and machine take of it, median",
+            "a bare loop on that line, median",
             statistics.median(bare) * 1000,
             "ms",
             floor,

@@ -50,17 +50,17 @@ class Station:
         steps: list[float] = []
         began_at = sent_at = self._send(self._writer.frame(pack(count), 2))
         for seq, frame in enumerate(frames):
-            request, came_at = self._receive(messages.MAVLINK_MSG_ID_MISSION_REQUEST)
+            request, received_at = self._receive(messages.MAVLINK_MSG_ID_MISSION_REQUEST)
             if (asked := int.from_bytes(request.raw[10:12], "little")) != seq:
                 raise BenchmarkError(f"item {asked} was asked for instead of {seq}")
             if seq:
-                steps.append(came_at - sent_at)
+                steps.append(received_at - sent_at)
             sent_at = self._send(frame)
-        ack, came_at = self._receive(messages.MAVLINK_MSG_ID_MISSION_ACK)
+        ack, received_at = self._receive(messages.MAVLINK_MSG_ID_MISSION_ACK)
         # target system, target component, result; MAVLink 2 leaves trailing zeros out, and ACCEPTED is zero.
         if ack.raw[1] > 2 and ack.raw[12] != MissionResult.ACCEPTED:
             raise BenchmarkError(f"the mission was not accepted: result {ack.raw[12]}")
-        return Upload(steps, came_at - began_at, came_at - sent_at)
+        return Upload(steps, received_at - began_at, received_at - sent_at)
 
     def echo(self, size: int) -> float:
         """Send a datagram to an echo server; returns the round trip, seconds."""
@@ -79,9 +79,9 @@ class Station:
         """Wait for a message; telemetry is skipped."""
         while True:
             datagram = self._socket.recv(2048)
-            came_at = time.perf_counter()
+            received_at = time.perf_counter()
             for frame in MavlinkSplitter().feed(datagram):
                 if frame.msgid == msgid:
-                    return frame, came_at
+                    return frame, received_at
                 if frame.msgid == messages.MAVLINK_MSG_ID_MISSION_ACK:
                     raise BenchmarkError("the upload was refused")

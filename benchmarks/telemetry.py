@@ -199,7 +199,7 @@ def _noise() -> list[Figure]:
     size = f"{_NOISE_BYTES / 1e6:.0f} MB of noise"
     return [
         Figure(f"protocols found in {size}", sum(isinstance(event, FcFound) for event in events), "", None, 0),
-        Figure(f"attitudes made of {size}", false_frames, "", None, 0),
+        Figure(f"attitudes decoded from {size}", false_frames, "", None, 0),
         Figure(f"memory gained over {size}", growth_kb, "kB", None, 64),
     ]
 
@@ -248,11 +248,11 @@ def _wait_for_attitude(ground: socket.socket, controller: "Controller") -> float
     """The delay of the next attitude, seconds."""
     while True:
         data = ground.recv(2048)
-        came_at = time.perf_counter()
+        received_at = time.perf_counter()
         for frame in MavlinkSplitter().feed(data):
             if frame.msgid == messages.MAVLINK_MSG_ID_ATTITUDE:
                 (roll,) = struct.unpack_from("<f", frame.payload, 4)
-                return came_at - controller.attitudes_at[round(math.degrees(roll) * 10) % ATTITUDES]
+                return received_at - controller.attitudes_at[round(math.degrees(roll) * 10) % ATTITUDES]
 
 
 class Controller:

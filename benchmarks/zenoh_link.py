@@ -66,11 +66,11 @@ def _latency_and_memory(folder: Path, endpoint: str) -> list[Figure]:
         request_rates(ground)
 
         def received(sample: zenoh.Sample) -> None:
-            came_at = time.perf_counter()
-            samples.append(came_at)
+            received_at = time.perf_counter()
+            samples.append(received_at)
             if str(sample.key_expr).endswith("/attitude"):
                 number = round(json.loads(sample.payload.to_bytes())["roll_deg"] * 10) % ATTITUDES
-                milliseconds.append((came_at - controller.attitudes_at[number]) * 1000)
+                milliseconds.append((received_at - controller.attitudes_at[number]) * 1000)
 
         with session.declare_subscriber(full(DEFAULT_PREFIX, _VEHICLE, ALL_TELEMETRY), received):
             time.sleep(_SETTLING_S)
@@ -83,11 +83,11 @@ def _latency_and_memory(folder: Path, endpoint: str) -> list[Figure]:
         memory_mb = resident_mb(process.pid)
     # Some replies, as to IDENT, belong to no group.
     if rate_hz < 0.5 * POLLS_HZ:
-        raise BenchmarkError(f"only {rate_hz:.0f} samples a second came")
+        raise BenchmarkError(f"only {rate_hz:.0f} samples a second arrived")
     floor = "a bare put through the router"
     libraries = f"{LIBRARIES}; import zenoh, cbor2"
     return [
-        Figure("samples a second that it was measured at", rate_hz, ""),
+        Figure("samples a second during the measurement", rate_hz, ""),
         Figure("reply to subscriber, median", statistics.median(found), "ms", Floor(statistics.median(bare_ms), floor)),
         Figure("reply to subscriber, p99", _p99(found), "ms", Floor(_p99(bare_ms), floor), 5.0),
         Figure("daemon with zenoh, resident", memory_mb, "MB", Floor(libraries_mb(libraries), "its libraries"), 70.0),
@@ -116,9 +116,9 @@ def _bare_latencies_ms(folder: Path, endpoint: str) -> list[float]:
     found: list[float] = []
 
     def received(sample: zenoh.Sample) -> None:
-        came_at = time.perf_counter()
+        received_at = time.perf_counter()
         (put_at,) = struct.unpack_from("<d", sample.payload.to_bytes())
-        found.append((came_at - put_at) * 1000)
+        found.append((received_at - put_at) * 1000)
 
     with (
         client(endpoint) as session,
@@ -203,7 +203,7 @@ async def _unread_us(with_zenoh: _Fed, without: _Fed) -> list[Figure]:
     on, off = map(statistics.median, costs)
     return [
         Figure("a reply handled, zenoh on without subscribers, CPU", on, "us", Floor(off, "the same without zenoh")),
-        Figure("what zenoh costs there", max(on - off, 0.0), "us", None, 10.0),
+        Figure("the cost of zenoh there", max(on - off, 0.0), "us", None, 10.0),
     ]
 
 

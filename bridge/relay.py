@@ -2,7 +2,7 @@
 """The ground station's end of a slow link to a vehicle: missions are received and read here, and cross it as a whole.
 
 A mission over MAVLink takes a round trip for each item. So the receiver of the bridge itself (bridge/transfers) runs
-beside the ground station, the whole list goes to the vehicle as one command, and the final ack waits for its result.
+next to the ground station, the whole list goes to the vehicle as one command, and the final ack waits for its result.
 Everything else is passed on, with new sequence numbers: stations take gaps for a bad link. Sans-IO.
 """
 

@@ -14,8 +14,10 @@ from pathlib import Path
 import zenoh
 
 arguments = sys.argv[1:]
+if arguments and arguments[0].startswith("-"):
+    sys.exit(__doc__)
 if arguments and arguments[0].endswith(".json5"):
-    # The files that it names are beside it.
+    # The files that it names are in the same folder.
     file = Path(arguments[0]).absolute()
     os.chdir(file.parent)
     config = zenoh.Config.from_file(file)

@@ -83,6 +83,16 @@ where_option = click.option(
 )
 
 
+def vehicles_options(command: F) -> F:
+    """--vehicle, --all and --where."""
+    return vehicle_option(all_option(where_option(command)))
+
+
+staged_option = click.option(
+    "--staged", is_flag=True, help="A tenth of the vehicles first, then the rest; stop at the first failure."
+)
+
+
 @contextmanager
 def fleet_session(where: dict[str, Any]) -> Iterator[tuple[zenoh.Session, str]]:
     """Join the fleet for one command. An error ends the program with one sentence, Ctrl-C silently.

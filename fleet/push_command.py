@@ -11,11 +11,10 @@ import zenoh
 from fleet.conditions import Condition, matching
 from fleet.options import (
     address_options,
-    all_option,
     fleet_session,
     json_option,
-    vehicle_option,
-    where_option,
+    staged_option,
+    vehicles_options,
 )
 from fleet.push import FleetPush, push
 from fleet.roll_call import alive, chosen, roll_call
@@ -41,12 +40,12 @@ from terminal.sentences import INTERRUPTED, UNREADABLE, complain, fail
 
 @dataclass(frozen=True, slots=True)
 class Pushed:
-    """What is pushed: where to, and the words for it, of the table, the summary and an interrupted push."""
+    """A kind of push: its key, the table's heading, the end of the summary, and the sentence after Ctrl-C."""
 
     key: ZenohKey
     heading: str
-    held: str
-    goes_on: str
+    summary: str
+    interrupted: str
 
 
 _MISSION = Pushed(
@@ -59,10 +58,8 @@ _MISSION = Pushed(
 
 @click.command("push", short_help="Write a mission file to vehicles, and verify it.")
 @click.argument("file", type=PATH)
-@vehicle_option
-@all_option
-@where_option
-@click.option("--staged", is_flag=True, help="A tenth of the vehicles first, then the rest; stop at the first failure.")
+@vehicles_options
+@staged_option
 @click.option("--dry-run", is_flag=True, help="Show how each vehicle would store the mission; write nothing.")
 @address_options
 @json_option
@@ -96,9 +93,7 @@ def push_mission(
 
 @click.command("verify", short_help="Compare the missions on vehicles with a file.")
 @click.argument("file", type=PATH)
-@vehicle_option
-@all_option
-@where_option
+@vehicles_options
 @address_options
 @json_option
 def verify_mission(
@@ -158,9 +153,9 @@ def push_file(
         print_json(push_data(delivery))
     else:
         print_table(push_table(delivery, what.heading))
-        click.echo(push_summary(delivery, what.held))
+        click.echo(push_summary(delivery, what.summary))
     if is_stopped:
-        complain(what.goes_on)
+        complain(what.interrupted)
         raise SystemExit(INTERRUPTED)
     return bool(delivery.failed)
 
@@ -168,7 +163,7 @@ def push_file(
 def vehicles_meant(
     session: zenoh.Session, prefix: str, names: tuple[str, ...], conditions: list[Condition]
 ) -> tuple[set[BridgeId], list[str], str]:
-    """All bridges, the names of the vehicles to serve, and the vehicles of which is unknown whether they match."""
+    """All bridges, the names of the vehicles meant, and a sentence about those that may match but did not answer."""
     bridges = alive(session, prefix)
     found = chosen(bridges, names, prefix)
     if not conditions:

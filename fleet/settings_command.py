@@ -10,7 +10,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from fleet.conditions import Condition
-from fleet.options import address_options, all_option, fleet_session, json_option, vehicle_option, where_option
+from fleet.options import address_options, fleet_session, json_option, staged_option, vehicle_option, vehicles_options
 from fleet.push_command import Pushed, end, push_file, require_choice, vehicles_meant
 from fleet.roll_call import alive, chosen
 from fleet.settings import SettingsTrial, read_settings, try_settings, variants
@@ -70,10 +70,8 @@ def diff_settings(names: tuple[str, ...], as_json: bool, **where: Any) -> None:
 
 @fleet_settings.command("restore")
 @click.argument("file", type=PATH)
-@vehicle_option
-@all_option
-@where_option
-@click.option("--staged", is_flag=True, help="A tenth of the vehicles first, then the rest; stop at the first failure.")
+@vehicles_options
+@staged_option
 @click.option("--dry-run", is_flag=True, help="Show what each vehicle would change; write nothing.")
 @address_options
 @json_option

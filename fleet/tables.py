@@ -145,9 +145,9 @@ def _result(progress: PushState) -> Text:
 
 def dry_run_table(trials: Sequence[Trial]) -> Table:
     """One row per vehicle, and below them the corrections, once for all vehicles that would hold the same records."""
-    corrections = {trial.checksum: trial.corrections for trial in trials if trial.is_taken}
+    corrections = {trial.checksum: trial.corrections for trial in trials if trial.is_accepted}
     lines = [line for checksum, said in corrections.items() if said for line in ("", f"Stored as {checksum}:", *said)]
-    return _trial_table(trials, "Accepts it", lambda trial: (trial.is_taken, ""), "\n".join(lines))
+    return _trial_table(trials, "Accepts it", lambda trial: (trial.is_accepted, ""), "\n".join(lines))
 
 
 def verify_table(trials: Sequence[Trial]) -> Table:

@@ -38,7 +38,7 @@ class Trial:
         return None if self.checksum is None else self.error is None and self.checksum == self.held
 
     @property
-    def is_taken(self) -> bool | None:
+    def is_accepted(self) -> bool | None:
         """True if the vehicle would accept the mission; None if it gave no verdict."""
         return None if self.checksum is None else self.error is None
 

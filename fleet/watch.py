@@ -3,7 +3,7 @@
 
 All send their overview, 14 B/s; only the vehicles on the screen also send their state, 1,400 B/s. Liveliness tokens
 have a session of their own: a zenoh session compares each arriving sample with every token that it knows, which takes
-a whole core for a thousand samples a second beside ten thousand tokens.
+a whole core for a thousand samples a second with ten thousand tokens.
 """
 
 import time

@@ -94,8 +94,8 @@ def screen(rows: Sequence[ScreenRow], top: int, page: int, *, is_connected: bool
     there = f"{len(rows):,} vehicles"
     if heard < len(rows) or not is_listed:
         there = f"Heard {heard:,} of {'' if is_listed else 'at least '}{there}"
-    ill = sum(bool(row.problem) for row in rows[: counts[_Rank.ARMED]]) + counts[_Rank.ILL]
-    head = f"{there}, {counts[_Rank.ARMED]:,} armed, {ill:,} with problems"
+    troubled = sum(bool(row.problem) for row in rows[: counts[_Rank.ARMED]]) + counts[_Rank.PROBLEM]
+    head = f"{there}, {counts[_Rank.ARMED]:,} armed, {troubled:,} with problems"
     shown = rows[top : top + page]
     last = "Ctrl-C ends."
     if len(shown) < len(rows):
@@ -129,8 +129,8 @@ class _Rank(IntEnum):
     """The order of the rows; those of one rank are ordered by name."""
 
     ARMED = 0
-    ILL = 1
-    WELL = 2
+    PROBLEM = 1
+    FINE = 2
     UNHEARD = 3
 
 
@@ -138,8 +138,8 @@ def _rank(row: ScreenRow) -> _Rank:
     if row.vehicle.armed:
         return _Rank.ARMED
     if row.problem:
-        return _Rank.ILL
-    return _Rank.WELL if row.is_heard else _Rank.UNHEARD
+        return _Rank.PROBLEM
+    return _Rank.FINE if row.is_heard else _Rank.UNHEARD
 
 
 @contextmanager

@@ -23,7 +23,7 @@ SettingValues = Mapping[str, float | str]
 class BackupLine:
     """One line of a list of backups.
 
-    board: tells two boards of one kind apart. kind: the firmware and its version. taken_at: unix seconds. occasion: why
+    board: distinguishes boards of one kind. kind: the firmware and its version. taken_at: unix seconds. occasion: why
     it was taken. changed_count: settings that differ from this board's last backup; None for its first.
     """
 

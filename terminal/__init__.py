@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the commands of service/ and fleet/ share: groups of commands, sentences, tables, mission files."""
+"""Shared by the commands of service/ and fleet/: groups of commands, sentences, tables, mission files."""

@@ -23,13 +23,13 @@ class Interview:
     def __init__(self) -> None:
         self._replies: dict[int, MspFrame] = {}
 
-    def ask(self, command: int, reply_payload: int, *, lasting: int | None = None) -> Conversation[MspFrame]:
+    def ask(self, command: int, reply_payload: int, *, stable: int | None = None) -> Conversation[MspFrame]:
         """Ask `command`; the reply may be an error frame, which means that the board does not know it.
 
-        lasting: how many of its first bytes must agree, if the others may change at any moment.
+        stable: how many of its first bytes must agree, if the others may change at any moment.
         """
         if command not in self._replies:
-            reply = yield from ask_surely(request(command), command, reply_payload, lasting=lasting)
+            reply = yield from ask_surely(request(command), command, reply_payload, stable=stable)
             if reply is None:
                 raise NoAnswer
             self._replies[command] = reply

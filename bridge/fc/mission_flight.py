@@ -21,7 +21,7 @@ from reports.vehicle_groups import Progress
 #: A build without mission flight refuses it, and is not asked again.
 FLIGHT_POLL = Poll(Msp.FLIGHT, FLIGHT_REQUEST, FLIGHT_SIZE, 0.5)
 _PAUSED = frozenset((FlightPhase.HELD, FlightPhase.NO_FIX, FlightPhase.HANDS))
-#: In the other phases the height tells.
+#: In the other phases the height decides.
 _STAGES: Mapping[FlightPhase, Stage] = {
     FlightPhase.WAIT: Stage.ON_GROUND,
     FlightPhase.LIFT: Stage.TAKEOFF,

@@ -169,18 +169,18 @@ def ask(
 
 
 def ask_surely(
-    frame: bytes, command: int, reply_payload: int, *, lasting: int | None = None
+    frame: bytes, command: int, reply_payload: int, *, stable: int | None = None
 ) -> Conversation[MspFrame | None]:
     """Ask until two replies in a row are equal; None if they never are, or if a reply is missing.
 
     The 8-bit checksum misses some pairs of flipped bits: with one wrong bit in a thousand, one INFO reply in 500 and
     one BOXNAMES reply in 25 are damaged without notice. An error frame is a reply, too.
-    lasting: compare only this many bytes of the payload, because the others may change; None: all.
+    stable: compare only this many bytes of the payload, because the others may change; None: all.
     """
     before: MspFrame | None = None
     for _ in range(_MAX_ASKS):
         reply = yield from ask(frame, command, reply_payload, is_kept=True)
-        if reply is None or (before is not None and _lasting(reply, lasting) == _lasting(before, lasting)):
+        if reply is None or (before is not None and _stable_part(reply, stable) == _stable_part(before, stable)):
             return reply
         before = reply
     return None
@@ -198,7 +198,7 @@ def ask_armed(arm_bit: int | None, *, tries: int = 3) -> Conversation[bool | Non
     return None if status is None or arm_bit is None else bool(status.box_flags >> arm_bit & 1)
 
 
-def _lasting(reply: MspFrame, size: int | None) -> MspFrame:
+def _stable_part(reply: MspFrame, size: int | None) -> MspFrame:
     return replace(reply, payload=reply.payload[:size])
 
 

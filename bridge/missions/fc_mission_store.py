@@ -162,7 +162,7 @@ class FcMissionStore(ABC, Generic[RecordT]):
 
 
 class FliesToItems(ABC):
-    """A mission store whose board can be told in flight which item to fly to."""
+    """A mission store whose board can be sent to another item in flight."""
 
     @abstractmethod
     def leg_of(self, records: Sequence[Any], seq: int) -> int:

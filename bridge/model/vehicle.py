@@ -146,7 +146,7 @@ class Signal(Reading):
 
 @dataclass(slots=True)
 class FlightState(Reading):
-    """armed: None if the flight controller cannot tell.
+    """armed: None if the flight controller does not report it.
 
     is_failsafe: True if it is armed and has taken over from the pilot, as far as it reports that.
     """

@@ -119,7 +119,7 @@ class ArrivingList:
         self._one_until = 0.0
         #: Items 0.._compared-1 were the same the second time; None if they are not requested again.
         self._compared: int | None = None
-        #: Items that came unasked: new ones, or repeats of another one than requested a second time.
+        #: Items that arrived unrequested: new ones, or repeats of another one than requested a second time.
         self._unasked = 0
 
     @property

@@ -67,8 +67,8 @@ class MissionWatch:
         if isinstance(held, HeldMission) and (news := (yield from self._settle(held))) is not None:
             return news
         if loading is Loading.ARMED:
-            told, self._unloaded = self._unloaded, self._missions.fc_store
-            return None if told is self._unloaded else _NOT_LOADED
+            announced, self._unloaded = self._unloaded, self._missions.fc_store
+            return None if announced is self._unloaded else _NOT_LOADED
         is_loaded = loading is Loading.LOADED
         if isinstance(held, Refusal) or (is_first and not (is_loaded and held.records)):
             return None

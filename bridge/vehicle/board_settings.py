@@ -217,7 +217,7 @@ class BoardSettings:
         self._next(now)
 
     def _read(self, table: SettingTable | None, now: float) -> None:
-        """The reader has ended; None: in vain."""
+        """The reader has ended; None: without a table."""
         fc_settings = self._fc_settings
         if table is not None:
             self._is_doubtful = self._is_asked = False

@@ -245,7 +245,7 @@ class Calibration:
         )
 
     def _send_report(self, status: int) -> None:
-        """MAG_CAL_REPORT without offsets, which the board does not tell. Mission Planner ignores one with an x of 0.
+        """MAG_CAL_REPORT without offsets, which the board does not report. Mission Planner ignores one with an x of 0.
 
         Not "autosaved", after which it demands a reboot: the board has restarted by itself, or needs none.
         """

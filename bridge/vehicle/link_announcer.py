@@ -93,5 +93,5 @@ class LinkAnnouncer:
             self.due = now + _NOT_FOUND_REPEAT_S
             self._say(Severity.WARNING, "No flight controller found: check power, wiring")
         else:
-            # Another text each time: Mission Planner does not renew a text that stands.
+            # Another text each time: Mission Planner does not renew a text that it still shows.
             self._say(Severity.WARNING, f"Flight controller lost: silent for {now - self._silent_since:.0f} s")

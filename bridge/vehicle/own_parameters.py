@@ -29,7 +29,7 @@ SYSID = "SYSID_THISMAV"
 _STICKS = ("ROLL", "PITCH", "THROTTLE", "YAW")
 #: The range of MSP's channels, us. ArduPilot's defaults (1100, 1900, 1500) would mean that nothing is calibrated.
 _CALIBRATION = {"MIN": 1000.0, "MAX": 2000.0, "TRIM": 1500.0}
-#: No board tells its sensors' offsets in ArduPilot's units, so a value other than 0 only means "calibrated".
+#: No board reports its sensors' offsets in ArduPilot's units, so a value other than 0 only means "calibrated".
 _ACCELEROMETER_OFFSET_M_S2, _COMPASS_OFFSET_MG = 0.001, 1.0
 #: INAV's reasons not to arm.
 _NO_ACCELEROMETER, _NO_COMPASS = ARMING_BLOCKERS[13], ARMING_BLOCKERS[12]

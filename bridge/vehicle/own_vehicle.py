@@ -86,7 +86,7 @@ class OwnVehicle:
         self._announced_home: Home | None = None
         self._also_wanted: Mapping[type[Reading], float] = {}
         #: The intervals of the messages and readings that `_rows` and the polls follow.
-        self._wishes: tuple[Mapping[int, float], Mapping[type[Reading], float]] = {}, {}
+        self._requested_rates: tuple[Mapping[int, float], Mapping[type[Reading], float]] = {}, {}
         self._newcomers_due = inf
         self._polls_set_at, self._polls_due = -inf, inf
         #: Armed, mode, failsafe and lost as last announced.
@@ -268,9 +268,9 @@ class OwnVehicle:
         """Set each poll to the highest rate requested."""
         self._polls_due = inf
         polls = self._session.polls
-        wishes = fastest_s(everyone, _DEFAULTS_S), self._also_wanted
-        if wishes != self._wishes:
-            self._wishes = intervals_s, also_wanted = wishes
+        requested_rates = fastest_s(everyone, _DEFAULTS_S), self._also_wanted
+        if requested_rates != self._requested_rates:
+            self._requested_rates = intervals_s, also_wanted = requested_rates
             wanted: dict[Msp, float] = {}
             for reading, interval_s in also_wanted.items():
                 _want(wanted, POLL_FOR.get(reading), interval_s)

@@ -192,7 +192,7 @@ def changed_names(request: SettingsRequest, before: bytes, after: bytes, names: 
 
 
 def _changed_ranges(before: bytes, after: bytes, names: Mapping[int, str]) -> Iterator[str]:
-    """MODE_RANGES: permanent id, aux channel, first and last step of each range; it may stand at any place."""
+    """MODE_RANGES: permanent id, aux channel, first and last step of each range; it may be at any place."""
     first, second = (_ranges(payload) for payload in (before, after))
     for number in sorted(first.keys() | second.keys()):
         if first.get(number) != second.get(number):

@@ -93,7 +93,7 @@ _BUFFER, _EXTENDED_BUFFER, _NEW_BUFFER = 64, 243, 192
 
 # -- Descendants of MultiWii with its buffer ---------------------------------------------------------------------------
 
-#: The first two are asked to tell these boards from newer ones: they answer with an error.
+#: The first two are requested to distinguish these boards from newer ones: they answer with an error.
 _OLD_READS = _reads(
     API_VERSION=(1, 0), FC_VARIANT=(2, 0),
     IDENT=(100, 7), STATUS=(101, 11), RAW_IMU=(102, 18), SERVO=(103, 16), MOTOR=(104, 16), RC=(105, 36),

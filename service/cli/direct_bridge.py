@@ -24,7 +24,7 @@ _TELEMETRY_TIMEOUT_S = 3.0
 _HEARTBEAT_TIMEOUT_S = 1.5
 _INTERVAL_S = 0.05
 _UNCONFIRMED = "interrupted; the flight controller has not confirmed that it keeps its mission: see `naze-bridge pull`"
-_TOLD_LATER = ("armed", "battery_v", "satellites", "mission_records")
+_KNOWN_LATER = ("armed", "battery_v", "satellites", "mission_records")
 
 
 async def ask_directly(
@@ -32,7 +32,7 @@ async def ask_directly(
 ) -> Json:
     """Send a request to our own bridge on this port; ControlError or StoreError if there is no reply.
 
-    `even_silent`: a port without a flight controller is no error; the status tells how many bytes were received.
+    `even_silent`: a port without a flight controller is no error; the status has the number of bytes received.
 
     If cancelled, a push is aborted, and Interrupted says how it ended.
     """
@@ -53,7 +53,7 @@ async def ask_directly(
             raise ControlError(f"no flight controller answers on {where}: check its power, the wiring and the speed")
         # The controller is identified before its telemetry arrives, and some never send all of it.
         if request == STATUS:
-            await _wait(lambda: None not in map(api.status().get, _TOLD_LATER), _TELEMETRY_TIMEOUT_S)
+            await _wait(lambda: None not in map(api.status().get, _KNOWN_LATER), _TELEMETRY_TIMEOUT_S)
         else:
             await _wait(lambda: api.status()["armed"] is not True, _HEARTBEAT_TIMEOUT_S)
         job = asyncio.ensure_future(api.do(request, lambda answer: progress(answer["progress"])))

@@ -166,18 +166,18 @@ def _fly(
     from simulator.flights.mission_upload import require_mission_flight, upload
     from simulator.flights.pilot import Pilot
 
-    def tell(text: str) -> None:
+    def say_progress(text: str) -> None:
         if not quiet:
             say(text)
 
-    contents = _flash(flash_file) if flash_file else prepared_flash(firmware, tell, _SETTINGS)
+    contents = _flash(flash_file) if flash_file else prepared_flash(firmware, say_progress, _SETTINGS)
     naze = FlyingNaze(firmware, memoryview(bytearray(contents)), weather=weather, place=place)
     pilot = Pilot(naze)
-    tell(f"{name} boots.")
+    say_progress(f"{name} boots.")
     pilot.power_on()
     require_mission_flight(pilot.console, name)
     upload(pilot.console, records)
-    tell(f"{len(records) - 1} commands are on the board. It flies, in wind of {weather.wind:g} m/s.")
+    say_progress(f"{len(records) - 1} commands are on the board. It flies, in wind of {weather.wind:g} m/s.")
     run = fly_mission(pilot, records)
     return run, judge(run, place)
 

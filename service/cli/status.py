@@ -109,8 +109,8 @@ def _settings(facts: Json) -> str:
     if facts["settings_seal"] is None:
         return "not read yet"
     change = facts["settings_changed"]
-    told = "" if change is None else f"; {duration(facts['settings_changed_s'])} ago: {change}"
-    return f"seal {facts['settings_seal']}{told}"
+    last = "" if change is None else f"; {duration(facts['settings_changed_s'])} ago: {change}"
+    return f"seal {facts['settings_seal']}{last}"
 
 
 def _reachable(link: str, addresses: list[str]) -> str:

@@ -43,7 +43,7 @@ class Given:
 
 
 def read_files(config: Path, problems: list[Problem]) -> dict[str, Given]:
-    """Read a configuration file and those beside it: values by key name, and True for each table present."""
+    """Read a configuration file and those in its folder: values by key name, and True for each table present."""
     found: dict[str, Given] = {}
     generated = [file for name in (PAGE_FILE, SETUP_FILE) if (file := config.parent / name).exists()]
     for path in (*generated, config, *_drop_ins(config.parent / DROP_INS, problems)):

@@ -64,7 +64,7 @@ class MspBoard(SimulatedBoard):
 
     @property
     def is_alive(self) -> bool:
-        """True if its port would exist if the board were a program."""
+        """False if INAV's simulator, a program, would have ended in this state."""
         return self.power not in (Power.OFF, Power.CRASHED, Power.BOOTLOADER)
 
     @property

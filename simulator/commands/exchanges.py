@@ -15,7 +15,7 @@ _LONGEST_WAIT_S = 5.0
 _CUT_SHORT_S = 0.5
 
 #: Command and payload of a request.
-Question = tuple[int, bytes]
+Request = tuple[int, bytes]
 #: The read time, the offset in all read bytes, and the bytes.
 Piece = tuple[float, int, bytes]
 
@@ -24,30 +24,30 @@ Piece = tuple[float, int, bytes]
 class Exchange:
     """A request, and its reply in pieces as read; no pieces if there was no reply."""
 
-    question: Question
-    asked_at: float
+    request: Request
+    requested_at: float
     answer: Sequence[Piece] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Conversation:
-    """A parsed capture. `exchanges` in the order of the requests; `unasked`: all other received data."""
+    """A parsed capture. `exchanges` in the order of the requests; `unsolicited`: all other received data."""
 
     exchanges: Sequence[Exchange]
-    unasked: Sequence[Piece]
+    unsolicited: Sequence[Piece]
 
 
-def take_apart(events: Sequence[UartEvent]) -> Conversation:
+def match_replies(events: Sequence[UartEvent]) -> Conversation:
     """Match replies with earlier requests by command, in order.
 
     Requests that the end of the recording or of the link cut short are omitted.
     """
     exchanges: list[Exchange] = []
-    unasked: list[Piece] = []
+    unsolicited: list[Piece] = []
     waiting: list[Exchange] = []
     unknown: set[Exchange] = set()
-    known: dict[Question, Question] = {}  # each is kept once: few distinct ones, repeated a hundred thousand times
-    answers = _answers(events, unasked)
+    known: dict[Request, Request] = {}  # each is kept once: few distinct ones, repeated a hundred thousand times
+    answers = _answers(events, unsolicited)
     answered_by, frame, pieces = next(answers, _NO_MORE)
     requests = MspParser()
     for number, event in enumerate(events):
@@ -59,36 +59,36 @@ def take_apart(events: Sequence[UartEvent]) -> Conversation:
             asked = []
             for found in requests.feed(event.data):
                 if found.direction is Direction.REQUEST:
-                    question = found.command, found.payload
-                    asked.append(Exchange(known.setdefault(question, question), event.at))
+                    request = found.command, found.payload
+                    asked.append(Exchange(known.setdefault(request, request), event.at))
             exchanges += asked
             # A repeated request replaces the earlier one, which timed out.
-            questions = {exchange.question for exchange in asked}
-            waiting = [earlier for earlier in waiting if earlier.question not in questions] + asked
+            repeated = {exchange.request for exchange in asked}
+            waiting = [earlier for earlier in waiting if earlier.request not in repeated] + asked
         while answered_by == number:
-            asker = _asker(waiting, frame, event.at)
-            if asker is None:
-                unasked += pieces
+            exchange = _exchange_of(waiting, frame, event.at)
+            if exchange is None:
+                unsolicited += pieces
             else:
-                asker.answer = pieces
+                exchange.answer = pieces
                 # Requests are answered in their order.
-                del waiting[: waiting.index(asker) + 1]
+                del waiting[: waiting.index(exchange) + 1]
             answered_by, frame, pieces = next(answers, _NO_MORE)
     unknown |= _cut_short(waiting, events[-1].at if events else 0.0)
-    return Conversation([exchange for exchange in exchanges if exchange not in unknown], sorted(unasked))
+    return Conversation([exchange for exchange in exchanges if exchange not in unknown], sorted(unsolicited))
 
 
 def _cut_short(waiting: Sequence[Exchange], at: float) -> set[Exchange]:
-    return {exchange for exchange in waiting if exchange.asked_at > at - _CUT_SHORT_S}
+    return {exchange for exchange in waiting if exchange.requested_at > at - _CUT_SHORT_S}
 
 
 _Answer = tuple[int, MspFrame, Sequence[Piece]]
 _NO_MORE: _Answer = (-1, MspFrame(Direction.ERROR, 0), ())
 
 
-def _asker(waiting: Sequence[Exchange], frame: MspFrame, at: float) -> Exchange | None:
-    alike = (exchange for exchange in waiting if exchange.question[0] == frame.command)
-    return next((exchange for exchange in alike if at <= exchange.asked_at + _LONGEST_WAIT_S), None)
+def _exchange_of(waiting: Sequence[Exchange], frame: MspFrame, at: float) -> Exchange | None:
+    alike = (exchange for exchange in waiting if exchange.request[0] == frame.command)
+    return next((exchange for exchange in alike if at <= exchange.requested_at + _LONGEST_WAIT_S), None)
 
 
 def _answers(events: Sequence[UartEvent], rest: list[Piece]) -> Iterator[_Answer]:

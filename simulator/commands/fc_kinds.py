@@ -12,7 +12,7 @@ from simulator.board.msp_firmware import BootFirmware
 from simulator.board.msp_options import MspOptions
 from simulator.board.options import Faults
 from simulator.board.telemetry_only import BASEFLIGHT, BETAFLIGHT, TelemetryFirmware
-from simulator.commands.run_board import Running, run_board
+from simulator.commands.run_board import RunOptions, run_board
 from simulator.inav.firmware import InavFirmware
 from simulator.inav.mission import EEPROM_SIZE
 from simulator.inav.places import PLACES_SIZE
@@ -46,12 +46,14 @@ def make_board(
     return MspBoard(_FIRMWARE[kind], eeprom, options, faults)
 
 
-def run_other_board(kind: str, options: MspOptions, faults: Faults, running: Running, state: Path | None) -> None:
-    """Run one until Ctrl-C. `state`: the file with its EEPROM."""
-    if running.tcp:
+def run_other_board(
+    kind: str, options: MspOptions, faults: Faults, run_options: RunOptions, state: Path | None
+) -> None:
+    """Run a board of this kind until Ctrl-C. `state`: the file with its EEPROM."""
+    if run_options.tcp:
         # A socket is served at once, with the ring of INAV's own simulator.
         options = replace(options, baud=None, ring_size=2048, serial_task_ms=0.01)
     eeprom = open_memory(state, bytes(new_eeprom(kind, options)), "name another file") if state else None
     board = make_board(kind, options, faults, eeprom)
     name = f"INAV {options.version}" if kind == "inav" else _NAMES[kind]
-    asyncio.run(run_board(board, name, running, lambda: board.is_alive))
+    asyncio.run(run_board(board, name, run_options, lambda: board.is_alive))

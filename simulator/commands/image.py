@@ -11,7 +11,7 @@ import click
 from protocols.firmware_image import FLASH_SIZE, Image, ImageError, parse_image
 from simulator.board.memory_file import open_memory
 from simulator.board.options import Faults
-from simulator.commands.run_board import Running, run_board
+from simulator.commands.run_board import RunOptions, run_board
 from simulator.emulated_naze.switches import EmulatedFaults
 from simulator.sky.sky import Weather
 
@@ -43,7 +43,7 @@ def read_image(path: Path) -> Image:
 def run_image(
     path: Path,
     faults: Faults,
-    running: Running,
+    run_options: RunOptions,
     state: Path | None,
     seed: int,
     weather: Weather | None = None,
@@ -61,7 +61,7 @@ def run_image(
         click.echo(f"\r{path.name} boots on the emulated board: {done:.0%}{end}", nl=False)
 
     board.on_boot = say
-    asyncio.run(run_board(board, f"Naze with {path.name}", running, lambda: True))
+    asyncio.run(run_board(board, f"Naze with {path.name}", run_options, lambda: True))
 
 
 def _on_bench(image: Image, flash: memoryview | None, faults: Faults, seed: int) -> "EmulatedNaze":

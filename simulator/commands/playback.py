@@ -19,7 +19,7 @@ from math import inf
 
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from protocols.uart_capture import UartAction, UartEvent
-from simulator.commands.exchanges import Exchange, take_apart
+from simulator.commands.exchanges import Exchange, match_replies
 
 #: A speed for lines without one.
 _ANY_SPEED = 115200
@@ -29,7 +29,7 @@ _JITTER_S = 0.25
 _GUESSED_DELAY_S = 0.005
 
 
-class _Story:
+class _Exchanges:
     """The recorded exchanges of one request."""
 
     def __init__(self) -> None:
@@ -39,7 +39,7 @@ class _Story:
 
     def add(self, exchange: Exchange) -> None:
         self._exchanges.append(exchange)
-        self._times.append(exchange.asked_at)
+        self._times.append(exchange.requested_at)
 
     def at(self, time: float) -> Exchange:
         """The exchange to replay for a request at this time."""
@@ -65,14 +65,14 @@ class CapturePlayer:
         self._answers = 0
         self._last_answer = (0.0, 0)
 
-        conversation = take_apart(events)
-        self._unasked = conversation.unasked
-        self._unasked_done = 0
+        conversation = match_replies(events)
+        self._unsolicited = conversation.unsolicited
+        self._unsolicited_done = 0
         self._exchanges = conversation.exchanges
-        self._asked_times = [exchange.asked_at for exchange in conversation.exchanges]
-        self._stories: dict[tuple[int, bytes], _Story] = {}
+        self._request_times = [exchange.requested_at for exchange in conversation.exchanges]
+        self._by_request: dict[tuple[int, bytes], _Exchanges] = {}
         for exchange in conversation.exchanges:
-            self._stories.setdefault(exchange.question, _Story()).add(exchange)
+            self._by_request.setdefault(exchange.request, _Exchanges()).add(exchange)
         changes = [*events[:1], *(event for before, event in pairwise(events) if before.speed != event.speed)]
         self._speed_times = [event.at for event in changes]
         self._speeds = [event.speed or _ANY_SPEED for event in changes]
@@ -108,10 +108,10 @@ class CapturePlayer:
     def advance(self, now: float) -> bytes:
         time = self._set_time(now)
         found: list[tuple[tuple[float, int], int, bytes]] = []
-        while self._unasked_done < len(self._unasked) and self._unasked[self._unasked_done][0] <= time:
-            at, offset, data = self._unasked[self._unasked_done]
+        while self._unsolicited_done < len(self._unsolicited) and self._unsolicited[self._unsolicited_done][0] <= time:
+            at, offset, data = self._unsolicited[self._unsolicited_done]
             found.append(((at, offset), 0, data))
-            self._unasked_done += 1
+            self._unsolicited_done += 1
         while self._going_out and self._going_out[0][0][0] <= time:
             found.append(heapq.heappop(self._going_out))
         return b"".join(data for _, _, data in sorted(found))
@@ -119,8 +119,8 @@ class CapturePlayer:
     def next_wakeup(self, now: float) -> float:
         """The time for the next call of `advance`; infinity if nothing will happen by itself."""
         due = self._going_out[0][0][0] if self._going_out else inf
-        if self._unasked_done < len(self._unasked):
-            due = min(due, self._unasked[self._unasked_done][0])
+        if self._unsolicited_done < len(self._unsolicited):
+            due = min(due, self._unsolicited[self._unsolicited_done][0])
         assert self._began_at is not None
         return max(now, self._began_at + due / self._tempo)
 
@@ -131,18 +131,18 @@ class CapturePlayer:
         return self._time
 
     def _answer(self, frame: MspFrame, time: float) -> None:
-        story = self._stories.get((frame.command, frame.payload))
-        exchange = None if story is None else story.at(time)
+        recorded = self._by_request.get((frame.command, frame.payload))
+        exchange = None if recorded is None else recorded.at(time)
         if exchange is None:
             if self._was_answering(time):
                 self._send(MspFrame(Direction.ERROR, frame.command).encode(), time + _GUESSED_DELAY_S, 0)
-        elif abs(exchange.asked_at - time) <= _JITTER_S or self._was_answering(time):
+        elif abs(exchange.requested_at - time) <= _JITTER_S or self._was_answering(time):
             for at, offset, piece in exchange.answer:
-                self._send(piece, round(time + at - exchange.asked_at, 6), offset)
+                self._send(piece, round(time + at - exchange.requested_at, 6), offset)
 
     def _was_answering(self, time: float) -> bool:
         """True if one of the last two requests before this time was answered."""
-        index = bisect_right(self._asked_times, time)
+        index = bisect_right(self._request_times, time)
         return any(exchange.answer for exchange in self._exchanges[max(index - 2, 0) : index])
 
     def _send(self, data: bytes, at: float, offset: int) -> None:

@@ -16,7 +16,7 @@ from simulator.links.tcp_link import SimTcpLink
 
 
 @dataclass(frozen=True, slots=True)
-class Running:
+class RunOptions:
     """The board's connections and scheduled events. Times in seconds.
 
     `link`: of a pseudo-terminal; `tcp`: host and port; one of them is set. `control`: a Unix socket.
@@ -31,7 +31,7 @@ class Running:
     script: tuple[tuple[float, str], ...] = ()
 
 
-async def run_board(board: SimulatedBoard, name: str, running: Running, is_alive: Callable[[], bool]) -> None:
+async def run_board(board: SimulatedBoard, name: str, run_options: RunOptions, is_alive: Callable[[], bool]) -> None:
     """Run it. click.ClickException if its link or address is not available."""
     loop = asyncio.get_running_loop()
     stop = asyncio.Event()
@@ -39,35 +39,35 @@ async def run_board(board: SimulatedBoard, name: str, running: Running, is_alive
         loop.add_signal_handler(number, stop.set)
     board.power_on_booted(loop.time())
     plug: Plug
-    if running.tcp:
-        plug = SimTcpLink(board, running.tcp, loop, is_alive)
-        place = "{}:{}".format(*running.tcp)
+    if run_options.tcp:
+        plug = SimTcpLink(board, run_options.tcp, loop, is_alive)
+        place = "{}:{}".format(*run_options.tcp)
     else:
-        assert running.link is not None
-        plug = PtyLink(board, running.link, loop)
-        place = f"{running.link}, {board.baud} baud"
+        assert run_options.link is not None
+        plug = PtyLink(board, run_options.link, loop)
+        place = f"{run_options.link}, {board.baud} baud"
     control = Control(board, plug, loop)
 
     def execute(line: str) -> None:
         if (answer := control.execute(line)) != "ok":
             click.echo(f"script: {line}: {answer}", err=True)
 
-    if running.hang_after is not None:
-        loop.call_later(running.hang_after, control.execute, "hang 1")
-    if running.power_cut_after is not None:
-        loop.call_later(running.power_cut_after, control.execute, "power off")
-    for at, line in running.script:
+    if run_options.hang_after is not None:
+        loop.call_later(run_options.hang_after, control.execute, "hang 1")
+    if run_options.power_cut_after is not None:
+        loop.call_later(run_options.power_cut_after, control.execute, "power off")
+    for at, line in run_options.script:
         loop.call_later(at, execute, line)
     try:
         plug.plug()
-        if running.control:
-            await control.listen(running.control)
+        if run_options.control:
+            await control.listen(run_options.control)
         click.echo(f"Simulated {name} at {place}. Ctrl-C ends it.")
         await stop.wait()
     except PlugError as error:
         raise click.ClickException(str(error)) from error
     except OSError as error:
-        raise click.ClickException(f"{running.control} cannot be created: {error.strerror}") from error
+        raise click.ClickException(f"{run_options.control} cannot be created: {error.strerror}") from error
     finally:
         plug.unplug()
         control.close()

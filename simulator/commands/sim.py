@@ -15,7 +15,7 @@ from simulator.board.options import Faults, SimOptions, TelemetryProtocol, Tree
 from simulator.commands.fc_kinds import KINDS, run_other_board
 from simulator.commands.image import run_image
 from simulator.commands.play import play_capture
-from simulator.commands.run_board import Running, run_board
+from simulator.commands.run_board import RunOptions, run_board
 from simulator.commands.stick_script import read_script
 from simulator.inav.boxes import BOXES
 from simulator.naze.board import SimulatedNaze
@@ -173,7 +173,7 @@ def sim(
         raise click.UsageError("specify the connection: --link PATH or --tcp HOST:PORT")
     faults = Faults(armed=armed, extension=not no_extension, bit_error_rate=bit_errors, lost_byte_rate=lost_bytes)
     moves = tuple((at_s / speed, line) for at_s, line in read_script(script)) if script else ()
-    running = Running(link, tcp, control, hang_after, power_cut_after, moves)
+    run_options = RunOptions(link, tcp, control, hang_after, power_cut_after, moves)
     if fly and image is None:
         raise click.UsageError("--fly needs a firmware: add --image FILE")
     if not fly:
@@ -181,12 +181,12 @@ def sim(
         _refuse_options("a board that does not fly", lambda name: name in in_flight_only)
     if image is not None:
         _refuse_options("--image", lambda name: name not in _WITH_IMAGE)
-        run_image(image, faults, running, state, seed, Weather(wind=wind, seed=seed) if fly else None, speed)
+        run_image(image, faults, run_options, state, seed, Weather(wind=wind, seed=seed) if fly else None, speed)
         return
     if kind != "naze":
         _refuse_options(f"--kind {kind}", lambda name: name in _OF_THE_NAZE)
         line = MspOptions(version=inav_version, baud=int(baud), capacity=capacity or 178, seed=seed)
-        run_other_board(kind, line, faults, running, state)
+        run_other_board(kind, line, faults, run_options, state)
         return
     if play is not None:
         if link is None:
@@ -209,4 +209,4 @@ def sim(
     memory = open_memory(state, blank, "use the same --capacity as before, or another file") if state else None
     missions = _load_core(core, options.capacity) if core else MissionCommands
     naze = SimulatedNaze(options, faults, memory, missions)
-    asyncio.run(run_board(naze, "Naze", running, lambda: True))
+    asyncio.run(run_board(naze, "Naze", run_options, lambda: True))

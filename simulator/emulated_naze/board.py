@@ -33,7 +33,7 @@ class EmulatedNaze(SimulatedBoard):
     """A Naze32 that runs `image`, without a simulated flight: it lies on a bench.
 
     `flash` is the chip of 128 KB: the image replaces its program, and the rest is kept; without it the rest is blank.
-    The board's time passes `tempo` times as fast as its callers', who get `longest_step_s` at most between two calls: a
+    The board's time runs `tempo` times as fast as its callers'. Between two calls at most `longest_step_s` pass: a
     computer that is too slow gets a slow board.
     """
 
@@ -63,7 +63,7 @@ class EmulatedNaze(SimulatedBoard):
         self._chip.flash_controller.on_power_cut = self._on_power_cut
         self._memory = HarakiriMemory(image, self._chip, flash)
         self._boot_loader: BootLoader | None = None
-        self._last_words = b""
+        self._boot_loader_sent = b""
         self._longest_step_s = longest_step_s
         self._ns_per_s = 1e9 * tempo
         # The callers' time when the chip's clock was zero.
@@ -110,7 +110,7 @@ class EmulatedNaze(SimulatedBoard):
     # -- controls --------------------------------------------------------------------------------------------
 
     def power_on_booted(self, now: float) -> None:
-        """Switch the power on and let the board boot at once; `on_boot` gets the part done, 0 to 1."""
+        """Switch the power on and let the board boot at once; `on_boot` gets the progress, 0 to 1."""
         super().power_on_booted(now)
         begun = now - self._boot_s
         while begun < now:
@@ -195,8 +195,8 @@ class EmulatedNaze(SimulatedBoard):
             self._chip.receive(1, data)
 
     def _take_sent(self, now: float) -> bytes:
-        last_words, self._last_words = self._last_words, b""
-        return last_words + (self._boot_loader.sent(now) if self._boot_loader else self._chip.take_sent(1))
+        boot_loader_sent, self._boot_loader_sent = self._boot_loader_sent, b""
+        return boot_loader_sent + (self._boot_loader.sent(now) if self._boot_loader else self._chip.take_sent(1))
 
     # -- the chip's own boot loader ---------------------------------------------------------------------------
 
@@ -214,7 +214,7 @@ class EmulatedNaze(SimulatedBoard):
 
     def _start_program(self, now: float) -> None:
         assert self._boot_loader is not None
-        self._last_words = self._boot_loader.sent(now)
+        self._boot_loader_sent = self._boot_loader.sent(now)
         self._leave_boot_loader()
         self._boot(now)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The STM32F103CB of a Naze32 with the chips around it: wiring and memory. Knows no real time."""
+"""The STM32F103CB of a Naze32 with the chips around it: wiring and memory. Its time passes only in calls."""
 
 import ctypes
 import random
@@ -18,7 +18,7 @@ from simulator.emulated_naze.switches import EmulatedCounters, EmulatedFaults
 RAM_BASE, RAM_SIZE = 0x2000_0000, 0x5000
 #: The battery's divider: 12.4 V.
 _BATTERY = 1550
-_REMEMBERED_ONLY = {
+_STORED_ONLY = {
     "AFIO": 0x4001_0000,
     "EXTI": 0x4001_0400,
     "PWR": 0x4000_7000,
@@ -76,7 +76,7 @@ class Chip:
         self._addressed: I2cDevice = next(iter(self._devices.values()))
         self._rcc = Rcc()
         self.flash_controller = FlashController(flash, self._stall, self._random, faults, counters)
-        self._bus = Bus(self._rcc, self.flash_controller, {at: Registers() for at in _REMEMBERED_ONLY.values()})
+        self._bus = Bus(self._rcc, self.flash_controller, {at: Registers() for at in _STORED_ONLY.values()})
         self._flash = (ctypes.c_uint8 * FLASH_SIZE).from_buffer(flash)
         types = dict(Outside._fields_)
         self._outside = Outside(
@@ -141,7 +141,7 @@ class Chip:
         """The pulse length on each motor's pin, in the firmware's order; 0 before the timers run."""
         return tuple(self._library.chip_timer_register(self._native, timer, at) for timer, at in _MOTOR_PINS)
 
-    # -- life ------------------------------------------------------------------------------------------------
+    # -- power and time --------------------------------------------------------------------------------------
 
     @property
     def now_ns(self) -> int:

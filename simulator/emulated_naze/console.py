@@ -41,7 +41,7 @@ class Console:
         return self.exchange(request(command, payload), command, timeout_s)
 
     def exchange(self, frame: bytes, command: int, timeout_s: float = 1.0) -> bytes | None:
-        """The same for a request that is already encoded."""
+        """The payload of the reply to `command`, which `frame` requests; None without one, or if it is refused."""
         parser = MspParser()
         self.send(frame)
         end = self.now + timeout_s

@@ -4,13 +4,9 @@
 from collections.abc import Callable
 
 from protocols.firmware_image import FLASH_BASE
-from simulator.board.flash import PowerCutError
+from simulator.board.flash import PAGE_SIZE, PowerCutError
 from simulator.emulated_naze.chip import Chip
-from simulator.emulated_naze.flash_controller import PAGE_SIZE
-
-_KEYR, _CR, _AR = 0x04, 0x10, 0x14
-_KEYS = (0x4567_0123, 0xCDEF_89AB)
-_PG, _PER, _STRT, _LOCK = 1, 1 << 1, 1 << 6, 1 << 7
+from simulator.emulated_naze.flash_controller import AR, CR, KEYR, KEYS, LOCK, PER, PG, STRT
 
 
 class ControlledFlash:
@@ -25,13 +21,13 @@ class ControlledFlash:
         return self._chip.load(FLASH_BASE + at, size)
 
     def erase(self, page: int, now: float) -> float:
-        began = self._unlock(_PER, now)
-        self._chip.flash_controller.write(_AR, FLASH_BASE + page * PAGE_SIZE)
-        self._chip.flash_controller.write(_CR, _PER | _STRT)
+        began = self._unlock(PER, now)
+        self._chip.flash_controller.write(AR, FLASH_BASE + page * PAGE_SIZE)
+        self._chip.flash_controller.write(CR, PER | STRT)
         return self._lock(began)
 
     def program(self, at: int, data: bytes, now: float) -> float:
-        began = self._unlock(_PG, now)
+        began = self._unlock(PG, now)
         for offset in range(0, len(data), 2):
             if not self._has_lost_power():
                 value = int.from_bytes(data[offset : offset + 2], "little")
@@ -40,13 +36,13 @@ class ControlledFlash:
 
     def _unlock(self, control: int, now: float) -> int:
         self._chip.advance(self._chip_ns(now))
-        for key in _KEYS:
-            self._chip.flash_controller.write(_KEYR, key)
-        self._chip.flash_controller.write(_CR, control)
+        for key in KEYS:
+            self._chip.flash_controller.write(KEYR, key)
+        self._chip.flash_controller.write(CR, control)
         return self._chip.now_ns
 
     def _lock(self, began_ns: int) -> float:
-        self._chip.flash_controller.write(_CR, _LOCK)
+        self._chip.flash_controller.write(CR, LOCK)
         if self._has_lost_power():
             raise PowerCutError
         return (self._chip.now_ns - began_ns) / 1e9

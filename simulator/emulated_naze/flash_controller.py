@@ -5,12 +5,14 @@ import random
 from collections.abc import Callable
 
 from protocols.firmware_image import FLASH_BASE, FLASH_SIZE
+from simulator.board.flash import PAGE_SIZE
 from simulator.emulated_naze.switches import EmulatedCounters, EmulatedFaults
 
-PAGE_SIZE = 1024
-_KEYS = (0x4567_0123, 0xCDEF_89AB)
+#: Registers, the keys that unlock the controller, and bits of CR.
+KEYR, SR, CR, AR, OBR, WRPR = 0x04, 0x0C, 0x10, 0x14, 0x1C, 0x20
+KEYS = (0x4567_0123, 0xCDEF_89AB)
 _PROGRAM_ERROR, _PROTECTION_ERROR, _END = 1 << 2, 1 << 4, 1 << 5
-_PG, _PER, _MER, _STRT, _LOCK = 1, 1 << 1, 1 << 2, 1 << 6, 1 << 7
+PG, PER, MER, STRT, LOCK = 1, 1 << 1, 1 << 2, 1 << 6, 1 << 7
 _ERASED = 0xFFFF
 #: Data sheet DS5319, table 29: typical of a half-word, and within the range of a page.
 _PROGRAM_NS = 52_500
@@ -41,48 +43,39 @@ class FlashController:
         self.reset()
 
     def reset(self) -> None:
-        self._control = _LOCK
+        self._control = LOCK
         self._status = self._address = self._keys = 0
 
     def read(self, offset: int) -> int:
-        match offset:
-            case 0x0C:  # SR
-                return self._status
-            case 0x10:  # CR
-                return self._control
-            case 0x1C:  # OBR
-                return 0x03FF_FFFC
-            case 0x20:  # WRPR
-                return 0xFFFF_FFFF
-        return 0
+        words = {SR: self._status, CR: self._control, OBR: 0x03FF_FFFC, WRPR: 0xFFFF_FFFF}
+        return words.get(offset, 0)
 
     def write(self, offset: int, value: int) -> None:
-        match offset:
-            case 0x04:  # KEYR
-                self._take_key(value)
-            case 0x0C:  # SR
-                self._status &= ~(value & (_PROGRAM_ERROR | _PROTECTION_ERROR | _END))
-            case 0x10:  # CR
-                self._write_control(value)
-            case 0x14:  # AR
-                self._address = value
+        if offset == KEYR:
+            self._take_key(value)
+        elif offset == SR:
+            self._status &= ~(value & (_PROGRAM_ERROR | _PROTECTION_ERROR | _END))
+        elif offset == CR:
+            self._write_control(value)
+        elif offset == AR:
+            self._address = value
 
     def _take_key(self, key: int) -> None:
-        if key == _KEYS[self._keys]:
+        if key == KEYS[self._keys]:
             self._keys += 1
-            if self._keys == len(_KEYS):
+            if self._keys == len(KEYS):
                 self._keys = 0
-                self._control &= ~_LOCK
+                self._control &= ~LOCK
         else:
             self._keys = 0
 
     def _write_control(self, value: int) -> None:
-        if self._control & _LOCK:
+        if self._control & LOCK:
             return
-        self._control = value & ~_STRT
-        if value & _STRT and value & _PER:
+        self._control = value & ~STRT
+        if value & STRT and value & PER:
             self._erase(self._address - FLASH_BASE & -PAGE_SIZE)
-        elif value & _STRT and value & _MER:
+        elif value & STRT and value & MER:
             for at in range(0, FLASH_SIZE, PAGE_SIZE):
                 self._erase(at)
 
@@ -101,7 +94,7 @@ class FlashController:
 
     def program(self, at: int, size: int, value: int) -> None:
         """Handle a store by the core into the flash, at an offset."""
-        if not self._control & _PG or size != 2 or at % 2:
+        if not self._control & PG or size != 2 or at % 2:
             self._status |= _PROGRAM_ERROR
             return
         self._counters.flash_programs += 1

@@ -30,7 +30,7 @@ _PER_VOLT = 4095 / 3.3 / 11
 
 @dataclass(slots=True, kw_only=True)
 class FlyingSwitches(EmulatedFaults):
-    """What can also fail in flight, or be set.
+    """The switches of a board in flight.
 
     `radio` 0 is a transmitter switched off, `gps_fix` 0 a hidden sky, `gps` 0 a broken wire to the module; `volts`
     other than 0 replaces the battery's.
@@ -69,7 +69,7 @@ class FlyingNaze(EmulatedNaze):
         self._requested = self._is_pending = False
 
     def truth(self, now: float) -> Craft | None:
-        """Where it truly is; without the firmware's `boxes` and `home`."""
+        """Its true state; without the firmware's `boxes` and `home`."""
         self._run_until(now)
         if self.power is not Power.RUNNING:
             return None

@@ -5,9 +5,8 @@ from enum import Enum
 from typing import Protocol
 
 from protocols.firmware_image import Image
-from simulator.board.flash import NorFlash
+from simulator.board.flash import PAGE_SIZE, NorFlash
 from simulator.board.options import Faults, SimOptions
-from simulator.emulated_naze.flash_controller import PAGE_SIZE
 from simulator.naze.mission_slots import MissionSlots, slot_pages
 
 #: In the struct of flags `f` (mw.h of both trees), ARMED is the second.

@@ -106,7 +106,7 @@ def _compiled() -> Path:
 
 
 def cache_folder() -> Path:
-    """Where compiled and prepared things are kept for the next run."""
+    """The folder of files that are compiled or prepared once."""
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "naze-bridge"
 
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether a mission was flown as the document of the list says, judged by the craft's true track.
+"""Judges by the craft's true track whether a mission was flown as its list says.
 
 The limits: a place within its radius + 2 m, 3 m of overshoot where it brakes, 1.5 s of a time, 15 degrees of a turn, a
 place that is held within its radius + 4 m and its height within 1.5 m, a landing within 6 m of where the descent began.
-The GPS module's own error of 1 m is in them.
+They include the GPS module's error of 1 m.
 """
 
 from dataclasses import dataclass, field
@@ -173,7 +173,7 @@ def _ending(run: MissionRun) -> str:
 def _overshoot(
     flown: Track, target: tuple[float, float], before: tuple[float, float], after: tuple[float, float]
 ) -> float:
-    """How far it went beyond the place in the direction of the leg, and farther than the next leg leads there."""
+    """The distance flown beyond the place along the leg, less what the next leg adds in that direction."""
     north, west = target[0] - before[0], target[1] - before[1]
     length = hypot(north, west)
     if length < 1.0:

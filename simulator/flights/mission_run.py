@@ -11,7 +11,7 @@ from simulator.flights.pilot import HIGH, LOW, MIDDLE, Pilot
 from simulator.flights.track import Track
 
 _EVERY_S = 0.2
-#: How long an end without landing is watched, and a flight that was stopped.
+#: The time to go on watching after an end without landing, and after a stop.
 _WATCH_S, _WATCH_STOPPED_S = 15.0, 5.0
 #: The slowest flight that is waited for: m/s, and s for each record.
 _SLOWEST, _FOR_RECORD_S = 0.4, 60.0

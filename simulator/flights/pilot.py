@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A pilot at the transmitter of an emulated board in the sky, with the switches of `prepared_flash`.
 
-He sees where the craft truly is, and has only sticks and switches.
+The pilot knows the craft's true position, but has only sticks and switches.
 """
 
 from collections.abc import Callable
@@ -14,7 +14,7 @@ from simulator.flights.track import Track
 LOW, MIDDLE, HIGH = 1000, 1500, 2000
 #: From power on to the first reply, with a GPS module: at most.
 _BOOT_S = 40.0
-#: Further until height and position are known.
+#: After that, until height and position are known.
 _SETTLE_S = 6.0
 _CLIMB, _HOVER, _FORWARD = 1620, 1500, 1620
 _STEP_S = 0.1
@@ -69,7 +69,7 @@ class Pilot:
         self.wait(0.5)
 
     def take_off(self, height: float) -> None:
-        """By hand in level flight to a height, then hold it and the place. PilotError."""
+        """Climb by hand in level flight, then hold height and place. PilotError."""
         switches = self.naze.faults
         switches.throttle = _CLIMB
         self.wait_until(lambda: self.height > height - 1.5, f"climbing to {height:.0f} m")
@@ -84,7 +84,7 @@ class Pilot:
         self.naze.faults.aux2 = HIGH if place else MIDDLE
 
     def fly_forward(self, metres: float) -> None:
-        """From the launch place by the nose, then hold the place there. PilotError."""
+        """Fly forward until so far from the launch place, then hold. PilotError."""
         switches = self.naze.faults
         self.hold(place=False)
         switches.pitch = _FORWARD

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the craft truly was: samples of a flight, and figures of them."""
+"""The craft's true track: samples of a flight, and figures of them."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field

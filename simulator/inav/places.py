@@ -7,10 +7,20 @@ A change is in RAM until the configuration is written. Geozones take effect at t
 import math
 import struct
 
-SAFEHOME, SET_SAFEHOME, FW_APPROACH, SET_FW_APPROACH = 0x2038, 0x2039, 0x204A, 0x204B
-GEOZONE, SET_GEOZONE, GEOZONE_VERTEX, SET_GEOZONE_VERTEX = 0x2210, 0x2211, 0x2212, 0x2213
-FEATURE, SET_FEATURE = 36, 37
-_GEOZONE_FEATURE = 1 << 4
+from protocols.msp.inav_places import (
+    FEATURE,
+    FW_APPROACH,
+    GEOZONE,
+    GEOZONE_FEATURE,
+    GEOZONE_VERTEX,
+    SAFEHOME,
+    SET_GEOZONE,
+    SET_GEOZONE_VERTEX,
+    SET_SAFEHOME,
+)
+from simulator.board.flight import METRES_PER_DEGREE
+
+SET_FEATURE, SET_FW_APPROACH = 37, 0x204B
 _FEATURES = 0x2040_0806
 _SAFEHOMES, _APPROACHES, _ZONES, _VERTICES = 8, 17, 63, 126
 _SAFEHOME_SIZE, _APPROACH_SIZE = 9, 14
@@ -22,7 +32,6 @@ _PLACE = struct.Struct("<BBii")
 _FREE = _VERTEX.pack(-1, 0, 0, 0)
 _NO_VERTICES = _FREE * _VERTICES
 _EXCLUSIVE, _CIRCLE = 0, 0
-_METRES_PER_DEGREE = 111_320.0
 #: Inclusive zones whose corners are further away are off.
 _IGNORED_M = 2000
 PLACES_SIZE = (
@@ -54,7 +63,7 @@ class InavPlaces:
             rest = rest[count * size :]
         self._safehomes, self._approaches, self._zones, self._vertices = self._tables
         self._missions = 0
-        self._zones_in_force = [*self._zones] if self._features & _GEOZONE_FEATURE else []
+        self._zones_in_force = [*self._zones] if self._features & GEOZONE_FEATURE else []
         self._vertices_in_force = [_VERTEX.unpack(vertex) for vertex in self._vertices if vertex != _FREE]
 
     def waypoint_set(self, number: int, *, is_last: bool) -> None:
@@ -95,16 +104,16 @@ class InavPlaces:
         return self._about_zone(command, index, payload, behind) if self._has_zones and index < _ZONES else None
 
     def _about_zone(self, command: int, zone: int, payload: bytes, behind: bytes) -> bytes | None:
-        match command, len(payload):
-            case (0x2210, _):
+        match len(payload):
+            case _ if command == GEOZONE:
                 return bytes((zone,)) + self._zones[zone]
-            case (0x2211, 14):
+            case 14 if command == SET_GEOZONE:
                 self._vertices[:] = [_FREE if vertex[0] == zone else vertex for vertex in self._vertices]
                 self._zones[zone] = payload[1:]
                 return b""
-            case (0x2212, size) if size >= 2:
+            case size if command == GEOZONE_VERTEX and size >= 2:
                 return self._vertex(zone, payload[1])
-            case (0x2213, 10 | 14):
+            case 10 | 14 if command == SET_GEOZONE_VERTEX:
                 _, number, lat, lon = _PLACE.unpack_from(payload)
                 # Of a circle it reads a radius even from a request that has none.
                 radius = int.from_bytes((payload + behind)[10:14], "little", signed=True)
@@ -177,4 +186,4 @@ def _metres(one: tuple[float, float], other: tuple[float, float]) -> float:
     """Between two places in degrees * 1e7."""
     north = (other[0] - one[0]) / 1e7
     east = (other[1] - one[1]) / 1e7 * math.cos(math.radians(one[0] / 1e7))
-    return math.hypot(north, east) * _METRES_PER_DEGREE
+    return math.hypot(north, east) * METRES_PER_DEGREE

@@ -117,14 +117,14 @@ class MultiWiiFirmware(MspFirmware):
         if number in (_HOME, _HOLD):
             lat, lon = home if number == _HOME else self._craft.position
             flag = _FLAG_HOME if number == _HOME else _FLAG_HOLD
-            return self._told(navigation.step, navigation.step.action, (lat, lon), flag).pack(number)
+            return self._shown(navigation.step, navigation.step.action, (lat, lon), flag).pack(number)
         if navigation.state is not State.NONE:
-            return self._told(navigation.step, 0, home, _FLAG_IN_PROGRESS).pack(number)
+            return self._shown(navigation.step, 0, home, _FLAG_IN_PROGRESS).pack(number)
         navigation.number, navigation.step, is_sound = self._mission.recall(number)
         return (navigation.step if is_sound else replace(navigation.step, flag=_FLAG_CRC_ERROR)).pack(number)
 
     @staticmethod
-    def _told(step: NavWaypoint, action: int, position: tuple[int, int], flag: int) -> NavWaypoint:
+    def _shown(step: NavWaypoint, action: int, position: tuple[int, int], flag: int) -> NavWaypoint:
         return replace(step, action=action, lat_e7=position[0], lon_e7=position[1], flag=flag)
 
     def _read(self, command: int) -> bytes | None:

@@ -48,7 +48,7 @@ class SimulatedNaze(SimulatedBoard):
         self._flash = NorFlash(memory, self.faults)
         self._whole_flash = WholeFlash(self._flash, self.faults)
         self._boot_loader: BootLoader | None = None
-        self._last_words = b""
+        self._boot_loader_sent = b""
         self._boot_missions = boot_missions
         self._uart = Uart(self.options.baud, self.counters, self.options.tree.value)
         self._boots_at = 0.0
@@ -158,7 +158,7 @@ class SimulatedNaze(SimulatedBoard):
 
     def _start_program(self, now: float) -> None:
         assert self._boot_loader
-        self._last_words = self._boot_loader.sent(now)
+        self._boot_loader_sent = self._boot_loader.sent(now)
         self._boot(now)
 
     def _boot(self, now: float) -> None:
@@ -187,5 +187,5 @@ class SimulatedNaze(SimulatedBoard):
             self._uart.receive(data, now)
 
     def _take_sent(self, now: float) -> bytes:
-        last_words, self._last_words = self._last_words, b""
-        return last_words + (self._boot_loader.sent(now) if self._boot_loader else self._uart.transmitted(now))
+        boot_loader_sent, self._boot_loader_sent = self._boot_loader_sent, b""
+        return boot_loader_sent + (self._boot_loader.sent(now) if self._boot_loader else self._uart.transmitted(now))

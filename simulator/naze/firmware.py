@@ -25,7 +25,7 @@ from simulator.naze.guard import accepts
 from simulator.naze.mavlink_port import MavlinkSchedule, MavlinkSender, Stream
 from simulator.naze.mission_flight import MissionFlight
 from simulator.naze.mission_slots import StoredConfig
-from simulator.naze.mission_store import Floppy
+from simulator.naze.mission_store import OwnMissionStore
 from simulator.naze.missions import Board, BootMissions
 from simulator.naze.parameters import Parameters
 from simulator.naze.settings_commands import STORED_SIZE, SettingsCommands
@@ -107,9 +107,11 @@ class Firmware:
         self._sender = MavlinkSender()
         # Harakiri's own list and MAVLink upload, also alongside the extension.
         self._parameters = Parameters(self._board, self._settings, spend_write, self._send_message)
-        self._floppy = Floppy(flash, self._board, self._missions, self._send_message, self._parameters.reset)
+        self._own_missions = OwnMissionStore(
+            flash, self._board, self._missions, self._send_message, self._parameters.reset
+        )
         if not (self._missions or self._config.is_valid):
-            self._floppy.clear()
+            self._own_missions.clear()
         self._cli = CommandLine(options.tree, self._cli_status, self._dump)
         self._flight_reports = MissionFlight(faults)
         self._schedule = MavlinkSchedule(now, self._flight_reports.message)
@@ -159,7 +161,7 @@ class Firmware:
             self._serve_cli()
         else:
             self._follow_pilot()
-            self._floppy.drop_stale(at)
+            self._own_missions.drop_stale(at)
             self._write_config_if_due()
             self._serve_uart()
         self._next_loop = max(at + self._looptime, self._clock)
@@ -204,11 +206,11 @@ class Firmware:
         with contextlib.suppress(FlashError):
             # With the extension the list has flash of its own; without it, it is part of the configuration.
             if self._missions:
-                self._floppy.save()
+                self._own_missions.save()
                 self._config.stage(self._board.wp_radius_cm, settings)
             self._config.erase()
             if not self._missions:
-                self._floppy.save()
+                self._own_missions.save()
             self._config.program(self._board.wp_radius_cm, settings, sealed=self._missions is not None)
         self._stall()
 
@@ -306,7 +308,7 @@ class Firmware:
             for frame in self._mavlink.feed(bytes((byte,))):
                 if frame.version == 1:
                     self._switch(Protocol.MAVLINK)
-                    self._floppy.take(frame, self._clock)
+                    self._own_missions.take(frame, self._clock)
                     self._parameters.take(frame, self._clock)
                     return True
         if self.protocol is not Protocol.MAVLINK and self._faults.msp and (request := self._msp.push(byte)):
@@ -320,7 +322,7 @@ class Firmware:
             frame = reply(command, answer)
             self._msp.overwrite(answer)
             if command == MissionCommand.COMMIT:
-                self._floppy.load()
+                self._own_missions.load()
         elif self._missions and not accepts(command, len(payload), box_size=self._answers.box_size, armed=self.armed):
             frame = error(command)
         else:
@@ -353,7 +355,7 @@ class Firmware:
         while (byte := self._uart.read(self._clock)) is not None:
             printed, asked = self._cli.type(byte)
             if asked is CliRequest.FLUSH:
-                self._floppy.clear()
+                self._own_missions.clear()
                 printed = printed.removesuffix(PROMPT) + self._cli_status().encode() + PROMPT
             elif asked is CliRequest.SAVE:
                 self._write_config()
@@ -364,7 +366,8 @@ class Firmware:
                 return
 
     def _cli_status(self) -> str:
-        return f"Floppy: {_FLOPPY_SIZE} B, {self._floppy.count} Datasets of {self._options.capacity} possible\r\n\r\n"
+        count, capacity = self._own_missions.count, self._options.capacity
+        return f"Floppy: {_FLOPPY_SIZE} B, {count} Datasets of {capacity} possible\r\n\r\n"
 
     def _dump(self) -> str:
         """The setting that this model has with and without the extension."""

@@ -38,7 +38,7 @@ _TO_PLACE = (WpCommand.WAYPOINT, WpCommand.LOITER_UNLIM, WpCommand.LOITER_TURNS,
 _NOT_ALONE = (WpCommand.SETROI, WpCommand.RETURN_TO_LAUNCH, WpCommand.LAND, WpCommand.TAKEOFF)
 
 
-class Floppy:
+class OwnMissionStore:
     """One boot's store. `send` packs and sends a message to a partner. `on_reset`: called at the end of a transfer.
 
     With the extension, `missions` keeps the list, and an interrupted upload leaves the old one. Without it, the list

@@ -37,7 +37,7 @@ class Parameters:
         self.is_listing = False
 
     def reset(self) -> None:
-        """Break the list off, as each end of a mission transfer does (reset_mavlink)."""
+        """Abort the list, as each end of a mission transfer does (reset_mavlink)."""
         self._next, self.is_listing = 0, False
 
     def take(self, frame: MavlinkFrame, now: float) -> None:

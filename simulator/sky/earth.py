@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The place where it flies: latitude and longitude, air pressure, and the magnetic field."""
+"""The place of a flight: latitude and longitude, air pressure, and the magnetic field."""
 
 from dataclasses import dataclass
 from math import cos, radians, sin

@@ -15,9 +15,9 @@ from simulator.sky.earth import Place
 from simulator.sky.noise import Wander
 from simulator.sky.vectors import Vector
 
-#: The module measures five times a second, and its position is this old when it is sent.
+#: The time between two measurements, and the age of one when it is sent.
 _PERIOD_S, _LAG_S = 0.2, 0.2
-#: Standard deviations: metres, forgotten within a minute; metres and m/s of one measurement.
+#: Standard deviations: metres, correlated over a minute; metres and m/s of one measurement.
 _WANDER_M, _WANDER_S, _POSITION_NOISE, _SPEED_NOISE = 0.7, 60.0, 0.02, 0.05
 _SATELLITES, _SATELLITES_LOST = 9, 3
 _SYNC = b"\xb5\x62"

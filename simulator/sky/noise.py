@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random values that stay near zero and forget slowly: gusts, and a GPS module's wandering position."""
+"""Random values around zero that change slowly: gusts, and a GPS module's wandering position."""
 
 import random
 from math import exp, sqrt
 
 
 class Wander:
-    """A first-order Gauss-Markov process: standard deviation `sigma`, forgotten within about `memory_s`."""
+    """A first-order Gauss-Markov process: standard deviation `sigma`, correlated over about `memory_s`."""
 
     def __init__(self, noise: random.Random, sigma: float, memory_s: float) -> None:
         self._noise = noise

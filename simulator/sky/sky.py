@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from math import pi, sin
 
 from simulator.sky.battery import Battery
-from simulator.sky.body import Airframe, Body
+from simulator.sky.body import GRAVITY, Airframe, Body
 from simulator.sky.earth import Place
 from simulator.sky.noise import Wander
 from simulator.sky.vectors import Vector, to_body, turned
@@ -36,7 +36,7 @@ class Weather:
 class Motion:
     """What the IMU measures: m/s2 and rad/s in body axes."""
 
-    acceleration: Vector = (0.0, 0.0, 9.80665)
+    acceleration: Vector = (0.0, 0.0, GRAVITY)
     rates: Vector = field(default=(0.0, 0.0, 0.0))
 
 
@@ -94,14 +94,14 @@ class Sky:
         t, body = self.now_s, self.body
         body.rates = (1.1 * sin(0.23 * t), 1.3 * sin(0.31 * t + 1), 0.8 * sin(0.17 * t + 2))
         body.attitude = turned(body.attitude, body.rates, _STEP_S)
-        body.felt = to_body(body.attitude, (0.0, 0.0, 9.80665))
+        body.felt = to_body(body.attitude, (0.0, 0.0, GRAVITY))
 
     # -- the sensors -----------------------------------------------------------------------------------------
 
     def motion(self) -> Motion:
         """A measurement of the IMU, with noise and vibration."""
         gauss = self._noise.gauss
-        shake = _VIBRATION * min(sum(self.body.thrusts) / (9.80665 * self.body.frame.mass), 2.0)
+        shake = _VIBRATION * min(sum(self.body.thrusts) / (GRAVITY * self.body.frame.mass), 2.0)
         phase = 2 * pi * _VIBRATION_HZ * self.now_s
         shakes = shake * sin(phase), shake * sin(phase + 2.0), shake * sin(phase + 4.0)
         a, r = self._motion.acceleration, self._motion.rates

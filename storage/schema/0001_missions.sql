@@ -1,4 +1,4 @@
--- Every mission that came in. Times are unix seconds.
+-- Every mission received. Times are unix seconds.
 
 -- What a list of missions shows. The bulk is apart, so that listing thousands reads few pages.
 CREATE TABLE missions (
@@ -16,7 +16,7 @@ CREATE TABLE missions (
     concluded_at  REAL                                -- NULL while the outcome is PENDING
 ) STRICT;
 
--- JSON as Python writes it: a parameter that was not given stands there as NaN.
+-- JSON as Python writes it: a parameter that was not given is NaN.
 CREATE TABLE mission_contents (
     number       INTEGER PRIMARY KEY REFERENCES missions (number),
     items        TEXT    NOT NULL,

@@ -1,7 +1,7 @@
 -- Tables of a flight controller's settings, one for each change. Times are unix seconds.
 CREATE TABLE settings_backups (
     number        INTEGER PRIMARY KEY AUTOINCREMENT,  -- a number is never given twice
-    board         TEXT    NOT NULL,                   -- tells two boards of one kind apart
+    board         TEXT    NOT NULL,                   -- distinguishes boards of one kind
     kind          TEXT    NOT NULL,                   -- the firmware and its version
     taken_at      REAL    NOT NULL,
     occasion      TEXT    NOT NULL,                   -- why it was taken

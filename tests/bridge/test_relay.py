@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A ground station beside the relay: its mission crosses the link as a whole, and the ack waits for the vehicle."""
+"""A ground station next to the relay: its mission crosses the link as a whole, and the ack waits for the vehicle."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -24,7 +24,7 @@ NONE = ListIdentity(0, 0)
 
 
 class Bench:
-    """The relay, a ground station at once beside it, and a vehicle whose replies are made by the test."""
+    """The relay, a ground station right next to it, and a vehicle whose replies are made by the test."""
 
     def __init__(self) -> None:
         self.to_vehicle: list[bytes] = []

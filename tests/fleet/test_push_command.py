@@ -3,13 +3,12 @@
 
 import json
 from collections.abc import Iterator
-from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
 from protocols.mission_item import Command
-from tests.support.fleet_bench import Fleet
+from tests.support.fleet_bench import Fleet, running_fleet
 from tests.support.plan import HOME, PlanRow, plain_plan, plan_file, waypoint
 from tests.support.programs import run_naze_bridge, until
 
@@ -18,11 +17,7 @@ NAMES = ("kite", "owl", "swift")
 
 @pytest.fixture(scope="module")
 def fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fleet]:
-    with ExitStack() as stack:
-        fleet = Fleet(tmp_path_factory.mktemp("fleet"), stack)
-        for name in NAMES:
-            fleet.start(name)
-        fleet.wait(*NAMES)
+    with running_fleet(tmp_path_factory.mktemp("fleet"), *NAMES) as fleet:
         yield fleet
 
 

@@ -4,12 +4,11 @@
 import json
 import subprocess
 from collections.abc import Iterator
-from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
-from tests.support.fleet_bench import Fleet
+from tests.support.fleet_bench import Fleet, running_fleet
 from tests.support.programs import run_naze_bridge, until
 
 NAMES = ("kite", "owl", "swift")
@@ -17,11 +16,7 @@ NAMES = ("kite", "owl", "swift")
 
 @pytest.fixture(scope="module")
 def fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fleet]:
-    with ExitStack() as stack:
-        fleet = Fleet(tmp_path_factory.mktemp("fleet"), stack)
-        for name in NAMES:
-            fleet.start(name)
-        fleet.wait(*NAMES)
+    with running_fleet(tmp_path_factory.mktemp("fleet"), *NAMES) as fleet:
         until(lambda: all(settings(fleet, name, "list").returncode == 0 for name in NAMES), "the settings")
         yield fleet
 

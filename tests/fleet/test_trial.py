@@ -7,7 +7,7 @@ from fleet.trial import Trial
 
 
 @pytest.mark.parametrize(
-    ("trial", "is_taken", "is_held"),
+    ("trial", "is_accepted", "is_held"),
     [
         (Trial("kite"), None, None),
         (Trial("kite", None, 5, "1234abcd", 5, "1234abcd"), True, True),
@@ -17,6 +17,6 @@ from fleet.trial import Trial
     ],
 )
 def test_a_mission_is_held_if_it_is_taken_and_its_checksum_is_that_of_the_list(
-    trial: Trial, is_taken: bool | None, is_held: bool | None
+    trial: Trial, is_accepted: bool | None, is_held: bool | None
 ) -> None:
-    assert (trial.is_taken, trial.is_held) == (is_taken, is_held)
+    assert (trial.is_accepted, trial.is_held) == (is_accepted, is_held)

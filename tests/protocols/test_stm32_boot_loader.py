@@ -19,7 +19,7 @@ from protocols.stm32_boot_loader import (
     write_memory,
 )
 from simulator.board.simulated_board import Power
-from tests.support.boot_loader_bench import BrokenOffError, DialogueBench, board_in_boot_loader
+from tests.support.boot_loader_bench import CablePulledError, DialogueBench, board_in_boot_loader
 
 PAGE = 5
 AT = FLASH_BASE + PAGE * PAGE_SIZE
@@ -52,7 +52,7 @@ def test_after_a_cut_anywhere_the_next_session_works_and_no_other_page_has_chang
         before = board.flash_contents
         bench = DialogueBench(board)
         bench.cut_after = cut
-        with pytest.raises(BrokenOffError):
+        with pytest.raises(CablePulledError):
             bench.run(session(b"0123456789abcdef"))
         bench.wait(0.001 * cut)
         again = DialogueBench(board, bench.now)
@@ -70,7 +70,7 @@ def test_a_long_write_broken_off_is_ended(cut: int) -> None:
     bench = DialogueBench(board)
     bench.run(synchronise(1.0))
     bench.cut_after = bench.sent + 7 + cut
-    with pytest.raises(BrokenOffError):
+    with pytest.raises(CablePulledError):
         bench.run(write_memory(AT, bytes(BLOCK_SIZE)))
     again = DialogueBench(board, bench.now)
     assert again.run(session(b"fedcba9876543210")) == b"fedcba9876543210"

@@ -19,7 +19,7 @@ from protocols.msp.mission import INFO_REQUEST, decode_info
 from protocols.stm32_boot_loader import Dialogue, start_program
 from simulator.board.simulated_board import Power
 from tests.support.benches import Starter
-from tests.support.boot_loader_bench import BrokenOffError, DialogueBench
+from tests.support.boot_loader_bench import CablePulledError, DialogueBench
 from tests.support.programs import happens
 from tests.support.real_bench import Figure, RealBench
 
@@ -112,7 +112,7 @@ def test_a_flash_broken_off_at_any_step_is_resumed(plain: Image, image: Image, c
         bench = RealBench(plain)
         line, _ = enter(bench)
         line.cut_after = line.sent + cut
-        with pytest.raises(BrokenOffError):
+        with pytest.raises(CablePulledError):
             line.run(flash(image.program))
         assert bench.naze.power is Power.BOOTLOADER
         again = DialogueBench(bench.naze, line.now + 3)

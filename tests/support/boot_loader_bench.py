@@ -16,7 +16,7 @@ T = TypeVar("T")
 _STEP_S = 1e-4
 
 
-class BrokenOffError(Exception):
+class CablePulledError(Exception):
     """The cable was pulled."""
 
 
@@ -37,7 +37,7 @@ class DialogueBench:
                 self.board.advance(self.now)
                 for byte in step.data:
                     if self.sent == self.cut_after:
-                        raise BrokenOffError
+                        raise CablePulledError
                     self.board.receive(bytes((byte,)), self.now)
                     self.sent += 1
                 reply, end = b"", self.now + step.timeout_s

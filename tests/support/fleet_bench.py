@@ -4,7 +4,8 @@
 import json
 import signal
 import subprocess
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -86,3 +87,14 @@ class Fleet:
         ended = self.ask("push", *arguments, "--json")
         assert ended.returncode == code, ended
         return {vehicle["vehicle"]: vehicle for vehicle in json.loads(ended.stdout)["vehicles"]}
+
+
+@contextmanager
+def running_fleet(folder: Path, *names: str) -> Iterator[Fleet]:
+    """A fleet whose vehicles, each with a simulated board, are all ready."""
+    with ExitStack() as stack:
+        fleet = Fleet(folder, stack)
+        for name in names:
+            fleet.start(name)
+        fleet.wait(*names)
+        yield fleet

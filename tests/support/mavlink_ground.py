@@ -52,7 +52,7 @@ class MavlinkGround:
         return None if ack is None else int(ack.type)
 
     def upload(self, count: int, stop_after: int | None = None, replace: Mapping[int, int] | None = None) -> int | None:
-        """Upload waypoints, some replaced by other commands; return the ACK's result, None if it was broken off."""
+        """Upload waypoints, some replaced by other commands; return the ACK's result, None if it was stopped."""
         self.send(m.MAVLink_mission_count_message(*_BOARD, count))
         for _ in range(count + 1):
             reply = self.wait(m.MAVLINK_MSG_ID_MISSION_REQUEST, m.MAVLINK_MSG_ID_MISSION_ACK)

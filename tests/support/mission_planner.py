@@ -161,7 +161,7 @@ class MissionPlanner:
         return True
 
     def _discard(self) -> None:
-        """Lose the packets that came while no loop was waiting: its reader passes on only what is waited for."""
+        """Lose the packets that arrived while no loop was waiting: its reader passes on no others."""
         deadline = time.monotonic() + 0.05
         while self._receive(deadline):
             pass
@@ -290,7 +290,7 @@ class MissionPlanner:
         return self.command(messages.MAV_CMD_COMPONENT_ARM_DISARM, 1)
 
     def read_hud(self) -> str:
-        """The line that now stands on its HUD."""
+        """The line on its HUD now."""
         return self.screen.hud(time.monotonic())
 
     def request_version(self) -> None:
@@ -383,7 +383,7 @@ class MissionPlanner:
             self.set_parameter("WPNAV_RADIUS", radius_m * 100)
 
     def set_current(self, seq: int) -> int:
-        """Set WP: its window hangs until a MISSION_CURRENT comes; returns the number of requests (setWPCurrent)."""
+        """Set WP: its window hangs until a MISSION_CURRENT arrives; returns the number of requests (setWPCurrent)."""
         for tries in range(1, 7):
             self.send(messages.MAVLink_mission_set_current_message(*self._target, seq))
             for message in self._packets(2.0):

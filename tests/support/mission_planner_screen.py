@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a pilot reads and hears in Mission Planner (CurrentState.cs, MAVLinkInterface.cs, HUD.cs, PrearmStatus.cs).
+"""The texts and speech of Mission Planner, as a pilot gets them.
 
-Its defaults: severity 4, voice on, "No RC receiver" warnings on.
+Sources: CurrentState.cs, MAVLinkInterface.cs, HUD.cs, PrearmStatus.cs. Its defaults: severity 4, voice on, warnings of
+a missing RC receiver on.
 """
 
 from protocols.mavlink.dialect import Message
@@ -39,7 +40,7 @@ _ROVER_MODES = {0: "Manual", 1: "Acro", 3: "Steering", 4: "Hold", 5: "Loiter", 1
 
 
 class MissionPlannerScreen:
-    """Fed with every message of the vehicle in the order of time. All questions take the moment they are about."""
+    """Fed with every message of the vehicle in the order of time. Every query takes a time."""
 
     def __init__(self) -> None:
         #: messageHigh: the one line on the HUD.
@@ -143,12 +144,12 @@ class MissionPlannerScreen:
             self.mode.set(at, modes[message.custom_mode])
 
     def _show(self, at: float, text: str) -> None:
-        """A text that still stands is not renewed."""
+        """A text that is still shown is not renewed."""
         if text and self.line.at(at) != text:
             self.line.set(at, text)
 
     def _say(self, at: float, text: str) -> None:
-        """A text that comes while the voice speaks is not said."""
+        """A text that arrives while the voice speaks is not said."""
         if at >= self._quiet_at:
             self.spoken.append((at, text))
             self._quiet_at = at + _SPEECH_S * len(text)

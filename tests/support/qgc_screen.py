@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a pilot reads and hears in QGroundControl 5.0, firmware ArduPilot (Vehicle.cc, MainStatusIndicator.qml,
-AutoPilotPlugin.cc, APMRadioComponent.cc, APMSensorsComponent.cc, PlanManager.cc).
+"""The texts and speech of QGroundControl 5.0 for an ArduPilot, as a pilot gets them.
+
+Sources: Vehicle.cc, MainStatusIndicator.qml, AutoPilotPlugin.cc, APMRadioComponent.cc, APMSensorsComponent.cc,
+PlanManager.cc.
 
 Only its rules, not its requests: a scripted client passes those it sends to `sent`.
 """
@@ -40,7 +42,7 @@ _RESULTS = {
 
 
 class QgcScreen:
-    """Fed with every message of the vehicle in the order of time. All questions take the moment they are about."""
+    """Fed with every message of the vehicle in the order of time. Every query takes a time."""
 
     def __init__(self) -> None:
         #: The version in which it speaks over UDP: that of the vehicle's first packet.

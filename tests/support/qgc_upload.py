@@ -80,7 +80,7 @@ class FatedLink:
 class QgcUpload:
     """Each request restarts its timer of 1.5 s; it announces the list again only until item 0 is requested.
 
-    The final MISSION_ACK is never asked for again. Messages of another mission type are not looked at. `send` puts a
+    The final MISSION_ACK is never asked for again. Messages of another mission type are ignored. `send` puts a
     message on the link.
     """
 

@@ -90,7 +90,7 @@ class RealBench(WireBench):
         self.wait_for_boot()
 
     def hold_write(self, pending: bool) -> None:
-        """Schedule a write of the configuration for a time that never comes, or cancel it."""
+        """Schedule a write of the configuration for a time that is never reached, or cancel it."""
         at_ms = int(self.now * 1000) + 10_000_000 if pending else 0
         self.naze.poke(self.image.symbols[_WRITE_PENDING], at_ms.to_bytes(4, "little"))
 

@@ -15,7 +15,7 @@ from tests.support.world import GroundStation, Radio, World
 
 
 class SentList:
-    """A list being uploaded. `send` puts a message on the link; `stop` ends it without a word."""
+    """A list being uploaded. `send` puts a message on the link; `stop` ends it silently."""
 
     def __init__(self, clock: Clock, send: Callable[[Message], None], items: Sequence[MissionItem]) -> None:
         self._clock, self._send, self._items = clock, send, items

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the pilot reads in Mission Planner and QGroundControl: both screens on one station of a simulated world.
+"""The screens of Mission Planner and QGroundControl, both fed by one station of a simulated world.
 
 screens = Screens(station)
 world.power_off()
@@ -14,13 +14,13 @@ from tests.support.mission_planner_screen import MissionPlannerScreen
 from tests.support.qgc_screen import QgcScreen
 from tests.support.world import GroundStation
 
-#: A line that is set once stands in Mission Planner for 10 s; after 30 s only what is renewed is left.
+#: Mission Planner shows a line that is set once for 10 s; after 30 s only repeated ones are left.
 LOOKS_S = (1.0, 9.0, 30.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Glance:
-    """What the pilot reads at one moment.
+    """The texts on both screens at one moment.
 
     Mission Planner: the line on the HUD, armed, FAILSAFE, SAFE, the mode, "Ready to Arm" (only shown while disarmed).
     QGroundControl: the status at the left of its toolbar, the reason not to arm over the map.

@@ -64,7 +64,7 @@ class TestMissionPlanner:
         screen = planner((0, text("lost")), (1, sensors(MOTORS, 0)), (2, sensors(MOTORS | GYRO | GPS, MOTORS)))
         assert [screen.hud(at) for at in (1.5, 2)] == ["lost", "Unhealthy GPS Signal"]
 
-    def test_while_prearm_is_unhealthy_the_last_such_text_stands(self) -> None:
+    def test_while_prearm_is_unhealthy_the_last_such_text_is_shown(self) -> None:
         notice = text("PreArm: no RC link", m.MAV_SEVERITY_INFO)
         status = [(at, sensors(MOTORS | PREARM, MOTORS)) for at in range(2, 40)]
         screen = planner((0, notice), (1, text("another")), *status)
@@ -107,7 +107,7 @@ class TestQgc:
         assert screen.is_in_setup
         assert screen.status(1) == "Not Ready"
 
-    def test_the_reason_not_to_arm_stands_for_35_s_and_is_spoken_at_most_every_10_s(self) -> None:
+    def test_the_reason_not_to_arm_is_shown_for_35_s_and_is_spoken_at_most_every_10_s(self) -> None:
         reason = text("PreArm: no RC link")
         screen = qgc(*((at, reason) for at in (0, 5, 12)))
         assert [screen.prearm_error.at(at) for at in (46, 48)] == ["PreArm: no RC link", ""]

@@ -55,7 +55,7 @@ def partial_list_message(mission_type: int = 0) -> Message:
     return messages.MAVLink_mission_write_partial_list_message(1, 1, 0, 0, mission_type)
 
 
-def assert_refusal_stands(world: World, station: GroundStation, result: MissionResult) -> None:
+def assert_refusal_is_repeated(world: World, station: GroundStation, result: MissionResult) -> None:
     """Mission Planner continues after any ack to its count; its further messages get the same refusal."""
     for seq in (0, 1, 0, 999):
         station.take()
@@ -78,7 +78,7 @@ def refused(world: World, station: GroundStation, count: int, result: MissionRes
     assert acks(station) == [result]
     assert any(words in text for text in station.texts()), station.texts()
     assert requested(station) == []
-    assert_refusal_stands(world, station, result)
+    assert_refusal_is_repeated(world, station, result)
     if world.naze.stored:
         assert world.stored == OLD_RECORDS
 

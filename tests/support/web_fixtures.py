@@ -26,8 +26,8 @@ def web(tmp_path: Path) -> Iterator[WebBench]:
 
 
 @pytest.fixture(scope="module")
-def lasting_web(tmp_path_factory: pytest.TempPathFactory) -> Iterator[WebBench]:
-    """The same, shared by all tests of a module that leave it usable; its store has one mission."""
+def shared_web(tmp_path_factory: pytest.TempPathFactory) -> Iterator[WebBench]:
+    """A page and a board for the tests of a module that leave them usable; the store has one mission."""
     with web_bench(tmp_path_factory.mktemp("web")) as bench:
         bench.push_example()
         yield bench

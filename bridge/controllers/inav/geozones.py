@@ -144,9 +144,9 @@ class InavGeozones(InavPlaceStore[Geozone]):
 
 @dataclass(frozen=True, slots=True)
 class FenceRules:
-    """The rules for a fence. former: the zones on the board."""
+    """The rules for a fence. current: the zones on the board."""
 
-    former: tuple[Geozone, ...] = ()
+    current: tuple[Geozone, ...] = ()
     is_feature_on: bool = True
     max_items: int = VERTICES
     has_home: bool = False
@@ -203,7 +203,7 @@ class FenceCheck(ListCheck):
     def _add(self, item: MissionItem, zone: Geozone) -> RejectingFinding | None:
         """Keep a zone, with the heights and the action of the present one of the same shape."""
         number = len(self._zones)
-        known = next((each for each in self._rules.former if _shape(each) == _shape(zone)), None)
+        known = next((each for each in self._rules.current if _shape(each) == _shape(zone)), None)
         kept = zone if known is None else known
         self._zones.append(replace(kept, number=number))
         if known is None:
@@ -231,12 +231,12 @@ class FenceCheck(ListCheck):
         zones = tuple(self._zones)
         if not zones:
             return CLEARED_LIST
-        lost = [each for each in self._rules.former if hidden_values(each) and _shape(each) not in map(_shape, zones)]
+        lost = [each for each in self._rules.current if hidden_values(each) and _shape(each) not in map(_shape, zones)]
         for zone in lost:
             self._say(f"Geozone {zone.number} is erased, with {hidden_values(zone)}")
         if not self._rules.is_feature_on:
             self._say("INAV's feature GEOZONE is off: the fence has no effect")
-        elif zones != self._rules.former:
+        elif zones != self._rules.current:
             self._say("INAV uses its new geozones after its next start", News.NOTICE)
         return Verdict(Result.ACCEPTED, MissionResult.ACCEPTED, zones, fence_items(zones), tuple(self._findings))
 

@@ -24,7 +24,7 @@ from protocols.rights.msp import Firmware
 
 _VARIANT = "INAV"
 #: The constant bytes of GETINFO.
-_LASTING_INFO = 2
+_STABLE_INFO = 2
 #: By INAV's platform type, from 0.
 _AIRFRAMES = (
     Airframe.QUADROTOR,
@@ -47,7 +47,7 @@ def _recognise(board: Interview) -> Conversation[FlightController | None]:
     boxes = yield from board.boxes_by_id(_BOXES)
     controller = FlightController(PROFILE, PROFILE.name, boxes=boxes, firmware=Firmware.INAV)
     # The pilot may load another mission at any time: only the capacity is constant.
-    info = decode_info((yield from board.ask(Nav.GETINFO, INFO_SIZE, lasting=_LASTING_INFO)).payload)
+    info = decode_info((yield from board.ask(Nav.GETINFO, INFO_SIZE, stable=_STABLE_INFO)).payload)
     if info is None or not info.capacity or controller.arm_bit is None:
         # Without an arm flag nothing would prevent a mission write in flight.
         return None

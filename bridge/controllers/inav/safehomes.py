@@ -78,22 +78,22 @@ class InavSafehomes(InavPlaceStore[Safehome]):
 
 @dataclass(frozen=True, slots=True)
 class RallyRules:
-    """The rules for rally points. former: the safehomes on the board."""
+    """The rules for rally points. current: the safehomes on the board."""
 
-    former: tuple[Safehome, ...] = ()
+    current: tuple[Safehome, ...] = ()
     max_items: int = SAFEHOMES
     has_home: bool = False
 
     def begin(self, count: int, _fallback_home: tuple[int, int] | None) -> "RallyCheck":
-        return RallyCheck(count, self.former)
+        return RallyCheck(count, self.current)
 
 
 class RallyCheck(ListCheck):
     """The check of a list of rally points."""
 
-    def __init__(self, count: int, former: tuple[Safehome, ...]) -> None:
+    def __init__(self, count: int, current: tuple[Safehome, ...]) -> None:
         super().__init__(count)
-        self._former = former
+        self._current = current
         self._places: list[tuple[int, int]] = []
 
     def _judge(self, item: MissionItem) -> RejectingFinding | None:
@@ -115,7 +115,7 @@ class RallyCheck(ListCheck):
     def _conclude(self) -> Verdict[Safehome]:
         if not self._places:
             return CLEARED_LIST
-        off = sum(not each.enabled and bool(each.lat_e7 or each.lon_e7) for each in self._former)
+        off = sum(not each.enabled and bool(each.lat_e7 or each.lon_e7) for each in self._current)
         if off:
             self._say(f"Safehomes that were off are erased: {off}", News.WARNING)
         records = self._fill()
@@ -127,7 +127,7 @@ class RallyCheck(ListCheck):
         former = {each.number: each for each in self._former}
         filled: dict[int, Safehome] = {}
         ahead = [*self._places]
-        for each in self._former:
+        for each in self._current:
             if each.enabled and (each.lat_e7, each.lon_e7) in ahead:
                 filled[each.number] = each
                 ahead.remove((each.lat_e7, each.lon_e7))

@@ -51,10 +51,10 @@ _NO_THROTTLE = (0, -1, -2)
 
 @dataclass(frozen=True, slots=True)
 class NavRules:
-    """The rules of one flight controller. former: its current list. others: the other missions in its store."""
+    """The rules of one flight controller. current: its current list. others: the other missions in its store."""
 
     profile: NavProfile
-    former: Mission = ()
+    current: Mission = ()
     others: tuple[Mission, ...] = ()
 
     @property
@@ -153,7 +153,7 @@ class NavCheck(ListCheck):
     def _flew_home(self) -> bool:
         """True if the record to be replaced has no place either."""
         place = len(self._records)
-        return place < len(self._rules.former) and flies_home(self._rules.former[place])
+        return place < len(self._rules.current) and flies_home(self._rules.current[place])
 
     def _hold(self, item: MissionItem) -> int:
         allowed = self._profile.longest_hold
@@ -302,12 +302,14 @@ class NavCheck(ListCheck):
         return not sets_speed and self._speed.at_jump[place] != leg_speed(self._records[target], 0)
 
     def _conclude(self) -> Verdict[NavRecord]:
-        kept, lost = keep_unshown(self._records, self._rules.former)
+        kept, lost = keep_unshown(self._records, self._rules.current)
         records = (*kept[:-1], replace(kept[-1], flag=LAST))
         items = items_from_records(records, self._home, self._sent_as)
         if lost:
             why = f"Lost with the old list, as no MAVLink item can show it: {lost}"
-            self._findings.append(Finding(None, "count", len(self._rules.former), len(records), why, news=News.WARNING))
+            self._findings.append(
+                Finding(None, "count", len(self._rules.current), len(records), why, news=News.WARNING)
+            )
         for mission in erased(self._rules.others, self._profile.capacity - len(records)):
             _, unshown = keep_unshown((), mission)
             copy = f"a copy without its {unshown}" if unshown else "a copy"

@@ -24,7 +24,7 @@ from protocols.msp.command_line import EchoWatch
 from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser
 
-#: Tried in this order; 115200, Harakiri's default, comes twice, for a board that was still booting.
+#: Tried in this order; 115200, Harakiri's default, is tried twice, for a board that was still booting.
 SPEEDS = (115200, 57600, 38400, 115200, 19200, 9600, 4800, 2400, 1200)
 #: At these speeds a visit lasts long enough for a 1 Hz heartbeat; at others for the replies to two probes.
 _HEARTBEAT_SPEEDS = (115200, 57600)

@@ -88,8 +88,8 @@ def check_permission(host: Host, fc: FcAddress) -> Checked | None:
     if found.st_mode & stat.S_IRGRP and found.st_mode & stat.S_IWGRP and group == _GROUP:
         return ok("permission", f"{device} is open to the group {_GROUP}")
     mode = stat.filemode(found.st_mode)
-    lasting = f"permanently, with a udev rule: {page('docs/install.md')}"
-    remedy = f"sudo chgrp {_GROUP} {device} && sudo chmod g+rw {device}; {lasting}"
+    permanent = f"permanently, with a udev rule: {page('docs/install.md')}"
+    remedy = f"sudo chgrp {_GROUP} {device} && sudo chmod g+rw {device}; {permanent}"
     found_text = f"{device} belongs to the group {group} with {mode}, and not to {_GROUP}"
     return problem("permission", found_text, remedy, open_to_group(device, _GROUP))
 

@@ -5,7 +5,7 @@ const TIMEOUT_MS = 8000;
 
 export const ask = async (path, token) => (await request(path, { headers: bearer(token) })).json();
 
-export const tell = async (path, token, body = null) =>
+export const post = async (path, token, body = null) =>
   (await request(path, { method: "POST", body, headers: { ...bearer(token), ...(body && { "Content-Type": "application/octet-stream" }) } })).json();
 
 export const fetchBytes = async (path, token) => (await request(path, { headers: bearer(token) })).blob();

@@ -108,8 +108,8 @@ function craftMark([x, y], heading, height_m) {
   const shape = heading === null
     ? draw("circle", { class: "craft", cx: x, cy: y, r: 7 })
     : draw("path", { class: "craft", d: "M0 -14l8 22-8-5-8 5z", transform: `translate(${x} ${y}) rotate(${round(heading)})` });
-  const told = height_m === null || height_m === undefined ? "Craft" : `Craft, ${height_m.toFixed(1)} m above home`;
-  return draw("g", { class: "touched craft-mark" }, draw("title", {}, told), shape);
+  const title = height_m === null || height_m === undefined ? "Craft" : `Craft, ${height_m.toFixed(1)} m above home`;
+  return draw("g", { class: "touched craft-mark" }, draw("title", {}, title), shape);
 }
 
 function scaleBar(pixelsPerMetre, width, height) {
@@ -127,8 +127,8 @@ function northArrow(width) {
 }
 
 function inWords(items, flown, home, craft) {
-  const told = [`Map with ${items.filter((item) => item.seq > 0 && isPlaced(item)).length} positions of the mission`];
-  if (flown !== null) told.push(`item ${flown} is flown now`);
-  if (home && craft) told.push(`the craft is ${Math.round(distance(home, craft))} m from home`);
-  return told.join("; ");
+  const parts = [`Map with ${items.filter((item) => item.seq > 0 && isPlaced(item)).length} positions of the mission`];
+  if (flown !== null) parts.push(`item ${flown} is flown now`);
+  if (home && craft) parts.push(`the craft is ${Math.round(distance(home, craft))} m from home`);
+  return parts.join("; ");
 }

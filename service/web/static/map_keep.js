@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Switches the map's tiles on and off, and has the Pi keep those of the view for the field.
-import { tell } from "./daemon.js";
+import { post } from "./daemon.js";
 import { byId, make, say, setText } from "./dom.js";
 import { action } from "./pi_request.js";
 import { currentToken, tokenField } from "./token.js";
@@ -11,20 +11,20 @@ let tiles = null; // of /api/state
 let map = null; // the MapView
 let ended = null; // the result that is shown
 
-const post = (path) => tell(`/api/map${path}`, currentToken());
+const change = (path) => post(`/api/map${path}`, currentToken());
 const toggle = action("", result, async () => {
-  await post(`?on=${tiles.on ? 0 : 1}`);
-  // Only a newly loaded page may, or may no longer, load pictures from the source. The token comes along.
+  await change(`?on=${tiles.on ? 0 : 1}`);
+  // Only a newly loaded page may, or may no longer, load pictures from the source. The token is kept.
   location.hash = `token=${encodeURIComponent(currentToken())}`;
   location.reload();
 });
 const keep = action("Keep this area for the field", result, async () => {
   if (map.tileArea === null) throw new Error("The map shows no place yet.");
   ended = null;
-  await post(`/keep?${new URLSearchParams(map.tileArea)}`);
+  await change(`/keep?${new URLSearchParams(map.tileArea)}`);
 });
-const stop = action("Stop", result, () => post("/stop").then(() => ""));
-const forget = action("Delete the kept tiles", result, () => post("/forget").then(() => "Deleted."));
+const stop = action("Stop", result, () => change("/stop").then(() => ""));
+const forget = action("Delete the kept tiles", result, () => change("/forget").then(() => "Deleted."));
 
 progress.append(count, " ", bar);
 byId("map-tiles").append(about, make("div", { class: "row" }, tokenField(), toggle, keep, stop, forget), progress, result);

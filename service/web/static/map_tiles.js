@@ -18,11 +18,11 @@ export const tilesVersion = () => [tiles.on, tiles.tiles];
 
 export class TileLayer {
   element = make("div", { class: "map-tiles" });
-  told = make("p", { class: "map-credit", role: "status" });
+  note = make("p", { class: "map-credit", role: "status" });
   #pictures = new Map(); // by zoom/x/y: { box, zoom, x, y, isShown, pending }
   #kept = new Map(); // by x/y: the zoom of the tile kept on the Pi
   #area = null;
-  #asked = "";
+  #requested = "";
   #failed = new Map(); // addresses, and when
 
   // The tiles in view: { zoom, x, y, columns, rows }; null if there are none.
@@ -41,8 +41,8 @@ export class TileLayer {
       this.#pictures.delete(key);
     }
     if (this.#area === null) {
-      this.#asked = "";
-      setText(this.told, "");
+      this.#requested = "";
+      setText(this.note, "");
       return;
     }
     this.element.style.height = `${map.height}px`;
@@ -64,16 +64,16 @@ export class TileLayer {
 
   // Asks the Pi which of the tiles it has: once for each view.
   async #lookUp() {
-    const query = new URLSearchParams(this.#area).toString(), question = `${query} ${tilesVersion()} ${this.#period()}`;
-    if (question === this.#asked) return;
-    this.#asked = question;
+    const query = new URLSearchParams(this.#area).toString(), request = `${query} ${tilesVersion()} ${this.#period()}`;
+    if (request === this.#requested) return;
+    this.#requested = request;
     try {
       const { kept } = await ask(`/api/map/kept?${query}`);
       this.#kept = new Map(kept.map(([x, y, zoom]) => [`${x}/${y}`, zoom]));
     } catch {
       this.#kept = new Map();
     }
-    if (question === this.#asked) for (const picture of this.#pictures.values()) this.#fill(picture);
+    if (request === this.#requested) for (const picture of this.#pictures.values()) this.#fill(picture);
   }
 
   // After a while failed tiles are tried again.
@@ -92,7 +92,7 @@ export class TileLayer {
       if (kept !== undefined && !box.children.length) this.#load(picture, ...coarser(x, y, zoom, kept));
       if (wasOn) this.#load(picture, source);
     }
-    this.#tell();
+    this.#updateNote();
   }
 
   // part: of the picture that fills the box: { left, top, size }, in boxes.
@@ -101,14 +101,14 @@ export class TileLayer {
     const end = () => {
       clearTimeout(timer);
       picture.pending -= 1;
-      this.#tell();
+      this.#updateNote();
     };
     const fail = () => {
       this.#failed.set(address, performance.now());
       image.remove();
       end();
     };
-    // OpenStreetMap's policy: a page says where it comes from.
+    // OpenStreetMap's policy: requests must carry the page's origin.
     const image = make("img", { alt: "", "data-address": address, referrerpolicy: "strict-origin-when-cross-origin", draggable: "false", onload: () => {
       picture.isShown = true;
       image.classList.add("loaded");
@@ -122,17 +122,17 @@ export class TileLayer {
   }
 
   // The credit, or once why there are no tiles.
-  #tell() {
+  #updateNote() {
     const pictures = [...this.#pictures.values()];
     if (pictures.some(({ isShown }) => isShown)) {
-      if (this.told.dataset.credit !== tiles.credit) this.told.replaceChildren(tiles.credit_page ? make("a", { href: tiles.credit_page, rel: "noreferrer", target: "_blank" }, tiles.credit) : tiles.credit);
-      this.told.dataset.credit = tiles.credit;
+      if (this.note.dataset.credit !== tiles.credit) this.note.replaceChildren(tiles.credit_page ? make("a", { href: tiles.credit_page, rel: "noreferrer", target: "_blank" }, tiles.credit) : tiles.credit);
+      this.note.dataset.credit = tiles.credit;
       return;
     }
-    delete this.told.dataset.credit;
+    delete this.note.dataset.credit;
     if (pictures.some(({ pending }) => pending)) return;
     const why = wasOn ? `this browser gets none from ${tiles.host}` : `after a reload this browser asks ${tiles.host}`;
-    setText(this.told, `No map tiles here: the Pi keeps none of this area, and ${why}.`);
+    setText(this.note, `No map tiles here: the Pi keeps none of this area, and ${why}.`);
   }
 }
 

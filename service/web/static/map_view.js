@@ -11,7 +11,7 @@ export class MapView {
   #tiles = new TileLayer();
   #canvas = make("div", { class: "map-canvas" });
   #tools;
-  #told = make("p", { class: "map-told", role: "status" }); // a finger sees no tooltips
+  #note = make("p", { class: "map-note", role: "status" }); // a finger sees no tooltips
   #contents = null;
   #drawn = "";
   #camera = { zoom: 1, dx: 0, dy: 0 }; // zoom 1: everything fits; dx, dy: pixels
@@ -21,8 +21,8 @@ export class MapView {
     const button = (label, name, press) => make("button", { type: "button", "aria-label": `${label === "Fit" ? "Fit: show everything" : name}: ${container.id}`, title: name, onclick: press }, label);
     this.#tools = make("div", { class: "map-tools" },
       button("+", "Zoom in", () => this.#zoom(STEP)), button("−", "Zoom out", () => this.#zoom(1 / STEP)), button("Fit", "Show everything", () => this.#move({ zoom: 1, dx: 0, dy: 0 })));
-    container.append(this.#tiles.element, this.#canvas, this.#tools, this.#tiles.told, this.#told);
-    this.#canvas.addEventListener("click", (event) => this.#tell(event));
+    container.append(this.#tiles.element, this.#canvas, this.#tools, this.#tiles.note, this.#note);
+    this.#canvas.addEventListener("click", (event) => this.#showMark(event));
     container.addEventListener("keydown", (event) => this.#key(event));
     this.#canvas.addEventListener("wheel", (event) => this.#wheel(event), { passive: false });
     this.#canvas.addEventListener("pointerdown", (event) => this.#fingers.set(event.pointerId, [event.clientX, event.clientY]));
@@ -58,14 +58,14 @@ export class MapView {
   }
 
   // The name and height of the mark under a finger.
-  #tell(event) {
+  #showMark(event) {
     let nearest = "", least = FINGER_PX;
     for (const mark of this.#canvas.querySelectorAll("g.touched")) {
       const box = mark.getBoundingClientRect();
       const far = Math.hypot(event.clientX - box.left - box.width / 2, event.clientY - box.top - box.height / 2);
       if (far <= least) [nearest, least] = [mark.querySelector("title").textContent, far];
     }
-    this.#told.textContent = nearest;
+    this.#note.textContent = nearest;
   }
 
   #move(camera) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A dropped or chosen mission file: checked by the Pi, drawn, its changes listed first, then written.
-import { tell } from "./daemon.js";
+import { post } from "./daemon.js";
 import { byId, make } from "./dom.js";
 import { MapView } from "./map_view.js";
 import { comparison } from "./mission_detail.js";
@@ -49,12 +49,12 @@ async function checked(file) {
     if (file.size > MOST_BYTES) throw new Error(`${file.name} is larger than ${MOST_BYTES / 1024} KiB, so it is not a mission that fits a flight controller.`);
     const body = await file.arrayBuffer();
     const query = `name=${encodeURIComponent(file.name)}`;
-    const list = await tell(`/api/check?${query}`, "", body);
+    const list = await post(`/api/check?${query}`, "", body);
     const container = make("div", { id: "file-map", class: "map" });
     preview = { map: new MapView(container), items: list.items };
     const isRejected = list.verdict === "REJECTED";
     const verdict = make("p", { class: isRejected ? "bad" : "good" }, verdictText(file.name, list));
-    const write = isRejected ? [] : [writeForm(`Write ${file.name} to the flight controller`, (token) => tell(`/api/write?${query}`, token, body))];
+    const write = isRejected ? [] : [writeForm(`Write ${file.name} to the flight controller`, (token) => post(`/api/write?${query}`, token, body))];
     return [verdict, ...comparison(list), container, make("h3", {}, "Altitude profile"), make("div", { id: "file-profile" }), ...write];
   } catch (error) {
     return [make("p", { class: "bad" }, error.message)];

@@ -2,7 +2,7 @@
 // The stored missions: the latest upload, and a list; each mission opens below its own row.
 import "./compare.js";
 import { byId, make, setClass, setText } from "./dom.js";
-import { ask, tell } from "./daemon.js";
+import { ask, post } from "./daemon.js";
 import { missionDetail, outcomeClass, when } from "./mission_detail.js";
 import { writeForm } from "./write_form.js";
 
@@ -54,7 +54,7 @@ function makeRow(number) {
     element.after(open);
     try {
       const mission = await ask(`/api/missions/${number}`);
-      cell.append(make("h3", {}, `Mission ${number}`), writeForm(`Write mission ${number} to the flight controller`, (token) => tell(`/api/missions/${number}/restore`, token)), ...missionDetail(mission));
+      cell.append(make("h3", {}, `Mission ${number}`), writeForm(`Write mission ${number} to the flight controller`, (token) => post(`/api/missions/${number}/restore`, token)), ...missionDetail(mission));
     } catch (error) {
       cell.append(make("p", { class: "bad" }, error.message));
     }

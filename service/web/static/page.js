@@ -60,7 +60,7 @@ async function look() {
 
 const isStale = () => performance.now() - lastAt > STALE_MS;
 
-// A request that nobody answers fails only after seconds: by then a green DISARMED would be a guess.
+// A request without a reply fails only after seconds: by then a green DISARMED would be a guess.
 function watch() {
   if (last !== null && isStale()) showSilence();
 }

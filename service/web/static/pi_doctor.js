@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Doctor's findings, each with its remedy as a button where the helper can carry it out; and what the wires tell, live.
+// Doctor's findings, each with its remedy as a button where the helper can carry it out; and the state of the wires, live.
 import { make, setText } from "./dom.js";
 import { action, aftermath, askPi } from "./pi_request.js";
 import { evidence } from "./state_bar.js";

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Requests about the Pi itself. Each is begun, and its reply fetched when there is one: it may take longer than a connection.
-import { ask, tell } from "./daemon.js";
+import { ask, post } from "./daemon.js";
 import { make, say } from "./dom.js";
 import { currentToken } from "./token.js";
 
 const PAUSE_MS = 300, TIMEOUT_MS = 150000;
 
 export async function askPi(request) {
-  const { id } = await tell("/api/pi", currentToken(), JSON.stringify(request));
+  const { id } = await post("/api/pi", currentToken(), JSON.stringify(request));
   const deadline = performance.now() + TIMEOUT_MS;
   while (performance.now() < deadline) {
     await new Promise((resolve) => setTimeout(resolve, PAUSE_MS));
@@ -38,7 +38,7 @@ export function action(text, result, work) {
   return button;
 }
 
-// What comes after changes were made, as a sentence.
+// A sentence about the effect of the changes that were made.
 export function aftermath({ steps, needs_reboot: needsReboot, cuts_network: cutsNetwork }) {
   if (!steps.length) return "Nothing had to be changed.";
   const done = `Done: ${steps.map(({ purpose }) => purpose).join("; ")}.`;

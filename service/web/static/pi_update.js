@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // An update from a file. A connection to the Pi is short, so the package is sent in pieces.
-import { tell } from "./daemon.js";
+import { post } from "./daemon.js";
 import { form, make, say } from "./dom.js";
 import { action, askPi, pressed } from "./pi_request.js";
 import { currentToken } from "./token.js";
@@ -25,7 +25,7 @@ async function install(file, bar, result) {
   Object.assign(bar, { hidden: false, max: file.size, value: 0 });
   try {
     for (let start = 0; start < file.size; start += PIECE) {
-      await tell(`/api/pi/package?start=${start}`, currentToken(), file.slice(start, start + PIECE));
+      await post(`/api/pi/package?start=${start}`, currentToken(), file.slice(start, start + PIECE));
       bar.value = start + PIECE;
     }
     say(result, "", "Checking the package …");

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The history of the flight controller's settings; each backup opens below its own row, with what restoring it changes.
 import { byId, make } from "./dom.js";
-import { ask, tell } from "./daemon.js";
+import { ask, post } from "./daemon.js";
 import { when } from "./mission_detail.js";
 import { writeForm } from "./write_form.js";
 
@@ -58,7 +58,7 @@ function restore(number, plan) {
   const rows = plan.changes.map(({ name, was, becomes }) => [name, was, becomes]);
   const label = `Restore and save ${rows.length} ${rows.length === 1 ? "setting" : "settings"}`;
   return [values("Restoring would change", rows, ["Now", "Restored"]), ...leftOut, ...notice,
-    writeForm(label, (token) => tell(`/api/settings/${number}/restore`, token))];
+    writeForm(label, (token) => post(`/api/settings/${number}/restore`, token))];
 }
 
 function values(title, rows, columns) {

@@ -48,7 +48,7 @@ function headline(state) {
   return [state.link.flight_controller, state.last_heard.mode, state.battery.voltage_v && `${state.battery.voltage_v.toFixed(1)} V`].filter(Boolean).join(", ");
 }
 
-// What the wires tell while no frame arrives. Between two states the search listens at one or two speeds.
+// The state of the wires while no frame arrives. Between two states the search listens at one or two speeds.
 export function evidence({ bytes_received }) {
   const arrives = heard !== null && bytes_received > heard.bytes;
   if (heard === null || bytes_received !== heard.bytes || performance.now() - heard.at > LISTEN_MS) heard = { bytes: bytes_received, at: performance.now(), arrives };

@@ -62,7 +62,7 @@ void let_pass(Chip *chip, int64_t to_ps) {
 }
 
 /* An interrupt is taken between blocks of code, so SysTick must not go off within one: code that reads its counter and
- * the number of ticks would find the counter restarted and the tick missing, and take the time for 1 ms earlier. */
+ * the number of ticks would find the counter restarted and the tick missing: a time that is 1 ms too early. */
 static int64_t before_tick(const Chip *chip, int64_t to_ps) {
     int64_t tick_ps = chip->alarm_ps[ALARM_SYSTICK];
     return to_ps < tick_ps ? to_ps : tick_ps - 1;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * The peripheral bus: the register block at each address (section 3.3, memory map); here too the simple ones, pins
+ * The peripheral bus: the register block at each address (section 3.3, memory map); also the simple ones: pins
  * (section 9.2) and the analog-digital converter in continuous mode with DMA, which measures the battery (section 11).
  */
 #include "chip.h"

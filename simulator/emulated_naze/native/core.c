@@ -115,7 +115,7 @@ uint8_t *chip_ram(Chip *chip) { return chip->ram; }
 
 const char *chip_error(const Chip *chip) { return chip->error; }
 
-/* -- life ---------------------------------------------------------------------------------------------------- */
+/* -- power and reset ----------------------------------------------------------------------------------------- */
 
 void chip_reset(Chip *chip) {
     uint32_t vectors[2];
@@ -189,7 +189,7 @@ Chip *chip_new(uint8_t *flash, uint32_t program_size, const Outside *outside) {
     make_usarts(chip);
     chip->timer[0].irq = IRQ_TIM2;
     for (int i = 0; i < PORTS; i++) chip->port[i].outside = 0xFFFF;
-    chip->port[2].outside = 0x7FFF; /* with PC15 high the firmware takes the board for revision 5, with another crystal */
+    chip->port[2].outside = 0x7FFF; /* with PC15 high the firmware assumes revision 5, with another crystal */
     bus_reset(chip);
     nvic_reset(chip);
     if (uc_open(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS, &chip->uc)) chip->uc = NULL;

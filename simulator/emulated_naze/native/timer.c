@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * General-purpose timers: their counter and an input capture; outputs are only remembered (sections 14 and 15). And the
+ * General-purpose timers: their counter and an input capture; outputs are only stored (sections 14 and 15). Also the
  * radio receiver on TIM2's channel 1: eight channels on one wire, as times between edges (PPM).
  */
 #include "chip.h"

@@ -11,7 +11,7 @@ from protocols.stm32_boot_loader import PAGE_SIZE, Dialogue, start_program
 from simulator.board.simulated_board import Power
 from simulator.naze.board import SimulatedNaze
 from simulator.naze.whole_flash import stand_in
-from tests.support.boot_loader_bench import BrokenOffError, DialogueBench, board_in_boot_loader
+from tests.support.boot_loader_bench import CablePulledError, DialogueBench, board_in_boot_loader
 
 _PAGES = 6
 PROGRAM = stand_in(patched=True) + random.Random(1).randbytes(_PAGES * PAGE_SIZE - 500)
@@ -72,7 +72,7 @@ def test_a_flash_broken_off_anywhere_is_resumed_and_no_half_program_starts() -> 
         before = board.flash_contents
         bench = DialogueBench(board)
         bench.cut_after = cut
-        with pytest.raises(BrokenOffError):
+        with pytest.raises(CablePulledError):
             bench.run(flash())
         half = board.flash_contents
         if not half.startswith(b"\xff" * 8):

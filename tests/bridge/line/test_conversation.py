@@ -43,7 +43,7 @@ def test_a_reply_is_believed_once_it_came_twice_in_a_row() -> None:
 
 def test_bytes_that_may_change_are_not_compared() -> None:
     first, second = reply(b"AB1"), reply(b"AB2")
-    assert carry_out(ask_surely(request(IDENT), IDENT, 3, lasting=2), first, second) == (second, 2)
+    assert carry_out(ask_surely(request(IDENT), IDENT, 3, stable=2), first, second) == (second, 2)
 
 
 def test_a_status_that_is_too_short_is_unknown() -> None:

@@ -31,7 +31,7 @@ from tests.support.upload_bench import (
     OLD_RECORDS,
     A,
     acks,
-    assert_refusal_stands,
+    assert_refusal_is_repeated,
     hanging_push,
     holding,
     partial_list_message,
@@ -108,7 +108,7 @@ def test_arming_while_items_arrive_denies_the_upload() -> None:
     assert "Armed: disarm to change the mission" in station.texts()
     assert world.stored == OLD_RECORDS
     world.run(1)
-    assert_refusal_stands(world, station, A.DENIED)
+    assert_refusal_is_repeated(world, station, A.DENIED)
     assert world.store.outcomes()[-1] is Outcome.REJECTED
 
 
@@ -162,7 +162,7 @@ def test_home_alone_is_invalid() -> None:
     world, station = holding()
     assert Upload(station, waypoints(1)).run() is A.INVALID
     assert "Mission rejected: only a home point, no command" in station.texts()
-    assert_refusal_stands(world, station, A.INVALID)
+    assert_refusal_is_repeated(world, station, A.INVALID)
     assert world.stored == OLD_RECORDS
 
 
@@ -479,7 +479,7 @@ def test_an_upload_during_a_long_flash_write_is_denied() -> None:
     world.wait_until(lambda _: bool(acks(station)), 3)
     assert 0.9 < world.now - began < 1.5
     assert any("busy" in text for text in station.texts())
-    assert_refusal_stands(world, station, A.DENIED)
+    assert_refusal_is_repeated(world, station, A.DENIED)
     assert world.stored == OLD_RECORDS
 
 
@@ -603,7 +603,7 @@ def test_an_unanswered_request_is_repeated_for_five_seconds(sent: int) -> None:
     gaps = [round(later - earlier, 3) for earlier, later in pairwise(times)]
     assert gaps == sorted(gaps)
     assert world.stored == OLD_RECORDS
-    assert_refusal_stands(world, station, A.OPERATION_CANCELLED)
+    assert_refusal_is_repeated(world, station, A.OPERATION_CANCELLED)
     assert world.store.outcomes() == ([Outcome.CANCELLED] if sent else [])
 
 
@@ -748,7 +748,7 @@ def test_a_list_that_breaks_a_rule_is_refused_at_once() -> None:
     assert upload.run() is A.INVALID
     assert upload.requested == list(range(13))
     assert any("LAND must be last" in text for text in station.texts())
-    assert_refusal_stands(world, station, A.INVALID)
+    assert_refusal_is_repeated(world, station, A.INVALID)
     assert world.stored == OLD_RECORDS
     assert world.store.outcomes() == [Outcome.REJECTED]
 

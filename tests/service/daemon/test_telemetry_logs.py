@@ -14,24 +14,24 @@ from tests.support.web_bench import WebBench
 pytest_plugins = ("tests.support.web_fixtures",)
 
 
-def test_logs_need_the_token(lasting_web: WebBench) -> None:
-    folder = lasting_web.daemon.state_dir / "logs"
+def test_logs_need_the_token(shared_web: WebBench) -> None:
+    folder = shared_web.daemon.state_dir / "logs"
     folder.mkdir(exist_ok=True)
     contents = bytes(range(256)) * (PIECE // 128)
     (folder / "2026-01-02 03-04-05.tlog").write_bytes(contents)
     (folder / "secret").write_bytes(b"other")
     path = "/api/logs/2026-01-02%2003-04-05.tlog"
     for url in ("/api/logs", path):
-        assert lasting_web.ask(url).status == 403
-    proof = {"Authorization": f"Bearer {lasting_web.token}"}
-    listed = lasting_web.ask("/api/logs", **proof).data["logs"]
+        assert shared_web.ask(url).status == 403
+    proof = {"Authorization": f"Bearer {shared_web.token}"}
+    listed = shared_web.ask("/api/logs", **proof).data["logs"]
     assert {"name": "2026-01-02 03-04-05.tlog", "size": len(contents)} in listed
     assert "secret" not in [log["name"] for log in listed]
-    first = lasting_web.ask(path, **proof).body
+    first = shared_web.ask(path, **proof).body
     assert first == contents[:PIECE]
-    assert first + lasting_web.ask(f"{path}?start={PIECE}", **proof).body == contents
+    assert first + shared_web.ask(f"{path}?start={PIECE}", **proof).body == contents
     for name in ("secret", "..%2Fweb-token", "2026-01-02%2003-04-06.tlog"):
-        assert lasting_web.ask(f"/api/logs/{name}", **proof).status == 404
+        assert shared_web.ask(f"/api/logs/{name}", **proof).status == 404
 
 
 async def test_without_a_state_directory_there_are_no_logs() -> None:

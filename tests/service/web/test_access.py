@@ -15,15 +15,15 @@ pytest_plugins = ("tests.support.web_fixtures",)
 RESTORE = "/api/missions/1/restore"
 
 
-def test_reading_needs_no_token(lasting_web: WebBench) -> None:
-    page = lasting_web.ask("/")
+def test_reading_needs_no_token(shared_web: WebBench) -> None:
+    page = shared_web.ask("/")
     assert (page.status, page.headers["Content-Type"]) == (200, "text/html; charset=utf-8")
-    assert lasting_web.ask("/api/missions").data["missions"][0]["source"] == "push of naze-field.waypoints"
+    assert shared_web.ask("/api/missions").data["missions"][0]["source"] == "push of naze-field.waypoints"
 
 
-def test_every_response_has_security_headers(lasting_web: WebBench) -> None:
+def test_every_response_has_security_headers(shared_web: WebBench) -> None:
     for path in ("/", "/page.js", "/api/state", "/api/missions/99", "/nothing"):
-        headers = lasting_web.ask(path).headers
+        headers = shared_web.ask(path).headers
         policy = headers["Content-Security-Policy"]
         assert "default-src 'none'" in policy
         assert "unsafe" not in policy
@@ -34,11 +34,11 @@ def test_every_response_has_security_headers(lasting_web: WebBench) -> None:
         assert "Server" not in headers
 
 
-def test_a_cached_file_is_not_sent_again(lasting_web: WebBench) -> None:
-    first = lasting_web.ask("/style.css")
-    again = lasting_web.ask("/style.css", **{"If-None-Match": first.headers["ETag"]})
+def test_a_cached_file_is_not_sent_again(shared_web: WebBench) -> None:
+    first = shared_web.ask("/style.css")
+    again = shared_web.ask("/style.css", **{"If-None-Match": first.headers["ETag"]})
     assert (again.status, again.body) == (304, b"")
-    assert lasting_web.ask("/style.css", **{"If-None-Match": '"other"'}).body == first.body
+    assert shared_web.ask("/style.css", **{"If-None-Match": '"other"'}).body == first.body
 
 
 STRANGERS = {
@@ -54,31 +54,31 @@ STRANGERS = {
 
 
 @pytest.mark.parametrize("name", STRANGERS)
-def test_restoring_needs_the_token(lasting_web: WebBench, name: str) -> None:
-    before = lasting_web.daemon.missions()
-    token = lasting_web.token
+def test_restoring_needs_the_token(shared_web: WebBench, name: str) -> None:
+    before = shared_web.daemon.missions()
+    token = shared_web.token
     headers = {key: value.format(token=token, half=token[:8]) for key, value in STRANGERS[name].items()}
-    answer = lasting_web.ask(f"{RESTORE}?token={token}", "POST", **headers)
+    answer = shared_web.ask(f"{RESTORE}?token={token}", "POST", **headers)
     assert answer.status == 403
-    assert answer.data == {"error": f"Wrong token. It is in {lasting_web.daemon.state_dir}/web-token on the Pi."}
-    assert lasting_web.state()["write"] is None
-    assert lasting_web.daemon.missions() == before
-    assert token not in lasting_web.daemon.printed
+    assert answer.data == {"error": f"Wrong token. It is in {shared_web.daemon.state_dir}/web-token on the Pi."}
+    assert shared_web.state()["write"] is None
+    assert shared_web.daemon.missions() == before
+    assert token not in shared_web.daemon.printed
 
 
-def test_opening_a_url_restores_nothing(lasting_web: WebBench) -> None:
-    answer = lasting_web.ask(RESTORE, Authorization=f"Bearer {lasting_web.token}")
+def test_opening_a_url_restores_nothing(shared_web: WebBench) -> None:
+    answer = shared_web.ask(RESTORE, Authorization=f"Bearer {shared_web.token}")
     assert (answer.status, answer.headers["Allow"]) == (405, "POST")
-    assert lasting_web.ask(RESTORE, "OPTIONS", Origin="http://evil.example").status == 405
-    assert lasting_web.state()["write"] is None
+    assert shared_web.ask(RESTORE, "OPTIONS", Origin="http://evil.example").status == 405
+    assert shared_web.state()["write"] is None
 
 
 @pytest.mark.parametrize(
     "host", ["evil.example", "evil.example:8080", "127.0.0.1.evil.example", "[::1].evil.example", "local.evil.example."]
 )
-def test_a_public_host_name_is_refused(lasting_web: WebBench, host: str) -> None:
+def test_a_public_host_name_is_refused(shared_web: WebBench, host: str) -> None:
     """DNS rebinding: a foreign site's name points to our address, and its page reads ours as its own."""
-    answer = lasting_web.ask("/api/state", Host=host)
+    answer = shared_web.ask("/api/state", Host=host)
     assert answer.status == 421
     assert "by the Pi's address" in answer.data["error"]
 
@@ -86,8 +86,8 @@ def test_a_public_host_name_is_refused(lasting_web: WebBench, host: str) -> None
 @pytest.mark.parametrize(
     "host", ["10.42.0.1:8080", "[fe80::1]:8080", "localhost", "naze", "naze.local:8080", "Naze.LOCAL", "naze.lan"]
 )
-def test_a_local_host_name_is_accepted(lasting_web: WebBench, host: str) -> None:
-    assert lasting_web.ask("/api/state", Host=host).status == 200
+def test_a_local_host_name_is_accepted(shared_web: WebBench, host: str) -> None:
+    assert shared_web.ask("/api/state", Host=host).status == 200
 
 
 def test_a_host_name_from_the_settings_is_accepted(start: Starter) -> None:
@@ -116,8 +116,8 @@ def test_a_host_name_from_the_settings_is_accepted(start: Starter) -> None:
         "/api/missions/1/difference/x",
     ],
 )
-def test_a_missing_page_is_404_with_a_sentence(lasting_web: WebBench, path: str) -> None:
-    answer = lasting_web.ask(path)
+def test_a_missing_page_is_404_with_a_sentence(shared_web: WebBench, path: str) -> None:
+    answer = shared_web.ask(path)
     assert answer.status == 404
     assert answer.data["error"]
     assert answer.data["error"].isprintable()
@@ -156,11 +156,11 @@ BAD_REQUESTS = {
 
 
 @pytest.mark.parametrize("name", BAD_REQUESTS)
-def test_bad_bytes_end_only_their_connection(lasting_web: WebBench, name: str) -> None:
-    answer = raw(lasting_web, *BAD_REQUESTS[name])
+def test_bad_bytes_end_only_their_connection(shared_web: WebBench, name: str) -> None:
+    answer = raw(shared_web, *BAD_REQUESTS[name])
     assert answer.count(b"HTTP/1.") <= 1  # a connection carries one request
-    assert lasting_web.ask("/api/state").status == 200
-    assert "Traceback" not in lasting_web.daemon.printed
+    assert shared_web.ask("/api/state").status == 200
+    assert "Traceback" not in shared_web.daemon.printed
 
 
 @pytest.mark.parametrize("in_pieces", [False, True])
@@ -179,14 +179,14 @@ def test_malformed_chunks_are_counted_without_a_traceback(web: WebBench, method:
 
 
 @pytest.mark.parametrize("head", [b"Content-Length: 1000000000000", b"Transfer-Encoding: chunked"])
-def test_a_huge_body_is_refused_unread(lasting_web: WebBench, head: bytes) -> None:
-    before = resident_kb(lasting_web.daemon.process.pid)
+def test_a_huge_body_is_refused_unread(shared_web: WebBench, head: bytes) -> None:
+    before = resident_kb(shared_web.daemon.process.pid)
     chunk = b"100000\r\n" + bytes(1 << 20) + b"\r\n"
     start = b"POST %b HTTP/1.1\r\nHost: a\r\nAuthorization: Bearer %b\r\n%b\r\n\r\n"
-    answer = raw(lasting_web, start % (RESTORE.encode(), lasting_web.token.encode(), head), *[chunk] * 64)
+    answer = raw(shared_web, start % (RESTORE.encode(), shared_web.token.encode(), head), *[chunk] * 64)
     assert answer.startswith((b"HTTP/1.1 413", b""))
-    assert lasting_web.state()["write"] is None
-    assert resident_kb(lasting_web.daemon.process.pid) - before < 8 << 10
+    assert shared_web.state()["write"] is None
+    assert resident_kb(shared_web.daemon.process.pid) - before < 8 << 10
 
 
 def resident_kb(pid: int) -> int:

@@ -10,33 +10,33 @@ from tests.support.web_bench import WebBench, web_daemon
 pytest_plugins = ("tests.support.web_fixtures",)
 
 
-def test_the_list_on_the_flight_controller_is_shown(lasting_web: WebBench) -> None:
-    held = lasting_web.ask("/api/held").data
+def test_the_list_on_the_flight_controller_is_shown(shared_web: WebBench) -> None:
+    held = shared_web.ask("/api/held").data
     assert held["count"] == len(held["items"]) == 13
-    assert held["checksum"] == lasting_web.state()["mission"]["checksum"] == lasting_web.daemon.pull()["checksum"]
+    assert held["checksum"] == shared_web.state()["mission"]["checksum"] == shared_web.daemon.pull()["checksum"]
     assert [item["name"] for item in held["items"][:4]] == ["WAYPOINT", "TAKEOFF", "WAYPOINT", "DO_SET_ROI"]
 
 
-def test_the_state_has_link_vehicle_and_traffic(lasting_web: WebBench) -> None:
-    state = until(lambda: (now := lasting_web.state())["gps"]["satellites"] and now, "telemetry")
+def test_the_state_has_link_vehicle_and_traffic(shared_web: WebBench) -> None:
+    state = until(lambda: (now := shared_web.state())["gps"]["satellites"] and now, "telemetry")
     assert (state["link"]["state"], state["link"]["speed_baud"]) == ("MSP", 115200)
     assert (state["status"]["armed"], state["status"]["mode"]) == (False, "STABILIZE")
     assert state["newest_mission"] == {"number": 1, "outcome": "VERIFIED"}
     received = state["traffic"]["fc"]["bytes_received"]
-    until(lambda: lasting_web.state()["traffic"]["fc"]["bytes_received"] > received, "more telemetry")
+    until(lambda: shared_web.state()["traffic"]["fc"]["bytes_received"] > received, "more telemetry")
 
 
-def test_metrics_are_served(lasting_web: WebBench) -> None:
+def test_metrics_are_served(shared_web: WebBench) -> None:
     """Their contents are tested in tests/service/web/test_metrics.py."""
-    answer = lasting_web.ask("/metrics")
+    answer = shared_web.ask("/metrics")
     assert answer.status == 200
     assert answer.headers["Content-Type"].startswith("text/plain; version=0.0.4")
     sample = f'naze_bridge_missions_total{{ack="ACCEPTED",vehicle="{host_name()}"}} 1.0'
     assert sample in answer.body.decode()
 
 
-def test_every_change_is_explained(lasting_web: WebBench) -> None:
-    mission = lasting_web.ask("/api/missions/1").data
+def test_every_change_is_explained(shared_web: WebBench) -> None:
+    mission = shared_web.ask("/api/missions/1").data
     changes = {row["left"]["seq"]: row["changes"] for row in mission["rows"] if row["changes"]}
     assert changes == {
         0: {"p2": "2..255 m"},
@@ -109,8 +109,8 @@ def test_only_one_restore_runs_at_a_time(web: WebBench) -> None:
     until(lambda: web.state()["write"]["done"], "the end of the first restore")
 
 
-def test_restoring_a_missing_mission_fails_with_a_sentence(lasting_web: WebBench) -> None:
-    ended = lasting_web.restore(77)
+def test_restoring_a_missing_mission_fails_with_a_sentence(shared_web: WebBench) -> None:
+    ended = shared_web.restore(77)
     assert not ended["ok"]
     assert ended["text"].startswith("there is no mission 77")
 

@@ -30,16 +30,16 @@ _LONGEST_S = 180.0
         ("x.elf", bytes(1_000_001), "not an ELF file"),
     ],
 )
-def test_a_wrong_image_is_refused(lasting_web: WebBench, name: str, body: bytes, why: str) -> None:
-    answer = post(lasting_web, f"/api/firmware?name={name}", body, Authorization=f"Bearer {lasting_web.token}")
+def test_a_wrong_image_is_refused(shared_web: WebBench, name: str, body: bytes, why: str) -> None:
+    answer = post(shared_web, f"/api/firmware?name={name}", body, Authorization=f"Bearer {shared_web.token}")
     assert answer.status == 422
     assert why in answer.data["error"]
 
 
-def test_without_the_token_nothing_is_flashed(lasting_web: WebBench) -> None:
-    assert post(lasting_web, "/api/firmware?name=x.bin", PATCHED, Authorization="Bearer 2222222222222222").status == 403
-    assert lasting_web.board is not None
-    assert not lasting_web.board.stats()["bootloader_entered"]
+def test_without_the_token_nothing_is_flashed(shared_web: WebBench) -> None:
+    assert post(shared_web, "/api/firmware?name=x.bin", PATCHED, Authorization="Bearer 2222222222222222").status == 403
+    assert shared_web.board is not None
+    assert not shared_web.board.stats()["bootloader_entered"]
 
 
 def test_a_battery_is_refused_then_the_patch_is_flashed_from_a_phone(browsers: Browsers, tmp_path: Path) -> None:

@@ -62,7 +62,7 @@ def test_places_that_the_page_has_are_not_sent_again(flying: WebBench) -> None:
     assert flying.ask("/api/track?first=x").status == 404
 
 
-def test_the_history_of_the_serial_line_is_served(lasting_web: WebBench) -> None:
-    history = lasting_web.ask("/api/link").data
+def test_the_history_of_the_serial_line_is_served(shared_web: WebBench) -> None:
+    history = shared_web.ask("/api/link").data
     assert history["interval_s"] == 2
     assert set(history["samples"][0]) == {"round_trip_ms", "lost", "damaged"}

@@ -44,8 +44,8 @@ def test_the_state_bar_stays_visible(browsers: Browsers, web: WebBench) -> None:
 
 
 @pytest.fixture(scope="module")
-def laptop(browsers: Browsers, lasting_web: WebBench) -> Iterator[Browser]:
-    with browsers.tab(lasting_web.port) as laptop:
+def laptop(browsers: Browsers, shared_web: WebBench) -> Iterator[Browser]:
+    with browsers.tab(shared_web.port) as laptop:
         yield laptop
 
 
@@ -56,11 +56,11 @@ def page(laptop: Browser) -> Browser:
     return laptop
 
 
-def test_old_values_are_marked_stale(lasting_web: WebBench, page: Browser) -> None:
-    assert lasting_web.board is not None
-    lasting_web.board.set("hang 1")
+def test_old_values_are_marked_stale(shared_web: WebBench, page: Browser) -> None:
+    assert shared_web.board is not None
+    shared_web.board.set("hang 1")
     until(lambda: {"STALE", "LOST"} & set(page.text("#badges").split()), "the warning")
-    lasting_web.board.set("hang 0")
+    shared_web.board.set("hang 0")
     until(lambda: page.text("#badges") == "DISARMED", "the craft again")
 
 
@@ -112,32 +112,32 @@ LIVE = """
     return [...document.querySelectorAll('[role=status], [role=alert], [aria-live]')].map((e) => e.textContent);"""
 
 
-def test_only_changes_are_announced_to_screen_readers(lasting_web: WebBench, page: Browser) -> None:
-    assert lasting_web.board is not None
+def test_only_changes_are_announced_to_screen_readers(shared_web: WebBench, page: Browser) -> None:
+    assert shared_web.board is not None
     before = page.run(LIVE)
     assert not any(before)
     page.wait_for_updates(3)
     assert page.run(LIVE) == before
-    lasting_web.board.set("armed 1")
+    shared_web.board.set("armed 1")
     page.wait_text("#spoken", "armed")
     spoken = page.run(LIVE)
     page.wait_for_updates(3)
     assert page.run(LIVE) == spoken
-    lasting_web.board.set("armed 0")
+    shared_web.board.set("armed 0")
 
 
-def test_a_selection_survives_updates(lasting_web: WebBench, page: Browser) -> None:
+def test_a_selection_survives_updates(shared_web: WebBench, page: Browser) -> None:
     page.run("""
         const all = [...document.querySelectorAll('dt')].find((e) => e.innerText === 'Firmware').nextElementSibling;
         getSelection().selectAllChildren(all);""")
-    lasting_web.daemon.push(plain_plan(9))
+    shared_web.daemon.push(plain_plan(9))
     page.wait_text("#held-text", "9 records")
     page.wait_for_updates(2)
     assert page.run("return String(getSelection())") == "Harakiri with the mission extension"
 
 
-def test_an_upload_in_progress_has_a_bar(lasting_web: WebBench, page: Browser) -> None:
-    with PlainStation(udp_to(lasting_web.daemon.address)) as station:
+def test_an_upload_in_progress_has_a_bar(shared_web: WebBench, page: Browser) -> None:
+    with PlainStation(udp_to(shared_web.daemon.address)) as station:
         station.send_heartbeat()
         station.send(messages.MAVLink_mission_count_message(1, 1, 20, 0))
         station.wait_for("MISSION_REQUEST")  # and then falls silent

@@ -21,8 +21,8 @@ def place(page: Browser) -> list[float]:
     return found
 
 
-def test_the_map_is_zoomed_and_panned(browsers: Browsers, lasting_web: WebBench) -> None:
-    with browsers.tab(lasting_web.port) as page:
+def test_the_map_is_zoomed_and_panned(browsers: Browsers, shared_web: WebBench) -> None:
+    with browsers.tab(shared_web.port) as page:
         page.open()
         until(lambda: len(page.all("#map .point")) > 2, "the waypoints")
         fit, scale = place(page), page.text("#map .scale + text")
@@ -44,17 +44,17 @@ def test_the_map_is_zoomed_and_panned(browsers: Browsers, lasting_web: WebBench)
         assert place(page) == fit
 
 
-def test_a_log_is_downloaded(browsers: Browsers, lasting_web: WebBench, tmp_path: Path) -> None:
-    folder = lasting_web.daemon.state_dir / "logs"
+def test_a_log_is_downloaded(browsers: Browsers, shared_web: WebBench, tmp_path: Path) -> None:
+    folder = shared_web.daemon.state_dir / "logs"
     folder.mkdir(exist_ok=True)
     name, contents = "2026-01-02 03-04-05.tlog", bytes(range(256)) * (PIECE // 100)
     (folder / name).write_bytes(contents)
     downloads = tmp_path / "downloads"
-    with browsers.tab(lasting_web.port, PHONE) as page:
+    with browsers.tab(shared_web.port, PHONE) as page:
         allow = {"behavior": "allow", "downloadPath": str(downloads)}
         page.driver.execute_cdp_cmd("Browser.setDownloadBehavior", allow)
         page.open()
-        page.find("#logs input").send_keys(lasting_web.token)
+        page.find("#logs input").send_keys(shared_web.token)
         page.press("#logs button")
         page.wait_text("#logs", name)
         page.press(f"button[aria-label='Download {name}']")
@@ -64,8 +64,8 @@ def test_a_log_is_downloaded(browsers: Browsers, lasting_web: WebBench, tmp_path
         assert page.errors() == []
 
 
-def test_on_a_phone_the_map_comes_first_and_a_finger_reads_heights(browsers: Browsers, lasting_web: WebBench) -> None:
-    with browsers.tab(lasting_web.port, PHONE) as page:
+def test_on_a_phone_the_map_comes_first_and_a_finger_reads_heights(browsers: Browsers, shared_web: WebBench) -> None:
+    with browsers.tab(shared_web.port, PHONE) as page:
         page.open()
         until(lambda: len(page.all("#map .point")) > 2, "the waypoints")
         assert page.run("""
@@ -75,15 +75,15 @@ def test_on_a_phone_the_map_comes_first_and_a_finger_reads_heights(browsers: Bro
             const mark = document.querySelectorAll("#map .point")[1], box = mark.getBoundingClientRect();
             const at = { clientX: box.left + box.width / 2 + 9, clientY: box.top - 5, bubbles: true };
             document.querySelector("#map svg").dispatchEvent(new MouseEvent("click", at))""")
-        assert page.text("#map .map-told") == page.run(
+        assert page.text("#map .map-note") == page.run(
             "return document.querySelectorAll('#map .point')[1].parentNode.querySelector('title').textContent"
         )
-        assert page.text("#map .map-told").endswith(" m")
+        assert page.text("#map .map-note").endswith(" m")
 
 
-def test_the_token_in_the_address_is_filled_in_and_hidden(browsers: Browsers, lasting_web: WebBench) -> None:
-    with browsers.tab(lasting_web.port, PHONE) as page:
-        page.driver.get(f"{page.url}#token={lasting_web.token}")
+def test_the_token_in_the_address_is_filled_in_and_hidden(browsers: Browsers, shared_web: WebBench) -> None:
+    with browsers.tab(shared_web.port, PHONE) as page:
+        page.driver.get(f"{page.url}#token={shared_web.token}")
         page.wait_for_updates(1)
-        assert page.run("return document.querySelector('input.token').value") == lasting_web.token
+        assert page.run("return document.querySelector('input.token').value") == shared_web.token
         assert page.run("return location.href") == page.url

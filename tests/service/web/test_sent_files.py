@@ -67,12 +67,12 @@ def test_a_file_is_written_only_with_the_token(web: WebBench) -> None:
         (EXAMPLE.read_bytes(), "text/plain", 415),  # as another site's page could send it
     ],
 )
-def test_a_bad_file_gets_one_sentence(lasting_web: WebBench, body: bytes, kind: str, status: int) -> None:
-    answer = post(lasting_web, "/api/check?name=a.waypoints", body, **{"Content-Type": kind})
+def test_a_bad_file_gets_one_sentence(shared_web: WebBench, body: bytes, kind: str, status: int) -> None:
+    answer = post(shared_web, "/api/check?name=a.waypoints", body, **{"Content-Type": kind})
     assert answer.status == status
     assert answer.data["error"]
     assert answer.data["error"].isprintable()
-    assert lasting_web.ask("/api/state").status == 200
+    assert shared_web.ask("/api/state").status == 200
 
 
 async def test_an_unexpected_error_ends_the_write_with_a_sentence() -> None:

@@ -5,9 +5,10 @@ import struct
 
 import pytest
 
+from protocols.msp.inav_places import FEATURE, SET_GEOZONE, SET_GEOZONE_VERTEX
 from protocols.msp.nav import NavAction
 from simulator.board.options import Faults
-from simulator.inav.places import FEATURE, SET_FEATURE, SET_GEOZONE, SET_GEOZONE_VERTEX
+from simulator.inav.places import SET_FEATURE
 from tests.support.msp_bench import MspBench, waypoint
 
 INAV_STATUS, EEPROM_WRITE = 0x2000, 250

@@ -9,10 +9,17 @@ import pytest
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.msp.frame import Direction, MspFrame
-from protocols.msp.inav_places import GEOZONE_FEATURE, SET_GEOZONE_VERTEX, SET_SAFEHOME
+from protocols.msp.inav_places import (
+    GEOZONE,
+    GEOZONE_FEATURE,
+    SAFEHOME,
+    SET_GEOZONE,
+    SET_GEOZONE_VERTEX,
+    SET_SAFEHOME,
+)
 from simulator.board.options import Faults
 from simulator.commands.fc_kinds import make_board
-from simulator.inav.places import GEOZONE, SAFEHOME, SET_FEATURE, SET_GEOZONE
+from simulator.inav.places import SET_FEATURE
 from tests.bridge.controllers.inav.test_mission_store import ACCEPTED, board_with
 from tests.bridge.controllers.nav.test_mission_store import plan
 from tests.support.conversations import Download, Upload, clear_message
