@@ -50,7 +50,7 @@ class BridgeConfig:
     """The configuration of one bridge. `speeds`: of the port, baud; (None,) if it has no speed.
 
     `version`: of the bridge itself. `unix_time_s`: the time of day at a monotonic time, None if unknown.
-    `links`: access rules by link name; every station may write over other links. `flight`: of the craft that a former
+    `links`: access rules by link name; every station may write over other links. `flight`: of the craft that a previous
     bridge left armed. `seals`: of the settings of the boards seen before.
     """
 

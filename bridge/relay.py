@@ -3,7 +3,7 @@
 
 A mission over MAVLink takes a round trip for each item. So the receiver of the bridge itself (bridge/transfers) runs
 next to the ground station, the whole list goes to the vehicle as one command, and the final ack waits for its result.
-Everything else is passed on, with new sequence numbers: stations take gaps for a bad link. Sans-IO.
+Everything else is passed on, with new sequence numbers: stations show gaps as a bad link. Sans-IO.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -38,7 +38,7 @@ from reports.verdict import Result, Verdict
 
 #: As a mission file in a command (service/zenoh_link/commands.py).
 _MOST_ITEMS = 1000
-#: How often a conversation looks whether the vehicle has replied.
+#: How often a conversation checks if the vehicle has replied.
 _LOOK_S = 0.02
 #: The state's copy of the mission arrives within this time.
 _COPY_S = 5.0

@@ -34,7 +34,7 @@ bool FlightIdles(void);
 /* An Autostart begun by the flight must end now, in the air. True once. */
 bool FlightEndsAutostart(void);
 
-/* The craft stands on the ground and must take off. */
+/* The craft is on the ground and must take off. */
 bool FlightAutostarts(void);
 
 /* Autostart's target height above the present one, cm: the flight's, or `otherwise_cm`. */

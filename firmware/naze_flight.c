@@ -615,7 +615,7 @@ static int16_t climb_rate(nf_t *f, const nf_input_t *in)
     if (!f->adjusting)
         return 0;
     if (f->state == NF_LEG && f->settings.speed_cm_s) {
-        /* Over the estimated time of the leg, and a fifth more, as the firmware's author has planned it. */
+        /* Over the estimated time of the leg, and a fifth more, as the firmware's author planned it. */
         const uint32_t eta_s = 1u + f->distance_cm / f->settings.speed_cm_s * 6u / 5u;
         rate = within(magnitude(f->height_error_cm) / (int32_t)eta_s, 2 * SLOWEST_CM_S, rate > 30 ? rate : 30);
     }

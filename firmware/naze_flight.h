@@ -41,7 +41,7 @@
 #define NF_MAX_READS 20u
 #define NF_NO_RECORD 0xFFFFu
 #define NF_MAX_LEG_M 2000u  /* the longest leg that is flown */
-#define NF_MIN_HEIGHT_CM 100 /* a craft whose throttle was high may still stand on the ground below this */
+#define NF_MIN_HEIGHT_CM 100 /* a craft whose throttle was high may still be on the ground below this */
 #define NF_SLOW_CM_S 50     /* a leg that closes in more slowly ... */
 #define NF_SLOW_MS 20000u   /* ... for so long is stalled */
 #define NF_LEAD_CD 4500     /* the heading asked for is at most this far from the present one, 1/100 degree */
@@ -135,7 +135,7 @@ typedef struct {
     nf_allowance_t rule;
     uint32_t base_ms;
     nf_state_t then;      /* at the deadline */
-    nf_reason_t reason;   /* ... told then */
+    nf_reason_t reason;   /* ... reported then */
 } nf_row_t;
 
 extern const nf_row_t nf_states[NF_STATES];
@@ -163,7 +163,7 @@ typedef struct {
     nm_list_t list;           /* the list that is stored now */
     bool switch_on;
     bool armed;
-    bool flying;              /* false: the craft stands on the ground. True once its throttle was high, on the ground too */
+    bool flying;              /* false: the craft is on the ground. True once its throttle was high, on the ground too */
     bool fix;                 /* good enough for position hold */
     bool home_known;
     bool instruments;         /* compass and barometer work and are calibrated */
@@ -213,7 +213,7 @@ typedef struct {
     uint32_t distance_cm;     /* to the target; 0 without one */
     int32_t bearing_cd;       /* ... */
     int32_t height_error_cm;  /* target height minus height; 0 without a target height */
-    bool battery_low;         /* told, nothing more */
+    bool battery_low;         /* reported, nothing more */
 
     nf_read_t read;
     void *self;

@@ -15,7 +15,7 @@ from payloads.keys import ALIVE, OVERVIEW, full
 from payloads.mission_data import Json
 from payloads.overview import state_of
 
-#: A router that is silent for so long does not answer.
+#: A router that is silent for this long does not answer.
 _TIMEOUT_S = 5.0
 #: When none of the missing replies has arrived for this long, their bridges are shown as not answering.
 _PAUSE_S = 2.0

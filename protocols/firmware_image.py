@@ -19,7 +19,7 @@ _RAM, _RAM_SIZE = 0x2000_0000, 0x5000
 _HARAKIRI = b"Harakiri"
 #: The patch's table for checksums (naze_slots.c): Harakiri itself computes no CRC-32.
 PATCH_MARK = struct.pack("<4I", 0x0000_0000, 0x1DB7_1064, 0x3B6E_20C8, 0x26D9_30AC)
-# Types of records; those that set a base have it shifted by so many bits.
+# Types of records; those that set a base have it shifted by this many bits.
 _HEX_DATA, _HEX_BASES = 0, {2: 4, 4: 16}
 _HEADER = struct.Struct("<16sHHIIIIIHHHHHH")
 _PROGRAM_HEADER = struct.Struct("<8I")

@@ -136,7 +136,7 @@ def _checked(data: bytes) -> bytes:
 
 
 _NAMES = {
-    GET_ID: "the question for the chip's type",
+    GET_ID: "the request for the chip's type",
     READ: "a read",
     GO: "the start",
     WRITE: "a write",

@@ -43,7 +43,7 @@ class MspPartSettings(FcSettings):
         self._names = SettingNames(boxes=board.boxes)
         self._accepts_any_byte = board.profile.accepts_any_byte
 
-    def read(self, former: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
+    def read(self, previous: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
         found: list[BoardSetting] = []
         for part in self._parts:
             if part.part is Part.PIDS and not self._names.pids:

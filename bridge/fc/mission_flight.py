@@ -79,7 +79,7 @@ FLIGHT_DECODERS: Mapping[int, Decoder] = {Msp.FLIGHT: _flight}
 
 
 def flight_report(progress: FlightProgress, before: FlightReport | None) -> FlightReport:
-    """`before`: the last report. Only from it a list that ended with LAND is known as flown: the board has disarmed."""
+    """`before`: the last report. Only it shows that a list that ended with LAND was flown: the board has disarmed."""
     record, reached = progress.record or 0, progress.reached or 0
     if progress.state is FlightPhase.OFF:
         if before is not None and progress.reason is FlightReason.DISARMED and _has_landed(before):

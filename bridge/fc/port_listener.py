@@ -65,7 +65,7 @@ class PortListener:
         self._watch.feed(data)
         self._size += len(data)
         self.what = self._watch.what
-        # A SiK radio passes on the vehicle's heartbeats of its other end, too: the whole time is listened.
+        # A SiK radio also passes on the heartbeats of a vehicle at its other end: so the whole time is used.
         self.is_done = bool(self.what)
 
     def tick(self, now: float) -> None:

@@ -24,7 +24,7 @@ from protocols.stm32_boot_loader import (
     write_memory,
 )
 
-#: Called with what is being done, how much of it is done, and the whole.
+#: Called with what is being done, how much of it is done, and the total.
 Progress = Callable[[str, int, int], None]
 
 _ATTEMPTS = 3
@@ -76,7 +76,7 @@ def rewrite_flash(present: bytes, wanted: bytes, progress: Progress) -> Dialogue
 
 
 def _write_pages(pages: list[int], wanted: bytes, progress: Progress) -> Dialogue[None]:
-    """Erase and write. A step that fails is found when its page is read back."""
+    """Erase and write. A step that fails is noticed when its page is read back."""
     for done, page in enumerate(pages, 1):
         yield from _attempt(erase_page(page))
         progress("erasing", done, len(pages))

@@ -21,7 +21,7 @@ from protocols.msp.command_line import EchoWatch, is_clean
 from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, request
 
-#: Harakiri's ring, less one heartbeat (25 bytes) that it may send unasked in AUTOSENSE, and a margin.
+#: Harakiri's ring, less one heartbeat (25 bytes) that it may send unprompted in AUTOSENSE, and a margin.
 MAX_OUTSTANDING_BYTES = 224
 #: The limit at the speed of FrSky telemetry, which an armed Harakiri puts into the same ring: 13 bytes eight times a
 #: second, up to 85 with GPS, barometer and time. Two of these frames may join the ring while the replies leave it.

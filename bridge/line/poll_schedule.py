@@ -30,7 +30,7 @@ _ASSUMED_BAUD = 115200
 _BESIDE_MISSIONS = 0.2
 #: No poll gets slower than this.
 _SLOWEST_S = 5.0
-#: Polls that other programs ask for: the shortest interval, and the part of telemetry's share that is theirs at least.
+#: Polls that other programs ask for: the shortest interval, and the smallest part of telemetry's share for them.
 _FOLLOWED_S = 0.1
 _FOLLOWED_SHARE = 0.1
 #: They ask for it until they were silent for this long.

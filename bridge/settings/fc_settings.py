@@ -90,10 +90,10 @@ class FcSettings(ABC):
     is_read_when_asked: ClassVar[bool] = False
 
     @abstractmethod
-    def read(self, former: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
+    def read(self, previous: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
         """All settings; None if the board does not answer. Other work may use the line at each Pause.
 
-        former: as last read, maybe from another board.
+        previous: as last read, maybe from another board.
         """
 
     @abstractmethod

@@ -34,7 +34,7 @@ _TOTAL = Rate(400, 400)
 _CURRENT_S = 0.2
 #: An unanswered request occupies the line longer than any other: its program pauses.
 _PAUSE_AFTER_LOSS_S = 0.5
-#: The interval at which waiting requests are looked at if nothing happens on the line.
+#: The interval at which waiting requests are checked if nothing happens on the line.
 _LOOK_AGAIN_S = 0.1
 #: A program that repeats its attempts is reported this often; all together at this rate.
 _REPORT_INTERVAL_S = 30.0

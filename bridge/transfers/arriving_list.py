@@ -20,7 +20,7 @@ _MAX_TIMEOUT_S = 0.75
 _OFTEN_S = 1.5
 _SELDOM_S = 0.7
 #: A sender of this many items that were not requested begins each list with item 0.
-_UNASKED = 3
+_UNREQUESTED = 3
 
 
 class Reply(Enum):
@@ -120,7 +120,7 @@ class ArrivingList:
         #: Items 0.._compared-1 were the same the second time; None if they are not requested again.
         self._compared: int | None = None
         #: Items that arrived unrequested: new ones, or repeats of another one than requested a second time.
-        self._unasked = 0
+        self._unrequested = 0
 
     @property
     def received(self) -> tuple[MissionItem, ...]:
@@ -160,12 +160,12 @@ class ArrivingList:
         if not self.items:
             self._one_until = sender.frames
         if held is None or seq == self.request.seq:
-            self._unasked += not self.request.answered(seq, now)
+            self._unrequested += not self.request.answered(seq, now)
             self.progress_at = now
         elif sender.is_copy or self.request.explains_repeat(seq):
             return Reply.NONE
         elif self._compared == 0:
-            self._unasked += 1
+            self._unrequested += 1
         if held is None:
             self.items[seq] = item
             while self._judged in self.items:
@@ -187,9 +187,9 @@ class ArrivingList:
 
     def _compare(self, sender: Speaker) -> None:
         """Begin or end the second reading."""
-        if self._unasked >= _UNASKED:
+        if self._unrequested >= _UNREQUESTED:
             self._compared, self._one_until = None, inf
         elif self._compared is None:
-            self._compared = self._unasked = 0
+            self._compared = self._unrequested = 0
         elif self._compared == self._judged:
             self._compared, self._one_until = None, sender.frames

@@ -56,7 +56,7 @@ from reports.verdict import CLEARED_LIST, Result, Verdict
 _TOO_MANY_UPLOADS = Refusal(MissionResult.DENIED, "Too many uploads: wait a few seconds")
 #: The maximum number of simultaneous uploads: one for each peer of a link.
 _MOST_UPLOADS = MAX_PEERS
-#: A ground station that reads has given up an upload of which nothing was heard for this long.
+#: A ground station that reads the mission has given up an upload that was silent for this long.
 _SILENT_S = 1.0
 _AGAIN = Replaced("the station started again")
 

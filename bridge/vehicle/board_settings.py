@@ -80,7 +80,7 @@ class BoardSettings:
         #: True if the board's flash holds what is in its RAM, as far as is known here.
         self.is_saved = False
         #: Called after each reading of the whole table; when the table has changed; after a save; after a change here
-        #: that others must not take for foreign.
+        #: that others must not mistake for one from elsewhere.
         self.on_read: Callable[[SettingTable], None] = lambda _table: None
         self.on_table: Callable[[SettingTable, float], None] = lambda _table, _now: None
         self.on_saved: Callable[[], None] = lambda: None
@@ -137,7 +137,7 @@ class BoardSettings:
         is_read = self._read_from is not None and self._read_from is self._fc_settings
         return is_read and not self._is_doubtful and self._session.vehicle.armed is False
 
-    # The door.
+    # For clients.
 
     def current(self, on_done: OnTable, now: float, within_s: float) -> None:
         """The table, checked against the board if that is possible within this time, else as last read."""

@@ -18,7 +18,7 @@ from bridge.vehicle.setting_clients import OnTable
 
 _MOST_NAMES = 8
 _NO_BOARD = SettingRefusal(Cause.NO_LINK, "The flight controller is not connected")
-#: Reasons why a save was not begun.
+#: Reasons why a save was not started.
 _BEFORE_SAVE = (Cause.ARMED, Cause.OCCUPIED, Cause.LIMIT, Cause.NO_LINK)
 _RUNNING = SettingRefusal(Cause.OCCUPIED, "Another restore is running: wait until it has ended")
 

@@ -154,7 +154,7 @@ Maker = Callable[[Moment], Message]
 def heartbeat(at: Moment) -> Message:
     """HEARTBEAT: an ArduPilot copter, plane or rover. A lost craft stays armed and in its mode, as last heard.
 
-    An armed craft on the ground is in STANDBY, as with ArduPilot: QGroundControl takes ACTIVE for flying.
+    An armed craft on the ground is in STANDBY, as with ArduPilot: to QGroundControl, ACTIVE means flying.
     """
     vehicle = at.vehicle
     state = vehicle.last(v.FlightState)
@@ -333,7 +333,7 @@ def sys_status(at: Moment) -> Message:
     """SYS_STATUS: mV, cA; errors_comm counts the failed I2C reads.
 
     Only what is known is enabled: Mission Planner replaces the line on its HUD by the first enabled sensor that is not
-    healthy. A GPS without a 3D fix is not: MAVSDK takes its bit for a good position.
+    healthy. A GPS without a 3D fix is not: to MAVSDK its bit means a good position.
     """
     health, fresh_health = at.vehicle.last(v.Health), at.fresh(v.Health)
     present, unknown, bad = _MOTORS | _PREARM, 0, 0

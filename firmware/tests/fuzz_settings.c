@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * Requests of a fuzzer to harakiri_settings.c. An input is a row of requests, each: flags (1 armed, 2 write scheduled,
- * 4 SET_SETTING, 8 with the setting's right identity), a size, and the payload; the rest of the buffer keeps stale bytes.
+ * Requests of a fuzzer to harakiri_settings.c. An input is a sequence of requests, each: flags (1 armed, 2 write scheduled,
+ * 4 SET_SETTING, 8 with the correct identity of the setting), a size, and the payload; the rest of the buffer keeps stale bytes.
  *
  * Always: a reply fits the buffer, every setting stays in its range, and a request that is not accepted changes nothing.
  */

@@ -27,7 +27,7 @@ class InavType(IntEnum):
     STRING = 6
 
 
-#: By type, but for texts.
+#: By type, except texts.
 _VALUES = [struct.Struct(f"<{letter}") for letter in "BbHhIf"]
 
 

@@ -283,7 +283,7 @@ _INAV: Rights = {
 
 
 def _agreed(command: int, tables: Collection[Rights]) -> MspRight | None:
-    """The right of a read that every firmware with a handler for it takes for that; the others answer with an error.
+    """The right of a request that is a read on every firmware with a handler for it; the others answer with an error.
 
     A number that few of them use may be anything on a board that is none of them.
     """

@@ -92,7 +92,7 @@ def open_serial(path: str) -> serial.Serial:
 
 
 def send_last_frame(port: serial.Serial) -> None:
-    """Let a frame end before the port closes: a board takes the next requests for the rest of half a frame.
+    """Let a frame end before the port closes: after half a frame a board reads the next requests as the rest of it.
 
     Then drop the rest. The kernel would wait up to 30 s for a board that accepts no bytes, and the event loop with it.
     """

@@ -15,7 +15,7 @@ _FORMS = 'write "0.0.0.0:8080" for the whole network, "127.0.0.1:8080" for this 
 _VIEW_ONLY = "openstreetmap.org"
 _PARTS = ("{z}", "{x}", "{y}")
 _HOST = re.compile(r"[A-Za-z0-9-]+(\.[A-Za-z0-9-]+)*(:(?P<port>[0-9]{1,5}))?")
-#: Of what follows the host.
+#: The path of a template.
 _TARGET = re.compile(r"/[A-Za-z0-9/._~!$&()*+,;=:@%?{}-]*")
 _TILE_FORMS = 'write an address like "https://tiles.example.org/{z}/{x}/{y}.png"'
 
@@ -111,8 +111,8 @@ class WebSettings:
     map_tiles: Annotated[
         TileSource,
         text('"https://HOST/{z}/{x}/{y}.png"', parse_tile_source),
-        "Server of the map's tiles. They are off until you switch them on in the page; of OpenStreetMap's server the Pi"
-        " keeps none.",
+        "Server of the map's tiles. They are off until you switch them on in the page; the Pi keeps none from"
+        " OpenStreetMap's own.",
     ] = TileSource()  # frozen
     map_credit: Annotated[
         str | None,

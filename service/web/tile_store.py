@@ -14,7 +14,7 @@ from service.settings.web import TileSource
 from service.web.tile_area import Place
 from storage.small_files import read_bounded
 
-#: A tile of so much coarser a level is only a blur.
+#: Levels: a tile that is any coarser is only a blur.
 _COARSER = 5
 #: The page itself waits for 8 s.
 _TIMEOUT_S = 5.0

@@ -24,7 +24,7 @@ _TIMEOUT_S = 8.0
 _SEARCH_S = 5.0
 #: While other queries wait: eight are answered in the time of one.
 _SHARED_SEARCH_S = _SEARCH_S / 8
-#: A search ends this long before its query's timeout, or is not begun.
+#: A search ends this long before its query's timeout, or is not started.
 _SPARE_S = 1.0
 _BUSY = "other queries about the past are being answered: ask for less, or try again in some seconds"
 

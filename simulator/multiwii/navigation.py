@@ -19,7 +19,7 @@ _HOVER_HEIGHT_M = 10.0
 #: NAV_CONFIG's rth_altitude: the lowest altitude of an RTH, unless the step's own is higher.
 _RTH_HEIGHT_M = 20.0
 _NO_JUMP = -10
-#: NAV_CONFIG's safe_wp_distance and nav_max_altitude: longer legs are not begun, greater heights not flown.
+#: NAV_CONFIG's safe_wp_distance and nav_max_altitude: longer legs are not started, greater heights not flown.
 SAFE_DISTANCE_M, HIGHEST_M = 500, 100
 #: NAV_CONFIG's wp_radius: a waypoint counts as reached at this distance.
 WP_RADIUS_M = 2

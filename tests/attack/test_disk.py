@@ -132,7 +132,7 @@ _SAVED_NOTHING = {
 
 
 def _obey_modes() -> None:
-    """Root, too, shall be unable to write to a read-only folder."""
+    """Make even root unable to write to a read-only folder."""
     if os.geteuid() == 0:
         assert ctypes.CDLL(None).prctl(_PR_CAPBSET_DROP, _CAP_DAC_OVERRIDE, 0, 0, 0) == 0
 

@@ -27,7 +27,7 @@ def bench(start: Starter) -> Iterator[Bench]:
 
 
 @pytest.fixture(scope="module")
-def lasting_bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
+def module_bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
     with ExitStack() as stack:
         bench = Starter(tmp_path_factory.mktemp("shared"), stack).bench()
         yield bench
@@ -35,14 +35,14 @@ def lasting_bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
 
 
 @pytest.fixture
-def shared(lasting_bench: Bench) -> Iterator[Bench]:
+def shared(module_bench: Bench) -> Iterator[Bench]:
     """A bench shared by the tests of a module that leave only missions behind; each test has its own clients.
 
     Each test starts with an empty board and after any earlier transfer: the daemon waits 5 s for missing items.
     """
-    until(lasting_bench.daemon.try_clear, "the end of an earlier test's transfer")
+    until(module_bench.daemon.try_clear, "the end of an earlier test's transfer")
     with ExitStack() as stack:
-        yield replace(lasting_bench, stack=stack)
+        yield replace(module_bench, stack=stack)
 
 
 @pytest.fixture

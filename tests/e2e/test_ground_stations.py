@@ -142,7 +142,7 @@ def test_all_stations_are_told_the_result_of_an_upload(shared: Bench) -> None:
     other.wait_until(lambda: 12 in [message.total for message in other.messages("MISSION_CURRENT")], "the new total")
 
 
-def test_many_former_stations_do_not_lock_out_a_new_one(bench: Bench) -> None:
+def test_many_earlier_stations_do_not_lock_out_a_new_one(bench: Bench) -> None:
     for _ in range(40):
         with udp_station(bench.daemon.address) as passer_by:
             passer_by.send_heartbeat()

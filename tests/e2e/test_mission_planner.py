@@ -125,7 +125,7 @@ def test_a_write_is_stored_with_the_rules_applied(shared: Bench, count: int, use
     lines = finding_lines(verdict.findings)
     assert lines
     assert all(line in planner.joined_texts() for _, line in lines)
-    # The summary stands on the HUD, also after the radius and a Read.
+    # The summary stays on the HUD, even after the radius and a Read.
     assert planner.read_hud() == summary(count, verdict)
     assert planner.screen.heard()[0] == summary(count, verdict)
 

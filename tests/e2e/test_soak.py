@@ -88,7 +88,7 @@ def test_a_daemon_survives_events_and_attacks_at_full_rate(
 
 
 def _settled(meter: Meter) -> int:
-    """The number of open descriptors once former clients' are closed."""
+    """The number of open descriptors once those of earlier clients are closed."""
     counts = [len(meter.descriptors())]
     while len(counts) < 10 or len(set(counts[-10:])) > 1:
         time.sleep(0.1)

@@ -95,7 +95,7 @@ class TestConnecting:
         assert screens.mission_planner.line.longest_gap_s(12, world.now) < 1.1
 
     def test_no_receiver_is_missing_before_its_channels_are_read(self) -> None:
-        """Mission Planner's "NO RC Receiver" also stood while nothing asked the board for its channels."""
+        """Mission Planner's "NO RC Receiver" was also shown while nothing asked the board for its channels."""
         world, station, screens = on_the_ground()
         for msgid in (m.MAVLINK_MSG_ID_RC_CHANNELS, m.MAVLINK_MSG_ID_RC_CHANNELS_RAW):
             ask(station, m.MAVLink_command_long_message(1, 1, 511, 0, msgid, -1, 0, 0, 0, 0, 0))
@@ -130,7 +130,7 @@ class TestConnecting:
 
 
 class TestLostFlightController:
-    def test_on_the_ground_it_stands_until_the_board_is_back(self) -> None:
+    def test_on_the_ground_it_stays_until_the_board_is_back(self) -> None:
         world, _, screens = on_the_ground()
         world.power_off()
         world.run(4.5)
@@ -149,7 +149,7 @@ class TestLostFlightController:
             assert glance.qgc == "Ready To Fly"
             assert glance.qgc_reason in ("PreArm: ready", "")
 
-    def test_in_flight_it_stands_and_nothing_else_does(self) -> None:
+    def test_in_flight_it_stays_and_nothing_else_is_shown(self) -> None:
         world, _, screens = on_the_ground()
         world.faults.armed = True
         world.run(20)
@@ -185,7 +185,7 @@ class TestLostFlightController:
 
 
 class TestArming:
-    def test_reasons_not_to_arm_stand_while_they_hold(self) -> None:
+    def test_reasons_not_to_arm_stay_while_they_hold(self) -> None:
         world, _, screens = inav(NOT_LEVEL | RC_LINK)
         began = world.now
         for glance in screens.look():
@@ -259,7 +259,7 @@ class TestWritingMissions:
         assert all(is_quiet(glance) for glance in screens.look())
         assert screens.mission_planner.texts()[-1] == "Mission verified: 9 records"
 
-    def test_the_summary_of_a_lossy_write_stands_and_is_spoken(self, indoors: Indoors) -> None:
+    def test_the_summary_of_a_lossy_write_stays_and_is_spoken(self, indoors: Indoors) -> None:
         world, station, screens = indoors
         items = waypoints(9)
         items[3], items[4] = replace(items[3], command=178), replace(items[4], frame=Frame.GLOBAL)
@@ -271,7 +271,7 @@ class TestWritingMissions:
         assert screens.mission_planner.heard(began - 1)[0] == summary
         assert screens.mission_planner.texts(began - 1)[-1] == summary
 
-    def test_an_erased_mission_stands(self, indoors: Indoors) -> None:
+    def test_an_erased_mission_stays(self, indoors: Indoors) -> None:
         _, station, screens = indoors
         assert Upload(station, waypoints(9)).run() is MissionResult.ACCEPTED
         items = waypoints(2)
@@ -280,13 +280,13 @@ class TestWritingMissions:
         huds = [glance.hud for glance in screens.look(1, 9)]
         assert huds == ["Mission erased: no command left"] * 2
 
-    def test_a_cleared_mission_stands(self, indoors: Indoors) -> None:
+    def test_a_cleared_mission_stays(self, indoors: Indoors) -> None:
         _, station, screens = indoors
         assert Upload(station, waypoints(9)).run() is MissionResult.ACCEPTED
         ask(station, clear_message())
         assert [glance.hud for glance in screens.look(1, 9)] == ["Mission on the flight controller cleared"] * 2
 
-    def test_the_reason_for_a_refusal_stands(self, indoors: Indoors) -> None:
+    def test_the_reason_for_a_refusal_stays(self, indoors: Indoors) -> None:
         _, station, screens = indoors
         items = waypoints(9)
         items[4] = replace(items[4], lat_e7=950_000_000)

@@ -75,7 +75,7 @@ def test_a_damaged_backup_is_not_shown_as_intact(tmp_path: Path) -> None:
             store.backups.get(numbers[1])
 
 
-def test_a_store_of_the_former_release_gets_the_table(tmp_path: Path) -> None:
+def test_a_store_of_an_earlier_release_gets_the_table(tmp_path: Path) -> None:
     path = tmp_path / "missions.db"
     with open_store(path, 0.0).store:
         pass

@@ -57,7 +57,7 @@ class HarakiriMavlinkSettings(FcSettings):
     def __init__(self, _board: FlightController) -> None:
         self._decoder = MavlinkDecoder()
 
-    def read(self, former: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
+    def read(self, previous: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
         yield Pause(_SETTLED_S)
         found: dict[int, tuple[str, float]] = {}
         count = _MOST

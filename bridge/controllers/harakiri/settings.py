@@ -41,7 +41,7 @@ from protocols.msp.setting_table import (
 )
 from protocols.msp.settings import BOXES
 
-#: Settings a request: the reply leaves room for a poll in the board's send ring. With names of 32 characters.
+#: Settings per request, with names of 32 characters: the reply leaves room for a poll in the board's send ring.
 _EACH = 4
 _ENTRY_SIZE, _HEADER_SIZE, _TABLE_SIZE = 46, 3, 9
 #: The table may change while it is read.
@@ -67,7 +67,7 @@ class HarakiriFcSettings(FcSettings):
         self._parts = MspPartSettings(board)
         self._lists_all: bool | None = None
 
-    def read(self, former: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
+    def read(self, previous: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
         """The values of the previous table if their checksum is still the board's: then that is three requests."""
         if self._lists_all is None:
             reply = yield from ask_surely(TABLE_REQUEST, SettingCommand.SETTING, _TABLE_SIZE)
@@ -75,8 +75,8 @@ class HarakiriFcSettings(FcSettings):
                 return None
             self._lists_all = reply.direction is Direction.REPLY
         if not self._lists_all:
-            return (yield from self._parts.read(former, reading))
-        listed = None if former is None else _listed(former)
+            return (yield from self._parts.read(previous, reading))
+        listed = None if previous is None else _listed(previous)
         for _ in range(_READINGS):
             whole = yield from _whole()
             if whole is None:

@@ -275,7 +275,7 @@ class InavMissions(NavMissions, FliesToItems):
         yield from self._load_first(before)
 
     def _load_first(self, saved: NavInfo) -> Conversation[None]:
-        """Until LOAD, INAV takes the written records for one long mission, whose last record decides about landing.
+        """Until LOAD, INAV treats the written records as one long mission, whose last record decides about landing.
 
         An aeroplane would land without its approach: only a loaded mission has a number (loadedMultiMissionIndex).
         """

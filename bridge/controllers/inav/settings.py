@@ -47,10 +47,10 @@ class InavFcSettings(FcSettings):
         self._modes = MspPartSettings(board, RANGES)
         self._is_read = False
 
-    def read(self, former: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
+    def read(self, previous: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
         """The last table if it was read from this board and nothing can have changed since: INAV has no checksum."""
         if self._is_read and not reading.is_doubtful:
-            return former
+            return previous
         found: list[BoardSetting] = []
         skipped = 0
         for index in range(_MOST):

@@ -48,8 +48,8 @@ _WP = frozenset((Nav.WP,))
 _CHECKS = 6
 #: Other changes, and transfers, have to wait until a check ends.
 _MOST_COMPARED = 12
-#: The number of former lists remembered: LOAD or another client is likely to bring one of them back.
-_FORMER = 3
+#: The number of previous lists remembered: LOAD or another client is likely to bring one of them back.
+_PREVIOUS = 3
 #: Restarts of one push after a read-back mismatch.
 _MAX_BEGINS = 3
 
@@ -62,9 +62,9 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
     watch_s = 0.25
     #: The list that was compared last, the ones before it, and the records that differ between them.
     _watched: tuple[NavRecord, ...] = ()
-    _former: tuple[tuple[NavRecord, ...], ...] = ()
-    _telling: frozenset[int] = frozenset()
-    #: The number of the record that was compared last, those apart.
+    _previous: tuple[tuple[NavRecord, ...], ...] = ()
+    _differing: frozenset[int] = frozenset()
+    #: The number of the record that was compared last, apart from those.
     _compared = 0
 
     def __init__(self, profile: NavProfile, controller: FlightController, vehicle: Vehicle) -> None:
@@ -236,7 +236,7 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
         self._watch(known)
         count = min(ceil(len(known) / _CHECKS), _MOST_COMPARED)
         following = [(self._compared + step) % len(known) + 1 for step in range(count)]
-        for number in (*self._telling, *following):
+        for number in (*self._differing, *following):
             held = yield from self.read(number)
             if held is not None and held != known[number - 1]:
                 return False
@@ -245,10 +245,10 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
 
     def _watch(self, known: tuple[NavRecord, ...]) -> None:
         if known != self._watched:
-            self._former = (self._watched, *[former for former in self._former if former != known])[:_FORMER]
-            pairs = [enumerate(zip(known, former, strict=False), 1) for former in self._former]
+            self._previous = (self._watched, *[old for old in self._previous if old != known])[:_PREVIOUS]
+            pairs = [enumerate(zip(known, old, strict=False), 1) for old in self._previous]
             firsts = [next((number for number, (one, other) in pair if one != other), 0) for pair in pairs]
-            self._telling, self._compared = frozenset(filter(None, firsts)), 0
+            self._differing, self._compared = frozenset(filter(None, firsts)), 0
             self._watched = known
 
     def _restore(self, before: tuple[NavRecord, ...] | None) -> Conversation[bool]:

@@ -27,14 +27,14 @@ def flies_home(record: NavRecord) -> bool:
     return record.action in LEGS and not (record.lat_e7 or record.lon_e7)
 
 
-def keep_unshown(records: Sequence[NavRecord], former: Sequence[NavRecord]) -> tuple[list[NavRecord], str]:
+def keep_unshown(records: Sequence[NavRecord], current: Sequence[NavRecord]) -> tuple[list[NavRecord], str]:
     """The records with the unshown values of those that they repeat, and the lost ones as text, "" if there are none.
 
-    `former`: the list on the flight controller.
+    `current`: the list on the flight controller.
     """
     kept: list[NavRecord] = []
     lost: Counter[str] = Counter()
-    for record, old in _aligned(records, former):
+    for record, old in _aligned(records, current):
         if record is not None and old is not None and _repeats(record, old):
             kept.append(replace(old, flag=old.flag if old.flag == FLY_HOME else 0))
             continue
@@ -46,17 +46,17 @@ def keep_unshown(records: Sequence[NavRecord], former: Sequence[NavRecord]) -> t
 
 
 def _aligned(
-    records: Sequence[NavRecord], former: Sequence[NavRecord]
+    records: Sequence[NavRecord], current: Sequence[NavRecord]
 ) -> Iterator[tuple[NavRecord | None, NavRecord | None]]:
     """Each record and the one in its place, counted from the end where the lists end alike: items may be inserted."""
     alike = 0
-    for record, old in zip(reversed(records), reversed(former), strict=False):
+    for record, old in zip(reversed(records), reversed(current), strict=False):
         # The target of a jump has another number then.
         if not (_repeats(record, old) or record.action == old.action == NavAction.JUMP):
             break
         alike += 1
-    yield from zip_longest(records[: len(records) - alike], former[: len(former) - alike])
-    yield from zip(records[len(records) - alike :], former[len(former) - alike :], strict=True)
+    yield from zip_longest(records[: len(records) - alike], current[: len(current) - alike])
+    yield from zip(records[len(records) - alike :], current[len(current) - alike :], strict=True)
 
 
 def _repeats(record: NavRecord, old: NavRecord) -> bool:

@@ -138,7 +138,7 @@ class HarakiriMavlink(MavlinkLine):
         port.runner.mavlink_up(self._send)
         assert event.heard is not None
         if event.heard.msgid != messages.MAVLINK_MSG_ID_HEARTBEAT:
-            # Unasked, it sends more than heartbeats only while armed.
+            # Unprompted, it sends more than heartbeats only while armed.
             port.hear_armed(Source.MAVLINK, now)
         self._telemetry.take([event.heard], now)
 

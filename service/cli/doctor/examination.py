@@ -35,7 +35,7 @@ _ON_PORT = (check_permission, check_console, check_holder)
 def examine(
     host: Host, settings: Settings, ask_running: Callable[[], Json], ask_port: Callable[[], Json]
 ) -> Iterator[Checked]:
-    """Yield the result of each check. The port is listened to only if the checks before found no problem with it."""
+    """Yield the result of each check. The last one listens to the port only if the others found no problem with it."""
     running = _status(ask_running)
     fc = settings.fc
     if isinstance(fc, AutoFc) and running is not None and "port" not in running:

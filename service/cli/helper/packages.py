@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """An update from a file: received and checked by the helper, installed by a process that outlives the old program.
 
-That process first packs the installed files again, so that there is a way back, and goes that way by itself if the
+That process first packs the installed files again, so that it can go back, and does so by itself if the
 bridge does not run with the new package: `python -m service.cli.helper.packages FILE`.
 """
 

@@ -111,21 +111,21 @@ def _keyfile(text: str) -> str:
 
 
 def open_hotspot(host: Host, machine: Machine, sleep: Callable[[float], None] = time.sleep) -> str:
-    """Open the hotspot, and return to the former Wi-Fi network if no device joins; returns the outcome, a sentence."""
+    """Open the hotspot, and return to the previous network if no device joins; returns the outcome, a sentence."""
     active = machine.run(("nmcli", "--terse", "--fields", "UUID,DEVICE", "connection", "show", "--active"))
-    former = next((line.split(":")[0] for line in active.splitlines() if line.endswith(f":{HOTSPOT_CARD}")), None)
+    previous = next((line.split(":")[0] for line in active.splitlines() if line.endswith(f":{HOTSPOT_CARD}")), None)
     leases = host.read(_LEASES)
     try:
         machine.run(("nmcli", "connection", "up", CONNECTION))
     except SetupError as error:
-        return f"{error}; {_return_to(former, machine)}"
-    for _ in range(JOIN_S if former is not None else 0):
+        return f"{error}; {_return_to(previous, machine)}"
+    for _ in range(JOIN_S if previous is not None else 0):
         if host.read(_LEASES) != leases or _has_neighbour(host):
             break
         sleep(1)
     else:
-        if former is not None:
-            return f"no device joined the hotspot within {JOIN_S} s; {_return_to(former, machine)}"
+        if previous is not None:
+            return f"no device joined the hotspot within {JOIN_S} s; {_return_to(previous, machine)}"
     _open_at_boot(host, machine, is_on=True)
     return "the hotspot is open"
 
@@ -150,13 +150,13 @@ def _open_at_boot(host: Host, machine: Machine, *, is_on: bool) -> None:
     machine.run(_RELOAD)
 
 
-def _return_to(former: str | None, machine: Machine) -> str:
+def _return_to(previous: str | None, machine: Machine) -> str:
     """Close the hotspot; the connection is removed, so that a restart does not open it either."""
     machine.carry_out(RemoveFile(HOTSPOT_FILE))
     machine.run(_RELOAD)
-    if former is None:
+    if previous is None:
         return "there was no other network"
-    machine.run(("nmcli", "connection", "up", former))
+    machine.run(("nmcli", "connection", "up", previous))
     return "back on the previous network"
 
 

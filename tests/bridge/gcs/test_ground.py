@@ -279,7 +279,7 @@ def test_a_truncated_datagram_does_not_affect_the_next() -> None:
     assert len(station.messages("COMMAND_ACK")) == 3
 
 
-def test_our_own_frames_are_not_taken_for_a_station() -> None:
+def test_our_own_frames_are_not_mistaken_for_a_station() -> None:
     world = ready_world()
     station = GroundStation(world)
     station.send(gcs_heartbeat())

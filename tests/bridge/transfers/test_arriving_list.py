@@ -46,7 +46,7 @@ def test_two_lists_are_never_mixed_if_a_request_is_on_its_way(repeat: float, ans
 
 
 @pytest.mark.parametrize("count", [9, 16])
-def test_two_lists_are_never_mixed_if_items_of_the_former_are_late(count: int) -> None:
+def test_two_lists_are_never_mixed_if_items_of_the_first_are_late(count: int) -> None:
     """MAVProxy had answered two requests for item 2, and both answers arrive after its next MISSION_COUNT."""
     world, station = holding()
     former, items = waypoints(16, 1), [*waypoints(1, 1), *waypoints(count, 2)[1:]]

@@ -118,7 +118,7 @@ def test_one_changed_record_in_the_longest_list_is_noticed_from_the_upload() -> 
 
 
 @pytest.mark.parametrize("streams_hz", [0, 50])
-def test_a_reloaded_former_list_is_noticed_within_two_seconds(streams_hz: int) -> None:
+def test_a_reloaded_earlier_list_is_noticed_within_two_seconds(streams_hz: int) -> None:
     """Another client has changed one of many records without saving, and loads the saved list."""
     board, world, _ = with_the_longest_list(streams_hz)
     ours = packed(plan(CAPACITY + 1))

@@ -18,7 +18,7 @@ class PausingSettings(FcSettings):
         self.result = result
         self.count = 0
 
-    def read(self, former: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
+    def read(self, previous: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
         for count in (10, 20, 30):
             self.count = count
             yield Pause(1.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The program's frame: what it loads, and faults of its output."""
+"""The program as a whole: what it loads, and faults of its output."""
 
 import os
 import resource

@@ -96,7 +96,7 @@ def test_out_of_range_shows_the_setting_as_it_is(bench: Bench) -> None:
     assert answer(bench, encode_read_settings(0, 0)).status is ReplyStatus.BAD_REQUEST
 
 
-def test_armed_all_is_refused(bench: Bench) -> None:
+def test_everything_is_refused_while_armed(bench: Bench) -> None:
     checksum = table(bench).checksum
     bench.naze.faults.armed = True
     bench.run(_SAVE_S)

@@ -244,7 +244,7 @@ def test_a_stop_during_a_transfer_loads_the_old_list_again() -> None:
 
 @pytest.mark.parametrize("size", [21, 100, 192])
 def test_an_unfinished_frame_in_its_parser_does_not_hide_the_board(size: int) -> None:
-    """The parser has no timeout: it takes the bridge's requests for the rest of the frame."""
+    """The parser has no timeout: it reads the bridge's requests as the rest of the frame."""
     board = make_board("inav", MspOptions())
     world = World(speeds=(115200,), peer=board, plugged=False)
     world.run(0.5)

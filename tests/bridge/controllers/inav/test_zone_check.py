@@ -80,5 +80,5 @@ def test_a_list_is_rejected_if_inav_would_not_arm_at_home() -> None:
     assert texts(circle(0, lowest_cm=2000), legs=LEGS) == []
     outside = "Mission rejected: Home is outside geozone 0 (inclusive): INAV would not arm"
     assert texts(circle(10, is_inclusive=True), legs=LEGS) == [outside]
-    # The craft stands elsewhere, where it arms.
+    # The craft is elsewhere, where it arms.
     assert texts(circle(0), legs=LEGS, here=(LAT - 2 * NORTH, LON)) == []

@@ -267,7 +267,7 @@ def test_a_frame_that_may_have_lost_its_header_is_followed_by_a_harmless_one() -
         assert all(any(at < later < at + 0.1 for later in moments) for at in risky)
 
 
-def test_a_reply_for_home_is_not_taken_for_a_written_record() -> None:
+def test_a_reply_for_home_is_not_mistaken_for_a_written_record() -> None:
     """Telemetry reads home with the same command."""
     inav = FakeInav()
     world, station = found(inav)

@@ -123,7 +123,7 @@ def test_a_harakiri_that_disarms_is_asked_for_msp_at_once() -> None:
 
 
 @pytest.mark.parametrize("version", [1, 2])
-def test_another_autopilot_in_place_of_a_harakiri_is_not_taken_for_it(version: int) -> None:
+def test_another_autopilot_in_place_of_a_harakiri_is_not_mistaken_for_it(version: int) -> None:
     """It can be told apart without a new connection only if it sends MAVLink 2."""
     world = ready_world()
     if version == 1:

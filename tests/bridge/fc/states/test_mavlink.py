@@ -35,7 +35,7 @@ def found_as_another(peer: SimulatedNaze) -> World:
     return world
 
 
-def test_a_harakiri_taken_for_another_autopilot() -> None:
+def test_a_harakiri_mistaken_for_another_autopilot() -> None:
     world = found_as_another(silent_harakiri())
     station = GroundStation(world)
     world.bridge.add_default_peer(station.peer)
@@ -47,7 +47,7 @@ def test_a_harakiri_taken_for_another_autopilot() -> None:
     world.assert_line_was_clean()
 
 
-def test_a_harakiri_taken_for_another_autopilot_answers_msp_again() -> None:
+def test_a_harakiri_mistaken_for_another_autopilot_answers_msp_again() -> None:
     peer = silent_harakiri()
     world = found_as_another(peer)
     peer.faults.msp = True
@@ -74,7 +74,7 @@ def test_corrupted_frames_during_the_search(seed: int) -> None:
     assert world.kind is harakiri.MAVLINK
 
 
-def test_another_autopilot_taken_for_a_harakiri() -> None:
+def test_another_autopilot_mistaken_for_a_harakiri() -> None:
     autopilot = Autopilot()
     world = World(peer=autopilot, speeds=(115200,))
     world.receive_from_fc(heartbeat(HARAKIRI, 1))

@@ -330,7 +330,7 @@ def test_a_crowd_does_not_multiply_frames() -> None:
     assert {peer for peer, _ in ground.take_datagrams()} == set(ground.peers())
 
 
-def test_an_address_that_is_used_again_gets_nothing_for_its_former_ids() -> None:
+def test_an_address_that_is_used_again_gets_nothing_for_its_earlier_ids() -> None:
     world, autopilot, (one, _) = passing()
     world.bridge.gcs_gone(one.peer, world.now)
     successor = GroundStation(world, "gcs0", sysid=7)

@@ -26,11 +26,11 @@ _ARP = "IP address HW type Flags HW address Mask Device\n"
 
 
 class NetworkManager(Machine):
-    """Keeps the active connection of wlan0; `former` is the home network's."""
+    """Keeps the active connection of wlan0; `previous` is the home network's."""
 
-    def __init__(self, host: Host, former: str | None = "home-uuid", *, radio_works: bool = True) -> None:
+    def __init__(self, host: Host, previous: str | None = "home-uuid", *, radio_works: bool = True) -> None:
         super().__init__(host)
-        self.active = former
+        self.active = previous
         self._radio_works = radio_works
 
     def run(self, command: Sequence[str], timeout_s: float = 60) -> str:
@@ -90,7 +90,7 @@ def test_a_device_with_its_own_address_counts(pi: FaultyMachine) -> None:
     assert open_hotspot(pi, manager, joins) == "the hotspot is open"
 
 
-def test_without_a_device_the_former_network_returns(pi: FaultyMachine) -> None:
+def test_without_a_device_the_previous_network_returns(pi: FaultyMachine) -> None:
     manager = NetworkManager(pi)
     slept: list[float] = []
     told = open_hotspot(pi, manager, slept.append)
@@ -100,14 +100,14 @@ def test_without_a_device_the_former_network_returns(pi: FaultyMachine) -> None:
     assert not pi.path(HOTSPOT_FILE).exists()
 
 
-def test_a_hotspot_that_cannot_open_leaves_the_former_network(pi: FaultyMachine) -> None:
+def test_a_hotspot_that_cannot_open_leaves_the_previous_network(pi: FaultyMachine) -> None:
     manager = NetworkManager(pi, radio_works=False)
     assert open_hotspot(pi, manager, lambda _: None).endswith("no radio; back on the previous network")
     assert manager.active == "home-uuid"
 
 
-def test_without_a_former_network_it_waits_for_nobody(pi: FaultyMachine) -> None:
-    manager = NetworkManager(pi, former=None)
+def test_without_a_previous_network_it_waits_for_nobody(pi: FaultyMachine) -> None:
+    manager = NetworkManager(pi, previous=None)
     assert open_hotspot(pi, manager, lambda _: pytest.fail("it waited")) == "the hotspot is open"
     assert opens_at_boot(pi)
 

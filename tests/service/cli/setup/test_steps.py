@@ -79,7 +79,7 @@ def test_a_fresh_card_is_set_up_in_one_run(tmp_path: Path, model: str) -> None:
     assert has_console is (model == "5")
     assert "console=tty1 root=PARTUUID=1-02 rootwait" in pi.read(CMDLINE)
     settings = tomllib.loads(pi.read(SETTINGS_FILE))
-    assert "fc" not in settings  # not said: config.toml, or the search
+    assert "fc" not in settings  # not given: config.toml, or the search
     assert settings["web"]["listen"] == "0.0.0.0:8080"
     assert settings["key_file"] == "/etc/naze-bridge/gcs.key"
     assert pi.path("/etc/naze-bridge/gcs.key").stat().st_mode & 0o777 == 0o600
