@@ -15,7 +15,7 @@ _HEAD = """\
 
 From the `--help` text of every command.
 """
-#: An option of at least so many commands is explained once.
+#: An option of at least this many commands is explained once.
 _COMMON = 4
 Option = tuple[str, str]
 

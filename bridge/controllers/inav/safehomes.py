@@ -124,14 +124,14 @@ class RallyCheck(ListCheck):
 
     def _fill(self) -> tuple[Safehome, ...]:
         """A place that is a safehome stays; one near a vanished one replaces it, and keeps its landing approach."""
-        former = {each.number: each for each in self._former}
+        current = {each.number: each for each in self._current}
         filled: dict[int, Safehome] = {}
         ahead = [*self._places]
         for each in self._current:
             if each.enabled and (each.lat_e7, each.lon_e7) in ahead:
                 filled[each.number] = each
                 ahead.remove((each.lat_e7, each.lon_e7))
-        for each in self._former:
+        for each in self._current:
             approach = each.approach
             if each.number in filled or approach is None or not approach.directions():
                 continue
@@ -147,7 +147,7 @@ class RallyCheck(ListCheck):
                 self._say(f"{lost} {approach_text(approach)}", News.WARNING)
         for number in range(SAFEHOMES):
             if number not in filled:
-                empty = former.get(number, Safehome(number, False, 0, 0)).emptied()
+                empty = current.get(number, Safehome(number, False, 0, 0)).emptied()
                 filled[number] = _moved(empty, ahead.pop(0)) if ahead else empty
         return tuple(filled[number] for number in range(SAFEHOMES))
 

@@ -13,9 +13,8 @@ from bridge.controllers.nav.rules import inav_profile
 from bridge.missions.list_check import check_list
 from protocols.inav_dump import read_inav_settings
 from protocols.mission_item import Command, MissionItem, MissionResult
-from protocols.msp.inav_places import FW_APPROACH, MISSION_APPROACH, FwApproach, Safehome
+from protocols.msp.inav_places import FW_APPROACH, MISSION_APPROACH, SET_FW_APPROACH, FwApproach, Safehome
 from reports.finding import without_defaults
-from simulator.inav.places import SET_FW_APPROACH
 from tests.bridge.controllers.inav.test_mission_store import ACCEPTED, board_with
 from tests.support.conversations import Upload
 from tests.support.nav_lists import HOME, LAT, LON, RTL, RTL_LANDS, WP, item
