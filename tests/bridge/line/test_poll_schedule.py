@@ -100,7 +100,7 @@ def test_a_refused_poll_is_tried_twice_per_flight_controller() -> None:
     assert line.run(60)[Msp.WP] == 2
 
 
-def test_a_single_error_is_taken_for_noise() -> None:
+def test_a_single_error_is_treated_as_noise() -> None:
     noisy = [True]
     line = Line(answer=lambda command: -1 if command == Msp.WP and noisy and noisy.pop() else REPLY_PAYLOADS[command])
     assert line.run(60)[Msp.WP] >= 29

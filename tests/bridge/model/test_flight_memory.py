@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A bridge that restarts in flight continues without a seam, as long as the board does not contradict its memory."""
+"""A bridge that restarts in flight continues seamlessly, as long as the board does not contradict its memory."""
 
 import pytest
 

@@ -31,7 +31,7 @@ def test_it_is_held_if_the_board_says_that_it_is_disarmed() -> None:
 @pytest.mark.parametrize(
     ("arm_bit", "reply", "refused"), [(ARM_BIT, status(1 << ARM_BIT), ARMED), (None, status(0), NO_ANSWER)]
 )
-def test_it_is_not_begun_on_an_armed_board_or_one_without_an_arm_flag(
+def test_it_is_not_started_on_an_armed_board_or_one_without_an_arm_flag(
     arm_bit: int | None, reply: MspFrame, refused: SettingRefusal
 ) -> None:
     conversation = while_disarmed(arm_bit, save())
@@ -41,7 +41,7 @@ def test_it_is_not_begun_on_an_armed_board_or_one_without_an_arm_flag(
     assert end.value.value is refused
 
 
-def test_without_an_answer_it_is_not_begun() -> None:
+def test_without_an_answer_it_is_not_started() -> None:
     conversation = while_disarmed(ARM_BIT, save())
     asked = [next(conversation), conversation.send(None), conversation.send(None)]
     assert all(isinstance(effect, Receive) for effect in asked)

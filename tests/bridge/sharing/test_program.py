@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Other programs take nothing from ground stations, missions and each other: floods, transfers, and repeated reads."""
+"""Other programs slow down neither ground stations, missions nor each other: floods, transfers, and repeated reads."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -81,7 +81,7 @@ def test_a_flooder_harms_only_itself(kind: str, baud: int) -> None:
         world.assert_line_was_clean()
 
 
-def test_many_flooders_leave_an_honest_program_its_part() -> None:
+def test_many_flooders_leave_an_honest_program_its_share() -> None:
     world, _ = flying_station("harakiri")
     flooders = [ShareProgram(world, f"192.0.2.{host}:1") for host in range(10)]
     for flooder in flooders:
@@ -96,7 +96,7 @@ def test_many_flooders_leave_an_honest_program_its_part() -> None:
     assert 200 * 12 <= sum(len(flooder.replies) for flooder in flooders) <= 400 * 12  # of 2000 a second
 
 
-def test_a_flooder_leaves_another_program_of_its_host_its_part() -> None:
+def test_a_flooder_leaves_another_program_of_its_host_its_share() -> None:
     world, _ = flying_station("harakiri")
     ShareProgram(world, "192.0.2.66:1").ask_every(0.0025, (IDENT, b""))
     honest = ShareProgram(world, "192.0.2.66:2")
@@ -227,7 +227,7 @@ def test_requests_during_a_transfer_wait_for_its_end(kind: str, baud: int) -> No
         world.run(2)
 
 
-def test_who_waits_too_long_is_disconnected() -> None:
+def test_a_program_that_waits_too_long_is_disconnected() -> None:
     world, _ = flying_station("harakiri", 2400)
     items = load_mission(EXAMPLES / "long-146.waypoints")
     outcome = world.push(items)

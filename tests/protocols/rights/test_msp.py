@@ -122,7 +122,7 @@ def test_a_frame_within_a_frame_has_no_row(firmware: Firmware) -> None:
 
 @pytest.mark.parametrize("firmware", [Firmware.HARAKIRI, Firmware.BASEFLIGHT, Firmware.MULTIWII, Firmware.UNKNOWN])
 def test_v2_is_sent_only_to_boards_that_speak_it(firmware: Firmware) -> None:
-    """Others take the letters of such a frame for typed ones."""
+    """Others read the letters of such a frame as typed ones."""
     assert max(MSP_RIGHTS[firmware]) < 255
 
 
