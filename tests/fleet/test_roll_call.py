@@ -32,7 +32,7 @@ _FLEET = [*NAZE_BRIDGE, "fleet"]
 
 
 @pytest.fixture(scope="module")
-def lasting_fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fleet]:
+def module_fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fleet]:
     """`kite` is fast, `snail` has a slow line."""
     with ExitStack() as stack:
         fleet = Fleet(tmp_path_factory.mktemp("fleet"), stack)
@@ -43,14 +43,14 @@ def lasting_fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fleet]:
 
 
 @pytest.fixture
-def fleet(lasting_fleet: Fleet) -> Fleet:
+def fleet(module_fleet: Fleet) -> Fleet:
     """Both vehicles are present and idle again after the previous test."""
-    for daemon in lasting_fleet.daemons.values():
+    for daemon in module_fleet.daemons.values():
         if not daemon.is_alive:
             daemon.kill_and_restart()
-    lasting_fleet.wait("kite", "snail")
-    until(lasting_fleet.daemons["snail"].try_clear, "the end of a previous push")
-    return lasting_fleet
+    module_fleet.wait("kite", "snail")
+    until(module_fleet.daemons["snail"].try_clear, "the end of a previous push")
+    return module_fleet
 
 
 class Command:

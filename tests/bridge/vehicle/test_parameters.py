@@ -312,7 +312,7 @@ def reply_to(world: World, station: GroundStation, name: bytes, value: float, se
     return [each for each in station.messages() if each.get_type() in ("PARAM_VALUE", "PARAM_ERROR", "STATUSTEXT")]
 
 
-def test_a_setting_is_set_on_the_board_and_told_to_all() -> None:
+def test_a_setting_is_set_on_the_board_and_sent_to_all() -> None:
     world, station = settled_world()
     other = GroundStation(world, "other", sysid=254)
     other.send(m.MAVLink_ping_message(0, 0, 0, 0))

@@ -164,7 +164,7 @@ def test_while_the_checksum_holds_a_list_comes_from_memory() -> None:
     assert requests(world, before).count(SettingCommand.SETTING) == 1
 
 
-def test_the_radius_set_and_a_calibration_begun_by_a_station_are_no_foreign_changes() -> None:
+def test_the_radius_set_and_a_calibration_begun_by_a_station_are_not_reported() -> None:
     world, station = sealed(naze)
     SettingsClient(world).wait_read()
     station.send(messages.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", 450, 9))
@@ -229,7 +229,7 @@ def test_another_board_is_no_change() -> None:
         assert world.events("settings.changed_on_board") == []
 
 
-def test_an_armed_board_is_not_asked_and_its_changes_are_told_after_the_flight() -> None:
+def test_an_armed_board_is_not_asked_and_its_changes_are_reported_after_the_flight() -> None:
     world, _ = sealed(naze)
     world.naze.faults.armed = True
     world.wait_until(lambda world: world.bridge.vehicle.armed is True, 5)

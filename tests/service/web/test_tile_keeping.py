@@ -57,7 +57,7 @@ def test_switching_tiles_off_ends_it(bench: TileBench) -> None:
     assert bench.ended()["text"].startswith("Stopped. ")
 
 
-def test_the_reason_of_a_failure_is_told(bench: TileBench) -> None:
+def test_the_reason_for_a_failure_is_shown(bench: TileBench) -> None:
     bench.tiles.reply = lambda *_: (403, {}, b"blocked")
     text = bench.keep(AREA)["text"]
     assert text.startswith(f"{bench.tiles.host} refuses /")
