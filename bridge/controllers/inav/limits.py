@@ -51,7 +51,7 @@ class SafehomeUsageMode(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class InavLimits:
-    """Fields with a name of INAV's are settings, in INAV's units: distances and altitudes in cm, but the first in m.
+    """Fields with a name of INAV's are settings, in INAV's units: cm, but the first in m.
 
     Their defaults are INAV's; 0 turns the first, nav_max_altitude and nav_wp_enforce_altitude off.
     vbat_warning_cell_voltage: 0.01 V. zones: those in force; none without the feature GEOZONE. cell_voltage: of the
