@@ -151,7 +151,7 @@ def texts_of(flight: Flight) -> list[str]:
 
 
 @pytest.mark.parametrize("tele_prot", [MSP, MAVLINK_57600])
-def test_a_reason_is_told_once_and_again_after_another_start(tele_prot: TelemetryProtocol) -> None:
+def test_a_reason_is_reported_once_and_again_after_another_start(tele_prot: TelemetryProtocol) -> None:
     flight = Flight(tele_prot)
     stalled = replace(LEG, state=FlightPhase.HELD, reason=FlightReason.STALLED)
     for progress in (LEG, stalled, stalled, LEG, stalled):
@@ -159,13 +159,13 @@ def test_a_reason_is_told_once_and_again_after_another_start(tele_prot: Telemetr
     assert texts_of(flight) == ["Mission stopped: too slow against the wind"] * 2
 
 
-def test_the_reason_of_an_earlier_flight_is_not_told() -> None:
+def test_the_reason_from_an_earlier_flight_is_not_reported() -> None:
     flight = Flight()
     flight.reports(FlightProgress(reason=FlightReason.RTL))
     assert texts_of(flight) == []
 
 
-def test_a_low_battery_is_told_while_the_mission_flies() -> None:
+def test_a_low_battery_is_reported_while_the_mission_flies() -> None:
     flight = Flight()
     flight.reports(replace(LEG, battery_low=True))
     assert "Battery low: land, or switch GPS HOME on" in flight.station.texts()
