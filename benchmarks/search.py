@@ -123,7 +123,7 @@ def _noise() -> Figure:
     chance = random.Random(_SEED)
     wrong = fed = 0
     now = 0.0
-    port = Port(SPEEDS, Autopilot.AUTO, (), Runner(), lambda _frames: None)
+    port = Port(SPEEDS, Autopilot.AUTO, (), Runner(), lambda _frames, _kinds: None)
     search = Searching(port, PortOpened(), now)
     while fed < _NOISE_BYTES:
         assert search.speed is not None

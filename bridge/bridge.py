@@ -144,6 +144,7 @@ class Bridge:
             {name: replace(access, passes_everything=passes_everything) for name, access in config.links.items()},
             LinkAccess(passes_everything=passes_everything),
         )
+        self._routes = Routes(ground)
         runner = self._runner = Runner()
         session = self._session = FcSession(
             config.speeds,
@@ -152,7 +153,7 @@ class Bridge:
             emit,
             incidents,
             self._controller_changed,
-            self._mavlink_received,
+            self._routes.from_autopilot,
             owner.autopilot,
             config.flight,
         )
@@ -396,7 +397,8 @@ class Bridge:
 
     def _controller_changed(self, controller: FlightController | None, now: float) -> None:
         self.is_passing_through = controller is not None and controller.profile.spoken is Spoken.OTHER_MAVLINK
-        self._incoming.routes = Routes(self._ground) if self.is_passing_through else None
+        self._routes.forget()
+        self._incoming.routes = self._routes if self.is_passing_through else None
         # A passed-through autopilot represents itself.
         self._own_vehicle.due = inf if self.is_passing_through else min(self._own_vehicle.due, now)
         self._backups.found()
@@ -424,10 +426,6 @@ class Bridge:
         if not isinstance(store, Refusal):
             # Read its list at once: MISSION_CURRENT reports the count, and the first Read needs no wait.
             self._watch.due = now
-
-    def _mavlink_received(self, frames: list[MavlinkFrame]) -> None:
-        if self._incoming.routes is not None:
-            self._incoming.routes.from_autopilot(frames)
 
     def _follow_line(self, now: float) -> None:
         """Pass on new readings, and serve programs, which may use the line when no poll is due."""

@@ -8,6 +8,7 @@ kept as bytes until `settle`.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import repeat
 
 from bridge.fc.mission_flight import flight_report
 from bridge.fc.msp_telemetry import velocity
@@ -16,7 +17,7 @@ from bridge.model.flight_mode import MISSION_BOXES, FlightMode, active_boxes, fl
 from protocols.mavlink.codec import MavlinkDecoder
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
-from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame
+from protocols.mavlink.frame import MavlinkFrame
 from protocols.msp.mission_flight import SUMMARY, decode_summary
 from protocols.msp.telemetry import Sensor
 
@@ -29,6 +30,8 @@ _AUTOPILOT_AT, _NO_AUTOPILOT = 5, bytes((m.MAV_AUTOPILOT_INVALID,))
 _UNKNOWN_U16, _UNKNOWN_U8 = 0xFFFF, 0xFF
 _MAX_RSSI, _HARAKIRI_MAX_RSSI = 254, 255
 _STICKS, _CHANNELS = 4, 18
+#: Messages kept: all of one dialect from a few components.
+_MAX_KINDS = 1024
 #: MAV_SYS_STATUS_SENSOR bits.
 SENSORS = {
     m.MAV_SYS_STATUS_SENSOR_3D_ACCEL: Sensor.ACCELEROMETER,
@@ -52,7 +55,8 @@ class MavlinkTelemetry:
         #: From a Harakiri's heartbeat, with its time; None until one is heard, up to a second after arming.
         self._is_level: tuple[bool, float] | None = None
         self._decoder = MavlinkDecoder()
-        self._unread: dict[int, tuple[MavlinkFrame, float]] = {}
+        #: The newest frame of each kind, and when it was heard. The keys are those of protocols.mavlink.frame.kinds.
+        self._unread: dict[bytes, tuple[bytes, float]] = {}
         self._readers: dict[int, Callable[[Message, float], None]] = {
             _HEARTBEAT: self._heartbeat,
             m.MAVLINK_MSG_ID_SYS_STATUS: self._sys_status,
@@ -74,38 +78,37 @@ class MavlinkTelemetry:
                 m.MAVLINK_MSG_ID_NAMED_VALUE_INT: self._named_value_int,
                 m.MAVLINK_MSG_ID_MISSION_ITEM_REACHED: self._mission_item_reached,
             }
-        #: Message id by the bytes of a frame's header that hold sender and message id.
+        #: The message ids of the kinds that the autopilot sends and that are read; its heartbeats.
         self._known: dict[bytes, int] = {}
+        self._beats: set[bytes] = set()
         self._compid: int | None = None
         #: The sender of a heartbeat since then.
         self._successor: tuple[int, int] | None = None
         #: When the autopilot counts as gone if no heartbeat of it is heard; a Harakiri never does.
         self._gone_at = -math.inf
 
-    def take(self, frames: Sequence[MavlinkFrame], now: float) -> None:
+    def take(self, frames: Sequence[bytes], kinds: Sequence[bytes], now: float) -> None:
         """Keep the newest frames. Heartbeats are read at once: arming must be noticed."""
         if now >= self._gone_at:
             self._recognise(frames, now)
-        known, unread = self._known, self._unread
-        for frame in frames:
-            raw = frame.raw
-            msgid = known.get(raw[5:10] if raw[0] == MAGIC_V2 else raw[3:6])
-            if msgid is not None:
-                unread[msgid] = frame, now
-                if msgid == _HEARTBEAT:
-                    self._successor = None
-                    self._gone_at = max(self._gone_at, now + _GONE_S)
-                    self._read(_HEARTBEAT)
-        if self._is_harakiri:
+        self._unread.update(zip(kinds, zip(frames, repeat(now)), strict=False))
+        if not self._beats.isdisjoint(kinds):
+            self._successor = None
+            self._gone_at = max(self._gone_at, now + _GONE_S)
+            for beat in self._beats.intersection(kinds):
+                self._read(beat, *self._unread.pop(beat))
+        if self._is_harakiri or len(self._unread) > _MAX_KINDS:
             self.settle()
 
     def settle(self) -> None:
         """Read what `take` has kept."""
-        for msgid in [*self._unread]:
-            self._read(msgid)
+        unread, self._unread = self._unread, {}
+        for kind, (frame, heard_at) in unread.items():
+            if kind in self._known:
+                self._read(kind, frame, heard_at)
 
-    def _recognise(self, frames: Sequence[MavlinkFrame], now: float) -> None:
-        for frame in frames:
+    def _recognise(self, frames: Sequence[bytes], now: float) -> None:
+        for frame in map(MavlinkFrame, frames):
             is_heartbeat = frame.msgid == _HEARTBEAT and self._compid in (None, frame.compid)
             if self._is_harakiri or (is_heartbeat and frame.payload[_AUTOPILOT_AT:][:1] != _NO_AUTOPILOT):
                 sender = bytes(frame.sender)
@@ -115,17 +118,17 @@ class MavlinkTelemetry:
                     if former != frame.sender:
                         continue
                     # The values of two autopilots must not mix.
-                    self._unread.clear()
                     self._vehicle.forget()
+                self._unread.clear()
                 self._known, self._compid = keys, frame.compid
+                self._beats = {kind for kind, msgid in keys.items() if msgid == _HEARTBEAT}
                 self._gone_at = math.inf if self._is_harakiri else now + _GONE_S
                 return
 
-    def _read(self, msgid: int) -> None:
-        frame, now = self._unread.pop(msgid)
-        message = self._decoder.decode(frame)
+    def _read(self, kind: bytes, frame: bytes, now: float) -> None:
+        message = self._decoder.decode(MavlinkFrame(frame))
         if message is not None:
-            self._readers[msgid](message, now)
+            self._readers[self._known[kind]](message, now)
 
     def _heartbeat(self, message: Message, now: float) -> None:
         armed = bool(message.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED)

@@ -16,7 +16,6 @@ from bridge.fc.states.searching import Searching
 from bridge.line.runner import Runner
 from bridge.model.events import Emit, FcFound, FcInCommandLine, FcLost, FcSensed, PortLost
 from bridge.model.flight_memory import FlightMemory
-from protocols.mavlink.frame import MavlinkFrame
 
 _Next = Mapping[type[Event] | Spoken, type[State]]
 _LOST: _Next = {Lost: Searching, PortClosed: Closed}
@@ -39,8 +38,8 @@ class FcSession:
     """Runs the state machine of one port.
 
     `on_change` is called with each flight controller that is found, and with None when it is lost or cannot be used.
-    `on_mavlink` gets its MAVLink frames. `incidents`: numbers for the ids of related log lines. `flight`: of the craft
-    that a previous bridge left armed.
+    `on_mavlink` gets its MAVLink frames and their kinds (protocols.mavlink.frame). `incidents`: numbers for the ids of
+    related log lines. `flight`: of the craft that a previous bridge left armed.
     """
 
     def __init__(
@@ -51,7 +50,7 @@ class FcSession:
         emit: Emit,
         incidents: Iterator[int],
         on_change: Callable[[FlightController | None, float], None],
-        on_mavlink: Callable[[list[MavlinkFrame]], None],
+        on_mavlink: Callable[[list[bytes], list[bytes]], None],
         autopilot: Autopilot,
         flight: FlightMemory | None,
     ) -> None:

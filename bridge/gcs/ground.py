@@ -185,9 +185,7 @@ class Ground:
         """Parse bytes from a station into frames. A datagram holds whole frames only."""
         splitter = station.splitter
         bad_before = splitter.bad_frames
-        frames = splitter.feed(data)
-        if datagram and splitter.is_waiting:
-            frames += splitter.reset()
+        frames = [*map(MavlinkFrame, splitter.split(data, is_end=datagram))]
         self.bad_frames += splitter.bad_frames - bad_before
         return frames
 
@@ -311,8 +309,11 @@ class Ground:
         """The datagrams to send; each holds whole frames. Those of one station are in order."""
         datagrams: list[tuple[Peer, bytes]] = []
         for station, frames in self._outgoing.items():
-            for datagram in _in_datagrams(frames) if len(frames) > 1 else frames:
-                datagrams.append((station.peer, datagram))  # noqa: PERF401
+            together = b"".join(frames)
+            if len(together) <= MAX_DATAGRAM_SIZE:
+                datagrams.append((station.peer, together))
+            else:
+                datagrams += ((station.peer, datagram) for datagram in _in_datagrams(frames, together))
         self._outgoing.clear()
         return datagrams
 
@@ -423,16 +424,13 @@ def _drop(_frames: Sequence[bytes]) -> None:
     """The frame listener of a bridge without a log."""
 
 
-def _in_datagrams(frames: Sequence[bytes]) -> list[bytes]:
+def _in_datagrams(frames: Sequence[bytes], together: bytes) -> list[bytes]:
     """Join frames into datagrams of at most 280 bytes: the cost is per datagram, not per byte."""
-    joined = b"".join(frames)
-    if len(joined) <= MAX_DATAGRAM_SIZE:
-        return [joined]
     datagrams: list[bytes] = []
     start = end = 0
     for frame in frames:
         if end + len(frame) > start + MAX_DATAGRAM_SIZE:
-            datagrams.append(joined[start:end])
+            datagrams.append(together[start:end])
             start = end
         end += len(frame)
-    return [*datagrams, joined[start:]]
+    return [*datagrams, together[start:]]

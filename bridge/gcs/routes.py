@@ -13,7 +13,7 @@ from bridge.gcs.cost import SEATS, Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import GroundStation
 from protocols.mavlink.dialect import messages
-from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame
+from protocols.mavlink.frame import MavlinkFrame
 
 #: Messages remembered that have no target: all of one dialect from a few components.
 _MAX_KINDS = 1024
@@ -25,24 +25,26 @@ _HEARTBEAT = messages.MAVLINK_MSG_ID_HEARTBEAT
 
 
 class Routes:
-    """The routes while one autopilot is on the port."""
+    """The routes of the autopilot on the port, while there is one."""
 
     def __init__(self, ground: Ground) -> None:
         self._ground = ground
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin again with another autopilot."""
         self._aboard: set[tuple[int, int]] = set()
         #: The station without its own budget that is the next to get telemetry.
         self._turn = 0
-        #: Messages without a target, by the bytes of the header that hold sender and message id.
+        #: The kinds (protocols.mavlink.frame) of messages without a target.
         self._for_all: set[bytes] = set()
 
-    def from_autopilot(self, frames: Sequence[MavlinkFrame]) -> None:
+    def from_autopilot(self, frames: Sequence[bytes], kinds: Sequence[bytes]) -> None:
         """Send the autopilot's frames on; those that arrived together share datagrams unless one has a target."""
-        raws = [frame.raw for frame in frames]
-        kinds = [raw[5:10] if raw[0] == MAGIC_V2 else raw[3:6] for raw in raws]
-        if self._for_all.issuperset(kinds) or all(map(self._is_for_all, kinds, frames)):
-            self._send(raws)
+        if self._for_all.issuperset(kinds) or all(map(self._is_for_all, kinds, map(MavlinkFrame, frames))):
+            self._send(frames)
             return
-        for frame in frames:
+        for frame in map(MavlinkFrame, frames):
             self._send_alone(frame)
 
     def addressed(self, system: int, component: int = 0) -> tuple[int, int] | None:
@@ -94,7 +96,7 @@ class Routes:
         self._ground.on_frames([frame.raw])
         self._ground.forward([frame.raw], self._stations_of(system, component))
 
-    def _send(self, frames: list[bytes]) -> None:
+    def _send(self, frames: Sequence[bytes]) -> None:
         self._ground.on_frames(frames)
         stations = self._ground.everyone()
         if len(stations) > SEATS and _HEARTBEAT not in (MavlinkFrame(raw).msgid for raw in frames):

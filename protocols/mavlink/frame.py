@@ -5,6 +5,7 @@ Frames are checked by CRC but not decoded: forwarding needs only the bytes.
 """
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from fastcrc.crc16 import mcrf4xx
@@ -112,6 +113,11 @@ class MavlinkFrame:
         return self.raw[start : start + self.raw[1]]
 
 
+def kinds(frames: Iterable[bytes]) -> list[bytes]:
+    """The bytes of each whole frame's header that hold its sender and message id."""
+    return [frame[5:10] if frame[0] == MAGIC_V2 else frame[3:6] for frame in frames]
+
+
 def is_plausible_heartbeat(frame: MavlinkFrame) -> bool:
     """True for a HEARTBEAT with legal length, type, autopilot, state and version (common.xml): evidence of MAVLink."""
     if frame.msgid != _HEARTBEAT or len(payload := frame.payload) != _HEARTBEAT_SIZE:
@@ -173,12 +179,16 @@ class MavlinkSplitter:
         return self.feed(b"", is_end=True)
 
     def feed(self, data: bytes, *, is_end: bool = False) -> list[MavlinkFrame]:
-        """Take received bytes; return the completed frames. `is_end`: drop an incomplete one.
+        """Take received bytes; return the completed frames. `is_end`: drop an incomplete one."""
+        return [*map(MavlinkFrame, self.split(data, is_end=is_end))]
+
+    def split(self, data: bytes, *, is_end: bool = False) -> list[bytes]:
+        """The same for frames that are only forwarded.
 
         One loop, with no call per frame except the CRC's: this is the main cost of forwarding a frame.
         """
         data = self._buffer + data
-        frames: list[MavlinkFrame] = []
+        frames: list[bytes] = []
         start, size = 0, len(data)
         while start < size:
             magic = data[start]
@@ -205,7 +215,7 @@ class MavlinkSplitter:
                 if end <= size:
                     # The CRC of bytes that end in their own CRC is 0.
                     if not mcrf4xx(data[start + 1 : crc_at] + crc_extra + data[crc_at : crc_at + _CRC_SIZE]):
-                        frames.append(MavlinkFrame(data[start:end]))
+                        frames.append(data[start:end])
                         start = end
                         if end > crc_at + _CRC_SIZE:
                             start -= _SIGNATURE_SIZE

@@ -149,13 +149,13 @@ class FcConnection:
         self._flush()
         self._report_search()
 
-    def _received(self, data: bytes) -> None:
+    def _received(self, data: bytes, now: float) -> None:
         if self.capture is not None:
             self.capture.note(UartAction.READ, self._speed, data)
         bridge = self._bridge
         if self._finder is not None:
             self._finder.received(data)
-        has_changed = bridge.fc_received(data, self._loop.time())
+        has_changed = bridge.fc_received(data, now)
         if bridge.is_passing_through:
             self._forward()
         elif has_changed:

@@ -6,12 +6,14 @@ import os
 import socket
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, closing, suppress
+from math import inf
 
 import serial
 import structlog
 
 from service.links.fc_device import DEVICE_ERRORS, Device, PortError, PortInUseError, send_last_frame
 from service.links.traffic import Traffic
+from service.machine.event_loop import EventLoop
 from storage.os_error import reason
 
 #: The reason given to `on_close` at the end of the daemon.
@@ -26,12 +28,15 @@ _IN_USE_RETRY_S = 2.0
 #: Unsent bytes above this are dropped: ground stations can send faster than a UART.
 _MAX_UNSENT = 8192
 #: So many reads within a window are gathered from then on, several a wake-up: telemetry that is a few ms older costs
-#: the pilot less than the wake-ups cost the CPU. Timers round up to whole ms.
-_MANY_READS, _RATE_WINDOW_S = 25, 0.25
-_GATHERED, _GATHERED_SIZE = 4, 1024
-_SHORTEST_DELAY_S, _LONGEST_DELAY_S = 0.0019, 0.0119
-#: The part of the rate at the start of gathering within which its delay still fits.
-_SAME_RATE = (0.75, 1.5)
+#: the pilot less than the wake-ups cost the CPU.
+_MANY_READS, _WINDOW_S = 25, 0.25
+#: A little less than a datagram holds (bridge/gcs/ground.py): two cost twice as much.
+_GATHERED_SIZE = 250
+_SHORTEST_DELAY_S, _LONGEST_DELAY_S = 0.002, 0.012
+#: Gathering with a long delay ends at a read of so many bytes.
+_MUCH = 1024
+#: Any gathering ends after such a window with less than this part of the rate at its start.
+_LONG_WINDOW_S, _LEAST_PART = 1.0, 0.4
 #: After a request, replies are read without delay for this long.
 _REPLIES_S = 0.25
 
@@ -50,7 +55,7 @@ class FcPort:
         self,
         open_device: Callable[[], Awaitable[Device]],
         on_open: Callable[[], None],
-        on_data: Callable[[bytes], None],
+        on_data: Callable[[bytes, float], None],
         on_close: Callable[[str], None],
         traffic: Traffic,
     ) -> None:
@@ -76,13 +81,13 @@ class FcPort:
         self.dropped_bytes = 0
         #: Reads may be delayed by a few ms, unless a reply is pending.
         self.may_gather = False
-        self._gathering: asyncio.TimerHandle | None = None
+        self._is_gathering = False
         self._gathers_from = 0.0
-        self._delay_s = 0.0
         self._window_began = 0.0
         self._window_bytes = 0  # received before it
-        self._next_look = _MANY_READS
+        self._next_look = self._reads_until_look = _MANY_READS
         self._bytes_per_s = 0.0  # when gathering began
+        self._most = inf
 
     async def run(self) -> None:
         """Open the port and keep reopening it; cancel to end."""
@@ -147,7 +152,7 @@ class FcPort:
         """Write without blocking; the rest is sent when the port is writable. `asks`: a reply is expected."""
         if self._device is None:
             return
-        if asks and self.may_gather:
+        if asks and (self.may_gather or self._is_gathering):
             self._gathers_from = self._loop.time() + _REPLIES_S
             self._read_at_once()
         if self._unsent:
@@ -177,71 +182,66 @@ class FcPort:
             self._loop.remove_writer(self._descriptor)
 
     def _readable(self) -> None:
-        data = self._read()
-        if data:
-            self._on_data(data)
-        if self._traffic.pieces_received >= self._next_look:
-            # The clock is read only now: at each read it would cost too much.
-            self._judge_rate(self._loop.time())
+        self._read(self._loop.time())
+
+    def _read(self, now: float) -> None:
+        try:
+            data = os.read(self._descriptor, _READ_SIZE)
+        except BlockingIOError:
+            # Gathering: nothing has arrived.
+            self._judge_rate(now)
+            return
+        except OSError as error:
+            self._shut(reason(error))
+            return
+        if not data:
+            self._shut("the other end closed the connection")
+            return
+        traffic = self._traffic
+        traffic.pieces_received += 1
+        traffic.bytes_received += len(data)
+        if self._is_tcp:
+            self._acknowledge()
+        if len(data) > self._most:
+            self._read_at_once()  # until the new rate is known
+        elif traffic.pieces_received >= self._next_look:
+            self._judge_rate(now)
+        self._on_data(data, now)
 
     def _judge_rate(self, now: float) -> None:
-        """Begin to gather if there were many reads in a short time."""
+        """Begin to gather after many reads in a short time; end it when less has arrived for longer."""
         window_s, size = now - self._window_began, self._traffic.bytes_received - self._window_bytes
-        self._begin_window(now)
-        is_busy = window_s < _RATE_WINDOW_S
-        if is_busy and self.may_gather and self._device is not None and now >= self._gathers_from:
-            self._loop.remove_reader(self._descriptor)
-            delay_s = window_s * min(_GATHERED / _MANY_READS, _GATHERED_SIZE / size)
-            self._delay_s = min(max(delay_s, _SHORTEST_DELAY_S), _LONGEST_DELAY_S)
-            self._bytes_per_s = size / window_s
-            self._gathering = self._loop.call_later(self._delay_s, self._gather)
-
-    def _gather(self) -> None:
-        """Read what arrived during the delay, and repeat until the rate changes."""
-        data = self._read()
-        if self._device is None:
-            return
-        self._gathering = self._loop.call_later(self._delay_s, self._gather)
-        now = self._loop.time()
-        if (window_s := now - self._window_began) >= _RATE_WINDOW_S:
-            least, most = (self._bytes_per_s * window_s * part for part in _SAME_RATE)
-            if not (self.may_gather and least <= self._traffic.bytes_received - self._window_bytes <= most):
+        if self._is_gathering:
+            if window_s < _LONG_WINDOW_S:
+                return
+            if not self.may_gather or size < self._bytes_per_s * window_s * _LEAST_PART:
                 self._read_at_once()
-            self._begin_window(now)
-        if data:
-            self._on_data(data)
-
-    def _begin_window(self, now: float) -> None:
+        elif window_s < _WINDOW_S and self.may_gather and now >= self._gathers_from:
+            self._begin_gathering(size / window_s)
         self._window_began = now
         self._window_bytes = self._traffic.bytes_received
-        self._next_look = self._traffic.pieces_received + _MANY_READS
+        self._next_look = self._traffic.pieces_received + self._reads_until_look
+
+    def _begin_gathering(self, bytes_per_s: float) -> None:
+        if isinstance(self._loop, EventLoop):
+            delay_s = min(max(_GATHERED_SIZE / bytes_per_s, _SHORTEST_DELAY_S), _LONGEST_DELAY_S)
+            self._is_gathering, self._bytes_per_s = True, bytes_per_s
+            self._most = inf if delay_s < 2 * _SHORTEST_DELAY_S else _MUCH
+            self._reads_until_look = int(_LONG_WINDOW_S / delay_s)
+            self._loop.remove_reader(self._descriptor)
+            self._loop.repeat(delay_s, self._read)
 
     def _read_at_once(self) -> None:
-        if self._gathering is not None:
+        if self._is_gathering:
             self._stop_gathering()
             self._loop.add_reader(self._descriptor, self._readable)
 
     def _stop_gathering(self) -> None:
-        if self._gathering is not None:
-            self._gathering.cancel()
-            self._gathering = None
-
-    def _read(self) -> bytes:
-        try:
-            data = os.read(self._descriptor, _READ_SIZE)
-        except BlockingIOError:
-            return b""
-        except OSError as error:
-            self._shut(reason(error))
-            return b""
-        if not data:
-            self._shut("the other end closed the connection")
-            return data
-        self._traffic.pieces_received += 1
-        self._traffic.bytes_received += len(data)
-        if self._is_tcp:
-            self._acknowledge()
-        return data
+        if self._is_gathering and isinstance(self._loop, EventLoop):
+            self._is_gathering, self._most = False, inf
+            self._reads_until_look = _MANY_READS
+            self._next_look = self._traffic.pieces_received + _MANY_READS
+            self._loop.stop_repeating()
 
     def _acknowledge(self) -> None:
         """Let the TCP connection acknowledge received bytes at once, not 40 ms later.

@@ -2,6 +2,7 @@
 """Records from the event loop to a slow disk, through a thread: the loop never waits."""
 
 import threading
+from collections import deque
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
@@ -27,10 +28,10 @@ class DiskWriter(Generic[T]):
         self._name = name
         self._write = write
         self._on_end = on_end
-        self._waiting: list[T] = []
-        self._size = 0
+        # Without a lock: `put` only appends and adds, the thread only removes.
+        self._waiting: deque[tuple[T, int]] = deque()
+        self._size_put = self._size_taken = 0
         self._ending = threading.Event()
-        self._lock = threading.Lock()
         #: Bytes dropped because too many were waiting.
         self.dropped = 0
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
@@ -38,11 +39,10 @@ class DiskWriter(Generic[T]):
 
     def put(self, record: T, size: int) -> None:
         """Queue a record of `size` bytes, or drop it if too many are waiting."""
-        with self._lock:
-            if self._size + size <= _MAX_WAITING:
-                self._waiting.append(record)
-                self._size += size
-                return
+        if self._size_put - self._size_taken + size <= _MAX_WAITING:
+            self._waiting.append((record, size))
+            self._size_put += size
+            return
         if not self.dropped:
             _log.warning("disk.too_slow", writing=self._name, why="the disk does not keep up; some data is dropped")
         self.dropped += size
@@ -59,9 +59,9 @@ class DiskWriter(Generic[T]):
         self._on_end()
 
     def _flush(self) -> None:
-        with self._lock:
-            records, self._waiting, self._size = self._waiting, [], 0
+        taken = [self._waiting.popleft() for _ in range(len(self._waiting))]
+        self._size_taken += sum(size for _, size in taken)
         try:
-            self._write(records)
+            self._write([record for record, _ in taken])
         except Exception:  # a bug must not end the recording
             _log.exception("daemon.fault", what=f"writing the {self._name}")

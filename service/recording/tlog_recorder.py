@@ -20,7 +20,9 @@ _Taken = tuple[int, bool, Sequence[bytes]]
 
 
 class TlogRecorder:
-    """Offers `on_frames`. Within a file time advances evenly; when the clock is set a new file begins.
+    """Takes whole frames that were received or are being sent by `on_frames`.
+
+    Within a file time advances evenly; when the clock is set a new file begins.
 
     A file begins without ground stations' heartbeats: Mission Planner shows the system whose HEARTBEAT comes first in a
     log, and recognises only the systems 255 and 253 as ground stations. They are left out until a vehicle's HEARTBEAT.
@@ -35,16 +37,14 @@ class TlogRecorder:
         self._is_flying = False
         self._awaits_vehicle = True
         self._frames: list[bytes] = []
+        self.on_frames: Callable[[Sequence[bytes]], None] = self._frames.extend
         self._writer = DiskWriter("telemetry log", self._write, self._folder.close)
-
-    def on_frames(self, frames: Sequence[bytes]) -> None:
-        """Take whole frames that were received or are being sent."""
-        self._frames += frames
 
     def record(self) -> None:
         """Record the frames taken since the last call: after the datagrams were sent, which must not wait for this."""
         if self._frames:
-            frames, self._frames = self._frames, []
+            frames = tuple(self._frames)
+            self._frames.clear()
             self._writer.put((time.monotonic_ns(), self._is_flying, frames), sum(map(len, frames)))
 
     def flies(self, *, is_flying: bool) -> None:

@@ -78,7 +78,7 @@ class Port:
     autopilot: Autopilot
     profiles: Sequence[Profile]
     runner: Runner
-    on_mavlink: Callable[[list[MavlinkFrame]], None]
+    on_mavlink: Callable[[list[bytes], list[bytes]], None]
     polls: PollSchedule = field(default_factory=PollSchedule)
     vehicle: Vehicle = field(default_factory=Vehicle)
     #: The bytes to be written to the port, in order.

@@ -10,7 +10,7 @@ from bridge.line.msp_link import PROBE, byte_time_s
 from bridge.model.vehicle import Source
 from protocols.mavlink.codec import FrameWriter, Packed
 from protocols.mavlink.dialect import messages
-from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter, is_autopilot_heartbeat
+from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter, is_autopilot_heartbeat, kinds
 from protocols.msp.command_line import HAZARDS, RUN_LENGTH
 from protocols.msp.frame import MspParser
 
@@ -22,7 +22,7 @@ _LINE_SILENCE_S = 0.1
 #: state was chosen. Those closer together than `_BEAT_S` count as one: every autopilot sends one a second.
 _STEADY_BEATS, _BEAT_S = 5, 0.7
 #: The size of a heartbeat's frame: MAVLink 1, MAVLink 2, and signed.
-_HEARTBEAT_SIZES = (17, 21, 34)
+_HEARTBEAT_SIZES = frozenset((17, 21, 34))
 #: Armed it sends its attitude 30 times a second: when that ends, it has disarmed and changed its speed.
 _ARMED_SILENCE_S = 0.8
 #: Its stream of 1600 bytes a second overruns its own send ring on a slow line, so most frames are torn: before it
@@ -56,15 +56,22 @@ class MavlinkLine(State):
     def bad_checksums(self) -> int | None:
         return self._splitter.bad_frames
 
-    def receive(self, data: bytes, now: float) -> Event | None:
+    def receive(self, data: bytes, now: float, *, is_end: bool = False) -> Event | None:
+        """`is_end`: an incomplete frame is dropped."""
         self._last_byte_at = now
-        return self._take(self._splitter.feed(data), now)
+        frames = self._splitter.split(data, is_end=is_end)
+        if not frames:
+            return None
+        self._heard_at = now
+        self.take(frames, now)
+        # Measured first: there may be thousands of frames a second.
+        return None if _HEARTBEAT_SIZES.isdisjoint(map(len, frames)) else self._revision(frames, now)
 
     def tick(self, now: float) -> Event | None:
         event = None
         if self._splitter.is_waiting and now >= self._last_byte_at + _LINE_SILENCE_S:
             # Frames may be hidden behind a false header.
-            event = self._take(self._splitter.reset(), now)
+            event = self.receive(b"", now, is_end=True)
         # Checked ten times a second rather than after each byte: a timer per byte would cost more than the frames.
         self._look_at = now + _LINE_SILENCE_S
         if now >= self._heard_at + self.timeout_s:
@@ -82,21 +89,13 @@ class MavlinkLine(State):
         return _SILENCE_S
 
     @abstractmethod
-    def take(self, frames: list[MavlinkFrame], now: float) -> None:
+    def take(self, frames: list[bytes], now: float) -> None:
         """Handle frames of the flight controller."""
 
-    def _take(self, frames: list[MavlinkFrame], now: float) -> Found | None:
-        if not frames:
-            return None
-        self._heard_at = now
-        self.take(frames, now)
-        return self._revision(frames, now)
-
-    def _revision(self, frames: list[MavlinkFrame], now: float) -> Found | None:
+    def _revision(self, frames: list[bytes], now: float) -> Found | None:
         """The other state, if its flight controller is the only one heard."""
-        for frame in frames:
-            # Measured first: there may be thousands of frames a second.
-            if len(frame.raw) not in _HEARTBEAT_SIZES or not is_autopilot_heartbeat(frame):
+        for frame in map(MavlinkFrame, frames):
+            if not is_autopilot_heartbeat(frame):
                 continue
             if frame.sender != self._beating:
                 self._beating, self._beats = frame.sender, 0
@@ -119,11 +118,12 @@ class PassThrough(MavlinkLine):
         self.telemetry = port.telemetry
         port.meet(self.controller)
         assert event.heard is not None
-        self.telemetry.take([event.heard], now)
+        self.telemetry.take(heard := [event.heard.raw], kinds(heard), now)
 
-    def take(self, frames: list[MavlinkFrame], now: float) -> None:
-        self.telemetry.take(frames, now)
-        self.port.on_mavlink(frames)
+    def take(self, frames: list[bytes], now: float) -> None:
+        their_kinds = kinds(frames)
+        self.telemetry.take(frames, their_kinds, now)
+        self.port.on_mavlink(frames, their_kinds)
 
 
 class HarakiriMavlink(MavlinkLine):
@@ -140,12 +140,12 @@ class HarakiriMavlink(MavlinkLine):
         if event.heard.msgid != messages.MAVLINK_MSG_ID_HEARTBEAT:
             # Unprompted, it sends more than heartbeats only while armed.
             port.hear_armed(Source.MAVLINK, now)
-        self._telemetry.take([event.heard], now)
+        self._telemetry.take(heard := [event.heard.raw], kinds(heard), now)
 
-    def receive(self, data: bytes, now: float) -> Event | None:
+    def receive(self, data: bytes, now: float, *, is_end: bool = False) -> Event | None:
         if self._msp.feed(data):
             return Lost("it answers MSP again", (self.speed,))
-        return super().receive(data, now)
+        return super().receive(data, now, is_end=is_end)
 
     def tick(self, now: float) -> Event | None:
         """Ask for MSP now and then, but not during a conversation."""
@@ -160,13 +160,13 @@ class HarakiriMavlink(MavlinkLine):
     def due(self) -> float:
         return min(super().due, self._probe_due)
 
-    def take(self, frames: list[MavlinkFrame], now: float) -> None:
+    def take(self, frames: list[bytes], now: float) -> None:
         was_armed = self.port.vehicle.armed
-        self._telemetry.take(frames, now)
+        self._telemetry.take(frames, kinds(frames), now)
         if was_armed and not self.port.vehicle.armed:
             self._probe_due = now
         if self.port.runner.is_busy:
-            for frame in frames:
+            for frame in map(MavlinkFrame, frames):
                 self.port.runner.received_mavlink(frame, now)
 
     @property

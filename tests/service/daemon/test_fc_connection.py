@@ -79,7 +79,8 @@ async def test_a_port_that_fails_to_close_is_reported_as_closed() -> None:
 
     opened = asyncio.Event()
     closed: list[str] = []
-    running = asyncio.create_task(FcPort(open_device, opened.set, lambda _: None, closed.append, Traffic()).run())
+    port = FcPort(open_device, opened.set, lambda _data, _now: None, closed.append, Traffic())
+    running = asyncio.create_task(port.run())
     await opened.wait()
     running.cancel()
     await asyncio.wait([running])

@@ -30,7 +30,7 @@ async def test_received_bytes_are_acknowledged_at_once() -> None:
         port = FcPort(
             device_opener(TcpFc("127.0.0.1", listener.getsockname()[1])),
             lambda: None,
-            lambda data: received.put_nowait(unacknowledged(board)),
+            lambda _data, _now: received.put_nowait(unacknowledged(board)),
             lambda _: None,
             Traffic(),
         )
@@ -63,7 +63,7 @@ async def test_a_connection_that_confirms_nothing_is_lost(monkeypatch: pytest.Mo
         port = FcPort(
             device_opener(TcpFc("127.0.0.1", listener.getsockname()[1])),
             lambda: None,
-            lambda _: None,
+            lambda _data, _now: None,
             lambda why: None if lost.done() else lost.set_result(why),
             Traffic(),
         )

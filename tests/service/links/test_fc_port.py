@@ -52,7 +52,7 @@ class Line:
         return self.port
 
     def is_gathering(self) -> bool:
-        return self.port._gathering is not None
+        return self.port._is_gathering
 
     async def stop(self) -> None:
         self._task.cancel()
@@ -107,7 +107,7 @@ class Line:
     def _on_open(self) -> None:
         self.opened += 1
 
-    def _on_data(self, data: bytes) -> None:
+    def _on_data(self, data: bytes, _now: float) -> None:
         self.reads += 1
         self.received += data
 
@@ -149,6 +149,21 @@ async def test_gathering_ends_when_a_reply_is_expected(line: Line) -> None:
     assert not line.is_gathering()
     sent = await line.feed(sent, 30, 1_000)
     await line.has_come(sent)
+    await line.stop()
+
+
+async def test_gathering_with_a_long_delay_ends_when_much_arrives_at_once(line: Line) -> None:
+    """At the new rate the delay may be too long."""
+    port = line.start()
+    await until_async(lambda: line.opened, "the port")
+    port.may_gather = True
+    sent = 0
+    while not line.is_gathering():
+        sent = await line.feed(sent, 10, 200)
+    await line.has_come(sent)
+    os.write(line.wire, b"".join(map(attitude, range(sent, sent + 30))))
+    await line.has_come(sent + 30)
+    assert not line.is_gathering()
     await line.stop()
 
 
@@ -330,7 +345,7 @@ async def test_after_each_loss_there_is_a_pause(monkeypatch: pytest.MonkeyPatch)
         far.close()
         return near
 
-    port = FcPort(open_device, lambda: None, lambda _data: None, lost.append, Traffic())
+    port = FcPort(open_device, lambda: None, lambda _data, _now: None, lost.append, Traffic())
     running = asyncio.get_running_loop().create_task(port.run())
     await until_async(lambda: lost, "the loss")
     for _ in range(50):
@@ -352,7 +367,7 @@ async def test_a_port_in_use_is_tried_less_often(line: Line, monkeypatch: pytest
         return open_serial(str(line.path))
 
     with serial.Serial(str(line.path), exclusive=True):
-        port = FcPort(open_device, lambda: None, lambda _data: None, lambda _why: None, Traffic())
+        port = FcPort(open_device, lambda: None, lambda _data, _now: None, lambda _why: None, Traffic())
         running = asyncio.get_running_loop().create_task(port.run())
         await until_async(lambda: port.trouble, "the failure")
         for _ in range(50):

@@ -9,7 +9,7 @@ import pytest
 from bridge.fc.mavlink_telemetry import MavlinkTelemetry
 from bridge.model.vehicle import Fix, GpsFix, GpsTime, Source, Vehicle
 from protocols.mavlink.dialect import messages as m
-from protocols.mavlink.frame import MavlinkSplitter
+from protocols.mavlink.frame import kinds
 from service.zenoh_link.time_source import SampleClock
 
 NOW = 1000.0
@@ -62,7 +62,8 @@ def test_a_mavlink_autopilots_time_is_used_once_it_has_one(unix_s: float, known:
     vehicle, codec = Vehicle(), m.MAVLink(None, srcSystem=1, srcComponent=1)
     telemetry = MavlinkTelemetry(vehicle, is_harakiri=False)
     sent = m.MAVLink_heartbeat_message(2, 3, 0, 0, 4, 3), m.MAVLink_system_time_message(round(unix_s * 1e6), 9)
-    telemetry.take(MavlinkSplitter().feed(b"".join(bytes(each.pack(codec)) for each in sent)), NOW)
+    frames = [bytes(each.pack(codec)) for each in sent]
+    telemetry.take(frames, kinds(frames), NOW)
     telemetry.settle()
     heard_time = vehicle.last(GpsTime)
     assert (None if heard_time is None else heard_time.unix_s) == known
