@@ -81,8 +81,10 @@ class InavMissions(NavMissions, FliesToItems):
     _are_limits_doubtful = True
     #: A board that does not answer about them is asked again only at the next upload.
     _are_limits_silent = False
-    #: All of the board's landing approaches, as last read, and as they are to be after the Write.
-    _approaches: tuple[FwApproach, ...] = ()
+    #: All of the board's landing approaches, as last read; None: they may have changed.
+    _approaches: tuple[FwApproach, ...] | None = None
+    #: The same before the current Write, and as they are to be after it.
+    _former_approaches: tuple[FwApproach, ...] = ()
     _wanted_approaches: tuple[FwApproach, ...] = ()
 
     def __init__(self, profile: NavProfile, controller: FlightController, vehicle: Vehicle) -> None:
@@ -92,12 +94,15 @@ class InavMissions(NavMissions, FliesToItems):
         self._board = controller
 
     def report(self) -> Conversation[StoreReport | None]:
-        """Also read the settings that the rules depend on, if they may have changed."""
+        """Also read the settings and approaches that the rules depend on, if they may have changed."""
         yield from self._read_limits()
+        if self._approaches is None and not self._vehicle.armed:
+            self._approaches = yield from read_approaches(range(APPROACHES))
         return (yield from super().report())
 
     def settings_changed(self) -> None:
         self._are_limits_doubtful, self._are_limits_silent = True, False
+        self._approaches = None
 
     def erased_by(self, records: Sequence[NavRecord]) -> tuple[Mission, ...]:
         """The last of the others, as many as do not fit."""
@@ -107,7 +112,7 @@ class InavMissions(NavMissions, FliesToItems):
         """Write the list, with the other missions behind it, and verify it."""
         result = yield from super().push(records, progress)
         if result.failure is None:
-            self._approaches = self._wanted_approaches
+            self._approaches = self._approaches and self._wanted_approaches
             self._stored = self._store_content(records or NOTHING)
             self.others = self._kept
         return result
@@ -200,7 +205,7 @@ class InavMissions(NavMissions, FliesToItems):
         if limits is not None:
             power = self._vehicle.last(Power)
             cell_v = power.voltage_v / power.cells if power and power.voltage_v and power.cells else None
-            approaches = self._moved_approaches()
+            approaches = self._moved_approaches(self._approaches or ())
             limits = replace(
                 limits,
                 cell_voltage=cell_v,
@@ -217,11 +222,9 @@ class InavMissions(NavMissions, FliesToItems):
         values = yield from read_values(SETTING_NAMES)
         safehomes = (yield from read_safehomes()) if values else ()
         zones = (yield from read_zones_in_force()) if values and self._has_zones else ()
-        approaches = (yield from read_approaches(range(APPROACHES))) if values else ()
-        if values is None or safehomes is None or zones is None or approaches is None:
+        if values is None or safehomes is None or zones is None:
             self._are_limits_doubtful = self._are_limits_silent = True
         elif values:
-            self._approaches = approaches
             limits = InavLimits(safehomes=safehomes, zones=zones, is_aeroplane=self._is_aeroplane)
             self._limits = limits.with_settings(values)
 
@@ -230,20 +233,20 @@ class InavMissions(NavMissions, FliesToItems):
         """The number of the mission that the new list replaces, from 1."""
         return self._seen[1] if self._seen and self.others else 1
 
-    def _moved_approaches(self) -> tuple[FwApproach, ...]:
+    def _moved_approaches(self, before: tuple[FwApproach, ...]) -> tuple[FwApproach, ...]:
         """Each mission keeps its approach; the new list, which is stored first, gets that of the one it replaces."""
         others = [number for number in range(1, len(self.others) + 2) if number != self._selected]
-        approaches = [*self._approaches]
+        approaches = [*before]
         for place, number in enumerate((self._selected, *others[: len(self._kept)]), MISSION_APPROACH):
-            before = MISSION_APPROACH + number - 1
-            if max(place, before) < len(approaches):
-                approaches[place] = self._approaches[before]._replace(number=place)
+            former = MISSION_APPROACH + number - 1
+            if max(place, former) < len(before):
+                approaches[place] = before[former]._replace(number=place)
         return tuple(approaches)
 
     def _store_content(self, records: Mission) -> Mission:
         """SAVE selects the first mission, so the new one goes there."""
         self._kept = self.others[: len(self.others) - len(self.erased_by(records))]
-        self._wanted_approaches = self._moved_approaches()
+        self._wanted_approaches = self._moved_approaches(self._former_approaches)
         return (*records, *chain.from_iterable(self._kept))
 
     def _order(self, wanted: Mission) -> list[tuple[int, NavRecord]]:
@@ -255,7 +258,7 @@ class InavMissions(NavMissions, FliesToItems):
             raise PushFailed(PushFailure.NO_ANSWER)
         if not info.is_valid or info.count != count:
             raise PushFailed(PushFailure.REFUSED, is_final=False)
-        if not (yield from write_approaches(self._wanted_approaches, self._approaches)):
+        if not (yield from write_approaches(self._wanted_approaches, self._former_approaches)):
             raise PushFailed(PushFailure.NO_ANSWER, is_final=False)
 
     def _keep(self) -> Conversation[None]:
@@ -286,12 +289,13 @@ class InavMissions(NavMissions, FliesToItems):
         self._seen = yield from self._look()
 
     def _confirm(self, before: Mission | None) -> Conversation[Mission | None]:
-        if self._is_aeroplane or not all(each.is_empty for each in self._approaches):
+        known = self._approaches
+        if known is None or self._is_aeroplane or not all(each.is_empty for each in known):
             # Another client may have set one since.
-            approaches = yield from read_approaches(range(APPROACHES))
-            if approaches is None:
+            self._approaches = yield from read_approaches(range(APPROACHES))
+            if self._approaches is None:
                 raise PushFailed(PushFailure.NO_ANSWER)
-            self._approaches = approaches
+        self._former_approaches = self._approaches or ()
         if (yield from self._is_unchanged((yield from self._look()))):
             return before
         # Another client has written or loaded a list since: its other missions must be kept, too.
@@ -303,19 +307,19 @@ class InavMissions(NavMissions, FliesToItems):
         """Make it LOAD the saved missions; if that is not the old list, write that one again."""
         if self._vehicle.armed:
             return False
-        self._wanted_approaches = self._approaches
+        self._wanted_approaches = self._former_approaches
         with suppress(LinkLost):
             yield from ask(LOAD_REQUEST, Nav.LOAD, 0)
             loaded = yield from self.pull()
             if loaded == before and (loaded or self.others):
-                return (yield from write_approaches(self._approaches, self._approaches))
+                return (yield from write_approaches(self._former_approaches, self._former_approaches))
         return (yield from super()._restore(before))
 
     def _restore_at_once(self, before: Mission | None) -> Conversation[bool]:
         """Make it LOAD the saved missions: the old list, unless another client wrote one without saving it."""
         with suppress(LinkLost):
             yield from ask(LOAD_REQUEST, Nav.LOAD, 0, tries=1)
-            yield from write_approaches(self._approaches, self._approaches)
+            yield from write_approaches(self._former_approaches, self._former_approaches)
             return bool(before) and (yield from self._is_unchanged((yield from self._look())))
         return False
 
