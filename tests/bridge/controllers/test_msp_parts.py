@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 from bridge.settings.fc_settings import Cause
+from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction
-from tests.support.settings_client import BOARDS, cause_of, ready, value_of
+from tests.support.fake_controllers import HARAKIRI_CAPABILITY, MspFake, ident
+from tests.support.settings_client import BOARDS, SettingsClient, cause_of, ready, value_of
 from tests.support.share_program import ShareProgram
+from tests.support.world import World
 
 SET_PID = 202
 
@@ -22,3 +25,19 @@ def test_a_change_by_another_program_is_read_again() -> None:
     assert reply.direction is Direction.REPLY
     world.run(10)
     assert client.value("ROLL_P") == 99
+
+
+def test_settings_of_an_unknown_firmware_are_shown_and_never_written() -> None:
+    board = MspFake(
+        {
+            Msp.IDENT: ident(230, HARAKIRI_CAPABILITY),
+            Msp.BOXNAMES: b"ARM;ANGLE;",
+            Msp.STATUS: bytes(11),
+            Msp.PIDNAMES: b"ROLL;PITCH;",
+            Msp.PID: bytes((40, 30, 23, 41, 31, 24)),
+        }
+    )
+    client = SettingsClient(World(peer=board))
+    assert client.wait_read().settings["PITCH_P"].value == 41
+    assert cause_of(client.change("PITCH_P", 45)) is Cause.FIXED
+    assert SET_PID not in board.asked

@@ -281,3 +281,15 @@ def test_a_harmless_request_follows_a_frame_with_a_hazard_byte_if_the_board_acce
     assert now < 0.1
     link.tick(now)
     assert sent(link) == [Msp.API_VERSION]
+    link.tick(now + 0.001)
+    assert sent(link) == []
+
+
+def test_another_request_does_as_well_as_a_follow_up() -> None:
+    link = MspLink(115200, [], 0.0)
+    link.any_byte = True
+    link.send(Send(request(100, b"#"), 100, 13), 0.0)
+    due = link.due
+    link.send(question(101, 11), 0.01)
+    link.tick(due)
+    assert sent(link) == [100, 101]
