@@ -135,12 +135,13 @@ class Firmware:
         """The time of the next main loop with work to do; None if it waits for a byte or the pilot."""
         if self._resets_at is not None:
             return self._resets_at
-        wanted = [self._uart.next_arrival()]
+        earliest = self._uart.next_arrival()
         if not self.in_cli:
             if self._pilot_is_obeyed():
                 return self._next_loop
-            wanted += [self._board.config_write_due, self._telemetry_due()]
-        earliest = min((at for at in wanted if at is not None), default=None)
+            for due in (self._board.config_write_due, self._telemetry_due()):
+                if due is not None and (earliest is None or due < earliest):
+                    earliest = due
         return None if earliest is None else self.loop_at(earliest)
 
     def loop_at(self, earliest: float) -> float:
@@ -267,15 +268,15 @@ class Firmware:
 
     def _telemetry_due(self) -> float | None:
         """The next time that the firmware sends, or changes its protocol, by itself."""
-        due = []
+        stream = change = None
         if self.protocol is not Protocol.MSP:
-            due.append(self._schedule.next_due(self.protocol is Protocol.AUTOSENSE))
+            stream = self._schedule.next_due(self.protocol is Protocol.AUTOSENSE)
         if not self.armed:
             if self.protocol is not Protocol.AUTOSENSE and not self._parameters.is_listing:
-                due.append(self._last_valid + _AUTOSENSE_SECONDS)
+                change = self._last_valid + _AUTOSENSE_SECONDS
         elif self._options.tele_prot is TelemetryProtocol.FRSKY_9600:
-            due.append(self._frsky_time + frsky.PERIOD_SECONDS)
-        return min(due, default=None)
+            change = self._frsky_time + frsky.PERIOD_SECONDS
+        return change if stream is None else stream if change is None else min(stream, change)
 
     def _send_telemetry(self) -> None:
         if self.protocol is Protocol.MSP:

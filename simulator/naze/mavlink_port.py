@@ -8,6 +8,7 @@ import math
 import struct
 from collections.abc import Callable
 from enum import Enum
+from functools import lru_cache
 
 from protocols.mavlink.codec import FrameWriter, Packed
 from simulator.board.flight import Craft
@@ -49,6 +50,13 @@ class Stream(Enum):
     ATTITUDE = (3, 30, "<Iffffff")
 
 
+@lru_cache(1024)  # each main loop asks
+def _slots_to_next(slot: int, only_heartbeat: bool) -> int:
+    """The number of slots from `slot` to the next one with a message."""
+    messages = (Stream.HEARTBEAT,) if only_heartbeat else Stream
+    return min(divisor - slot % divisor for divisor, *_ in (message.value for message in messages))
+
+
 class MavlinkSchedule:
     """The schedule of messages. `only_heartbeat`: the firmware is in AUTOSENSE. `of_flight`: a slot's own message."""
 
@@ -63,8 +71,7 @@ class MavlinkSchedule:
 
     def next_due(self, only_heartbeat: bool) -> float:
         """The time of the next message."""
-        divisors = [message.value[0] for message in ((Stream.HEARTBEAT,) if only_heartbeat else Stream)]
-        return self._time + SLOT_SECONDS * min(divisor - self._slot % divisor for divisor in divisors)
+        return self._time + SLOT_SECONDS * _slots_to_next(self._slot, only_heartbeat)
 
     def take_due(self, now: float, only_heartbeat: bool, is_listing: bool) -> list[Stream | Packed]:
         due: list[Stream | Packed] = []

@@ -10,6 +10,7 @@ import itertools
 import random
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 from pymavlink.dialects.v20 import all as every_message
@@ -383,7 +384,7 @@ class World:
             assert (controller.firmware, self.bridge.vehicle.armed) == (Firmware.INAV, True)
             return
         boards = Firmware if controller is None else (controller.firmware,)
-        effects = {msp_right(firmware, frame.command, frame.payload).effect for firmware in boards}
+        effects = {_effect(firmware, frame.command, frame.payload) for firmware in boards}
         assert effects & ({Effect.READ} if controller is None else {Effect.READ, Effect.CHANGE}), (boards, frame)
 
     def _carry_out(self, effect: StoreEffect) -> None:
@@ -395,6 +396,11 @@ class World:
 
     def _note(self, event: BridgeEvent) -> None:
         self.log_event.append(Event(self.now, event.level, event.name_in_log, event.facts()))
+
+
+@lru_cache(1024)  # the same few requests are sent over and over
+def _effect(firmware: Firmware, command: int, payload: bytes) -> Effect:
+    return msp_right(firmware, command, payload).effect
 
 
 def ready_world() -> World:
