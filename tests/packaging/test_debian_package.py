@@ -77,9 +77,13 @@ def root(package: Path, tmp_path: Path) -> Iterator[BareRoot]:
 
 
 def with_version(package: Path, version: str, folder: Path) -> Path:
-    """The package under another version, with a module that no other has."""
+    """The package under another version, with a module that no other has, and without libraries: dpkg compiles all."""
     with unpacked(package, folder) as control:
-        own = control.parents[1] / f"usr/lib/naze-bridge/lib/python{_OWN}/site-packages/v{version}"
+        sites = control.parents[1] / "usr/lib/naze-bridge/lib"
+        for library in sites.glob("*/site-packages/*"):
+            if library.is_dir() and library.name != "service":
+                shutil.rmtree(library)
+        own = sites / f"python{_OWN}/site-packages/v{version}"
         own.mkdir()
         (own / "module.py").touch()
         control.write_text(re.sub(r"^Version: .*", f"Version: {version}", control.read_text(), flags=re.MULTILINE))

@@ -13,11 +13,13 @@ from typing import Self
 
 #: For one command that hangs. dpkg compiles all libraries, which takes minutes on a busy machine.
 _TIMEOUT_S = 900
-#: On a separate tmpfs, because an overlay cannot be on an overlay. /run is empty: no systemd runs here.
+#: On a separate tmpfs, because an overlay cannot be on an overlay. /run is empty: no systemd runs here. The index of
+#: manual pages would be made again by each dpkg.
 _MAKE = """
 set -e
 mount -t tmpfs none "$0"; cd "$0"; mkdir upper work root
 mount -t overlay overlay -o lowerdir=/,upperdir=upper,workdir=work root
+rm -f root/var/lib/man-db/auto-update
 mount -t proc proc root/proc; mount --rbind /dev root/dev; mount -t tmpfs none root/run; mount -t tmpfs none root/tmp
 ip link set lo up 2>/dev/null || true
 exec chroot root sh -c 'echo ready; exec cat'
