@@ -15,7 +15,7 @@ import pytest
 import zenoh
 
 from payloads.zenoh_file import read_zenoh_file
-from tests.support.programs import free_port, run_naze_bridge, until
+from tests.support.programs import TIMEOUT_S, free_port, run_naze_bridge, until
 from tests.support.zenoh_router import EXAMPLES, Router, running_router
 
 MEMBERS = {"kite": "vehicle", "owl": "vehicle", "anna": "pilot", "bert": "pilot"}
@@ -76,12 +76,12 @@ def answer(query: zenoh.Query) -> None:
         query.reply(query.key_expr, "owl")
 
 
-def replies(session: zenoh.Session, key: str) -> list[str]:
-    return [each.ok.payload.to_string() for each in session.get(key, timeout=3.0) if each.ok]
+def replies(session: zenoh.Session, key: str, seconds: float = TIMEOUT_S) -> list[str]:
+    return [each.ok.payload.to_string() for each in session.get(key, timeout=seconds) if each.ok]
 
 
-def tokens(session: zenoh.Session) -> list[str]:
-    return [str(each.ok.key_expr) for each in session.liveliness().get("fleet/**", timeout=3.0) if each.ok]
+def tokens(session: zenoh.Session, seconds: float = TIMEOUT_S) -> list[str]:
+    return [str(each.ok.key_expr) for each in session.liveliness().get("fleet/**", timeout=seconds) if each.ok]
 
 
 @pytest.mark.parametrize("expelled", ["kite", "bert"])
@@ -118,8 +118,8 @@ def test_an_expelled_member_has_no_rights_after_the_routers_restart(fleet: Membe
     for key in KEYS:
         speaking.put(key, "forged")
         speaking.delete(key)
-    assert [replies(asking, key) for key in KEYS] == [[]] * len(KEYS)
-    assert tokens(asking) == []
+    assert [replies(asking, key, 3.0) for key in KEYS] == [[]] * len(KEYS)
+    assert tokens(asking, 3.0) == []
     owl.put("fleet/owl/v1/event", "{}")
     until(lambda: "fleet/owl/v1/event" in received, "the event at another member")
     time.sleep(1.0)  # forged and overheard samples would arrive
