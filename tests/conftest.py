@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 
+import os
+import random
 import signal
+from collections.abc import Generator
 
 import pytest
 from hypothesis import settings
@@ -29,16 +32,27 @@ _WAITING = tuple(
 )
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(
+    collector: pytest.Collector,
+) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+    """Let each worker read the files in another order: in a fresh clone it finds most of them compiled by others."""
+    report = yield
+    if isinstance(collector, pytest.Directory):
+        random.Random(os.environ.get("PYTEST_XDIST_WORKER")).shuffle(report.result)
+    return report
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Sort the long files first, then alternate between files that wait and files that compute.
 
     This uses the cores better than one kind after the other. The order within a file is kept."""
-    files = list(dict.fromkeys(_file(item) for item in items))
+    files = sorted({_file(item) for item in items})
     waiting = [file for folder in _WAITING for file in files if file.startswith(folder)]
     computing = [file for file in files if not file.startswith(_WAITING)]
     place = {file: at / len(kind) for kind in (waiting, computing) for at, file in enumerate(kind)}
     place |= {file: at - len(_LONG) for file in files for at, long in enumerate(_LONG) if file.startswith(long)}
-    items.sort(key=lambda item: place[_file(item)])
+    items.sort(key=lambda item: (place[_file(item)], _file(item)))
 
 
 def _file(item: pytest.Item) -> str:
