@@ -18,6 +18,8 @@ from simulator.board.msp_sensors import SensorReplies
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from simulator.commands.fc_kinds import make_board
 from simulator.inav.boxes import BOXES as INAV_BOXES
+from tests.bridge.controllers.inav.test_approaches import set_approaches
+from tests.bridge.controllers.inav.test_place_store import RALLY, RALLY_ITEMS
 from tests.support.conversations import Upload, clear_message, waypoints
 from tests.support.screens import Glance, Screens
 from tests.support.world import GroundStation, World
@@ -372,6 +374,21 @@ def test_a_mission_of_an_inav_is_told_in_the_words_of_its_osd() -> None:
     assert screens.qgc.heard(began) == ["Set WP: only in flight, in the mode NAV WP", *words]
     assert screens.mission_planner.heard(began) == ["Set WP: only in flight, in the mode NAV WP"]
     assert screens.glance().hud == ""
+
+
+def test_a_deleted_rally_points_landing_approach_is_read_in_full() -> None:
+    """Mission Planner's HUD has the summary; QGroundControl joins the pieces of the sentence and says it."""
+    world, station, screens = inav()
+    assert Upload(station, RALLY_ITEMS, mission_type=RALLY).run() is MissionResult.ACCEPTED
+    set_approaches(world.naze, 0)
+    began = world.now
+    assert Upload(station, RALLY_ITEMS[1:], mission_type=RALLY).run() is MissionResult.ACCEPTED
+    world.run(1)
+    approach = "FW approach 0: heading 90, from 40 m to the ground at 1 m above home"
+    lost = f"Safehome 0 was deleted or moved over 100 m, and lost its {approach}"
+    summary = "Rally points verified: 2 items, warnings: 1"
+    assert lost in [" ".join(text.split()) for text in screens.qgc.heard(began)]
+    assert screens.mission_planner.texts(began)[-1] == screens.glance().hud == summary
 
 
 def test_once_after_its_first_write_a_station_hears_that_only_missions_are_stored() -> None:
