@@ -20,7 +20,7 @@ from protocols.msp.inav_places import (
 
 
 def read_approaches(numbers: Iterable[int]) -> Conversation[tuple[FwApproach, ...] | None]:
-    """Those of these numbers; none from a version before 7.1. None: it does not answer."""
+    """Those of these numbers; none from a version before 7.1. None: no answer, or one about others."""
     found: list[FwApproach] = []
     for number in numbers:
         reply = yield from ask(encode_read_approach(number), FW_APPROACH, APPROACH_SIZE)
@@ -29,6 +29,8 @@ def read_approaches(numbers: Iterable[int]) -> Conversation[tuple[FwApproach, ..
         approach = decode_approach(reply.payload)
         if approach is None:
             return ()
+        if approach.number != number:
+            return None
         found.append(approach)
     return tuple(found)
 

@@ -30,7 +30,7 @@ _NOT_MOVED_M = 1.0
 
 
 def read_safehomes() -> Conversation[tuple[Safehome, ...] | None]:
-    """All of them, also those that are off; none from a version without them. None: it does not answer."""
+    """All of them, also those that are off; none from a version without them. None: no answer, or one about others."""
     found: list[Safehome] = []
     for number in range(SAFEHOMES):
         reply = yield from ask(encode_read_safehome(number), SAFEHOME, SAFEHOME_SIZE)
@@ -38,6 +38,8 @@ def read_safehomes() -> Conversation[tuple[Safehome, ...] | None]:
             return None
         safehome = decode_safehome(reply.payload)
         if safehome is not None:
+            if safehome.number != number:
+                return None
             found.append(safehome)
     return tuple(found)
 

@@ -1,12 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The rules for rally points on INAV."""
 
+import struct
 from dataclasses import replace
 
-from bridge.controllers.inav.safehomes import RallyRules
+import pytest
+
+from bridge.controllers.inav.approaches import read_approaches
+from bridge.controllers.inav.safehomes import RallyRules, read_safehomes
+from bridge.line.conversation import Conversation
 from bridge.missions.list_check import check_list
 from protocols.mission_item import Command, MissionResult
-from protocols.msp.inav_places import Safehome
+from protocols.msp.frame import Direction, MspFrame
+from protocols.msp.inav_places import FW_APPROACH, SAFEHOME, Safehome
 from tests.bridge.controllers.inav.test_place_store import RALLY_ITEMS, place
 
 
@@ -28,3 +34,17 @@ def test_more_than_eight_points_and_other_items_are_rejected() -> None:
 def test_safehomes_that_are_off_are_named_when_they_are_erased() -> None:
     verdict = check_list(RALLY_ITEMS, RallyRules((Safehome(0, False, 453838000, 84733000),)))
     assert [finding.text() for finding in verdict.findings] == ["Safehomes that were off are erased: 1"]
+
+
+@pytest.mark.parametrize(
+    ("reading", "reply"),
+    [
+        (read_safehomes(), MspFrame(Direction.REPLY, SAFEHOME, struct.pack("<BBii", 200, 1, 453838000, 84733000))),
+        (read_approaches(range(8)), MspFrame(Direction.REPLY, FW_APPROACH, struct.pack("<BiiBhhB", 200, *6 * (0,)))),
+    ],
+)
+def test_a_reply_about_another_place_is_no_answer(reading: Conversation[object], reply: MspFrame) -> None:
+    next(reading)
+    with pytest.raises(StopIteration) as ended:
+        reading.send(reply)
+    assert ended.value.value is None
