@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from bridge.gcs.ground_station import GroundStation
 
-#: Messages a second to all stations with their own budget: at least 75 for each of the first 16. The defaults are 55.
+#: Messages a second to all stations with their own budget: at least 75 for each of the first 16. The defaults are 46.
 _MOST_PER_S = 1200
 #: The same to all other stations: telemetry for a crowd must leave a Pi Zero time for the pilot.
 _MOST_TO_OTHERS_PER_S = 400
@@ -19,22 +19,19 @@ _MOST_TO_OTHERS_PER_S = 400
 _BURST_S = 1.0
 #: A message due within this fraction of its interval is sent now, because the readings arrive at their own rate.
 _EARLY = 0.25
-#: The shortest interval for a station that was never heard, s. The default rates would cost a Pi Zero twice the CPU.
-_UNHEARD_S = 0.1
 
 
 class MessageRates:
-    """One station's requests and schedule, by message id. No interval is below `shortest_s`.
+    """One station's requests and schedule, by message id.
 
     Each message uses `cost_s` of its time; messages are sent while `used_until` is not more than a burst ahead.
     """
 
-    __slots__ = "cost_s", "due", "requested", "shortest_s", "used_until"
+    __slots__ = "cost_s", "due", "requested", "used_until"
 
     def __init__(self) -> None:
         self.requested: dict[int, float] = {}
         self.due: dict[int, float] = {}
-        self.shortest_s = 0.0
         self.cost_s = 1 / _MOST_PER_S
         self.used_until = -inf
 
@@ -47,24 +44,19 @@ class MessageRates:
             self.requested[msgid] = interval_s
 
     def interval_s(self, msgid: int, default_s: float) -> float:
-        return max(self.requested.get(msgid, default_s), self.shortest_s)
+        return self.requested.get(msgid, default_s)
 
     @property
     def is_default(self) -> bool:
-        return not (self.requested or self.shortest_s)
+        return not self.requested
 
 
-def share_out(stations: Sequence["GroundStation"], *, in_flight: bool) -> None:
-    """Divide the messages a second between the stations: the share of those with a budget does not depend on others.
-
-    `in_flight` False: a station that was never heard gets no message more than ten times a second.
-    """
+def share_out(stations: Sequence["GroundStation"]) -> None:
+    """Divide the messages a second between the stations: the share of those with a budget does not depend on others."""
     own = sum(station.has_own_budget for station in stations)
     for station in stations:
         others = len(stations) - own
-        rates = station.rates
-        rates.cost_s = own / _MOST_PER_S if station.has_own_budget else others / _MOST_TO_OTHERS_PER_S
-        rates.shortest_s = 0.0 if in_flight or station.is_heard else _UNHEARD_S
+        station.rates.cost_s = own / _MOST_PER_S if station.has_own_budget else others / _MOST_TO_OTHERS_PER_S
 
 
 def fastest_s(stations: Sequence["GroundStation"], defaults_s: Mapping[int, float]) -> Mapping[int, float]:
@@ -86,7 +78,7 @@ def take_due(stations: Sequence["GroundStation"], msgid: int, default_s: float, 
         rates = station.rates
         if rates.used_until > now + _BURST_S:
             continue
-        interval_s = max(rates.requested.get(msgid, default_s), rates.shortest_s)
+        interval_s = rates.requested.get(msgid, default_s)
         due = rates.due.get(msgid, -inf)
         if interval_s == inf or now < due - interval_s * _EARLY:
             continue

@@ -38,8 +38,9 @@ _FOLLOWED_FOR_S = 3.0
 #: A reply is current for one interval, or for this long.
 _CURRENT_S = 1.0
 #: Together with one that is due, polls are sent that will be due within this part of their interval, and this time:
-#: every wake-up costs CPU time. At the default rates all others join ATTITUDE.
-_EARLY, _EARLIEST_S = 0.2, 0.04
+#: every wake-up costs CPU time. For the same reason a poll that the line does not slow down is due at multiples of its
+#: interval: at the default rates all others join ATTITUDE.
+_EARLY, _EARLIEST_S = 0.2, 0.05
 #: A lost reply reduces all rates by a tenth, each received one restores a little: 1 % losses change nothing, 10 % halve
 #: the rates.
 _LOSS_FACTOR = 0.9
@@ -128,13 +129,19 @@ class _Slot:
     def set_interval(self, interval_s: float) -> None:
         self.interval_s = interval_s
         self.early_s = min(interval_s * _EARLY, _EARLIEST_S)
-        self.due = inf if interval_s == inf else self.asked_at + interval_s
+        self._set_due()
 
     def asked(self, now: float) -> None:
         """The request was sent. The next is due one interval after this one was due, unless that is long past."""
         self.is_asked = True
         self.asked_at = now if now >= self.due + self.interval_s else self.due
-        self.due = self.asked_at + self.interval_s
+        self._set_due()
+
+    def _set_due(self) -> None:
+        if self.interval_s == self.wanted_s < inf and self.asked_at > -inf:
+            self.due = (round(self.asked_at / self.interval_s) + 1) * self.interval_s
+        else:
+            self.due = inf if self.interval_s == inf else self.asked_at + self.interval_s
 
     def may_be_asked_at(self, link: MspLink, room: int) -> float:
         """When the link would take it; infinity if the link must change first."""

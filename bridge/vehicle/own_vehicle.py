@@ -118,7 +118,7 @@ class OwnVehicle:
     def _end_second(self, now: float) -> None:
         self._second_ends = max(self._second_ends + _TICK_S, now)
         everyone = self._ground.everyone()
-        share_out(everyone, in_flight=bool(self._session.vehicle.armed))
+        share_out(everyone)
         self._set_polls(everyone)
         self._polls_set_at = now
         self.arming_reasons.follow(now)

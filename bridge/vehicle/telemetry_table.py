@@ -42,7 +42,7 @@ class Row:
 
 
 TELEMETRY = (
-    Row(m.MAVLINK_MSG_ID_ATTITUDE, v.Orientation, 0.04, EXTRA1, (make.attitude,)),
+    Row(m.MAVLINK_MSG_ID_ATTITUDE, v.Orientation, 0.1, EXTRA1, (make.attitude,)),
     Row(m.MAVLINK_MSG_ID_GPS_RAW_INT, v.GpsFix, 0.2, EXTENDED_STATUS, (make.gps_raw_int,)),
     Row(m.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, v.GlobalPosition, 0.2, POSITION, (make.global_position_int,), v.Height),
     Row(m.MAVLINK_MSG_ID_VFR_HUD, v.Height, 0.2, EXTRA2, (make.vfr_hud,), v.GpsFix),

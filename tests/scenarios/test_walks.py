@@ -77,7 +77,7 @@ async def _ack(daemon: TracedDaemon) -> Walk:
 
 async def _arming(daemon: TracedDaemon) -> Walk:
     daemon.send(m.MAVLink_request_data_stream_message(*_TARGET, m.MAV_DATA_STREAM_ALL, 0, 0))
-    await asyncio.sleep(2.0)  # STATUS is polled alone from now on, mostly
+    await asyncio.sleep(2.3)  # STATUS is polled alone from now on, except each full second
     daemon.wake_ups.clear()
     daemon.faults.armed = True
     return measure(await daemon.until(_reports_armed))

@@ -90,6 +90,18 @@ def test_slower_polls_go_out_with_the_fastest() -> None:
     assert [round(asked[command] / 20) for command in (Msp.ATTITUDE, Msp.RAW_GPS, Msp.MOTOR)] == [25, 5, 2]
 
 
+def test_polls_requested_at_different_times_go_out_together() -> None:
+    line = Line()
+    wanted = {}
+    for command, interval_s in {Msp.ATTITUDE: 0.1, Msp.RAW_GPS: 0.2, Msp.ALTITUDE: 0.2, Msp.RC: 0.5}.items():
+        wanted[command] = interval_s
+        line.schedule.want(dict(wanted))
+        line.run(1.07)
+    before = len(line.asked)
+    line.run(20)
+    assert len({at for at, _ in line.asked[before:]}) <= 11 * 20
+
+
 def test_a_refused_poll_is_tried_twice_per_flight_controller() -> None:
     line = Line(answer=lambda command: -1 if command == Msp.WP else REPLY_PAYLOADS[command])
     assert line.run(60)[Msp.WP] == 2

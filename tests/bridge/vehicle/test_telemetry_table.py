@@ -20,7 +20,7 @@ def test_telemetry_takes_only_its_share_of_the_line(baud: int) -> None:
     world, station = flown(2, baud=baud)
     for row in TELEMETRY:
         station.send(m.MAVLink_command_long_message(1, 1, 511, 0, row.msgid, 10_000, 0, 0, 0, 0, 0))
-    world.run(10)
+    world.run(20)
     world.written.clear()
     station.take()
     world.run(30)
@@ -34,8 +34,8 @@ def test_telemetry_takes_only_its_share_of_the_line(baud: int) -> None:
 
 
 @pytest.mark.parametrize(("baud", "attitude_hz", "position_hz", "status_hz"), [
-    (115200, 25, 5, 4), (57600, 25, 5, 4), (19200, 25, 5, 4),
-    (9600, 14, 2.8, 4), (2400, 2.8, 0.5, 1.5), (1200, 0.9, 0.25, 0.7),
+    (115200, 10, 5, 4), (57600, 10, 5, 4), (19200, 10, 5, 4),
+    (9600, 7.6, 4, 4), (2400, 1.6, 0.8, 1.5), (1200, 0.6, 0.3, 0.7),
 ])  # fmt: skip
 def test_default_rates_depend_on_the_line_speed(
     baud: int, attitude_hz: float, position_hz: float, status_hz: float
