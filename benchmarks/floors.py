@@ -22,16 +22,17 @@ from fastcrc.crc16 import mcrf4xx
 from bridge.line.poll_schedule import POLLS, Poll
 from bridge.vehicle.telemetry_table import TELEMETRY
 from protocols.mavlink.codec import FrameWriter, pack
-from protocols.mavlink.dialect import Message
+from protocols.mavlink.dialect import CRC_EXTRA, Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.msp.commands import Msp
 
+_QUADROTOR = 2
 _MSP_REPLY, _MSP_OVERHEAD = b"$M>", 6
 _ANGLES = struct.Struct("<3h")
 _ATTITUDE = struct.Struct("<BBBBBBBHBI6f")
 _ATTITUDE_PAYLOAD = 28
-_ATTITUDE_CRC_EXTRA = bytes((m.MAVLink_attitude_message.crc_extra,))
+_ATTITUDE_CRC_EXTRA = CRC_EXTRA[m.MAVLINK_MSG_ID_ATTITUDE]
 
 
 def _serve(loop: asyncio.AbstractEventLoop, answers: Callable[[bytes], list[bytes]]) -> None:
@@ -63,7 +64,7 @@ class _Vehicle:
     def _answer(self, frame: MavlinkFrame) -> Message | None:
         match frame.msgid:
             case m.MAVLINK_MSG_ID_HEARTBEAT:
-                return m.MAVLink_heartbeat_message(m.MAV_TYPE_QUADROTOR, m.MAV_AUTOPILOT_ARDUPILOTMEGA, 0, 0, 3, 3)
+                return m.MAVLink_heartbeat_message(_QUADROTOR, m.MAV_AUTOPILOT_ARDUPILOTMEGA, 0, 0, 3, 3)
             case m.MAVLINK_MSG_ID_MISSION_COUNT:
                 self._count, self._seq = int.from_bytes(frame.payload[:2], "little"), 0
             case m.MAVLINK_MSG_ID_MISSION_ITEM_INT:

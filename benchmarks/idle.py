@@ -17,25 +17,27 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
 from benchmarks.figure import Figure, Floor
 from benchmarks.processes import ENVIRONMENT, Board, cpu_s, daemon, floor_program, simulated_naze
 from protocols.mavlink.codec import FrameWriter, pack
-from protocols.mavlink.dialect import messages
+from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MavlinkSplitter
 
 _SETTLING_S = 3.0
 _WATCHED_S = 20.0
 _STARTS = 7
-_DIALECT = "from pymavlink.dialects.v20 import ardupilotmega"
+_DIALECT = "import protocols.mavlink.messages"
 #: Hz by stream.
 _MISSION_PLANNER_HZ = {
-    messages.MAV_DATA_STREAM_EXTENDED_STATUS: 2,
-    messages.MAV_DATA_STREAM_POSITION: 2,
-    messages.MAV_DATA_STREAM_EXTRA1: 4,
-    messages.MAV_DATA_STREAM_EXTRA2: 4,
-    messages.MAV_DATA_STREAM_EXTRA3: 2,
-    messages.MAV_DATA_STREAM_RAW_SENSORS: 2,
-    messages.MAV_DATA_STREAM_RC_CHANNELS: 2,
+    mavlink.MAV_DATA_STREAM_EXTENDED_STATUS: 2,
+    mavlink.MAV_DATA_STREAM_POSITION: 2,
+    mavlink.MAV_DATA_STREAM_EXTRA1: 4,
+    mavlink.MAV_DATA_STREAM_EXTRA2: 4,
+    mavlink.MAV_DATA_STREAM_EXTRA3: 2,
+    mavlink.MAV_DATA_STREAM_RAW_SENSORS: 2,
+    mavlink.MAV_DATA_STREAM_RC_CHANNELS: 2,
 }
 _MISSION_PLANNER = [
     messages.MAVLink_request_data_stream_message(1, 1, stream, rate_hz, 1)
@@ -78,7 +80,7 @@ def _idle(folder: Path, board: Board) -> list[Figure]:
 
 
 @contextmanager
-def _connected(ground: socket.socket, requests: Sequence[messages.MAVLink_message] = ()) -> Iterator[None]:
+def _connected(ground: socket.socket, requests: Sequence[Message] = ()) -> Iterator[None]:
     """Answer as a ground station: send requests, then a heartbeat every second."""
     writer = FrameWriter(255, 190)
     heartbeat = messages.MAVLink_heartbeat_message(messages.MAV_TYPE_GCS, messages.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3)

@@ -29,7 +29,8 @@ _TIMED = messages.MAVLINK_MSG_ID_RAW_IMU
 _TIMED_PAYLOAD = struct.Struct("<QI7hBh")
 _NUMBER_AND_TIME = struct.Struct("<QI")
 _AXES = (-7, 11, 980, 3, -2, 1, 230)
-_HEARTBEAT = struct.pack("<IBBBBB", 0, messages.MAV_TYPE_QUADROTOR, messages.MAV_AUTOPILOT_ARDUPILOTMEGA, 81, 3, 3)
+_QUADROTOR = 2
+_HEARTBEAT = struct.pack("<IBBBBB", 0, _QUADROTOR, messages.MAV_AUTOPILOT_ARDUPILOTMEGA, 81, 3, 3)
 _HEARTBEAT_INTERVAL_NS = 1_000_000_000
 #: Unpaced: frames sent at once, and frames in flight. A terminal holds 4096 bytes, and no frame may be lost because
 #: this process was too slow to read it.

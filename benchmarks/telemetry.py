@@ -33,7 +33,7 @@ from bridge.line.msp_link import byte_time_s
 from bridge.model.events import BridgeEvent, FcFound
 from bridge.vehicle.telemetry_table import TELEMETRY
 from protocols.mavlink.codec import FrameWriter, pack
-from protocols.mavlink.dialect import messages
+from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.msp.commands import Msp
 from protocols.msp.frame import MspParser
@@ -218,7 +218,7 @@ def _request(ground: socket.socket, rates_hz: Mapping[int, float]) -> None:
         ground.sendto(_frame(request), sender)
 
 
-def _frame(message: messages.MAVLink_message) -> bytes:
+def _frame(message: Message) -> bytes:
     return FrameWriter(255, 190).frame(pack(message), 2)
 
 

@@ -27,7 +27,7 @@ from bridge.model.refusal import ARMED, Refusal
 from bridge.model.vehicle import FlightState, Source, Vehicle
 from bridge.transfers.downloads import MissionDownloads
 from bridge.transfers.uploads import MissionUploads
-from protocols.mavlink.codec import MavlinkDecoder, item_from_float_message, item_from_int_message, repack
+from protocols.mavlink.codec import decode, item_from_float_message, item_from_int_message, repack
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
@@ -160,7 +160,6 @@ class _End:
         self.ids = ids
         self._to_vehicle = to_vehicle
         self._targets = {(system, component) for system in (0, ids[0]) for component in (0, ids[1])}
-        self._decoder = MavlinkDecoder()
         self.ground = Ground(*ids, _ignore, lambda _station, _now: None, None, {}, LinkAccess())
         self._runner = Runner()
         self.missions = _RemoteMissions(Vehicle(), self._runner, self.ground, write)
@@ -193,7 +192,7 @@ class _End:
             self.ground.forward([frame.raw], self.ground.everyone())
             return
         self.ground.multicast(packed, self.ground.everyone())
-        message = self._decoder.decode(frame) if frame.msgid in _HEARD else None
+        message = decode(frame.msgid, frame.payload) if frame.msgid in _HEARD else None
         if message is not None and frame.msgid == m.MAVLINK_MSG_ID_HEARTBEAT:
             armed = bool(message.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED)
             self.missions.vehicle.hear(FlightState(now, Source.MAVLINK, armed))
@@ -223,7 +222,7 @@ class _End:
         handler = self._handlers.get(frame.msgid) if self.missions.is_local else None
         if handler is None or frame.target not in self._targets:
             return False
-        message = self._decoder.decode(frame)
+        message = decode(frame.msgid, frame.payload)
         if message is None or getattr(message, "mission_type", 0) != m.MAV_MISSION_TYPE_MISSION:
             return False
         if getattr(message, "current", 0) in _GUIDED and not self.uploads.is_writing(station):

@@ -4,8 +4,7 @@
 The libraries are the wheels that requirements.lock pins, for the Pythons of Debian 12 and 13 and Ubuntu 24.04 side by
 side; pip fetches them for any architecture on any machine, and nothing is compiled. The target needs no network.
 
-Two libraries have no wheel for armhf. For cbor2 its last pure Python release is used (armhf.lock); for pymavlink the
-arm64 wheel, whose only compiled part, dfindexer, is left out of every package.
+cbor2 has no wheel for armhf: its last pure Python release is used there (armhf.lock).
 
 pip evaluates a requirement's `python_version < ...` for the Python that runs it, not for the target's. So far our
 requirements do not differ between 3.11 and 3.14.
@@ -30,9 +29,6 @@ _PIP = (sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet")
 PYTHONS = ("3.11", "3.12", "3.13")
 #: Debian's name of an architecture -> the name in wheels.
 _MACHINES = {"amd64": "x86_64", "arm64": "aarch64", "armhf": "armv7l"}
-_NOT_FOR_ARMHF = ("cbor2", "pymavlink")
-#: The machines whose wheels are installed.
-_WHEELS_OF = {"amd64": ("x86_64",), "arm64": ("aarch64",), "armhf": ("armv7l", "aarch64")}
 #: The C library that wheels may require; Debian 12 has 2.36.
 _GLIBC = (*(f"manylinux_2_{minor}" for minor in range(36, 16, -1)), "manylinux2014")
 
@@ -47,7 +43,7 @@ def build(architecture: str, pythons: Sequence[str] = PYTHONS, folder: Path = _D
     libraries = {}
     for python in pythons:
         fetch(architecture, python, wheels)
-        target = [word for machine in _WHEELS_OF[architecture] for word in _target(python, machine)]
+        target = _target(python, _MACHINES[architecture])
         # Only from the wheels, whose hashes were just checked; build tools are left out.
         libraries[python] = work / python
         from_wheels = ("--no-index", "--find-links", wheels, "--no-compile", "--target", libraries[python])
@@ -81,23 +77,21 @@ def debian_version(version: str) -> str:
 def fetch(architecture: str, python: str, wheels: Path) -> None:
     """Download the wheels for one Python to the folder `wheels`; their hashes are checked."""
     wheels.mkdir(parents=True, exist_ok=True)
-    for lock, machine in _locks(architecture, wheels.parent):
+    for lock in _locks(architecture, wheels.parent):
         hashed = ("--require-hashes", "--no-deps", "--requirement", lock)
-        _run(*_PIP, "download", *hashed, *_target(python, machine), "--dest", wheels)
+        _run(*_PIP, "download", *hashed, *_target(python, _MACHINES[architecture]), "--dest", wheels)
 
 
-def _locks(architecture: str, work: Path) -> list[tuple[Path, str]]:
-    """The pinned wheel files to fetch for a machine."""
+def _locks(architecture: str, work: Path) -> list[Path]:
+    """The lists of pinned wheel files to fetch for an architecture."""
     lock = _PROJECT / "requirements.lock"
     if architecture != "armhf":
-        return [(lock, _MACHINES[architecture])]
+        return [lock]
     # A requirement extends from its name to the next line that is not indented.
     pinned = re.findall(r"^[a-z].*\n(?:[ ].*\n)*", lock.read_text(), re.MULTILINE)
-    special = [each for each in pinned if each.startswith(tuple(f"{name}==" for name in _NOT_FOR_ARMHF))]
-    usual, of_arm64 = work / "usual.lock", work / "arm64.lock"
-    usual.write_text("".join(each for each in pinned if each not in special))
-    of_arm64.write_text("".join(each for each in special if each.startswith("pymavlink==")))
-    return [(usual, "armv7l"), (_HERE / "armhf.lock", "armv7l"), (of_arm64, "aarch64")]
+    usual = work / "usual.lock"
+    usual.write_text("".join(each for each in pinned if not each.startswith("cbor2==")))
+    return [usual, _HERE / "armhf.lock"]
 
 
 def _target(python: str, machine: str) -> list[str]:

@@ -27,9 +27,7 @@ _UNITS = (
 )
 _SCHEMAS = "payloads/schemas"
 _SCRIPTS = ("postinst", "prerm", "postrm")
-#: Of pymavlink's 44 MB of dialects the bridge imports one, and pymavlink's own mavutil one; lxml is for its generator.
-_DIALECTS = ("v20/__init__.py", "v20/ardupilotmega.py", "v20/all.py")
-_NEEDLESS = ("lxml", "lxml-*", "bin", "share", "pymavlink/tools", "pymavlink/dfindexer")
+_NEEDLESS = ("bin", "share")
 
 
 def lay_out(root: Path, libraries: Mapping[str, Path], project: Path, version: str, architecture: str) -> None:
@@ -42,7 +40,8 @@ def lay_out(root: Path, libraries: Mapping[str, Path], project: Path, version: s
     sites = []
     for python, folder in libraries.items():
         sites.append(environment / "lib" / f"python{python}" / "site-packages")
-        _leave_out(folder)
+        for name in _NEEDLESS:
+            shutil.rmtree(folder / name, ignore_errors=True)
         shutil.copytree(folder, sites[-1])
     _share(*sites)
     (root / "usr/bin").mkdir()
@@ -74,16 +73,6 @@ def lay_out(root: Path, libraries: Mapping[str, Path], project: Path, version: s
             runs = path.is_dir() or path.parent == environment / "bin" or path == documents / "firmware/apply"
             path.chmod(0o755 if runs else 0o644)
     _describe(root, version, architecture)
-
-
-def _leave_out(site: Path) -> None:
-    for pattern in _NEEDLESS:
-        for path in site.glob(pattern):
-            shutil.rmtree(path)
-    dialects = site / "pymavlink" / "dialects"
-    for path in dialects.glob("*/*"):
-        if str(path.relative_to(dialects)) not in _DIALECTS:
-            path.unlink()
 
 
 def _share(first: Path, *others: Path) -> None:

@@ -1,57 +1,57 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`python -m generators.message_table`: print a new message_table.py from pymavlink's dialect `all`.
 
-Checking a frame needs its message's CRC_EXTRA, so every message must be known that any flight controller may send. The
-table has what the dialect that the daemon imports lacks: importing `all`, too, would cost the daemon 6 MB.
+Checking a frame needs its message's CRC_EXTRA, so every message must be known that any flight controller may send.
 
 Where a smaller dialect (matrixpilot, paparazzi) reuses an id, `all` has the message of ardupilotmega, which includes
 common. The smaller dialect's frames then look damaged and are dropped.
 """
 
-import os
+import struct
 import sys
-
-# pymavlink reads this at import time.
-os.environ.setdefault("MAVLINK20", "1")
+from typing import Any
 
 from pymavlink.dialects.v10 import all as mavlink_1
 from pymavlink.dialects.v20 import all as mavlink_2
 
-from protocols.mavlink.dialect import message_format, messages
 from protocols.mavlink.message_format import MessageFormat
 
 #: COMPONENT_METADATA is in common.xml, but not in pymavlink's `all`.
-_MISSING = {397: ("COMPONENT_METADATA", MessageFormat(182, None, 108, None, None))}
+_MISSING = {397: MessageFormat("COMPONENT_METADATA", 182, None, 108, None, None)}
 _HEAD = '''# SPDX-License-Identifier: GPL-3.0-or-later
-"""Facts about messages that pymavlink's ardupilotmega dialect lacks. Made by `make message-table`, not by hand."""
+"""The format of every message that is known to MAVLink. Made by `make messages` from pymavlink, not by hand."""
 
 from protocols.mavlink.message_format import MessageFormat
 
+#: By message id.
+MESSAGE_FORMATS = {
 '''
 
 
 def table() -> str:
-    names = {msgid: str(kind.msgname) for msgid, kind in mavlink_2.mavlink_map.items()}
     bases = {msgid: int(kind.unpacker.size) for msgid, kind in mavlink_1.mavlink_map.items()}
-    kinds = mavlink_2.mavlink_map.items()
-    known = {msgid: message_format(kind, bases.get(msgid)) for msgid, kind in kinds}
-    others = {msgid: (names[msgid], form) for msgid, form in known.items() if msgid not in messages.mavlink_map}
-    rows = [
-        "#: The size in MAVLink 1, by message id, of the dialect's messages that have extension fields in MAVLink 2.\n",
-        "BASE_SIZES = {\n",
-        *(
-            f"    {msgid}: {form.base_size},  # {names[msgid]}\n"
-            for msgid, form in sorted(known.items())
-            if msgid in messages.mavlink_map and form.base_size not in (None, form.full_size)
-        ),
-        "}\n#: Messages of other dialects, by message id.\nOTHER_FORMATS = {\n",
-        *(
-            f"    {msgid}: MessageFormat({', '.join(map(str, form))}),  # {name}\n"
-            for msgid, (name, form) in sorted({**_MISSING, **others}.items())
-        ),
-        "}\n",
-    ]
-    return _HEAD + "".join(rows)
+    known = {msgid: _format(kind, bases.get(msgid)) for msgid, kind in mavlink_2.mavlink_map.items()}
+    rows = (_row(msgid, form) for msgid, form in sorted({**_MISSING, **known}.items()))
+    return f"{_HEAD}{''.join(rows)}}}\n"
+
+
+def _row(msgid: int, form: MessageFormat) -> str:
+    values = ", ".join(map(str, form[1:]))
+    return f'    {msgid}: MessageFormat("{form.name}", {values}),\n'
+
+
+def _format(kind: Any, base_size: int | None) -> MessageFormat:
+    """The format of one of pymavlink's classes, which do not say where the extension fields begin."""
+    places: dict[str, int] = {}
+    if "target_system" in kind.fieldnames:
+        at = 0
+        for name, letter, count in zip(
+            kind.ordered_fieldnames, kind.native_format[1:], kind.array_lengths, strict=True
+        ):
+            places[name] = at
+            at += struct.calcsize(f"<{chr(letter)}") * max(1, count)
+    system_at, component_at = places.get("target_system"), places.get("target_component")
+    return MessageFormat(kind.msgname, kind.crc_extra, base_size, kind.unpacker.size, system_at, component_at)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from bridge.gcs.rights import RIGHTS
 from protocols.mavlink.command import command_name
-from protocols.mavlink.dialect import messages
+from protocols.mavlink.dialect import MESSAGE_FORMATS
 from protocols.rights.effect import Effect
 from protocols.rights.mavlink import COMMANDS, MESSAGES, FieldRule
 from protocols.rights.msp import MSP_RIGHTS, Firmware, MspRight
@@ -109,7 +109,7 @@ def _effect_names(effects: Collection[Effect]) -> str:
 
 def mavlink_table() -> str:
     """A row for each effect of messages."""
-    return _effects("messages", {messages.mavlink_map[msgid].msgname: row for msgid, row in MESSAGES.items()})
+    return _effects("messages", {MESSAGE_FORMATS[msgid].name: row for msgid, row in MESSAGES.items()})
 
 
 def command_table() -> str:

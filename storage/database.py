@@ -14,7 +14,6 @@ import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager
 from datetime import UTC, datetime
-from importlib import resources
 from pathlib import Path
 
 from storage.os_error import reason
@@ -260,8 +259,7 @@ def _prepare(connection: sqlite3.Connection, path: Path) -> None:
 
 def _schema_steps() -> list[str]:
     """The schema files' texts in the order of their numbers; step n migrates version n-1 to n."""
-    folder = resources.files("storage") / "schema"
-    return [file.read_text() for file in sorted(folder.iterdir(), key=lambda file: file.name)]
+    return [file.read_text() for file in sorted(Path(__file__).with_name("schema").iterdir())]
 
 
 def migrate(connection: sqlite3.Connection) -> None:

@@ -14,7 +14,7 @@ from bridge.fc.mission_flight import flight_report
 from bridge.fc.msp_telemetry import velocity
 from bridge.model import vehicle as v
 from bridge.model.flight_mode import MISSION_BOXES, FlightMode, active_boxes, flight_mode, names_of_active
-from protocols.mavlink.codec import MavlinkDecoder
+from protocols.mavlink.codec import decode
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame
@@ -54,7 +54,6 @@ class MavlinkTelemetry:
         self._is_harakiri = is_harakiri
         #: From a Harakiri's heartbeat, with its time; None until one is heard, up to a second after arming.
         self._is_level: tuple[bool, float] | None = None
-        self._decoder = MavlinkDecoder()
         #: The newest frame of each kind, and when it was heard. The keys are those of protocols.mavlink.frame.kinds.
         self._unread: dict[bytes, tuple[bytes, float]] = {}
         self._readers: dict[int, Callable[[Message, float], None]] = {
@@ -126,7 +125,8 @@ class MavlinkTelemetry:
                 return
 
     def _read(self, kind: bytes, frame: bytes, now: float) -> None:
-        message = self._decoder.decode(MavlinkFrame(frame))
+        whole = MavlinkFrame(frame)
+        message = decode(whole.msgid, whole.payload)
         if message is not None:
             self._readers[self._known[kind]](message, now)
 

@@ -42,7 +42,7 @@ _SHORTEST_COMPASS_S = 45.0
 #: Longer than any calibration, with the restart.
 _LONGEST_S = 360.0
 _COMPASS, _ONE_COMPASS = 0, 1 << 0
-_UNKNOWN = math.nan
+_UNKNOWN = (math.nan,) * 10
 _STATUS_CHECKS = 2
 _ASKS_AFTER_ACTION = 12
 #: After a restart the first readings may still settle.
@@ -249,8 +249,7 @@ class Calibration:
 
         Not "autosaved", after which it demands a reboot: the board has restarted by itself, or needs none.
         """
-        unknown = [_UNKNOWN] * 10
-        self._ground.to(self._station, m.MAVLink_mag_cal_report_message(_COMPASS, _ONE_COMPASS, status, 0, *unknown))
+        self._ground.to(self._station, m.MAVLink_mag_cal_report_message(_COMPASS, _ONE_COMPASS, status, 0, *_UNKNOWN))
 
     def _acknowledge(self, station: Station, command: int, result: CommandResult) -> None:
         self._ground.to(station, m.MAVLink_command_ack_message(command, result, 0, 0, station.sysid, station.compid))

@@ -15,9 +15,9 @@ from bridge.gcs.station import Peer, Severity, Station
 from bridge.model.events import Emit, GcsRefused
 from bridge.vehicle.message_router import MessageRouter
 from bridge.vehicle.parameters import Parameters
-from protocols.mavlink.codec import MavlinkDecoder
+from protocols.mavlink.codec import decode
 from protocols.mavlink.command import CommandResult
-from protocols.mavlink.dialect import Message
+from protocols.mavlink.dialect import MESSAGE_FORMATS, Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.mavlink.ftp import refuse
@@ -50,7 +50,6 @@ class Incoming:
         self._ids = sysid, compid
         self._emit = emit
         self._our_targets = frozenset(product((0, sysid), (0, compid)))
-        self._decoder = MavlinkDecoder()
         self.routes: Routes | None = None
         #: Refusals by (link, reason).
         self.refused: Counter[tuple[str, str]] = Counter()
@@ -116,7 +115,7 @@ class Incoming:
                 answers = partial(self._ground.to_as, asked, sender)
         if not (is_vehicle and sender.allows(Cost.ANSWER)):
             return
-        message = self._decoder.decode(frame)
+        message = decode(frame.msgid, frame.payload)
         answer = None if message is None else _denial(message, station)
         if answer is not None:
             answers(answer)
@@ -131,8 +130,8 @@ class Incoming:
         if refused.is_routine or refused.why in station.reported:
             return False
         station.reported.add(refused.why)
-        name, known = Station(station.peer, *frame.sender), m.mavlink_map.get(frame.msgid)
-        message = str(frame.msgid if known is None else known.msgname)
+        name, known = Station(station.peer, *frame.sender), MESSAGE_FORMATS.get(frame.msgid)
+        message = str(frame.msgid if known is None else known.name)
         self._emit(GcsRefused(station=str(name), message=message, why=refused.why))
         return True
 

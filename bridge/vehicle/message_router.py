@@ -17,7 +17,7 @@ from bridge.transfers.uploads import MissionUploads
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.parameters import Parameters
-from protocols.mavlink.codec import MavlinkDecoder, item_from_float_message, item_from_int_message
+from protocols.mavlink.codec import decode, item_from_float_message, item_from_int_message
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame
@@ -79,7 +79,6 @@ class MessageRouter:
         self._vehicle = vehicle
         self._commands = commands
         self._transfers = transfers
-        self._decoder = MavlinkDecoder()
         #: Of mission messages, by the type of their lists.
         self._of_type = {kind: self._mission_handlers(each.uploads, each.downloads) for kind, each in transfers.items()}
         self.handlers: Mapping[int, _Handler] = {
@@ -129,7 +128,7 @@ class MessageRouter:
     def take(self, sender: GroundStation, station: Station, frame: MavlinkFrame, msgid: int, now: float) -> None:
         """Handle a frame for the bridge's vehicle, if it is understood and its sender has not sent too many."""
         handler = self.handlers.get(msgid)
-        if handler is None or (message := self._decoder.decode(frame)) is None:
+        if handler is None or (message := decode(msgid, frame.payload)) is None:
             return
         if not sender.allows(Cost.TRANSFER if msgid in _OF_A_TRANSFER else Cost.ANSWER):
             return

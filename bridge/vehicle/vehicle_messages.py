@@ -409,20 +409,21 @@ def _battery(at: Moment) -> tuple[int, int, int]:
 def rc_channels(at: Moment) -> Message:
     """RC_CHANNELS: microseconds."""
     channels = at.need(v.Sticks).channels_us
-    return messages.MAVLink_rc_channels_message(at.boot_ms, len(channels), *_padded(channels, _CHANNELS), _rssi(at))
+    fields = *_padded(channels, _CHANNELS), _rssi(at)
+    return messages.MAVLink_rc_channels_message(at.boot_ms, len(channels), *fields)
 
 
 def rc_channels_raw(at: Moment) -> Message:
     """RC_CHANNELS_RAW: the first eight."""
-    channels = _padded(at.need(v.Sticks).channels_us, _RAW_CHANNELS)
-    return messages.MAVLink_rc_channels_raw_message(at.boot_ms, 0, *channels, _rssi(at))
+    fields = *_padded(at.need(v.Sticks).channels_us, _RAW_CHANNELS), _rssi(at)
+    return messages.MAVLink_rc_channels_raw_message(at.boot_ms, 0, *fields)
 
 
 def raw_imu(at: Moment) -> Message:
     """RAW_IMU: 1/1000 g; gyro and compass in the flight controller's own scale."""
     imu = at.need(v.ImuSample)
-    acc_mg = (_fit(axis, 16) for axis in imu.acc_mg)
-    return messages.MAVLink_raw_imu_message(at.boot_ms * 1000, *acc_mg, *imu.gyro, *imu.mag)
+    x, y, z = (_fit(axis, 16) for axis in imu.acc_mg)
+    return messages.MAVLink_raw_imu_message(at.boot_ms * 1000, x, y, z, *imu.gyro, *imu.mag)
 
 
 def servo_output_raw(at: Moment) -> Message:
@@ -443,13 +444,16 @@ def attitude_quaternion(at: Moment) -> Message:
     now = at.need(v.Orientation)
     halves = [math.radians(angle) / 2 for angle in (known(now.roll_deg), known(now.pitch_deg), now.heading_deg)]
     (sin_r, sin_p, sin_y), (cos_r, cos_p, cos_y) = map(math.sin, halves), map(math.cos, halves)
+    roll_rate, pitch_rate, yaw_rate = _rates(now)
     return messages.MAVLink_attitude_quaternion_message(
         at.boot_ms,
         cos_r * cos_p * cos_y + sin_r * sin_p * sin_y,
         sin_r * cos_p * cos_y - cos_r * sin_p * sin_y,
         cos_r * sin_p * cos_y + sin_r * cos_p * sin_y,
         cos_r * cos_p * sin_y - sin_r * sin_p * cos_y,
-        *_rates(now),
+        roll_rate,
+        pitch_rate,
+        yaw_rate,
     )
 
 
@@ -556,10 +560,9 @@ def home_position(at: Moment) -> Message:
     """HOME_POSITION: degrees * 1e7, mm above mean sea level; the local frame has its origin there."""
     home = known(at.vehicle.home)
     altitude_mm = _fit(round(known(home.altitude_m) * 1000), 32)
-    unknown_attitude, unknown_approach = [math.nan] * 4, [math.nan] * 3
-    return messages.MAVLink_home_position_message(
-        home.lat_e7, home.lon_e7, altitude_mm, 0.0, 0.0, 0.0, unknown_attitude, *unknown_approach
-    )
+    place = (home.lat_e7, home.lon_e7, altitude_mm)
+    unknown_attitude, unknown_approach = [math.nan] * 4, (math.nan, math.nan, math.nan)
+    return messages.MAVLink_home_position_message(*place, 0.0, 0.0, 0.0, unknown_attitude, *unknown_approach)
 
 
 def gps_global_origin(at: Moment) -> Message:

@@ -20,18 +20,15 @@ _HEADER_V1 = struct.Struct("<BBBBBB")
 _HEADER_V2 = struct.Struct("<BBBBBBBHB")
 
 
-class MavlinkDecoder:
-    """Turns checked frames into pymavlink messages. Bad content is dropped, never raised."""
-
-    def __init__(self) -> None:
-        self._mavlink = messages.MAVLink(None)
-
-    def decode(self, frame: MavlinkFrame) -> Message | None:
-        """Decode a frame; None if its length does not fit its message."""
-        try:
-            return self._mavlink.decode(bytearray(frame.raw))
-        except (messages.MAVError, struct.error, UnicodeDecodeError):
-            return None
+def decode(msgid: int, payload: bytes) -> Message | None:
+    """A received message; None if it is not one of those that we use."""
+    kind: type[Message] | None = messages.KINDS.get(msgid)
+    if kind is None:
+        return None
+    size = kind.unpacker.size
+    # MAVLink 2 omits trailing zeros, and a newer dialect may have more fields.
+    values = kind.unpacker.unpack(payload[:size].ljust(size, b"\0"))
+    return kind(*map(values.__getitem__, kind.places))
 
 
 class Packed(NamedTuple):
@@ -61,23 +58,16 @@ def repack(frame: MavlinkFrame) -> Packed | None:
     return Packed(frame.msgid, whole, frame.payload.rstrip(b"\0") or b"\0")
 
 
-def _payload_alone(_packer: None, _crc_extra: int, payload: bytes, *, force_mavlink1: bool) -> bytes:
-    return payload
-
-
 def pack(message: Message) -> Packed:
     """Pack a message's fields, once for all receivers.
 
-    MAVLink 1 has no extension fields, and Mission Planner drops a frame of another size; pymavlink packs them
-    anyway. A message that the dialect lacks is already packed.
+    MAVLink 1 has no extension fields, and Mission Planner drops a frame of another size. A message that the dialect
+    lacks is already packed.
     """
     if isinstance(message, Packed):
         return message
-    # pymavlink would add a header and a CRC, which takes as long as all other work for a message.
-    message._pack = _payload_alone  # noqa: SLF001
-    payload: bytes = message.pack(None)
-    del message._pack  # noqa: SLF001
-    msgid: int = type(message).id
+    payload: bytes = message.to_payload()
+    msgid: int = message.msgid
     return Packed(msgid, payload[: MESSAGE_FORMATS[msgid].base_size], payload.rstrip(b"\0") or b"\0")
 
 
@@ -127,7 +117,7 @@ def item_from_int_message(message: Message) -> MissionItem:
 def item_message(item: MissionItem, sysid: int, compid: int, mission_type: int = 0, *, as_int: bool) -> Message:
     """Make the message for one item, addressed to a ground station."""
     lat_e7, lon_e7 = item.lat_e7 or 0, item.lon_e7 or 0
-    make = messages.MAVLink_mission_item_int_message if as_int else messages.MAVLink_mission_item_message
-    x, y = (lat_e7, lon_e7) if as_int else (lat_e7 / 1e7, lon_e7 / 1e7)
-    params = (item.p1, item.p2, item.p3, item.p4)
-    return make(sysid, compid, item.seq, item.frame, item.command, 0, 1, *params, x, y, item.alt_m, mission_type)
+    head = (sysid, compid, item.seq, item.frame, item.command, 0, 1, item.p1, item.p2, item.p3, item.p4)
+    if as_int:
+        return messages.MAVLink_mission_item_int_message(*head, lat_e7, lon_e7, item.alt_m, mission_type)
+    return messages.MAVLink_mission_item_message(*head, lat_e7 / 1e7, lon_e7 / 1e7, item.alt_m, mission_type)

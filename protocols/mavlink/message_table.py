@@ -1,118 +1,362 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Facts about messages that pymavlink's ardupilotmega dialect lacks. Made by `make message-table`, not by hand."""
+"""The format of every message that is known to MAVLink. Made by `make messages` from pymavlink, not by hand."""
 
 from protocols.mavlink.message_format import MessageFormat
 
-#: The size in MAVLink 1, by message id, of the dialect's messages that have extension fields in MAVLink 2.
-BASE_SIZES = {
-    1: 31,  # SYS_STATUS
-    24: 30,  # GPS_RAW_INT
-    26: 22,  # SCALED_IMU
-    27: 26,  # RAW_IMU
-    29: 14,  # SCALED_PRESSURE
-    31: 32,  # ATTITUDE_QUATERNION
-    36: 21,  # SERVO_OUTPUT_RAW
-    37: 6,  # MISSION_REQUEST_PARTIAL_LIST
-    38: 6,  # MISSION_WRITE_PARTIAL_LIST
-    39: 37,  # MISSION_ITEM
-    40: 4,  # MISSION_REQUEST
-    42: 2,  # MISSION_CURRENT
-    43: 2,  # MISSION_REQUEST_LIST
-    44: 4,  # MISSION_COUNT
-    45: 2,  # MISSION_CLEAR_ALL
-    47: 3,  # MISSION_ACK
-    48: 13,  # SET_GPS_GLOBAL_ORIGIN
-    49: 12,  # GPS_GLOBAL_ORIGIN
-    51: 4,  # MISSION_REQUEST_INT
-    69: 11,  # MANUAL_CONTROL
-    70: 18,  # RC_CHANNELS_OVERRIDE
-    73: 37,  # MISSION_ITEM_INT
-    77: 3,  # COMMAND_ACK
-    100: 26,  # OPTICAL_FLOW
-    101: 32,  # GLOBAL_VISION_POSITION_ESTIMATE
-    102: 32,  # VISION_POSITION_ESTIMATE
-    103: 20,  # VISION_SPEED_ESTIMATE
-    104: 32,  # VICON_POSITION_ESTIMATE
-    105: 62,  # HIGHRES_IMU
-    107: 64,  # HIL_SENSOR
-    108: 84,  # SIM_STATE
-    113: 36,  # HIL_GPS
-    116: 22,  # SCALED_IMU2
-    124: 35,  # GPS2_RAW
-    129: 22,  # SCALED_IMU3
-    132: 14,  # DISTANCE_SENSOR
-    137: 14,  # SCALED_PRESSURE2
-    138: 36,  # ATT_POS_MOCAP
-    143: 14,  # SCALED_PRESSURE3
-    147: 36,  # BATTERY_STATUS
-    148: 60,  # AUTOPILOT_VERSION
-    149: 30,  # LANDING_TARGET
-    152: 4,  # MEMINFO
-    158: 14,  # MOUNT_STATUS
-    162: 8,  # FENCE_STATUS
-    180: 45,  # CAMERA_FEEDBACK
-    192: 44,  # MAG_CAL_REPORT
-    193: 22,  # EKF_STATUS_REPORT
-    194: 25,  # PID_TUNING
-    225: 65,  # EFI_STATUS
-    232: 63,  # GPS_INPUT
-    242: 52,  # HOME_POSITION
-    243: 53,  # SET_HOME_POSITION
-    253: 51,  # STATUSTEXT
-}
-#: Messages of other dialects, by message id.
-OTHER_FORMATS = {
-    53: MessageFormat(3, 5, 5, None, None),  # MISSION_CHECKSUM
-    220: MessageFormat(34, 32, 32, None, None),  # NAV_FILTER_BIAS
-    221: MessageFormat(71, 42, 42, None, None),  # RADIO_CALIBRATION
-    222: MessageFormat(15, 3, 3, None, None),  # UALBERTA_SYS_STATUS
-    223: MessageFormat(119, 47, 47, 42, 43),  # COMMAND_INT_STAMPED
-    224: MessageFormat(102, 45, 45, 42, 43),  # COMMAND_LONG_STAMPED
-    397: MessageFormat(182, None, 108, None, None),  # COMPONENT_METADATA
-    420: MessageFormat(20, None, 73, 6, 7),  # RADIO_RC_CHANNELS
-    435: MessageFormat(134, None, 46, None, None),  # AVAILABLE_MODES
-    436: MessageFormat(193, None, 9, None, None),  # CURRENT_MODE
-    437: MessageFormat(30, None, 1, None, None),  # AVAILABLE_MODES_MONITOR
-    441: MessageFormat(169, None, 17, None, None),  # GNSS_INTEGRITY
-    513: MessageFormat(99, None, 45, 40, 41),  # RANGING_BEACON
-    8002: MessageFormat(218, None, 16, None, None),  # SENS_POWER
-    8003: MessageFormat(231, None, 41, None, None),  # SENS_MPPT
-    8004: MessageFormat(172, None, 98, None, None),  # ASLCTRL_DATA
-    8005: MessageFormat(251, None, 38, None, None),  # ASLCTRL_DEBUG
-    8006: MessageFormat(97, None, 14, None, None),  # ASLUAV_STATUS
-    8007: MessageFormat(64, None, 32, None, None),  # EKF_EXT
-    8008: MessageFormat(234, None, 33, None, None),  # ASL_OBCTRL
-    8009: MessageFormat(144, None, 16, None, None),  # SENS_ATMOS
-    8010: MessageFormat(155, None, 41, None, None),  # SENS_BATMON
-    8011: MessageFormat(20, None, 102, None, None),  # FW_SOARING_DATA
-    8012: MessageFormat(54, None, 16, None, None),  # SENSORPOD_STATUS
-    8013: MessageFormat(222, None, 46, None, None),  # SENS_POWER_BOARD
-    8014: MessageFormat(200, None, 14, None, None),  # GSM_LINK_STATUS
-    8015: MessageFormat(23, None, 24, None, None),  # SATCOM_LINK_STATUS
-    8016: MessageFormat(149, None, 18, None, None),  # SENSOR_AIRFLOW_ANGLES
-    17000: MessageFormat(103, None, 179, None, None),  # TEST_TYPES
-    17150: MessageFormat(26, None, 33, None, None),  # ARRAY_TEST_0
-    17151: MessageFormat(72, None, 16, None, None),  # ARRAY_TEST_1
-    17153: MessageFormat(19, None, 17, None, None),  # ARRAY_TEST_3
-    17154: MessageFormat(89, None, 17, None, None),  # ARRAY_TEST_4
-    17155: MessageFormat(27, None, 10, None, None),  # ARRAY_TEST_5
-    17156: MessageFormat(14, None, 91, None, None),  # ARRAY_TEST_6
-    17157: MessageFormat(187, None, 84, None, None),  # ARRAY_TEST_7
-    17158: MessageFormat(106, None, 24, None, None),  # ARRAY_TEST_8
-    60000: MessageFormat(4, None, 22, 20, 21),  # AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_EXT
-    60010: MessageFormat(208, None, 33, None, None),  # STORM32_GIMBAL_MANAGER_INFORMATION
-    60011: MessageFormat(183, None, 7, None, None),  # STORM32_GIMBAL_MANAGER_STATUS
-    60012: MessageFormat(99, None, 36, 32, 33),  # STORM32_GIMBAL_MANAGER_CONTROL
-    60013: MessageFormat(129, None, 24, 20, 21),  # STORM32_GIMBAL_MANAGER_CONTROL_PITCHYAW
-    60014: MessageFormat(134, None, 8, 4, 5),  # STORM32_GIMBAL_MANAGER_CORRECT_ROLL
-    60020: MessageFormat(202, None, 4, None, None),  # QSHOT_STATUS
-    60040: MessageFormat(156, None, 245, None, None),  # FRSKY_PASSTHROUGH_ARRAY
-    60041: MessageFormat(191, None, 255, None, None),  # PARAM_VALUE_ARRAY
-    60045: MessageFormat(14, None, 23, 2, 3),  # MLRS_RADIO_LINK_STATS
-    60046: MessageFormat(171, None, 28, 8, 9),  # MLRS_RADIO_LINK_INFORMATION
-    60047: MessageFormat(55, None, 7, None, None),  # MLRS_RADIO_LINK_FLOW_CONTROL
-    60050: MessageFormat(220, None, 14, None, None),  # AVSS_PRS_SYS_STATUS
-    60051: MessageFormat(245, None, 24, None, None),  # AVSS_DRONE_POSITION
-    60052: MessageFormat(101, None, 44, None, None),  # AVSS_DRONE_IMU
-    60053: MessageFormat(45, None, 6, None, None),  # AVSS_DRONE_OPERATION_MODE
+#: By message id.
+MESSAGE_FORMATS = {
+    0: MessageFormat("HEARTBEAT", 50, 9, 9, None, None),
+    1: MessageFormat("SYS_STATUS", 124, 31, 43, None, None),
+    2: MessageFormat("SYSTEM_TIME", 137, 12, 12, None, None),
+    4: MessageFormat("PING", 237, 14, 14, 12, 13),
+    5: MessageFormat("CHANGE_OPERATOR_CONTROL", 217, 28, 28, 0, None),
+    6: MessageFormat("CHANGE_OPERATOR_CONTROL_ACK", 104, 3, 3, None, None),
+    7: MessageFormat("AUTH_KEY", 119, 32, 32, None, None),
+    11: MessageFormat("SET_MODE", 89, 6, 6, 4, None),
+    20: MessageFormat("PARAM_REQUEST_READ", 214, 20, 20, 2, 3),
+    21: MessageFormat("PARAM_REQUEST_LIST", 159, 2, 2, 0, 1),
+    22: MessageFormat("PARAM_VALUE", 220, 25, 25, None, None),
+    23: MessageFormat("PARAM_SET", 168, 23, 23, 4, 5),
+    24: MessageFormat("GPS_RAW_INT", 24, 30, 52, None, None),
+    25: MessageFormat("GPS_STATUS", 23, 101, 101, None, None),
+    26: MessageFormat("SCALED_IMU", 170, 22, 24, None, None),
+    27: MessageFormat("RAW_IMU", 144, 26, 29, None, None),
+    28: MessageFormat("RAW_PRESSURE", 67, 16, 16, None, None),
+    29: MessageFormat("SCALED_PRESSURE", 115, 14, 16, None, None),
+    30: MessageFormat("ATTITUDE", 39, 28, 28, None, None),
+    31: MessageFormat("ATTITUDE_QUATERNION", 246, 32, 48, None, None),
+    32: MessageFormat("LOCAL_POSITION_NED", 185, 28, 28, None, None),
+    33: MessageFormat("GLOBAL_POSITION_INT", 104, 28, 28, None, None),
+    34: MessageFormat("RC_CHANNELS_SCALED", 237, 22, 22, None, None),
+    35: MessageFormat("RC_CHANNELS_RAW", 244, 22, 22, None, None),
+    36: MessageFormat("SERVO_OUTPUT_RAW", 222, 21, 37, None, None),
+    37: MessageFormat("MISSION_REQUEST_PARTIAL_LIST", 212, 6, 7, 4, 5),
+    38: MessageFormat("MISSION_WRITE_PARTIAL_LIST", 9, 6, 7, 4, 5),
+    39: MessageFormat("MISSION_ITEM", 254, 37, 38, 32, 33),
+    40: MessageFormat("MISSION_REQUEST", 230, 4, 5, 2, 3),
+    41: MessageFormat("MISSION_SET_CURRENT", 28, 4, 4, 2, 3),
+    42: MessageFormat("MISSION_CURRENT", 28, 2, 6, None, None),
+    43: MessageFormat("MISSION_REQUEST_LIST", 132, 2, 3, 0, 1),
+    44: MessageFormat("MISSION_COUNT", 221, 4, 5, 2, 3),
+    45: MessageFormat("MISSION_CLEAR_ALL", 232, 2, 3, 0, 1),
+    46: MessageFormat("MISSION_ITEM_REACHED", 11, 2, 2, None, None),
+    47: MessageFormat("MISSION_ACK", 153, 3, 4, 0, 1),
+    48: MessageFormat("SET_GPS_GLOBAL_ORIGIN", 41, 13, 21, 12, None),
+    49: MessageFormat("GPS_GLOBAL_ORIGIN", 39, 12, 20, None, None),
+    50: MessageFormat("PARAM_MAP_RC", 78, 37, 37, 18, 19),
+    51: MessageFormat("MISSION_REQUEST_INT", 196, 4, 5, 2, 3),
+    53: MessageFormat("MISSION_CHECKSUM", 3, 5, 5, None, None),
+    54: MessageFormat("SAFETY_SET_ALLOWED_AREA", 15, 27, 27, 24, 25),
+    55: MessageFormat("SAFETY_ALLOWED_AREA", 3, 25, 25, None, None),
+    61: MessageFormat("ATTITUDE_QUATERNION_COV", 167, 72, 72, None, None),
+    62: MessageFormat("NAV_CONTROLLER_OUTPUT", 183, 26, 26, None, None),
+    63: MessageFormat("GLOBAL_POSITION_INT_COV", 119, 181, 181, None, None),
+    64: MessageFormat("LOCAL_POSITION_NED_COV", 191, 225, 225, None, None),
+    65: MessageFormat("RC_CHANNELS", 118, 42, 42, None, None),
+    66: MessageFormat("REQUEST_DATA_STREAM", 148, 6, 6, 2, 3),
+    67: MessageFormat("DATA_STREAM", 21, 4, 4, None, None),
+    69: MessageFormat("MANUAL_CONTROL", 243, 11, 30, None, None),
+    70: MessageFormat("RC_CHANNELS_OVERRIDE", 124, 18, 38, 16, 17),
+    73: MessageFormat("MISSION_ITEM_INT", 38, 37, 38, 32, 33),
+    74: MessageFormat("VFR_HUD", 20, 20, 20, None, None),
+    75: MessageFormat("COMMAND_INT", 158, 35, 35, 30, 31),
+    76: MessageFormat("COMMAND_LONG", 152, 33, 33, 30, 31),
+    77: MessageFormat("COMMAND_ACK", 143, 3, 10, 8, 9),
+    81: MessageFormat("MANUAL_SETPOINT", 106, 22, 22, None, None),
+    82: MessageFormat("SET_ATTITUDE_TARGET", 49, 39, 39, 36, 37),
+    83: MessageFormat("ATTITUDE_TARGET", 22, 37, 37, None, None),
+    84: MessageFormat("SET_POSITION_TARGET_LOCAL_NED", 143, 53, 53, 50, 51),
+    85: MessageFormat("POSITION_TARGET_LOCAL_NED", 140, 51, 51, None, None),
+    86: MessageFormat("SET_POSITION_TARGET_GLOBAL_INT", 5, 53, 53, 50, 51),
+    87: MessageFormat("POSITION_TARGET_GLOBAL_INT", 150, 51, 51, None, None),
+    89: MessageFormat("LOCAL_POSITION_NED_SYSTEM_GLOBAL_OFFSET", 231, 28, 28, None, None),
+    90: MessageFormat("HIL_STATE", 183, 56, 56, None, None),
+    91: MessageFormat("HIL_CONTROLS", 63, 42, 42, None, None),
+    92: MessageFormat("HIL_RC_INPUTS_RAW", 54, 33, 33, None, None),
+    93: MessageFormat("HIL_ACTUATOR_CONTROLS", 47, 81, 81, None, None),
+    100: MessageFormat("OPTICAL_FLOW", 175, 26, 34, None, None),
+    101: MessageFormat("GLOBAL_VISION_POSITION_ESTIMATE", 102, 32, 117, None, None),
+    102: MessageFormat("VISION_POSITION_ESTIMATE", 158, 32, 117, None, None),
+    103: MessageFormat("VISION_SPEED_ESTIMATE", 208, 20, 57, None, None),
+    104: MessageFormat("VICON_POSITION_ESTIMATE", 56, 32, 116, None, None),
+    105: MessageFormat("HIGHRES_IMU", 93, 62, 63, None, None),
+    106: MessageFormat("OPTICAL_FLOW_RAD", 138, 44, 44, None, None),
+    107: MessageFormat("HIL_SENSOR", 108, 64, 65, None, None),
+    108: MessageFormat("SIM_STATE", 32, 84, 92, None, None),
+    109: MessageFormat("RADIO_STATUS", 185, 9, 9, None, None),
+    110: MessageFormat("FILE_TRANSFER_PROTOCOL", 84, 254, 254, 1, 2),
+    111: MessageFormat("TIMESYNC", 34, 16, 16, None, None),
+    112: MessageFormat("CAMERA_TRIGGER", 174, 12, 12, None, None),
+    113: MessageFormat("HIL_GPS", 124, 36, 39, None, None),
+    114: MessageFormat("HIL_OPTICAL_FLOW", 237, 44, 44, None, None),
+    115: MessageFormat("HIL_STATE_QUATERNION", 4, 64, 64, None, None),
+    116: MessageFormat("SCALED_IMU2", 76, 22, 24, None, None),
+    117: MessageFormat("LOG_REQUEST_LIST", 128, 6, 6, 4, 5),
+    118: MessageFormat("LOG_ENTRY", 56, 14, 14, None, None),
+    119: MessageFormat("LOG_REQUEST_DATA", 116, 12, 12, 10, 11),
+    120: MessageFormat("LOG_DATA", 134, 97, 97, None, None),
+    121: MessageFormat("LOG_ERASE", 237, 2, 2, 0, 1),
+    122: MessageFormat("LOG_REQUEST_END", 203, 2, 2, 0, 1),
+    123: MessageFormat("GPS_INJECT_DATA", 250, 113, 113, 0, 1),
+    124: MessageFormat("GPS2_RAW", 87, 35, 57, None, None),
+    125: MessageFormat("POWER_STATUS", 203, 6, 6, None, None),
+    126: MessageFormat("SERIAL_CONTROL", 220, 79, 79, None, None),
+    127: MessageFormat("GPS_RTK", 25, 35, 35, None, None),
+    128: MessageFormat("GPS2_RTK", 226, 35, 35, None, None),
+    129: MessageFormat("SCALED_IMU3", 46, 22, 24, None, None),
+    130: MessageFormat("DATA_TRANSMISSION_HANDSHAKE", 29, 13, 13, None, None),
+    131: MessageFormat("ENCAPSULATED_DATA", 223, 255, 255, None, None),
+    132: MessageFormat("DISTANCE_SENSOR", 85, 14, 39, None, None),
+    133: MessageFormat("TERRAIN_REQUEST", 6, 18, 18, None, None),
+    134: MessageFormat("TERRAIN_DATA", 229, 43, 43, None, None),
+    135: MessageFormat("TERRAIN_CHECK", 203, 8, 8, None, None),
+    136: MessageFormat("TERRAIN_REPORT", 1, 22, 22, None, None),
+    137: MessageFormat("SCALED_PRESSURE2", 195, 14, 16, None, None),
+    138: MessageFormat("ATT_POS_MOCAP", 109, 36, 120, None, None),
+    139: MessageFormat("SET_ACTUATOR_CONTROL_TARGET", 168, 43, 43, 41, 42),
+    140: MessageFormat("ACTUATOR_CONTROL_TARGET", 181, 41, 41, None, None),
+    141: MessageFormat("ALTITUDE", 47, 32, 32, None, None),
+    142: MessageFormat("RESOURCE_REQUEST", 72, 243, 243, None, None),
+    143: MessageFormat("SCALED_PRESSURE3", 131, 14, 16, None, None),
+    144: MessageFormat("FOLLOW_TARGET", 127, 93, 93, None, None),
+    146: MessageFormat("CONTROL_SYSTEM_STATE", 103, 100, 100, None, None),
+    147: MessageFormat("BATTERY_STATUS", 154, 36, 54, None, None),
+    148: MessageFormat("AUTOPILOT_VERSION", 178, 60, 78, None, None),
+    149: MessageFormat("LANDING_TARGET", 200, 30, 60, None, None),
+    150: MessageFormat("SENSOR_OFFSETS", 134, 42, 42, None, None),
+    151: MessageFormat("SET_MAG_OFFSETS", 219, 8, 8, 6, 7),
+    152: MessageFormat("MEMINFO", 208, 4, 8, None, None),
+    153: MessageFormat("AP_ADC", 188, 12, 12, None, None),
+    154: MessageFormat("DIGICAM_CONFIGURE", 84, 15, 15, 6, 7),
+    155: MessageFormat("DIGICAM_CONTROL", 22, 13, 13, 4, 5),
+    156: MessageFormat("MOUNT_CONFIGURE", 19, 6, 6, 0, 1),
+    157: MessageFormat("MOUNT_CONTROL", 21, 15, 15, 12, 13),
+    158: MessageFormat("MOUNT_STATUS", 134, 14, 15, 12, 13),
+    160: MessageFormat("FENCE_POINT", 78, 12, 12, 8, 9),
+    161: MessageFormat("FENCE_FETCH_POINT", 68, 3, 3, 0, 1),
+    162: MessageFormat("FENCE_STATUS", 189, 8, 9, None, None),
+    163: MessageFormat("AHRS", 127, 28, 28, None, None),
+    164: MessageFormat("SIMSTATE", 154, 44, 44, None, None),
+    165: MessageFormat("HWSTATUS", 21, 3, 3, None, None),
+    166: MessageFormat("RADIO", 21, 9, 9, None, None),
+    167: MessageFormat("LIMITS_STATUS", 144, 22, 22, None, None),
+    168: MessageFormat("WIND", 1, 12, 12, None, None),
+    169: MessageFormat("DATA16", 234, 18, 18, None, None),
+    170: MessageFormat("DATA32", 73, 34, 34, None, None),
+    171: MessageFormat("DATA64", 181, 66, 66, None, None),
+    172: MessageFormat("DATA96", 22, 98, 98, None, None),
+    173: MessageFormat("RANGEFINDER", 83, 8, 8, None, None),
+    174: MessageFormat("AIRSPEED_AUTOCAL", 167, 48, 48, None, None),
+    175: MessageFormat("RALLY_POINT", 138, 19, 19, 14, 15),
+    176: MessageFormat("RALLY_FETCH_POINT", 234, 3, 3, 0, 1),
+    177: MessageFormat("COMPASSMOT_STATUS", 240, 20, 20, None, None),
+    178: MessageFormat("AHRS2", 47, 24, 24, None, None),
+    179: MessageFormat("CAMERA_STATUS", 189, 29, 29, 26, None),
+    180: MessageFormat("CAMERA_FEEDBACK", 52, 45, 47, 42, None),
+    181: MessageFormat("BATTERY2", 174, 4, 4, None, None),
+    182: MessageFormat("AHRS3", 229, 40, 40, None, None),
+    183: MessageFormat("AUTOPILOT_VERSION_REQUEST", 85, 2, 2, 0, 1),
+    184: MessageFormat("REMOTE_LOG_DATA_BLOCK", 159, 206, 206, 4, 5),
+    185: MessageFormat("REMOTE_LOG_BLOCK_STATUS", 186, 7, 7, 4, 5),
+    186: MessageFormat("LED_CONTROL", 72, 29, 29, 0, 1),
+    191: MessageFormat("MAG_CAL_PROGRESS", 92, 27, 27, None, None),
+    192: MessageFormat("MAG_CAL_REPORT", 36, 44, 54, None, None),
+    193: MessageFormat("EKF_STATUS_REPORT", 71, 22, 26, None, None),
+    194: MessageFormat("PID_TUNING", 98, 25, 33, None, None),
+    195: MessageFormat("DEEPSTALL", 120, 37, 37, None, None),
+    200: MessageFormat("GIMBAL_REPORT", 134, 42, 42, 40, 41),
+    201: MessageFormat("GIMBAL_CONTROL", 205, 14, 14, 12, 13),
+    214: MessageFormat("GIMBAL_TORQUE_CMD_REPORT", 69, 8, 8, 6, 7),
+    215: MessageFormat("GOPRO_HEARTBEAT", 101, 3, 3, None, None),
+    216: MessageFormat("GOPRO_GET_REQUEST", 50, 3, 3, 0, 1),
+    217: MessageFormat("GOPRO_GET_RESPONSE", 202, 6, 6, None, None),
+    218: MessageFormat("GOPRO_SET_REQUEST", 17, 7, 7, 0, 1),
+    219: MessageFormat("GOPRO_SET_RESPONSE", 162, 2, 2, None, None),
+    220: MessageFormat("NAV_FILTER_BIAS", 34, 32, 32, None, None),
+    221: MessageFormat("RADIO_CALIBRATION", 71, 42, 42, None, None),
+    222: MessageFormat("UALBERTA_SYS_STATUS", 15, 3, 3, None, None),
+    223: MessageFormat("COMMAND_INT_STAMPED", 119, 47, 47, 42, 43),
+    224: MessageFormat("COMMAND_LONG_STAMPED", 102, 45, 45, 42, 43),
+    225: MessageFormat("EFI_STATUS", 208, 65, 73, None, None),
+    226: MessageFormat("RPM", 207, 8, 8, None, None),
+    230: MessageFormat("ESTIMATOR_STATUS", 163, 42, 42, None, None),
+    231: MessageFormat("WIND_COV", 105, 40, 40, None, None),
+    232: MessageFormat("GPS_INPUT", 151, 63, 65, None, None),
+    233: MessageFormat("GPS_RTCM_DATA", 35, 182, 182, None, None),
+    234: MessageFormat("HIGH_LATENCY", 150, 40, 40, None, None),
+    235: MessageFormat("HIGH_LATENCY2", 179, 42, 42, None, None),
+    241: MessageFormat("VIBRATION", 90, 32, 32, None, None),
+    242: MessageFormat("HOME_POSITION", 104, 52, 60, None, None),
+    243: MessageFormat("SET_HOME_POSITION", 85, 53, 61, 52, None),
+    244: MessageFormat("MESSAGE_INTERVAL", 95, 6, 6, None, None),
+    245: MessageFormat("EXTENDED_SYS_STATE", 130, 2, 2, None, None),
+    246: MessageFormat("ADSB_VEHICLE", 184, 38, 38, None, None),
+    247: MessageFormat("COLLISION", 81, 19, 19, None, None),
+    248: MessageFormat("V2_EXTENSION", 8, 254, 254, 3, 4),
+    249: MessageFormat("MEMORY_VECT", 204, 36, 36, None, None),
+    250: MessageFormat("DEBUG_VECT", 49, 30, 30, None, None),
+    251: MessageFormat("NAMED_VALUE_FLOAT", 170, 18, 18, None, None),
+    252: MessageFormat("NAMED_VALUE_INT", 44, 18, 18, None, None),
+    253: MessageFormat("STATUSTEXT", 83, 51, 54, None, None),
+    254: MessageFormat("DEBUG", 46, 9, 9, None, None),
+    256: MessageFormat("SETUP_SIGNING", 71, None, 42, 8, 9),
+    257: MessageFormat("BUTTON_CHANGE", 131, None, 9, None, None),
+    258: MessageFormat("PLAY_TUNE", 187, None, 232, 0, 1),
+    259: MessageFormat("CAMERA_INFORMATION", 92, None, 237, None, None),
+    260: MessageFormat("CAMERA_SETTINGS", 146, None, 14, None, None),
+    261: MessageFormat("STORAGE_INFORMATION", 179, None, 61, None, None),
+    262: MessageFormat("CAMERA_CAPTURE_STATUS", 12, None, 23, None, None),
+    263: MessageFormat("CAMERA_IMAGE_CAPTURED", 133, None, 255, None, None),
+    264: MessageFormat("FLIGHT_INFORMATION", 49, None, 32, None, None),
+    265: MessageFormat("MOUNT_ORIENTATION", 26, None, 20, None, None),
+    266: MessageFormat("LOGGING_DATA", 193, None, 255, 2, 3),
+    267: MessageFormat("LOGGING_DATA_ACKED", 35, None, 255, 2, 3),
+    268: MessageFormat("LOGGING_ACK", 14, None, 4, 2, 3),
+    269: MessageFormat("VIDEO_STREAM_INFORMATION", 109, None, 215, None, None),
+    270: MessageFormat("VIDEO_STREAM_STATUS", 59, None, 20, None, None),
+    271: MessageFormat("CAMERA_FOV_STATUS", 22, None, 53, None, None),
+    275: MessageFormat("CAMERA_TRACKING_IMAGE_STATUS", 126, None, 32, None, None),
+    276: MessageFormat("CAMERA_TRACKING_GEO_STATUS", 18, None, 50, None, None),
+    277: MessageFormat("CAMERA_THERMAL_RANGE", 62, None, 30, None, None),
+    280: MessageFormat("GIMBAL_MANAGER_INFORMATION", 70, None, 33, None, None),
+    281: MessageFormat("GIMBAL_MANAGER_STATUS", 48, None, 13, None, None),
+    282: MessageFormat("GIMBAL_MANAGER_SET_ATTITUDE", 123, None, 35, 32, 33),
+    283: MessageFormat("GIMBAL_DEVICE_INFORMATION", 74, None, 149, None, None),
+    284: MessageFormat("GIMBAL_DEVICE_SET_ATTITUDE", 99, None, 32, 30, 31),
+    285: MessageFormat("GIMBAL_DEVICE_ATTITUDE_STATUS", 137, None, 49, 38, 39),
+    286: MessageFormat("AUTOPILOT_STATE_FOR_GIMBAL_DEVICE", 210, None, 57, 50, 51),
+    287: MessageFormat("GIMBAL_MANAGER_SET_PITCHYAW", 1, None, 23, 20, 21),
+    288: MessageFormat("GIMBAL_MANAGER_SET_MANUAL_CONTROL", 20, None, 23, 20, 21),
+    295: MessageFormat("AIRSPEED", 234, None, 12, None, None),
+    296: MessageFormat("GLOBAL_POSITION_SENSOR", 158, None, 41, 36, 37),
+    299: MessageFormat("WIFI_CONFIG_AP", 19, None, 96, None, None),
+    301: MessageFormat("AIS_VESSEL", 243, None, 58, None, None),
+    310: MessageFormat("UAVCAN_NODE_STATUS", 28, None, 17, None, None),
+    311: MessageFormat("UAVCAN_NODE_INFO", 95, None, 116, None, None),
+    320: MessageFormat("PARAM_EXT_REQUEST_READ", 243, None, 20, 2, 3),
+    321: MessageFormat("PARAM_EXT_REQUEST_LIST", 88, None, 2, 0, 1),
+    322: MessageFormat("PARAM_EXT_VALUE", 243, None, 149, None, None),
+    323: MessageFormat("PARAM_EXT_SET", 78, None, 147, 0, 1),
+    324: MessageFormat("PARAM_EXT_ACK", 132, None, 146, None, None),
+    330: MessageFormat("OBSTACLE_DISTANCE", 23, None, 167, None, None),
+    331: MessageFormat("ODOMETRY", 91, None, 233, None, None),
+    332: MessageFormat("TRAJECTORY_REPRESENTATION_WAYPOINTS", 236, None, 239, None, None),
+    333: MessageFormat("TRAJECTORY_REPRESENTATION_BEZIER", 231, None, 109, None, None),
+    335: MessageFormat("ISBD_LINK_STATUS", 225, None, 24, None, None),
+    339: MessageFormat("RAW_RPM", 199, None, 5, None, None),
+    340: MessageFormat("UTM_GLOBAL_POSITION", 99, None, 70, None, None),
+    345: MessageFormat("PARAM_ERROR", 209, None, 21, 2, 3),
+    350: MessageFormat("DEBUG_FLOAT_ARRAY", 232, None, 252, None, None),
+    360: MessageFormat("ORBIT_EXECUTION_STATUS", 11, None, 25, None, None),
+    370: MessageFormat("SMART_BATTERY_INFO", 75, None, 109, None, None),
+    373: MessageFormat("GENERATOR_STATUS", 117, None, 42, None, None),
+    375: MessageFormat("ACTUATOR_OUTPUT_STATUS", 251, None, 140, None, None),
+    376: MessageFormat("RELAY_STATUS", 199, None, 8, None, None),
+    385: MessageFormat("TUNNEL", 147, None, 133, 2, 3),
+    386: MessageFormat("CAN_FRAME", 132, None, 16, 4, 5),
+    387: MessageFormat("CANFD_FRAME", 4, None, 72, 4, 5),
+    388: MessageFormat("CAN_FILTER_MODIFY", 8, None, 37, 32, 33),
+    390: MessageFormat("ONBOARD_COMPUTER_STATUS", 156, None, 240, None, None),
+    397: MessageFormat("COMPONENT_METADATA", 182, None, 108, None, None),
+    420: MessageFormat("RADIO_RC_CHANNELS", 20, None, 73, 6, 7),
+    435: MessageFormat("AVAILABLE_MODES", 134, None, 46, None, None),
+    436: MessageFormat("CURRENT_MODE", 193, None, 9, None, None),
+    437: MessageFormat("AVAILABLE_MODES_MONITOR", 30, None, 1, None, None),
+    441: MessageFormat("GNSS_INTEGRITY", 169, None, 17, None, None),
+    513: MessageFormat("RANGING_BEACON", 99, None, 45, 40, 41),
+    8002: MessageFormat("SENS_POWER", 218, None, 16, None, None),
+    8003: MessageFormat("SENS_MPPT", 231, None, 41, None, None),
+    8004: MessageFormat("ASLCTRL_DATA", 172, None, 98, None, None),
+    8005: MessageFormat("ASLCTRL_DEBUG", 251, None, 38, None, None),
+    8006: MessageFormat("ASLUAV_STATUS", 97, None, 14, None, None),
+    8007: MessageFormat("EKF_EXT", 64, None, 32, None, None),
+    8008: MessageFormat("ASL_OBCTRL", 234, None, 33, None, None),
+    8009: MessageFormat("SENS_ATMOS", 144, None, 16, None, None),
+    8010: MessageFormat("SENS_BATMON", 155, None, 41, None, None),
+    8011: MessageFormat("FW_SOARING_DATA", 20, None, 102, None, None),
+    8012: MessageFormat("SENSORPOD_STATUS", 54, None, 16, None, None),
+    8013: MessageFormat("SENS_POWER_BOARD", 222, None, 46, None, None),
+    8014: MessageFormat("GSM_LINK_STATUS", 200, None, 14, None, None),
+    8015: MessageFormat("SATCOM_LINK_STATUS", 23, None, 24, None, None),
+    8016: MessageFormat("SENSOR_AIRFLOW_ANGLES", 149, None, 18, None, None),
+    9000: MessageFormat("WHEEL_DISTANCE", 113, None, 137, None, None),
+    9005: MessageFormat("WINCH_STATUS", 117, None, 34, None, None),
+    10001: MessageFormat("UAVIONIX_ADSB_OUT_CFG", 209, None, 20, None, None),
+    10002: MessageFormat("UAVIONIX_ADSB_OUT_DYNAMIC", 186, None, 41, None, None),
+    10003: MessageFormat("UAVIONIX_ADSB_TRANSCEIVER_HEALTH_REPORT", 4, None, 1, None, None),
+    10004: MessageFormat("UAVIONIX_ADSB_OUT_CFG_REGISTRATION", 133, None, 9, None, None),
+    10005: MessageFormat("UAVIONIX_ADSB_OUT_CFG_FLIGHTID", 103, None, 9, None, None),
+    10006: MessageFormat("UAVIONIX_ADSB_GET", 193, None, 4, None, None),
+    10007: MessageFormat("UAVIONIX_ADSB_OUT_CONTROL", 71, None, 17, None, None),
+    10008: MessageFormat("UAVIONIX_ADSB_OUT_STATUS", 240, None, 14, None, None),
+    10151: MessageFormat("LOWEHEISER_GOV_EFI", 195, None, 85, None, None),
+    11000: MessageFormat("DEVICE_OP_READ", 134, None, 52, 4, 5),
+    11001: MessageFormat("DEVICE_OP_READ_REPLY", 15, None, 136, None, None),
+    11002: MessageFormat("DEVICE_OP_WRITE", 234, None, 180, 4, 5),
+    11003: MessageFormat("DEVICE_OP_WRITE_REPLY", 64, None, 5, None, None),
+    11004: MessageFormat("SECURE_COMMAND", 11, None, 232, 8, 9),
+    11005: MessageFormat("SECURE_COMMAND_REPLY", 93, None, 230, None, None),
+    11010: MessageFormat("ADAP_TUNING", 46, None, 49, None, None),
+    11011: MessageFormat("VISION_POSITION_DELTA", 106, None, 44, None, None),
+    11020: MessageFormat("AOA_SSA", 205, None, 16, None, None),
+    11030: MessageFormat("ESC_TELEMETRY_1_TO_4", 144, None, 44, None, None),
+    11031: MessageFormat("ESC_TELEMETRY_5_TO_8", 133, None, 44, None, None),
+    11032: MessageFormat("ESC_TELEMETRY_9_TO_12", 85, None, 44, None, None),
+    11033: MessageFormat("OSD_PARAM_CONFIG", 195, None, 37, 16, 17),
+    11034: MessageFormat("OSD_PARAM_CONFIG_REPLY", 79, None, 5, None, None),
+    11035: MessageFormat("OSD_PARAM_SHOW_CONFIG", 128, None, 8, 4, 5),
+    11036: MessageFormat("OSD_PARAM_SHOW_CONFIG_REPLY", 177, None, 34, None, None),
+    11037: MessageFormat("OBSTACLE_DISTANCE_3D", 130, None, 28, None, None),
+    11038: MessageFormat("WATER_DEPTH", 47, None, 38, None, None),
+    11039: MessageFormat("MCU_STATUS", 142, None, 9, None, None),
+    11040: MessageFormat("ESC_TELEMETRY_13_TO_16", 132, None, 44, None, None),
+    11041: MessageFormat("ESC_TELEMETRY_17_TO_20", 208, None, 44, None, None),
+    11042: MessageFormat("ESC_TELEMETRY_21_TO_24", 201, None, 44, None, None),
+    11043: MessageFormat("ESC_TELEMETRY_25_TO_28", 193, None, 44, None, None),
+    11044: MessageFormat("ESC_TELEMETRY_29_TO_32", 189, None, 44, None, None),
+    11060: MessageFormat("NAMED_VALUE_STRING", 162, None, 78, None, None),
+    12900: MessageFormat("OPEN_DRONE_ID_BASIC_ID", 114, None, 44, 0, 1),
+    12901: MessageFormat("OPEN_DRONE_ID_LOCATION", 254, None, 59, 30, 31),
+    12902: MessageFormat("OPEN_DRONE_ID_AUTHENTICATION", 140, None, 53, 4, 5),
+    12903: MessageFormat("OPEN_DRONE_ID_SELF_ID", 249, None, 46, 0, 1),
+    12904: MessageFormat("OPEN_DRONE_ID_SYSTEM", 77, None, 54, 28, 29),
+    12905: MessageFormat("OPEN_DRONE_ID_OPERATOR_ID", 49, None, 43, 0, 1),
+    12915: MessageFormat("OPEN_DRONE_ID_MESSAGE_PACK", 94, None, 249, 0, 1),
+    12918: MessageFormat("OPEN_DRONE_ID_ARM_STATUS", 139, None, 51, None, None),
+    12919: MessageFormat("OPEN_DRONE_ID_SYSTEM_UPDATE", 7, None, 18, 16, 17),
+    12920: MessageFormat("HYGROMETER_SENSOR", 20, None, 5, None, None),
+    17000: MessageFormat("TEST_TYPES", 103, None, 179, None, None),
+    17150: MessageFormat("ARRAY_TEST_0", 26, None, 33, None, None),
+    17151: MessageFormat("ARRAY_TEST_1", 72, None, 16, None, None),
+    17153: MessageFormat("ARRAY_TEST_3", 19, None, 17, None, None),
+    17154: MessageFormat("ARRAY_TEST_4", 89, None, 17, None, None),
+    17155: MessageFormat("ARRAY_TEST_5", 27, None, 10, None, None),
+    17156: MessageFormat("ARRAY_TEST_6", 14, None, 91, None, None),
+    17157: MessageFormat("ARRAY_TEST_7", 187, None, 84, None, None),
+    17158: MessageFormat("ARRAY_TEST_8", 106, None, 24, None, None),
+    42000: MessageFormat("ICAROUS_HEARTBEAT", 227, None, 1, None, None),
+    42001: MessageFormat("ICAROUS_KINEMATIC_BANDS", 239, None, 46, None, None),
+    50001: MessageFormat("CUBEPILOT_RAW_RC", 246, None, 32, None, None),
+    50002: MessageFormat("HERELINK_VIDEO_STREAM_INFORMATION", 181, None, 246, None, None),
+    50003: MessageFormat("HERELINK_TELEM", 62, None, 19, None, None),
+    50004: MessageFormat("CUBEPILOT_FIRMWARE_UPDATE_START", 240, None, 10, 8, 9),
+    50005: MessageFormat("CUBEPILOT_FIRMWARE_UPDATE_RESP", 152, None, 6, 4, 5),
+    52000: MessageFormat("AIRLINK_AUTH", 13, None, 100, None, None),
+    52001: MessageFormat("AIRLINK_AUTH_RESPONSE", 239, None, 1, None, None),
+    60000: MessageFormat("AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_EXT", 4, None, 22, 20, 21),
+    60010: MessageFormat("STORM32_GIMBAL_MANAGER_INFORMATION", 208, None, 33, None, None),
+    60011: MessageFormat("STORM32_GIMBAL_MANAGER_STATUS", 183, None, 7, None, None),
+    60012: MessageFormat("STORM32_GIMBAL_MANAGER_CONTROL", 99, None, 36, 32, 33),
+    60013: MessageFormat("STORM32_GIMBAL_MANAGER_CONTROL_PITCHYAW", 129, None, 24, 20, 21),
+    60014: MessageFormat("STORM32_GIMBAL_MANAGER_CORRECT_ROLL", 134, None, 8, 4, 5),
+    60020: MessageFormat("QSHOT_STATUS", 202, None, 4, None, None),
+    60040: MessageFormat("FRSKY_PASSTHROUGH_ARRAY", 156, None, 245, None, None),
+    60041: MessageFormat("PARAM_VALUE_ARRAY", 191, None, 255, None, None),
+    60045: MessageFormat("MLRS_RADIO_LINK_STATS", 14, None, 23, 2, 3),
+    60046: MessageFormat("MLRS_RADIO_LINK_INFORMATION", 171, None, 28, 8, 9),
+    60047: MessageFormat("MLRS_RADIO_LINK_FLOW_CONTROL", 55, None, 7, None, None),
+    60050: MessageFormat("AVSS_PRS_SYS_STATUS", 220, None, 14, None, None),
+    60051: MessageFormat("AVSS_DRONE_POSITION", 245, None, 24, None, None),
+    60052: MessageFormat("AVSS_DRONE_IMU", 101, None, 44, None, None),
+    60053: MessageFormat("AVSS_DRONE_OPERATION_MODE", 45, None, 6, None, None),
 }

@@ -1,15 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A small MAVLink ground station that writes and reads missions over UDP, for the demonstration."""
 
+import socket
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
-from protocols.mavlink.codec import item_from_int_message, item_message
+from protocols.mavlink.codec import FrameWriter, decode, item_from_int_message, item_message, pack
 from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.mission_item import MissionItem, MissionResult
 
+_HEARTBEAT_INTERVAL_S = 0.2
 _REPLY_TIMEOUT_S = 1.0
 _TRIES = 8
+_DATAGRAM_SIZE = 2048
 
 
 class ClientError(Exception):
@@ -19,11 +24,28 @@ class ClientError(Exception):
 class MissionClient:
     """A connection to one vehicle. `texts` collects received STATUSTEXTs."""
 
-    def __init__(self, link: Message, sysid: int, compid: int) -> None:
-        self._link = link
-        self._sysid = sysid
-        self._compid = compid
+    def __init__(self, address: tuple[str, int]) -> None:
+        self._address = address
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._writer, self._splitter = FrameWriter(255, 190), MavlinkSplitter()
+        self._sysid, self._compid = 0, 0
         self.texts: list[str] = []
+
+    def connect(self, timeout_s: float) -> bool:
+        """Wait for the heartbeat of a vehicle with a flight controller; False if none arrives in time."""
+        heartbeat = messages.MAVLink_heartbeat_message(
+            messages.MAV_TYPE_GCS, messages.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3
+        )
+        for _ in range(max(round(timeout_s / _HEARTBEAT_INTERVAL_S), 1)):
+            self._send(heartbeat)
+            for frame, message in self._received(_HEARTBEAT_INTERVAL_S):
+                if message.get_type() == "HEARTBEAT" and message.system_status != messages.MAV_STATE_UNINIT:
+                    self._sysid, self._compid = frame.sysid, frame.compid
+                    return True
+        return False
+
+    def close(self) -> None:
+        self._socket.close()
 
     def write(self, items: Sequence[MissionItem], progress: Callable[[int], None]) -> MissionResult:
         """Upload a list; returns the type of the final MISSION_ACK."""
@@ -45,36 +67,43 @@ class MissionClient:
             message = self._ask(wanted, "MISSION_ITEM_INT")
             if message.seq == len(items):
                 items.append(item_from_int_message(message))
-        self._link.mav.send(messages.MAVLink_mission_ack_message(self._sysid, self._compid, 0, 0))
+        self._send(messages.MAVLink_mission_ack_message(self._sysid, self._compid, 0, 0))
         return items
 
     def _ask(self, message: Message, *answers: str) -> Message:
         for _ in range(_TRIES):
-            self._link.mav.send(message)
-            while True:
-                answer = self._link.recv_match(type=[*answers, "STATUSTEXT"], blocking=True, timeout=_REPLY_TIMEOUT_S)
-                if answer is None:
-                    break
-                if answer.get_type() != "STATUSTEXT":
+            self._send(message)
+            for _, answer in self._received(_REPLY_TIMEOUT_S):
+                if answer.get_type() in answers:
                     return answer
-                self.texts.append(answer.text)
+                if answer.get_type() == "STATUSTEXT":
+                    self.texts.append(answer.text)
         raise ClientError(f"no answer to {message.get_type()}")
+
+    def _send(self, message: Message) -> None:
+        self._socket.sendto(self._writer.frame(pack(message), 2), self._address)
+
+    def _received(self, timeout_s: float) -> Iterator[tuple[MavlinkFrame, Message]]:
+        """The messages that arrive within a time."""
+        end = time.monotonic() + timeout_s
+        while (left_s := end - time.monotonic()) > 0:
+            self._socket.settimeout(left_s)
+            try:
+                frames = self._splitter.feed(self._socket.recv(_DATAGRAM_SIZE))
+            except TimeoutError:
+                return
+            for frame in frames:
+                if (message := decode(frame.msgid, frame.payload)) is not None:
+                    yield frame, message
 
 
 @contextmanager
 def connect(host: str, port: int, timeout_s: float) -> Iterator[MissionClient]:
     """Connect to the vehicle on a UDP port; ClientError if no heartbeat arrives in time."""
-    from pymavlink import mavutil  # with numpy and every dialect: --help does without
-
-    link = mavutil.mavlink_connection(f"udpout:{host}:{port}", source_system=255, source_component=190)
+    client = MissionClient((host, port))
     try:
-        for _ in range(max(int(timeout_s / 0.2), 1)):
-            link.mav.heartbeat_send(messages.MAV_TYPE_GCS, messages.MAV_AUTOPILOT_INVALID, 0, 0, 0)
-            heartbeat = link.recv_match(type="HEARTBEAT", blocking=True, timeout=0.2)
-            linked = heartbeat is not None and heartbeat.system_status != messages.MAV_STATE_UNINIT
-            if linked:
-                yield MissionClient(link, heartbeat.get_srcSystem(), heartbeat.get_srcComponent())
-                return
-        raise ClientError(f"no vehicle with a flight controller on UDP port {port} within {timeout_s:.0f} s")
+        if not client.connect(timeout_s):
+            raise ClientError(f"no vehicle with a flight controller on UDP port {port} within {timeout_s:.0f} s")
+        yield client
     finally:
-        link.close()
+        client.close()

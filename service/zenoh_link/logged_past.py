@@ -16,7 +16,7 @@ from math import inf
 from pathlib import Path
 
 from payloads.mission_data import Json
-from protocols.mavlink.codec import MavlinkDecoder
+from protocols.mavlink.codec import decode
 from protocols.mavlink.dialect import Message, messages
 from protocols.tlog import STAMP_SIZE, read_tlog
 from service.recording.tlog_folder import is_log_name
@@ -176,10 +176,11 @@ def _is_armed(heartbeat: Message) -> bool:
 
 def _messages(records: bytes) -> Iterator[tuple[float, Message]]:
     """The vehicle's messages, with pauses."""
-    decoder = MavlinkDecoder()
     pause_at = time.monotonic() + _SLICE_S
     for record in read_tlog(records, _SEARCHED):
-        if record.frame.compid == messages.MAV_COMP_ID_AUTOPILOT1 and (message := decoder.decode(record.frame)):
+        frame = record.frame
+        is_ours = frame.compid == messages.MAV_COMP_ID_AUTOPILOT1
+        if is_ours and (message := decode(frame.msgid, frame.payload)):
             yield record.at_us / 1e6, message
         if time.monotonic() > pause_at:
             time.sleep(_PAUSE_S)

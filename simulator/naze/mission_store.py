@@ -9,7 +9,7 @@ is acknowledged.
 from collections.abc import Callable
 
 from protocols.float32 import single
-from protocols.mavlink.codec import MavlinkDecoder, Packed, pack
+from protocols.mavlink.codec import Packed, decode, pack
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame
@@ -58,7 +58,6 @@ class OwnMissionStore:
         self._slots = MissionSlots(flash, board.options)
         self._send = send
         self._on_reset = on_reset
-        self._decoder = MavlinkDecoder()
         self._partner = (0, 0)
         self.load()
         self._receiving = self._sending = self._knows_roi = False
@@ -95,7 +94,7 @@ class OwnMissionStore:
             self.load()
 
     def take(self, frame: MavlinkFrame, now: float) -> None:
-        message = self._decoder.decode(frame)
+        message = decode(frame.msgid, frame.payload)
         if message is None:
             return
         self._partner = (frame.sysid, frame.compid)

@@ -7,7 +7,7 @@ given one begins with, and schedules a write of the configuration. There is no P
 
 from collections.abc import Callable
 
-from protocols.mavlink.codec import MavlinkDecoder, Packed, pack
+from protocols.mavlink.codec import Packed, decode, pack
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame
 from simulator.naze.missions import Board
@@ -32,7 +32,6 @@ class Parameters:
         self._settings = settings
         self._spend_write = spend_write
         self._send = send
-        self._decoder = MavlinkDecoder()
         self._next = 0
         self.is_listing = False
 
@@ -44,7 +43,7 @@ class Parameters:
         match frame.msgid:
             case m.MAVLINK_MSG_ID_PARAM_REQUEST_LIST:
                 self.is_listing = True
-            case m.MAVLINK_MSG_ID_PARAM_SET if message := self._decoder.decode(frame):
+            case m.MAVLINK_MSG_ID_PARAM_SET if message := decode(frame.msgid, frame.payload):
                 if (self._board.config_write_due is not None or self._spend_write()) and self._set(
                     message.param_id, message.param_value
                 ):

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import zenoh
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from protocols.mavlink.dialect import messages
 from protocols.tlog import tlog_record
 from service.recording.tlog_recorder import TLOG_FOLDER
 from tests.support.benches import Starter

@@ -4,15 +4,17 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+from pymavlink.dialects.v20 import ardupilotmega as m
+
 from bridge.gcs.station import Peer
 from bridge.relay import Relay, WriteResult
-from protocols.mavlink.codec import FrameWriter, MavlinkDecoder, pack
+from protocols.mavlink.codec import FrameWriter, decode
 from protocols.mavlink.dialect import Message
-from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.mission_record import ListIdentity
 from reports.finding import Finding, News
+from tests.support.packing import pack
 
 VEHICLE = (7, 1)
 PEER = Peer("udp", "planner")
@@ -33,7 +35,6 @@ class Bench:
         self.now = 100.0
         self.frames: list[tuple[int, Message]] = []
         self._writer, self._vehicle = FrameWriter(255, 190), FrameWriter(*VEHICLE)
-        self._decoder = MavlinkDecoder()
 
     def send(self, message: Message) -> list[Message]:
         """Send a message of the ground station; the relay's answers."""
@@ -68,7 +69,7 @@ class Bench:
     def _take(self) -> None:
         for _, data in self.relay.take_datagrams():
             for frame in MavlinkSplitter().feed(data):
-                message = self._decoder.decode(frame)
+                message = decode(frame.msgid, frame.payload)
                 assert message is not None
                 self.frames.append((frame.raw[4], message))
 

@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Several vehicles at one ground station: frames reach the vehicle that they address, and no two share a system id."""
 
+from pymavlink.dialects.v20 import ardupilotmega as m
+
 from bridge.gcs.station import Peer
 from bridge.relay import Relay
 from bridge.relays import Relays
-from protocols.mavlink.codec import FrameWriter, MavlinkDecoder, pack
+from protocols.mavlink.codec import FrameWriter, decode
 from protocols.mavlink.dialect import Message
-from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mission_record import ListIdentity
 from tests.bridge.test_relay import PLAN, item_int
+from tests.support.packing import pack
 
 PEER = Peer("udp", "planner")
 
@@ -24,7 +26,7 @@ class Bench:
         self.relays = Relays(lambda *clash: self.clashes.append(clash))
         self.relays.add_default_peer(PEER)
         self.now = 100.0
-        self._writer, self._decoder = FrameWriter(255, 190), MavlinkDecoder()
+        self._writer = FrameWriter(255, 190)
         for name, system in systems.items():
             self.join(name, system)
 
@@ -52,7 +54,7 @@ class Bench:
         return [(frame.sysid, message) for frame in frames for message in self._messages(frame.raw)]
 
     def _messages(self, data: bytes) -> list[Message]:
-        found = [self._decoder.decode(frame) for frame in MavlinkSplitter().feed(data)]
+        found = [decode(frame.msgid, frame.payload) for frame in MavlinkSplitter().feed(data)]
         return [message for message in found if message is not None]
 
 

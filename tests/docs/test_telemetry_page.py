@@ -6,9 +6,9 @@ from math import inf
 from pathlib import Path
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.vehicle.telemetry_table import NO_STREAM, TELEMETRY, Row
-from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.missing_messages import CURRENT_MODE
 
 PAGE = (Path(__file__).parents[2] / "docs" / "telemetry.md").read_text()

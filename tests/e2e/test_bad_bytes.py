@@ -10,7 +10,8 @@ import tty
 from collections.abc import Iterator
 from pathlib import Path
 
-from protocols.mavlink.dialect import messages
+from pymavlink.dialects.v20 import ardupilotmega as messages
+
 from protocols.msp.command_line import is_clean
 from protocols.msp.commands import Msp
 from protocols.msp.frame import request

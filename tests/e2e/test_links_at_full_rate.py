@@ -10,11 +10,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from protocols.mavlink.codec import FrameWriter, pack
-from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.codec import FrameWriter
+from protocols.mavlink.dialect import Message
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from tests.support.benches import Starter
+from tests.support.packing import pack
 from tests.support.plain_station import PlainStation
 from tests.support.programs import TIMEOUT_S, free_port
 

@@ -5,9 +5,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.missions.mission_texts import finding_lines, summary
-from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.dialect import Message
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mission_item import Command, Frame, MissionResult
 from reports.verdict import Result

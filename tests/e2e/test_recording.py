@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 from pymavlink import mavutil
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from protocols.mavlink.dialect import messages
 from protocols.tlog import TlogRecord, read_tlog
 from protocols.uart_capture import UartAction, read_capture
 from tests.support.benches import Starter

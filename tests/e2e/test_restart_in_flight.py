@@ -3,7 +3,8 @@
 
 import time
 
-from protocols.mavlink.dialect import messages as m
+from pymavlink.dialects.v20 import ardupilotmega as m
+
 from service.daemon.flight_file import FLIGHT_FILE
 from tests.support.benches import Starter
 from tests.support.plain_station import PlainStation, udp_station

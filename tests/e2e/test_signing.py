@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from protocols.mavlink.dialect import messages
 from protocols.mavlink.signing import key_from_passphrase, ticks
 from protocols.mission_item import MissionResult
 from tests.support.benches import Starter

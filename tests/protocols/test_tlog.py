@@ -9,8 +9,8 @@ from fastcrc.crc16 import mcrf4xx
 from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink import mavutil
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from protocols.mavlink.dialect import messages
 from protocols.tlog import read_tlog, tlog_record
 
 NOON_US = 1_795_262_400_000_000

@@ -4,12 +4,12 @@
 from collections.abc import Callable
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.fc.states.cli import Cli
 from bridge.fc.states.mavlink import HarakiriMavlink
 from bridge.fc.states.msp import Identifying, Polling
 from protocols.firmware_image import Image
-from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import MissionItem, MissionResult
 from simulator.emulated_naze.board import EmulatedNaze
 from tests.support.conversations import Download, Upload, records_of, waypoints

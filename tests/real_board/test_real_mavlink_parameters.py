@@ -2,17 +2,18 @@
 """Harakiri's own parameters over MAVLink on the image, patched or not, and the bridge that shows them."""
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.controllers.harakiri.mavlink_settings import HarakiriMavlinkSettings
 from bridge.settings.board_setting import SettingTable
 from bridge.settings.fc_settings import SettingRefusal
 from protocols.firmware_image import Image
-from protocols.mavlink.codec import FrameWriter, pack
-from protocols.mavlink.dialect import messages as m
+from protocols.mavlink.codec import FrameWriter
 from protocols.mavlink.frame import MavlinkSplitter
 from simulator.emulated_naze.board import EmulatedNaze
 from tests.support import mavlink_parameters as page
+from tests.support.packing import pack
 from tests.support.real_bench import Figure, RealBench
 from tests.support.settings_client import SettingsClient
 from tests.support.world import GroundStation, World

@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 from math import hypot
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
 from protocols.firmware_image import Image
 from protocols.mavlink.dialect import Message
-from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.msp.mission_flight import FlightPhase
 from simulator.emulated_naze.console import Console

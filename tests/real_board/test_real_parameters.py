@@ -2,11 +2,11 @@
 """The settings of the image as parameters through the whole bridge: listed, set, saved, refused while armed."""
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.settings.board_setting import BoardSetting, SettingTable, shown
 from bridge.settings.fc_settings import Cause, SettingRefusal
 from protocols.firmware_image import Image
-from protocols.mavlink.dialect import messages as m
 from protocols.msp.frame import Direction, MspParser
 from protocols.msp.setting_table import SettingCommand
 from simulator.emulated_naze.board import EmulatedNaze

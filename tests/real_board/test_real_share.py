@@ -2,9 +2,9 @@
 """Other programs and the image: a flood for a minute, an honest program and an upload beside it, and a flight."""
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
 from protocols.firmware_image import Image
-from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import MissionResult
 from protocols.msp.frame import Direction
 from simulator.emulated_naze.board import EmulatedNaze

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.fc.states.msp import Polling
-from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
 from protocols.msp.mission import WpRecord
 from simulator.board.options import SimOptions

@@ -2,8 +2,8 @@
 """A Harakiri armed with tele_prot 1 answers MSP between FrSky frames; both share one send ring."""
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
 from simulator.board.options import SimOptions, TelemetryProtocol
 from tests.support.conversations import Upload, waypoints

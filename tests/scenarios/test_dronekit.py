@@ -7,8 +7,9 @@ would ask for item 0 and wait forever.
 
 from collections.abc import Callable
 
+from pymavlink.dialects.v20 import ardupilotmega as m
+
 from protocols.mavlink.dialect import Message
-from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import Command
 from simulator.board.flight import FIELD_LAT_E7, FIELD_LON_E7
 from tests.support.world import GroundStation, World, ready_world

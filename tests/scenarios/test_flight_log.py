@@ -5,8 +5,8 @@ from collections import Counter
 from collections.abc import Sequence
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
-from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mavlink.missing_messages import CURRENT_MODE
 from simulator.board.options import SimOptions, TelemetryProtocol

@@ -17,9 +17,9 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from hypothesis.database import DirectoryBasedExampleDatabase
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from payloads.mission_data import to_json
-from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.tlog import read_tlog, tlog_record

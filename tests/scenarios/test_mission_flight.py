@@ -5,9 +5,9 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
 from protocols.mavlink.dialect import Message
-from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.msp.commands import Msp
 from protocols.msp.frame import MspParser

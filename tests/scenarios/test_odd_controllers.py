@@ -6,10 +6,10 @@ import random
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.missions.fc_mission_store import PushFailure
-from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
 from protocols.mission_record import ListIdentity, identify
 from protocols.msp.frame import Direction, MspFrame, MspParser

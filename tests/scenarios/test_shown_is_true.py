@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
 from protocols.mavlink.dialect import Message
-from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import MissionItem, MissionResult
 from simulator.board.flight import Craft
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol

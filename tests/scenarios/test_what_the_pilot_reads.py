@@ -6,12 +6,12 @@ from functools import partial
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.controllers.harakiri.profile import arming_blockers
 from bridge.gcs.rights import LinkAccess
 from bridge.model.vehicle import Source, Sticks, Vehicle
 from protocols.mavlink.dialect import Message
-from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import Frame, MissionResult
 from simulator.board.msp_options import MspOptions
 from simulator.board.msp_sensors import SensorReplies

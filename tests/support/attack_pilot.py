@@ -9,7 +9,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from protocols.mavlink.dialect import Message, messages
+from pymavlink.dialects.v20 import ardupilotmega as messages
+
+from protocols.mavlink.dialect import Message
 from protocols.mavlink.signing import key_from_passphrase, ticks
 from protocols.mission_item import MissionResult
 from tests.support.plain_station import PlainStation

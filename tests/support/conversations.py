@@ -5,10 +5,12 @@ import struct
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from pymavlink.dialects.v20 import ardupilotmega as messages
+
 from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.missions.list_check import check_list
 from protocols.mavlink.codec import item_from_float_message, item_from_int_message
-from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.dialect import Message
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult, degrees_to_e7
 from protocols.msp.mission import WpRecord
 from tests.support.world import GroundStation

@@ -3,9 +3,10 @@
 
 from typing import Any
 
+from pymavlink.dialects.v20 import ardupilotmega as m
+
 from protocols.mavlink.codec import FrameWriter, Packed
 from protocols.mavlink.dialect import MESSAGE_FORMATS
-from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.msp.frame import MspFrame, MspParser
 from tests.support.fake_controllers import QuietLine

@@ -7,7 +7,8 @@ import struct
 from collections.abc import Mapping
 from math import inf
 
-from protocols.mavlink.dialect import messages
+from pymavlink.dialects.v20 import ardupilotmega as messages
+
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from simulator.naze.board import SimulatedNaze
 

@@ -4,9 +4,10 @@
 import random
 from collections.abc import Sequence
 
+from pymavlink.dialects.v20 import ardupilotmega as m
+
 from protocols.mavlink.codec import FrameWriter, Packed
 from protocols.mavlink.dialect import MESSAGE_FORMATS
-from protocols.mavlink.dialect import messages as m
 from protocols.msp.frame import Direction, MspFrame
 
 #: Messages that ground stations send; others are drawn less often.

@@ -3,14 +3,17 @@
 
 from collections.abc import Mapping
 
-from protocols.mavlink.codec import FrameWriter, MavlinkDecoder, pack
+from pymavlink.dialects.v20 import ardupilotmega as m
+
+from protocols.mavlink.codec import FrameWriter, decode
 from protocols.mavlink.dialect import Message
-from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+from protocols.mission_item import Command
 from tests.support.naze_bench import WireBench
+from tests.support.packing import pack
 
 #: A command that the firmware does not store.
-UNKNOWN = m.MAV_CMD_DO_JUMP
+UNKNOWN = Command.DO_JUMP
 _BOARD = (1, 200)
 
 
@@ -27,7 +30,6 @@ class MavlinkGround:
         self._bench = bench
         self._writer = FrameWriter(255, 190)
         self._splitter = MavlinkSplitter()
-        self._decoder = MavlinkDecoder()
         self._frames: list[MavlinkFrame] = []
 
     def send(self, message: Message) -> None:
@@ -40,7 +42,7 @@ class MavlinkGround:
             while self._frames:
                 frame = self._frames.pop(0)
                 if frame.msgid in wanted:
-                    return self._decoder.decode(frame)
+                    return decode(frame.msgid, frame.payload)
             if self._bench.now >= end:
                 return None
             self._frames += self._splitter.feed(self._bench.run(0.02))
@@ -57,7 +59,7 @@ class MavlinkGround:
         for _ in range(count + 1):
             reply = self.wait(m.MAVLINK_MSG_ID_MISSION_REQUEST, m.MAVLINK_MSG_ID_MISSION_ACK)
             assert reply is not None, "no reply"
-            if reply.get_msgId() == m.MAVLINK_MSG_ID_MISSION_ACK:
+            if reply.msgid == m.MAVLINK_MSG_ID_MISSION_ACK:
                 return int(reply.type)
             if reply.seq == stop_after:
                 return None

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Harakiri's own parameters over MAVLink: tests for the model and the image."""
 
-from protocols.mavlink.dialect import messages as m
+from pymavlink.dialects.v20 import ardupilotmega as m
+
 from tests.support.mavlink_ground import MavlinkGround
 from tests.support.naze_bench import WireBench
 

@@ -17,9 +17,10 @@ from types import TracebackType
 from typing import Any, Self
 
 from pymavlink.dialects.v10 import ardupilotmega as mavlink_1
+from pymavlink.dialects.v20 import ardupilotmega as messages
 from pymavlink.mavftp import MAVFTP
 
-from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.dialect import Message
 from protocols.mavlink.ftp import FtpOp
 from protocols.mission_item import Frame, MissionResult
 from tests.support.mission_planner_screen import MissionPlannerScreen

@@ -5,8 +5,9 @@ Sources: CurrentState.cs, MAVLinkInterface.cs, HUD.cs, PrearmStatus.cs. Its defa
 a missing RC receiver on.
 """
 
+from pymavlink.dialects.v20 import ardupilotmega as m
+
 from protocols.mavlink.dialect import Message
-from protocols.mavlink.dialect import messages as m
 from tests.support.timeline import Timeline
 
 _WORST_SHOWN = m.MAV_SEVERITY_WARNING

@@ -8,7 +8,8 @@ from collections.abc import Iterator, Sequence
 from types import ModuleType, TracebackType
 from typing import Any, Self
 
-from protocols.mavlink.dialect import messages as v20
+from pymavlink.dialects.v20 import ardupilotmega as v20
+
 from protocols.mission_item import MissionResult
 from tests.support.plan import PlanRow
 from tests.support.programs import TIMEOUT_S

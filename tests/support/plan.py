@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from pymavlink.dialects.v20 import ardupilotmega as messages
+
 from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.missions.list_check import check_list
-from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.dialect import Message
 from protocols.mission_file.qgc_wpl import write_qgc_wpl
 from protocols.mission_item import Command, Frame, MissionItem, degrees_to_e7
 from protocols.mission_record import pack_records

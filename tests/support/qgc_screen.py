@@ -9,8 +9,9 @@ Only its rules, not its requests: a scripted client passes those it sends to `se
 
 from math import inf
 
+from pymavlink.dialects.v20 import ardupilotmega as m
+
 from protocols.mavlink.dialect import Message
-from protocols.mavlink.dialect import messages as m
 from tests.support.timeline import Timeline
 
 _COMMUNICATION_LOST_S = 3.5

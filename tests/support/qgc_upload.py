@@ -14,7 +14,9 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Protocol
 
-from protocols.mavlink.dialect import Message, messages
+from pymavlink.dialects.v20 import ardupilotmega as messages
+
+from protocols.mavlink.dialect import Message
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mission_item import MissionItem, MissionResult
 from tests.support.conversations import count_message, item_message

@@ -13,11 +13,14 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from protocols.mavlink.codec import FrameWriter, pack
-from protocols.mavlink.dialect import Message, messages
+from pymavlink.dialects.v20 import ardupilotmega as messages
+
+from protocols.mavlink.codec import FrameWriter
+from protocols.mavlink.dialect import Message
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mission_item import MissionResult
 from protocols.msp.mission import unpack_records
+from tests.support.packing import pack
 from tests.support.plain_station import tcp_station, udp_station
 from tests.support.plan import judge, plain_plan, records_of
 from tests.support.programs import Board, Daemon

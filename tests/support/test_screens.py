@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The models of what Mission Planner and QGroundControl show follow the rules of their sources."""
 
-from protocols.mavlink.codec import FrameWriter, MavlinkDecoder, pack
+from pymavlink.dialects.v20 import ardupilotmega as m
+
+from protocols.mavlink.codec import FrameWriter
 from protocols.mavlink.dialect import Message
-from protocols.mavlink.dialect import messages as m
-from protocols.mavlink.frame import MavlinkSplitter
 from tests.support.mission_planner_screen import MissionPlannerScreen
+from tests.support.packing import pack
 from tests.support.qgc_screen import MISSING, NEEDS_SETUP, QgcScreen
 
 MOTORS, GYRO, GPS, PREARM = (
@@ -30,10 +31,7 @@ def heartbeat(status: int = m.MAV_STATE_STANDBY, *, armed: bool = False) -> Mess
 
 
 def received(message: Message, version: int = 2) -> Message:
-    (frame,) = MavlinkSplitter().feed(FrameWriter(1, 1).frame(pack(message), version))
-    decoded = MavlinkDecoder().decode(frame)
-    assert decoded is not None
-    return decoded
+    return m.MAVLink(None).decode(bytearray(FrameWriter(1, 1).frame(pack(message), version)))
 
 
 def planner(*fed: tuple[float, Message]) -> MissionPlannerScreen:

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A bridge whose board holds a list, and a ground station that writes another one message by message."""
 
+from pymavlink.dialects.v20 import ardupilotmega as messages
+
 from bridge.line.conversation import Conversation, Pause
 from bridge.transfers.upload_states import Receiving, UploadState
-from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.dialect import Message
 from protocols.mission_item import MissionItem, MissionResult
 from simulator.board.options import Faults, SimOptions
 from tests.support.conversations import count_message, item_message, records_of, waypoints

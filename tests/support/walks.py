@@ -13,11 +13,11 @@ from pathlib import Path
 from types import FrameType
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.line.conversation import StoreEffect
-from protocols.mavlink.codec import FrameWriter, MavlinkDecoder, pack
+from protocols.mavlink.codec import FrameWriter
 from protocols.mavlink.dialect import Message
-from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkSplitter
 from service.daemon.daemon import Daemon
 from service.daemon.store_worker import StoreWorker
@@ -26,6 +26,7 @@ from service.settings.addresses import SimulatedFc, parse_gcs
 from simulator.board.options import Faults
 from simulator.links.pipe_link import SimLink
 from simulator.naze.board import SimulatedNaze
+from tests.support.packing import pack
 from tests.support.programs import free_port
 from tests.support.world import MemoryStore
 
@@ -33,6 +34,8 @@ _TIMEOUT_S = 30.0
 _POLL_S = 0.001
 _ROOT = f"{Path(__file__).parents[2]}/"
 _PRODUCT = ("bridge/", "protocols/", "reports/", "service/", "storage/")
+#: The messages' classes, which a reader of a walk skips.
+_MESSAGES = ("protocols/mavlink/messages.py", "protocols/mavlink/message_base.py")
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +103,7 @@ class TracedDaemon:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.connect(address)
         self._socket.setblocking(False)
-        self._writer, self._decoder = FrameWriter(255, 190), MavlinkDecoder()
+        self._writer = FrameWriter(255, 190)
 
     def send(self, message: Message) -> None:
         self._socket.send(self._writer.frame(pack(message), 2))
@@ -128,7 +131,7 @@ class TracedDaemon:
         if event not in ("call", "return") or not name.startswith(_ROOT):
             return
         file = name.removeprefix(_ROOT)
-        if not file.startswith(_PRODUCT):
+        if not file.startswith(_PRODUCT) or file in _MESSAGES:
             return
         if event == "return":
             self._depth -= 1
@@ -146,9 +149,7 @@ class TracedDaemon:
         with suppress(BlockingIOError):
             while True:
                 for frame in MavlinkSplitter().feed(self._socket.recv(2048)):
-                    message = self._decoder.decode(frame)
-                    assert message is not None
-                    yield message
+                    yield m.MAVLink(None).decode(bytearray(frame.raw))
 
 
 def run_traced(story: Callable[[TracedDaemon], Awaitable[None]], monkeypatch: pytest.MonkeyPatch) -> None:

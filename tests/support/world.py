@@ -14,6 +14,7 @@ from functools import lru_cache
 from typing import Any
 
 from pymavlink.dialects.v20 import all as every_message
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.bridge import Bridge
 from bridge.config import BridgeConfig, BridgeSettings, PassThroughRule
@@ -37,7 +38,7 @@ from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission, Re
 from bridge.model.settings import SealMemory, SealsOfThisRun
 from bridge.sharing.program import Program
 from bridge.vehicle.settings_backups import TakenBackup
-from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.dialect import Message
 from protocols.mavlink.frame import MAGIC_V1, MavlinkSplitter
 from protocols.mission_record import ListIdentity, identify
 from protocols.msp.command_line import is_clean

@@ -21,7 +21,7 @@ from bridge.fc.profile import FlightController, RuleSettings
 from bridge.line.conversation import Await, Conversation, LinkLost, Pause, Stopped, Transmit
 from bridge.missions.fc_mission_store import PushFailed, PushFailure, PushProgress, PushResult, StoreReport, StoreState
 from bridge.model.vehicle import Vehicle
-from protocols.mavlink.codec import MavlinkDecoder, pack
+from protocols.mavlink.codec import decode, pack
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame
@@ -54,7 +54,6 @@ class HarakiriMavlinkMissions(HarakiriStore):
     def __init__(self, _board: FlightController, vehicle: Vehicle, settings: RuleSettings) -> None:
         self._vehicle = vehicle
         self._settings = settings
-        self._decoder = MavlinkDecoder()
 
     def report(self) -> Conversation[StoreReport | None]:
         """Its state from telemetry; the stored list is unknown until it is read."""
@@ -156,7 +155,7 @@ class HarakiriMavlinkMissions(HarakiriStore):
         for seq in range(count):
             message = m.MAVLink_mission_request_message(*_TARGET, seq)
             answer = yield from self._question(message, _ITEM, seq)
-            item = None if answer is None else self._decoder.decode(answer)
+            item = None if answer is None else decode(answer.msgid, answer.payload)
             record = None if item is None else _record(item)
             if record is None:
                 return None
@@ -174,7 +173,7 @@ class HarakiriMavlinkMissions(HarakiriStore):
         return None
 
     def _field(self, frame: MavlinkFrame, name: str) -> int:
-        message = self._decoder.decode(frame)
+        message = decode(frame.msgid, frame.payload)
         return _NO_SEQ if message is None else int(getattr(message, name))
 
 

@@ -9,11 +9,10 @@ from collections.abc import Mapping
 from math import isfinite
 
 from bridge.controllers.harakiri.setting_texts import TEXTS
-from bridge.fc.profile import FlightController
 from bridge.line.conversation import Await, Conversation, Pause, Transmit
 from bridge.settings.board_setting import BoardSetting, SettingTable, Value, ValueKind, table_of
 from bridge.settings.fc_settings import Cause, FcSettings, SettingRefusal, TableReading, fixed
-from protocols.mavlink.codec import MavlinkDecoder, pack
+from protocols.mavlink.codec import decode, pack
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame
 
@@ -54,9 +53,6 @@ class HarakiriMavlinkSettings(FcSettings):
     )
     is_read_when_asked = True
 
-    def __init__(self, _board: FlightController) -> None:
-        self._decoder = MavlinkDecoder()
-
     def read(self, previous: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
         yield Pause(_SETTLED_S)
         found: dict[int, tuple[str, float]] = {}
@@ -68,7 +64,7 @@ class HarakiriMavlinkSettings(FcSettings):
                 frame: MavlinkFrame | None = yield Await(frozenset((_VALUE,)), _SILENCE_S)
                 if frame is None:
                     break
-                value = self._decoder.decode(frame)
+                value = decode(frame.msgid, frame.payload)
                 if value is None or not value.param_index < value.param_count <= _MOST:
                     continue
                 count = value.param_count

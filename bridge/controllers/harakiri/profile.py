@@ -108,7 +108,7 @@ MAVLINK = Profile(
     _FAMILY,
     Spoken.MAVLINK,
     missions=HarakiriMavlinkMissions,
-    settings=HarakiriMavlinkSettings,
+    settings=lambda _board: HarakiriMavlinkSettings(),
     arming_blockers=arming_blockers,
     mavlink_sender=(1, 1, 200),  # baseflight_mavlink.c; other autopilots send as component 1
 )

@@ -27,7 +27,7 @@ _TIME_PROGRAMS = ("chronyd", "ntpd", "gpsd")
 #: A Pi without a clock starts in 1970, or at its last shutdown; no release is older than this.
 EPOCH = datetime(2026, 1, 1, tzinfo=UTC)
 _LEAST_FREE = 64 << 20
-_LIBRARIES = ("pymavlink", "pyserial", "eclipse-zenoh")
+_LIBRARIES = ("pyserial", "eclipse-zenoh")
 _HWMON = "/sys/class/hwmon"
 _THROTTLED = ("vcgencmd", "get_throttled")
 #: Of its reply: undervoltage now, and since the start.

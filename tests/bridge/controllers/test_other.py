@@ -4,9 +4,9 @@
 from collections.abc import Callable
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.controllers import other
-from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
 from protocols.msp.nav import Nav
 from tests.bridge.controllers.nav.test_mission_store import found, plan

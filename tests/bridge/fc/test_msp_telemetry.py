@@ -7,8 +7,9 @@ from collections import Counter
 from itertools import pairwise
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.dialect import Message
 from protocols.msp.commands import Msp
 from protocols.msp.frame import MspParser
 from simulator.board.flight import FlightState

@@ -4,12 +4,13 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.fc.port_listener import LISTENING_SPEEDS, OtherDeviceWatch, PortListener
-from protocols.mavlink.codec import FrameWriter, pack
-from protocols.mavlink.dialect import messages as m
+from protocols.mavlink.codec import FrameWriter
 from protocols.msp.commands import Msp
 from protocols.msp.frame import request
+from tests.support.packing import pack
 
 NMEA = b"$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47\r\n"
 RADIO_STATUS = FrameWriter(51, 68).frame(pack(m.MAVLink_radio_status_message(0, 0, 100, 0, 0, 0, 0)), 1)

@@ -4,9 +4,10 @@
 import gc
 from collections import Counter
 
+from pymavlink.dialects.v20 import ardupilotmega as m
+
 from bridge.gcs.budget import Budget, HostBudget, HostBudgets
 from bridge.gcs.cost import SEATS, Cost
-from protocols.mavlink.dialect import messages as m
 from protocols.msp.frame import MspParser
 from tests.support.world import GroundStation, ready_world
 

@@ -6,16 +6,17 @@ from collections.abc import Callable, Iterator
 from math import inf
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.gcs.ground import Ground
 from bridge.gcs.rights import LinkAccess
 from bridge.gcs.station import Peer, Station
-from protocols.mavlink.codec import FrameWriter, pack
-from protocols.mavlink.dialect import messages as m
+from protocols.mavlink.codec import FrameWriter
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.mission_item import MissionResult
 from simulator.board.options import SimOptions
 from tests.support.conversations import Upload, records_of, waypoints
+from tests.support.packing import pack
 from tests.support.world import GroundStation, Radio, World, ready_world
 
 HOUR_S = 3600.0

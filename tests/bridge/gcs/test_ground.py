@@ -7,6 +7,7 @@ import pytest
 from fastcrc.crc16 import mcrf4xx
 from hypothesis import given
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.gcs.ground import EXPIRY_S, MAX_DATAGRAM_SIZE
 from bridge.gcs.ground_station import GroundStation as GcsStation
@@ -15,7 +16,7 @@ from bridge.gcs.places import MAX_PEERS
 from bridge.gcs.rights import LinkAccess
 from bridge.gcs.station import Peer, Severity
 from bridge.gcs.texts import split_text
-from protocols.mavlink.dialect import CRC_EXTRA, Message, messages
+from protocols.mavlink.dialect import CRC_EXTRA, Message
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mission_item import MissionResult
 from tests.support.conversations import Upload, waypoints

@@ -5,12 +5,12 @@ import gc
 from collections.abc import Callable
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.gcs.ground import EXPIRY_S
 from bridge.gcs.ground_station import GroundStation as GcsStation
 from bridge.gcs.ground_station import Speaker
 from bridge.gcs.station import Peer
-from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame
 from tests.support.conversations import count_message
 from tests.support.world import GroundStation, World, ready_world

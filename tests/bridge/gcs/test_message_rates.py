@@ -4,10 +4,11 @@
 import math
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.gcs.ground import EXPIRY_S
 from bridge.vehicle.telemetry_table import TELEMETRY, Row
-from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.dialect import Message
 from protocols.mavlink.missing_messages import AVAILABLE_MODES
 from protocols.msp.commands import Msp
 from protocols.msp.frame import MspParser

@@ -9,6 +9,7 @@ from functools import partial
 from itertools import pairwise
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import GroundStation as GcsStation
@@ -18,12 +19,12 @@ from bridge.gcs.station import Peer, Station
 from bridge.transfers import upload_states
 from bridge.transfers import uploads as uploads_module
 from bridge.transfers.upload_answers import UploadAnswers
-from protocols.mavlink.codec import FrameWriter, pack
+from protocols.mavlink.codec import FrameWriter
 from protocols.mavlink.dialect import Message
-from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.mission_item import MissionResult
 from tests.support.conversations import Upload, count_message, item_message, records_of, waypoints
+from tests.support.packing import pack
 from tests.support.world import GroundStation, Radio, World, ready_world
 
 HELLO = m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)

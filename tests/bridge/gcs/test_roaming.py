@@ -4,9 +4,10 @@
 import random
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.gcs.ground import EXPIRY_S, MOVED_S
-from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.dialect import Message
 from protocols.mission_item import MissionResult
 from tests.support.conversations import Download, Upload, count_message, item_message, records_of, waypoints
 from tests.support.world import GroundStation, Radio, World, ready_world

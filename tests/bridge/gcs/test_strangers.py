@@ -11,13 +11,13 @@ from collections.abc import Iterator
 
 import pytest
 from pymavlink.dialects.v20 import all as every_message
+from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.controllers import other
 from bridge.gcs.rights import LinkAccess, Standing
 from bridge.gcs.station import Peer
 from protocols.mavlink.codec import FrameWriter, Packed
 from protocols.mavlink.dialect import MESSAGE_FORMATS, Message
-from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mavlink.signing import Check, Signing, Timestamps, key_from_passphrase, ticks
 from tests.bridge.fc.states.test_pass_through import Autopilot

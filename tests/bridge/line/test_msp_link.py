@@ -5,11 +5,11 @@ import random
 from itertools import pairwise
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.line.conversation import Send
 from bridge.line.msp_link import MAX_OUTSTANDING_BYTES, RESYNC, MspLink
 from bridge.model.vehicle import Orientation
-from protocols.mavlink.dialect import messages
 from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, request
 from simulator.board.options import Faults, SimOptions

@@ -4,11 +4,11 @@
 from collections.abc import Iterator
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.controllers.harakiri.mission_store import HarakiriMissions
 from bridge.model.mission_log import Outcome
 from bridge.model.refusal import Refusal
-from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import MissionResult
 from simulator.board.options import SimOptions
 from tests.support.conversations import Download, Upload, records_of, waypoints

@@ -2,8 +2,8 @@
 """A bridge that restarts in flight continues seamlessly, as long as the board does not contradict its memory."""
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
-from protocols.mavlink.dialect import messages as m
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from simulator.naze.board import SimulatedNaze
 from tests.support.fake_controllers import DeafWhileArmed

@@ -4,12 +4,12 @@
 import struct
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.fc.profile import FlightController
 from bridge.model.airframe import Airframe
 from bridge.model.vehicle import Vehicle
 from bridge.vehicle import vehicle_messages as make
-from protocols.mavlink.dialect import messages as m
 from tests.bridge.vehicle.test_vehicle_messages import BETAFLIGHT, HARAKIRI, INAV, at, status, with_replies
 
 _AVAILABLE_MODE = struct.Struct("<IIBBB35s")

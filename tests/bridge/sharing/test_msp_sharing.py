@@ -5,8 +5,8 @@ import itertools
 import random
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
-from protocols.mavlink.dialect import messages as m
 from protocols.msp.frame import MAX_REPLY, Direction, MspFrame, request
 from protocols.msp.nav import LAST, NavAction, NavRecord
 from simulator.commands.fc_kinds import make_board

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
-from protocols.mavlink.dialect import messages as m
 from protocols.msp.frame import Direction, MspParser
 from simulator.board.msp_options import MspOptions
 from simulator.board.options import SimOptions

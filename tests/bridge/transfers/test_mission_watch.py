@@ -4,8 +4,8 @@
 from dataclasses import replace
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from protocols.mavlink.dialect import messages
 from protocols.msp.frame import MspParser
 from protocols.msp.nav import Nav
 from simulator.board.msp_board import MspBoard

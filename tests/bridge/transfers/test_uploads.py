@@ -6,10 +6,11 @@ from dataclasses import replace
 from itertools import pairwise
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.model.mission_log import Outcome
 from bridge.transfers.upload_states import Asking, Delivering, Receiving
-from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.dialect import Message
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from tests.support.conversations import (

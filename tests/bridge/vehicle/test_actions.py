@@ -6,11 +6,12 @@ from collections.abc import Callable
 from functools import partial
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.missions.mission_service import NO_LINK
 from bridge.vehicle.calibration import ActionResult
 from bridge.vehicle.commands import _REFUSED
-from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.dialect import Message
 from protocols.msp.frame import MspParser
 from simulator.board.msp_sensors import SensorReplies
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol

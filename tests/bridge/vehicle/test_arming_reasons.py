@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reasons not to arm are reported when they change."""
 
-from protocols.mavlink.dialect import messages
+from pymavlink.dialects.v20 import ardupilotmega as messages
+
 from simulator.board.options import Faults
 from tests.bridge.controllers.inav.test_telemetry import introduced
 

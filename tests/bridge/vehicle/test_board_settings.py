@@ -2,10 +2,10 @@
 """The settings of every kind of board: read as a whole, changed one by one and read back, saved; never armed."""
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.settings.board_setting import BoardSetting, Value, shown
 from bridge.settings.fc_settings import Cause, SettingRefusal
-from protocols.mavlink.dialect import messages
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from protocols.msp.setting_table import SettingCommand
 from simulator.board.options import Faults

@@ -11,8 +11,8 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
-from protocols.mavlink.dialect import messages as m
 from simulator.board.options import Faults, SimOptions
 from simulator.commands.fc_kinds import make_board
 from tests.support.fake_inav import FakeInav

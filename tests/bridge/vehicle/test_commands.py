@@ -5,9 +5,10 @@ import math
 from collections.abc import Callable
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.vehicle.telemetry_table import TELEMETRY
-from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.dialect import Message
 from tests.support.world import GroundStation, World, ready_world
 
 m = messages

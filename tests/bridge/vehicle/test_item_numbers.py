@@ -4,7 +4,8 @@
 from dataclasses import replace
 from typing import Any
 
-from protocols.mavlink.dialect import messages as m
+from pymavlink.dialects.v20 import ardupilotmega as m
+
 from protocols.mission_item import Command, MissionItem, MissionResult
 from tests.support.conversations import Download, Upload, waypoints
 from tests.support.fake_inav import FakeInav

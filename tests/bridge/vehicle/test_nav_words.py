@@ -2,10 +2,10 @@
 """The words of INAV's OSD as texts: when they change, with the item numbers of each ground station."""
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.gcs.station import Severity
 from bridge.vehicle.nav_words import NavWords, nav_words, severity_of
-from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.msp.nav import FINISHED, NavAction, NavMode, NavState, NavStatus
 from tests.bridge.vehicle.test_item_numbers import HOME, LEGS, WITH_TAKEOFF, bench

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.gcs.rights import LinkAccess
 from bridge.gcs.station import Peer
 from bridge.model.vehicle import MissionLeg
 from protocols.mavlink.dialect import Message
-from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.msp.frame import MspFrame, MspParser
 from protocols.msp.nav import FINISHED, SET_WP_INDEX, Nav, NavState, NavStatus

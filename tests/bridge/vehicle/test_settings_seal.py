@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.config import BridgeConfig
 from bridge.model.settings import BoardId, ChangedPart, Seal, SealsOfThisRun, SettingsChange
-from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from protocols.msp.mission import MissionCommand

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from bridge.controllers import other
 from bridge.controllers.harakiri import profile as harakiri
@@ -75,11 +76,11 @@ def attitude(roll: int = 0, pitch: int = 0, heading: int = 0) -> bytes:
 
 def sent(message: Packed) -> Any:
     """The message as received."""
-    return m.MAVLink(None).decode(bytearray(FrameWriter(1, 1).frame(message, 2)))
+    return mavlink.MAVLink(None).decode(bytearray(FrameWriter(1, 1).frame(message, 2)))
 
 
 def fields(message: Any) -> dict[str, Any]:
-    return {name: getattr(message, name) for name in message.fieldnames}
+    return {name: getattr(message, name) for name in mavlink.mavlink_map[message.msgid].fieldnames}
 
 
 def test_without_readings_there_are_no_messages() -> None:
@@ -115,7 +116,7 @@ def test_a_current_sensor_below_zero_is_no_huge_consumption() -> None:
 
 def test_without_a_fix_there_is_no_position() -> None:
     state = with_replies(Vehicle(), HARAKIRI, STATUS=status(), RAW_GPS=gps(fix=0), ALTITUDE=bytes(6))
-    assert make.gps_raw_int(at(state)).fix_type == m.GPS_FIX_TYPE_NO_FIX
+    assert make.gps_raw_int(at(state)).fix_type == mavlink.GPS_FIX_TYPE_NO_FIX
     position = fields(make.global_position_int(at(state)))
     assert [position[name] for name in ("lat", "lon", "alt", "relative_alt", "vx", "vy", "vz")] == [0] * 7
     assert at(state).made((make.home_position,)) == []
@@ -186,7 +187,7 @@ def test_a_reported_course_is_used() -> None:
     with_replies(state, INAV, RAW_GPS=gps(fix=2, more=struct.pack("<HH", 900, 140)))
     position, raw = fields(make.global_position_int(at(state))), fields(make.gps_raw_int(at(state)))
     assert (position["vx"], position["vy"]) == (0, 250)
-    assert (raw["cog"], raw["eph"], raw["fix_type"]) == (9000, 140, m.GPS_FIX_TYPE_3D_FIX)
+    assert (raw["cog"], raw["eph"], raw["fix_type"]) == (9000, 140, mavlink.GPS_FIX_TYPE_3D_FIX)
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@
 import pytest
 from pymavlink.dialects.v10 import ardupilotmega as mavlink_1
 
-from protocols.mavlink.codec import FrameWriter, MavlinkDecoder, pack
+from protocols.mavlink.codec import FrameWriter, decode, pack
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MavlinkSplitter
 
@@ -36,7 +36,7 @@ SENT = [
 @pytest.mark.parametrize("message", SENT, ids=lambda message: str(message.get_type()))
 def test_our_frames_are_valid_mavlink_1(message: Message) -> None:
     frame = FrameWriter(1, 1).frame(pack(message), 1)
-    assert frame[1] == mavlink_1.mavlink_map[message.get_msgId()].unpacker.size
+    assert frame[1] == mavlink_1.mavlink_map[message.msgid].unpacker.size
     received = mavlink_1.MAVLink(None).decode(bytearray(frame))
     for name in received.get_fieldnames():
         assert getattr(received, name) == pytest.approx(getattr(message, name)), name
@@ -46,6 +46,6 @@ def test_our_frames_are_valid_mavlink_1(message: Message) -> None:
 @pytest.mark.parametrize("message", SENT, ids=lambda message: str(message.get_type()))
 def test_our_frames_are_read(message: Message, version: int) -> None:
     (frame,) = MavlinkSplitter().feed(FrameWriter(1, 1).frame(pack(message), version))
-    received = MavlinkDecoder().decode(frame)
+    received = decode(frame.msgid, frame.payload)
     assert received is not None
     assert received.get_type() == message.get_type()

@@ -6,10 +6,11 @@ from itertools import pairwise
 
 from hypothesis import example, given
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from protocols.mavlink.codec import FrameWriter, MavlinkDecoder, pack
-from protocols.mavlink.dialect import messages
+from protocols.mavlink.codec import FrameWriter, decode
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+from tests.support.packing import pack
 
 MEGABYTE = 1 << 20
 
@@ -18,13 +19,13 @@ def make_frames() -> list[bytes]:
     """Frames of both versions, short and long, truncated zeros included."""
     writer = FrameWriter(1, 190)
     some = [
-        messages.MAVLink_heartbeat_message(2, 3, 81, 0, 3, 3),
-        messages.MAVLink_mission_request_message(255, 190, 7, 0),
-        messages.MAVLink_statustext_message(3, b"\xfe\xfd\xfe\x09" * 12),
-        messages.MAVLink_mission_item_int_message(
+        mavlink.MAVLink_heartbeat_message(2, 3, 81, 0, 3, 3),
+        mavlink.MAVLink_mission_request_message(255, 190, 7, 0),
+        mavlink.MAVLink_statustext_message(3, b"\xfe\xfd\xfe\x09" * 12),
+        mavlink.MAVLink_mission_item_int_message(
             1, 1, 3, 3, 16, 0, 1, 0.0, 2.0, 0.0, 0.0, 453838000, 84733000, 20.0, 0
         ),
-        messages.MAVLink_param_request_list_message(0, 0),
+        mavlink.MAVLink_param_request_list_message(0, 0),
     ]
     return [writer.frame(pack(message), version) for message in some for version in (1, 2)]
 
@@ -78,9 +79,8 @@ def test_no_frame_is_lost_behind_garbage_unless_a_valid_one_covers_it(
 @given(streams)
 def test_found_frames_decode_or_are_refused(data: bytes) -> None:
     found, splitter = split(data, [])
-    decoder = MavlinkDecoder()
     for frame in found + splitter.reset():
-        decoder.decode(frame)
+        decode(frame.msgid, frame.payload)
 
 
 @given(st.binary(max_size=300))
@@ -91,19 +91,18 @@ def test_any_payload_with_a_valid_checksum_decodes_or_is_refused(payload: bytes)
     from protocols.mavlink.dialect import CRC_EXTRA
 
     payload = payload[:255]
-    decoder = MavlinkDecoder()
     for msgid in (0, 20, 23, 39, 44, 45, 47, 73, 76, 110, 253):
         header = bytes((len(payload), 0, 0, 5, 255, 190)) + msgid.to_bytes(3, "little")
         crc = mcrf4xx(header + payload + CRC_EXTRA[msgid])
         (frame,) = MavlinkSplitter().feed(b"\xfd" + header + payload + crc.to_bytes(2, "little"))
-        decoder.decode(frame)
+        decode(frame.msgid, frame.payload)
 
 
 def test_a_signed_frame_includes_its_signature() -> None:
-    mavlink = messages.MAVLink(None, srcSystem=255, srcComponent=190)
-    mavlink.signing.secret_key = bytes(32)
-    mavlink.signing.sign_outgoing = True
-    frame = bytes(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(mavlink))
+    codec = mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
+    codec.signing.secret_key = bytes(32)
+    codec.signing.sign_outgoing = True
+    frame = bytes(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(codec))
     splitter = MavlinkSplitter()
     (found,) = splitter.feed(frame + FRAMES[0])[:1]
     assert found.raw == frame

@@ -2,9 +2,9 @@
 """A heartbeat is evidence of a flight controller only if every field is plausible."""
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
 from protocols.mavlink.dialect import MESSAGE_FORMATS
-from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import (
     MavlinkFrame,
     is_autopilot_heartbeat,

@@ -30,7 +30,7 @@ def packed(kind: type[Message], version: int, **fields: int) -> bytes:
 
 
 def test_the_table_is_up_to_date() -> None:
-    """After an update of pymavlink, run `make message-table`."""
+    """After an update of pymavlink, run `make messages`."""
     assert Path(message_table.__file__).read_text() == table()
 
 

@@ -9,9 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from protocols.mavlink.codec import FrameWriter, pack
+from protocols.mavlink.codec import FrameWriter
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.mavlink.signing import TICKS_PER_S, TOLERANCE, Check, Signing, Timestamps, key_from_passphrase, ticks
+from tests.support.packing import pack
 
 KEY = key_from_passphrase("a passphrase")
 #: A moment in 2026, in seconds since the Unix epoch.

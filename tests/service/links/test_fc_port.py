@@ -12,14 +12,15 @@ from pathlib import Path
 
 import pytest
 import serial
+from pymavlink.dialects.v20 import ardupilotmega as m
 
-from protocols.mavlink.codec import FrameWriter, pack
-from protocols.mavlink.dialect import messages as m
+from protocols.mavlink.codec import FrameWriter
 from protocols.mavlink.frame import MavlinkSplitter
 from service.links.fc_device import device_opener, open_serial
 from service.links.fc_port import FcPort
 from service.links.traffic import Traffic
 from service.settings.addresses import SerialFc
+from tests.support.packing import pack
 from tests.support.programs import TIMEOUT_S, until_async
 
 _writer = FrameWriter(1, 1)

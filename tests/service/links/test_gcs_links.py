@@ -6,15 +6,16 @@ import socket
 import threading
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.gcs.station import Peer
-from protocols.mavlink.codec import FrameWriter, pack
-from protocols.mavlink.dialect import messages as m
+from protocols.mavlink.codec import FrameWriter
 from service.links import tcp_link, udp_link
 from service.links.fc_device import device_opener
 from service.links.gcs_links import LinkError, open_link
 from service.settings.addresses import TcpFc, parse_fc, parse_gcs
 from tests.support.links import Links, RecordedEvents, received
+from tests.support.packing import pack
 from tests.support.programs import TIMEOUT_S, free_port, until_async
 
 FRAME = bytes.fromhex("fe09000101000000000002030000030346f1")

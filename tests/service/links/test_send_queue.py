@@ -5,11 +5,12 @@ from collections.abc import Sequence
 
 from hypothesis import given
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import ardupilotmega as m
 
-from protocols.mavlink.codec import FrameWriter, pack
-from protocols.mavlink.dialect import messages as m
+from protocols.mavlink.codec import FrameWriter
 from protocols.mavlink.frame import MavlinkSplitter
 from service.links.send_queue import SendQueue
+from tests.support.packing import pack
 
 LIMIT = 600
 

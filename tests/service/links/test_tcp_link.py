@@ -8,14 +8,15 @@ import socket
 from collections.abc import Mapping
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.gcs.station import Peer
-from protocols.mavlink.codec import FrameWriter, pack
-from protocols.mavlink.dialect import messages as m
+from protocols.mavlink.codec import FrameWriter
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from service.links import tcp_link
 from service.links.tcp_link import TcpLink
 from service.settings.addresses import GcsAddress
+from tests.support.packing import pack
 from tests.support.programs import TIMEOUT_S, free_port
 
 

@@ -9,7 +9,7 @@ import pytest
 from service.machine.package import address, version
 
 
-@pytest.mark.parametrize("package", ["naze-bridge", "eclipse-zenoh", "pymavlink"])
+@pytest.mark.parametrize("package", ["naze-bridge", "eclipse-zenoh", "pyserial"])
 def test_the_version_is_that_of_the_metadata(package: str) -> None:
     assert version(package) == metadata.version(package)
 

@@ -6,8 +6,8 @@ from itertools import count
 from pathlib import Path
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from protocols.mavlink.dialect import messages
 from protocols.tlog import read_tlog
 from service.recording.tlog_recorder import TlogRecorder
 from service.settings import TlogLimits

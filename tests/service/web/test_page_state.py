@@ -5,8 +5,8 @@ import socket
 from collections.abc import Iterator
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from protocols.mavlink.dialect import messages
 from tests.support.chromium import PHONE, Browser, Browsers
 from tests.support.plain_station import PlainStation
 from tests.support.plan import plain_plan

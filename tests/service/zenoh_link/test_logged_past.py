@@ -9,9 +9,10 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from payloads.mission_data import Json
-from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.dialect import Message
 from protocols.tlog import tlog_record
 from service.daemon.api import DaemonApi
 from service.daemon.daemon import Daemon

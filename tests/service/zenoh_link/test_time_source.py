@@ -5,10 +5,10 @@ import time
 from pathlib import Path
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.fc.mavlink_telemetry import MavlinkTelemetry
 from bridge.model.vehicle import Fix, GpsFix, GpsTime, Source, Vehicle
-from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import kinds
 from service.zenoh_link.time_source import SampleClock
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The model's own parameters over MAVLink; tests/real_board has the same tests for the image."""
 
-from protocols.mavlink.dialect import messages as m
+from pymavlink.dialects.v20 import ardupilotmega as m
+
 from protocols.msp.frame import request
 from simulator.board.options import Faults
 from simulator.naze.setting_table import SETTINGS

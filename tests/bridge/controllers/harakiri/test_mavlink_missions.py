@@ -9,6 +9,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.controllers.harakiri.check import HarakiriRules
@@ -17,7 +18,6 @@ from bridge.missions.list_check import check_list
 from bridge.missions.mission_service import HeldMission
 from bridge.model.mission_log import ArrivedMission, Outcome
 from bridge.model.refusal import Refusal
-from protocols.mavlink.dialect import messages
 from protocols.mission_item import Command, MissionItem, MissionResult
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from simulator.naze.board import SimulatedNaze

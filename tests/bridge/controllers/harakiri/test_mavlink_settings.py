@@ -6,13 +6,13 @@ from collections.abc import Iterable
 from itertools import pairwise
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.controllers.harakiri.mavlink_settings import HarakiriMavlinkSettings
 from bridge.settings.board_setting import SettingTable
 from bridge.settings.fc_settings import NO_ANSWER, Cause, SettingRefusal
 from protocols.mavlink.dialect import Message
-from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mission_item import MissionResult
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol

@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.controllers.inav import profile as inav
 from bridge.controllers.inav.limits import InavLimits
@@ -13,7 +14,6 @@ from bridge.controllers.multiwii import profile as multiwii
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile, multiwii_profile
 from bridge.missions.list_check import check_list
-from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.frame import MspParser
 from protocols.msp.nav import LAST, Nav, NavAction

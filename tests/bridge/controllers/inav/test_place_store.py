@@ -5,8 +5,8 @@ import struct
 from dataclasses import replace
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from protocols.mavlink.dialect import messages
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.msp.frame import Direction, MspFrame
 from protocols.msp.inav_places import (

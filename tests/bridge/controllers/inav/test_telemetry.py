@@ -5,9 +5,9 @@ import math
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.model.vehicle import Charge, GpsTime, Load, MissionLeg, Power
-from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.nav import NavMode, NavStatus
 from simulator.board.msp_board import MspBoard

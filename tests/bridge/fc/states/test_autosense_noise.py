@@ -10,12 +10,12 @@ known messages from one sender within a visit (2^-78 for each pair of positions)
 import random
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.fc.profile import Autopilot
 from bridge.fc.states.base import Port, PortOpened
 from bridge.fc.states.searching import SPEEDS, Searching
 from bridge.line.runner import Runner
-from protocols.mavlink.dialect import messages
 from protocols.msp.frame import Direction, MspFrame, request
 
 MEGABYTE = 1 << 20

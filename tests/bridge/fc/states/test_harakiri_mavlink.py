@@ -4,12 +4,12 @@
 from itertools import pairwise
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.controllers import other
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.fc.profile import Profile
 from bridge.line.msp_link import PROBE
-from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from simulator.naze.board import SimulatedNaze

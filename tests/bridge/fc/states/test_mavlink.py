@@ -2,10 +2,11 @@
 """A damaged frame decides for the wrong flight controller; its steady heartbeats correct that."""
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.controllers import other
 from bridge.controllers.harakiri import profile as harakiri
-from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.dialect import Message
 from simulator.board.options import Faults
 from simulator.naze.board import SimulatedNaze
 from tests.bridge.fc.states.test_pass_through import Autopilot

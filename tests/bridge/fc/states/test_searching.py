@@ -5,12 +5,12 @@ import random
 from collections.abc import Callable
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.controllers import other
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.fc.states.base import Closed
 from bridge.fc.states.searching import SPEEDS, Searching
-from protocols.mavlink.dialect import messages
 from protocols.msp.frame import request
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from tests.support.fake_controllers import (
