@@ -80,7 +80,8 @@ def sent(message: Packed) -> Any:
 
 
 def fields(message: Any) -> dict[str, Any]:
-    return {name: getattr(message, name) for name in mavlink.mavlink_map[message.msgid].fieldnames}
+    kind = getattr(mavlink, f"MAVLink_{message.get_type().lower()}_message")
+    return {name: getattr(message, name) for name in kind.fieldnames}
 
 
 def test_without_readings_there_are_no_messages() -> None:
