@@ -44,7 +44,7 @@ def test_a_flight_without_a_ground_station_is_logged_at_full_rates(protocol: Tel
     log.take()
     world.run(10)
     flown = log.take()
-    assert flown["ATTITUDE"] == pytest.approx(250, rel=0.1)
+    assert flown["ATTITUDE"] == pytest.approx(100, rel=0.1)
     assert flown["GLOBAL_POSITION_INT"] >= 20
     assert {"BATTERY_STATUS", "SYS_STATUS", "RC_CHANNELS", "VFR_HUD", "HEARTBEAT"} <= set(flown)
     world.faults.armed = False
@@ -64,4 +64,4 @@ def test_low_requested_rates_do_not_slow_the_log() -> None:
     station.take()
     world.run(10)
     assert len(station.messages("ATTITUDE")) == pytest.approx(10, abs=2)
-    assert log.take()["ATTITUDE"] == pytest.approx(250, rel=0.1)
+    assert log.take()["ATTITUDE"] == pytest.approx(100, rel=0.1)

@@ -17,6 +17,7 @@ from bridge.gcs.rights import LinkAccess
 from bridge.gcs.station import Peer, Severity
 from bridge.gcs.texts import split_text
 from protocols.mavlink.dialect import CRC_EXTRA, Message
+from protocols.mavlink.dialect import messages as own
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mission_item import MissionResult
 from tests.support.conversations import Upload, waypoints
@@ -137,7 +138,7 @@ def test_messages_of_one_moment_share_datagrams() -> None:
     world.run(5)
     ground = world.inside.ground
     ground.take_datagrams()
-    values = [m.MAVLink_named_value_int_message(0, b"number", number) for number in range(1, 21)]
+    values = [own.MAVLink_named_value_int_message(0, b"number", number) for number in range(1, 21)]
     for value in values:
         ground.broadcast(value)
     datagrams = [data for peer, data in ground.take_datagrams() if peer == station.peer]

@@ -37,16 +37,23 @@ def test_no_request_changes_a_board(name: str, seed: int) -> None:
     board = BOARDS[name]()
     world = World(speeds=(115200,), peer=board)
     world.wait_until(lambda w: w.bridge.vehicle.armed is False and not w.bridge.is_busy, 30)
-    before, stored = [answer(world, *setting) for setting in SETTINGS], world.naze.stored_records
+    before, stored = present(world), world.naze.stored_records
     assert any(before)
     draw = random.Random(seed)
     for _ in range(AT_ONCE):
         answer(world, draw.choice(COMMANDS), fill(draw), is_v2=draw.random() < 0.3)
-    world.run(3)  # older replies are no longer current
-    assert [answer(world, *setting) for setting in SETTINGS] == before
+    assert present(world) == before
     assert world.naze.stored_records == stored
     assert not world.naze.armed
     assert not world.naze.counters.resets
+
+
+def present(world: World) -> list[bytes | None]:
+    """The second reading: MultiWii shows home with fields of the waypoint that was used last."""
+    for _ in range(2):
+        world.run(3)  # older replies are no longer current
+        found = [answer(world, *setting) for setting in SETTINGS]
+    return found
 
 
 def fill(draw: random.Random) -> bytes:

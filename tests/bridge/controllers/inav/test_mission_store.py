@@ -181,7 +181,7 @@ def test_polls_to_a_slow_board_are_not_lost() -> None:
         station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
         world.run(1)
     assert world.inside.session.state.link.requests_lost == lost
-    assert len(station.messages("ATTITUDE")) > 5 * 18
+    assert len(station.messages("ATTITUDE")) > 5 * 7
 
 
 def test_mission_progress_is_reported_item_by_item() -> None:
