@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`python -m generators.messages`: print a new messages.py, the part of pymavlink's ardupilotmega that we use.
 
-The whole dialect costs a process 7 MB and a tenth of a second. A message is part of it if its class or id is named in
+The whole dialect costs a process 6 MB and a tenth of a second. A message is part of it if its class or id is named in
 an installed package, and a constant if it is named there.
 """
 

@@ -157,7 +157,7 @@ class MavlinkSplitter:
     A header is rejected at once if its message is unknown (the CRC could not be checked), if a MAVLink 1 size does
     not fit the message, or if it has an unknown incompatibility flag, as the protocol requires.
 
-    Any other header is trusted until its frame is complete, or until `reset`. A truncated frame therefore delays at
+    Any other header is trusted until its frame is complete, or until `is_end`. A truncated frame therefore delays at
     most 279 following bytes. Frames inside an incomplete frame are not returned: a log downloaded over MAVLink contains
     whole frames as data.
 
@@ -174,12 +174,11 @@ class MavlinkSplitter:
         """True while a frame is incomplete."""
         return bool(self._buffer)
 
-    def reset(self) -> list[MavlinkFrame]:
-        """Drop an incomplete frame (silence, end of a datagram); return the frames found in its bytes."""
-        return self.feed(b"", is_end=True)
-
     def feed(self, data: bytes, *, is_end: bool = False) -> list[MavlinkFrame]:
-        """Take received bytes; return the completed frames. `is_end`: drop an incomplete one."""
+        """Take received bytes; return the completed frames.
+
+        `is_end` (silence, end of a datagram): drop an incomplete frame, and find those in its bytes.
+        """
         return [*map(MavlinkFrame, self.split(data, is_end=is_end))]
 
     def split(self, data: bytes, *, is_end: bool = False) -> list[bytes]:

@@ -57,7 +57,7 @@ def in_pieces(feed: Callable[[bytes], Any]) -> Callable[[bytes, int], None]:
 def mavlink(data: bytes, size: int) -> None:
     splitter = MavlinkSplitter()
     in_pieces(splitter.feed)(data, size)
-    splitter.reset()
+    splitter.feed(b"", is_end=True)
 
 
 def msp(data: bytes, size: int) -> None:

@@ -84,7 +84,7 @@ class InavMissions(NavMissions, FliesToItems):
     #: All of the board's landing approaches, as last read; None: they may have changed.
     _approaches: tuple[FwApproach, ...] | None = None
     #: The same before the current Write, and as they are to be after it.
-    _former_approaches: tuple[FwApproach, ...] = ()
+    _previous_approaches: tuple[FwApproach, ...] = ()
     _wanted_approaches: tuple[FwApproach, ...] = ()
 
     def __init__(self, profile: NavProfile, controller: FlightController, vehicle: Vehicle) -> None:
@@ -238,15 +238,15 @@ class InavMissions(NavMissions, FliesToItems):
         others = [number for number in range(1, len(self.others) + 2) if number != self._selected]
         approaches = [*before]
         for place, number in enumerate((self._selected, *others[: len(self._kept)]), MISSION_APPROACH):
-            former = MISSION_APPROACH + number - 1
-            if max(place, former) < len(before):
-                approaches[place] = before[former]._replace(number=place)
+            previous = MISSION_APPROACH + number - 1
+            if max(place, previous) < len(before):
+                approaches[place] = before[previous]._replace(number=place)
         return tuple(approaches)
 
     def _store_content(self, records: Mission) -> Mission:
         """SAVE selects the first mission, so the new one goes there."""
         self._kept = self.others[: len(self.others) - len(self.erased_by(records))]
-        self._wanted_approaches = self._moved_approaches(self._former_approaches)
+        self._wanted_approaches = self._moved_approaches(self._previous_approaches)
         return (*records, *chain.from_iterable(self._kept))
 
     def _order(self, wanted: Mission) -> list[tuple[int, NavRecord]]:
@@ -258,7 +258,7 @@ class InavMissions(NavMissions, FliesToItems):
             raise PushFailed(PushFailure.NO_ANSWER)
         if not info.is_valid or info.count != count:
             raise PushFailed(PushFailure.REFUSED, is_final=False)
-        if not (yield from write_approaches(self._wanted_approaches, self._former_approaches)):
+        if not (yield from write_approaches(self._wanted_approaches, self._previous_approaches)):
             raise PushFailed(PushFailure.NO_ANSWER, is_final=False)
 
     def _keep(self) -> Conversation[None]:
@@ -295,7 +295,7 @@ class InavMissions(NavMissions, FliesToItems):
             self._approaches = yield from read_approaches(range(APPROACHES))
             if self._approaches is None:
                 raise PushFailed(PushFailure.NO_ANSWER)
-        self._former_approaches = self._approaches or ()
+        self._previous_approaches = self._approaches or ()
         if (yield from self._is_unchanged((yield from self._look()))):
             return before
         # Another client has written or loaded a list since: its other missions must be kept, too.
@@ -307,19 +307,19 @@ class InavMissions(NavMissions, FliesToItems):
         """Make it LOAD the saved missions; if that is not the old list, write that one again."""
         if self._vehicle.armed:
             return False
-        self._wanted_approaches = self._former_approaches
+        self._wanted_approaches = self._previous_approaches
         with suppress(LinkLost):
             yield from ask(LOAD_REQUEST, Nav.LOAD, 0)
             loaded = yield from self.pull()
             if loaded == before and (loaded or self.others):
-                return (yield from write_approaches(self._former_approaches, self._former_approaches))
+                return (yield from write_approaches(self._previous_approaches, self._previous_approaches))
         return (yield from super()._restore(before))
 
     def _restore_at_once(self, before: Mission | None) -> Conversation[bool]:
         """Make it LOAD the saved missions: the old list, unless another client wrote one without saving it."""
         with suppress(LinkLost):
             yield from ask(LOAD_REQUEST, Nav.LOAD, 0, tries=1)
-            yield from write_approaches(self._former_approaches, self._former_approaches)
+            yield from write_approaches(self._previous_approaches, self._previous_approaches)
             return bool(before) and (yield from self._is_unchanged((yield from self._look())))
         return False
 

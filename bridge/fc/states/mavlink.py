@@ -118,7 +118,8 @@ class PassThrough(MavlinkLine):
         self.telemetry = port.telemetry
         port.meet(self.controller)
         assert event.heard is not None
-        self.telemetry.take(heard := [event.heard.raw], kinds(heard), now)
+        heard = [event.heard.raw]
+        self.telemetry.take(heard, kinds(heard), now)
 
     def take(self, frames: list[bytes], now: float) -> None:
         their_kinds = kinds(frames)
@@ -140,7 +141,8 @@ class HarakiriMavlink(MavlinkLine):
         if event.heard.msgid != messages.MAVLINK_MSG_ID_HEARTBEAT:
             # Unprompted, it sends more than heartbeats only while armed.
             port.hear_armed(Source.MAVLINK, now)
-        self._telemetry.take(heard := [event.heard.raw], kinds(heard), now)
+        heard = [event.heard.raw]
+        self._telemetry.take(heard, kinds(heard), now)
 
     def receive(self, data: bytes, now: float, *, is_end: bool = False) -> Event | None:
         if self._msp.feed(data):

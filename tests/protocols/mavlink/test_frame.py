@@ -57,11 +57,11 @@ def split(data: bytes, cuts: list[int]) -> tuple[list[MavlinkFrame], MavlinkSpli
 @example(b"\xfe\xff" + FRAMES[0], [])
 def test_a_stream_gives_the_same_frames_however_it_is_split(data: bytes, cuts: list[int]) -> None:
     whole, splitter = split(data, [])
-    rest = splitter.reset()
+    rest = splitter.feed(b"", is_end=True)
     for places in (cuts, list(range(len(data)))):
         frames, other = split(data, places)
         assert frames == whole
-        assert other.reset() == rest
+        assert other.feed(b"", is_end=True) == rest
     # Every byte is either in a frame or counted.
     assert splitter.skipped_bytes + sum(len(frame.raw) for frame in whole + rest) == len(data)
 
@@ -72,14 +72,14 @@ def test_no_frame_is_lost_behind_garbage_unless_a_valid_one_covers_it(
 ) -> None:
     data = before + frame + after
     found, splitter = split(data, [])
-    found += splitter.reset()
+    found += splitter.feed(b"", is_end=True)
     assert b"".join(one.raw for one in found).find(frame) >= 0
 
 
 @given(streams)
 def test_found_frames_decode_or_are_refused(data: bytes) -> None:
     found, splitter = split(data, [])
-    for frame in found + splitter.reset():
+    for frame in found + splitter.feed(b"", is_end=True):
         decode(frame.msgid, frame.payload)
 
 
@@ -114,7 +114,7 @@ def test_an_unknown_incompatibility_flag_is_refused() -> None:
     assert frame[0] == 0xFD
     frame[2] = 0x02
     splitter = MavlinkSplitter()
-    assert splitter.feed(bytes(frame)) + splitter.reset() == []
+    assert splitter.feed(bytes(frame)) + splitter.feed(b"", is_end=True) == []
 
 
 def test_a_megabyte_of_any_bytes_takes_bounded_work() -> None:
@@ -127,5 +127,5 @@ def test_a_megabyte_of_any_bytes_takes_bounded_work() -> None:
         for start in range(0, len(data), 4096):
             splitter.feed(data[start : start + 4096])
             assert len(splitter._buffer) < 10 + 255 + 2 + 13
-        splitter.reset()
+        splitter.feed(b"", is_end=True)
         assert splitter._buffer == b""

@@ -60,7 +60,7 @@ def split(pieces: Sequence[bytes], chance: Random) -> list[bytes]:
         size = chance.choice((1, 7, 64, 500))
         found += splitter.feed(data[at : at + size])
         at += size
-    return [frame.raw for frame in found + splitter.reset()]
+    return [frame.raw for frame in found + splitter.feed(b"", is_end=True)]
 
 
 def without_signature(frame: bytes) -> bytes:
@@ -146,9 +146,9 @@ def test_silence_releases_a_frame_hidden_by_a_truncated_one() -> None:
     splitter = MavlinkSplitter()
     hiding = bytes((0xFD, 255, 0, 0, 1, 1, 1, 0, 0, 0))
     assert splitter.feed(hiding + FRAME + FRAME) == []
-    assert [frame.raw for frame in splitter.reset()] == [FRAME, FRAME]
+    assert [frame.raw for frame in splitter.feed(b"", is_end=True)] == [FRAME, FRAME]
     assert splitter.skipped_bytes == len(hiding)
-    assert splitter.reset() == []
+    assert splitter.feed(b"", is_end=True) == []
 
 
 def test_a_signature_with_missing_bytes_loses_no_later_frame() -> None:
@@ -168,7 +168,7 @@ def test_each_byte_of_a_hostile_stream_is_tried_once() -> None:
     stream = header * 28 * 10
     for at in range(0, len(stream), 280):
         splitter.feed(stream[at : at + 280])
-    splitter.reset()
+    splitter.feed(b"", is_end=True)
     assert splitter.bad_frames <= len(stream) // len(header)
     assert splitter.skipped_bytes == len(stream)
 
