@@ -7,11 +7,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* An emulated CPU is slow: there a cut is tried at every fifth operation only, and shorter lists' recovery is cut too. */
+/* Power cuts are tried at operations 1, 1 + cut_step, ... An emulated CPU is slow: there the step is larger, and the lists
+   whose recovery is cut too are shorter. */
 #ifdef __arm__
-enum { STEP = 5, NESTED_RECORDS = 1 };
+static unsigned cut_step = 5;
+enum { NESTED_RECORDS = 1 };
 #else
-enum { STEP = 1, NESTED_RECORDS = 8 };
+static unsigned cut_step = 1;
+enum { NESTED_RECORDS = 8 };
 #endif
 
 enum { LOST = -2 };
@@ -450,7 +453,7 @@ static void test_flash_failures_leave_the_old_list(void)
 {
     const list_t old = list_of(40, 1), list = list_of(33, 2);
     for (sim_fail_t fail = SIM_FAIL_LOUD; fail <= SIM_FAIL_SILENT; fail++) {
-        for (uint32_t at = 1;; at += STEP) {
+        for (uint32_t at = 1;; at += cut_step) {
             used_board(&old);
             sim_fail_at(&board, at, fail);
             const int status = push(&list);
@@ -524,7 +527,7 @@ static void check_whole(const list_t *old, const list_t *new)
     CHECK(sim_config_intact(&board) && board.violations == 0);
 }
 
-/* Cut `act` at every operation, each in three ways; with `again`, cut the recovery at every operation too. */
+/* Cut `act` at its operations, each in three ways; with `again`, cut the recovery at its operations too. */
 static void cut_everywhere(const list_t *old, const list_t *new, act_t act, bool again)
 {
     static sim_t start, recovering;
@@ -533,7 +536,7 @@ static void cut_everywhere(const list_t *old, const list_t *new, act_t act, bool
     else
         fresh_board(NULL);
     start = board;
-    for (uint32_t at = 1;; at += STEP) {
+    for (uint32_t at = 1;; at += cut_step) {
         for (int cut = SIM_CUT_BEFORE; cut <= SIM_CUT_AFTER; cut++) {
             board = start;
             board.random = at;
@@ -542,7 +545,7 @@ static void cut_everywhere(const list_t *old, const list_t *new, act_t act, bool
                 return;
             check_whole(old, new);
             recovering = board;
-            for (uint32_t next = 1; again; next += STEP) {
+            for (uint32_t next = 1; again; next += cut_step) {
                 bool lost = false;
                 for (int second = SIM_CUT_BEFORE; second <= SIM_CUT_AFTER; second++) {
                     board = recovering;
@@ -586,7 +589,7 @@ static void cut_repeated_push(uint16_t records)
 {
     const list_t old = list_of((uint16_t)(records - 1), 77), second = list_of(records, 11);
     const list_t first = with_byte(&second, 0, second.records[0] ^ 1);
-    for (uint32_t at = 1;; at += STEP) {
+    for (uint32_t at = 1;; at += cut_step) {
         for (int cut = SIM_CUT_BEFORE; cut <= SIM_CUT_AFTER; cut++) {
             fresh_board(&old);
             sim_cut_at(&board, at, (sim_cut_t)cut);
@@ -605,13 +608,14 @@ static void test_power_cuts(void)
 {
     cut_scenarios(NM_CAPACITY, false);
     cut_repeated_push(NM_CAPACITY);
-    printf("  power cut before, within and after every %sflash operation of push, clear, repeated push and the firmware's own\n"
-           "  save, %u records: %u of %u left the whole old or the whole new list\n",
-           STEP > 1 ? "fifth " : "", NM_CAPACITY, cuts, cuts);
+    printf("  power cut before, within and after each flash operation of push, clear, repeated push and the firmware's own\n"
+           "  save, in steps of %u, %u records: %u of %u left the whole old or the whole new list\n",
+           cut_step, NM_CAPACITY, cuts, cuts);
     cuts = 0;
     cut_scenarios(NESTED_RECORDS, true);
     cut_repeated_push(NESTED_RECORDS);
-    printf("  and at every operation of the recovery again, %d records: %u of %u\n", NESTED_RECORDS, cuts, cuts);
+    printf("  and at each operation of the recovery again, in steps of %u, %d records: %u of %u\n",
+           cut_step, NESTED_RECORDS, cuts, cuts);
 }
 
 /* ---- stack (on the emulated Cortex-M3) -------------------------------------------------------------------------------- */
@@ -656,7 +660,8 @@ static void measure_stack(void)
 }
 #endif
 
-int main(void)
+/* Arguments: cut_step. */
+int main(int argc, char **argv)
 {
     static void (*const tests[])(void) = {
         test_push_and_read_back,
@@ -677,6 +682,9 @@ int main(void)
         test_a_truncated_frame_is_dropped,
         test_power_cuts,
     };
+    if (argc > 1)
+        cut_step = (unsigned)atoi(argv[1]);
+    CHECK(cut_step >= 1);
     for (unsigned i = 0; i < sizeof tests / sizeof *tests; i++)
         tests[i]();
 #ifdef __arm__
