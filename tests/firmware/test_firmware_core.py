@@ -23,7 +23,7 @@ def make(*arguments: str) -> str:
 
 
 # Each pair of compiler, standard and word size once. One build cuts the power at every operation; the others are for
-# differences between compilers, and cut it at some. `make -C firmware test` runs all eight builds, and all cuts on each.
+# differences between compilers, and cut it at some. `make -C firmware test` makes all cuts in all eight builds.
 @pytest.mark.parametrize(
     ("build", "cut_step"), [("gcc-c99-64", 1), ("gcc-c11-32", 7), ("clang-c99-32", 11), ("clang-c11-64", 13)]
 )
