@@ -33,8 +33,8 @@ _MACHINES = {"amd64": "x86_64", "arm64": "aarch64", "armhf": "armv7l"}
 _GLIBC = (*(f"manylinux_2_{minor}" for minor in range(36, 16, -1)), "manylinux2014")
 
 
-def build(architecture: str, pythons: Sequence[str] = PYTHONS, folder: Path = _DIST) -> Path:
-    """Build the package in `folder`; returns its path."""
+def build(architecture: str, pythons: Sequence[str] = PYTHONS, folder: Path = _DIST, compression: str = "xz") -> Path:
+    """Build the package in `folder`; returns its path. `compression` is dpkg-deb's."""
     work = _WORK / architecture
     shutil.rmtree(work, ignore_errors=True)
     wheels = work / "wheels"
@@ -52,7 +52,7 @@ def build(architecture: str, pythons: Sequence[str] = PYTHONS, folder: Path = _D
     lay_out(root, libraries, _PROJECT, debian_version(version), architecture)
     folder.mkdir(exist_ok=True)
     package = folder / f"naze-bridge_{debian_version(version)}_{architecture}.deb"
-    _run("dpkg-deb", "--root-owner-group", "-Zxz", "--build", root, package)
+    _run("dpkg-deb", "--root-owner-group", f"-Z{compression}", "--build", root, package)
     return package
 
 
@@ -75,23 +75,32 @@ def debian_version(version: str) -> str:
 
 
 def fetch(architecture: str, python: str, wheels: Path) -> None:
-    """Download the wheels for one Python to the folder `wheels`; their hashes are checked."""
+    """Download the wheels for one Python to the folder `wheels`; their hashes are checked.
+
+    Wheels for every Python and machine that are already there stay.
+    """
     wheels.mkdir(parents=True, exist_ok=True)
-    for lock in _locks(architecture, wheels.parent):
+    for lock in _locks(architecture, wheels):
         hashed = ("--require-hashes", "--no-deps", "--requirement", lock)
         _run(*_PIP, "download", *hashed, *_target(python, _MACHINES[architecture]), "--dest", wheels)
 
 
-def _locks(architecture: str, work: Path) -> list[Path]:
-    """The lists of pinned wheel files to fetch for an architecture."""
+def _locks(architecture: str, wheels: Path) -> list[Path]:
+    """The lists of pinned wheel files to fetch for an architecture to the folder `wheels`."""
     lock = _PROJECT / "requirements.lock"
-    if architecture != "armhf":
-        return [lock]
+    fetched = {_pin(*wheel.name.split("-")[:2]) for wheel in wheels.glob("*-none-any.whl")}
     # A requirement extends from its name to the next line that is not indented.
-    pinned = re.findall(r"^[a-z].*\n(?:[ ].*\n)*", lock.read_text(), re.MULTILINE)
-    usual = work / "usual.lock"
-    usual.write_text("".join(each for each in pinned if not each.startswith("cbor2==")))
-    return [usual, _HERE / "armhf.lock"]
+    pinned = re.findall(r"^(([a-z].*?)==([^ \n]+).*\n(?:[ ].*\n)*)", lock.read_text(), re.MULTILINE)
+    needed = [text for text, name, version in pinned if _pin(name, version) not in fetched]
+    if architecture == "armhf":
+        needed = [each for each in needed if not each.startswith("cbor2==")]
+    usual = wheels.parent / "usual.lock"
+    usual.write_text("".join(needed))
+    return [*([usual] if needed else []), *([_HERE / "armhf.lock"] if architecture == "armhf" else [])]
+
+
+def _pin(name: str, version: str) -> str:
+    return f"{re.sub('[-_.]+', '-', name).lower()}=={version}"
 
 
 def _target(python: str, machine: str) -> list[str]:

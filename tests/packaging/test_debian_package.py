@@ -63,10 +63,29 @@ _STOP = "kill $(cat /run/pid); while grep -q . /proc/$(cat /run/pid)/cmdline; do
 
 @pytest.fixture(scope="module")
 def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    # dpkg-deb's default would take longer than everything else.
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("DPKG_DEB_COMPRESSOR_LEVEL", "0")
-        return build(_HOST, _PYTHONS, tmp_path_factory.mktemp("package"))
+    # Compression would take longer than everything else.
+    return build(_HOST, _PYTHONS, tmp_path_factory.mktemp("package"), compression="none")
+
+
+@pytest.fixture(scope="module")
+def without_libraries(package: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The package with service/ only, for tests of its scripts: these compile all modules at each installation."""
+    folder = tmp_path_factory.mktemp("without-libraries")
+    with unpacked(package, folder) as control:
+        for library in (control.parents[1] / "usr/lib/naze-bridge/lib").glob("*/site-packages/*"):
+            if library.is_dir() and library.name != "service":
+                shutil.rmtree(library)
+    return folder / "repacked.deb"
+
+
+@pytest.fixture(scope="module")
+def wheels(package: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of wheels, first those of the package that are for every Python and machine."""
+    folder = tmp_path_factory.mktemp("fetched") / "wheels"
+    folder.mkdir()
+    for wheel in (_REPOSITORY / "build" / "deb" / _HOST / "wheels").glob("*-none-any.whl"):
+        shutil.copy(wheel, folder)
+    return folder
 
 
 @pytest.fixture
@@ -77,13 +96,9 @@ def root(package: Path, tmp_path: Path) -> Iterator[BareRoot]:
 
 
 def with_version(package: Path, version: str, folder: Path) -> Path:
-    """The package under another version, with a module that no other has, and without libraries: dpkg compiles all."""
+    """The package under another version, with a module that no other has."""
     with unpacked(package, folder) as control:
-        sites = control.parents[1] / "usr/lib/naze-bridge/lib"
-        for library in sites.glob("*/site-packages/*"):
-            if library.is_dir() and library.name != "service":
-                shutil.rmtree(library)
-        own = sites / f"python{_OWN}/site-packages/v{version}"
+        own = control.parents[1] / f"usr/lib/naze-bridge/lib/python{_OWN}/site-packages/v{version}"
         own.mkdir()
         (own / "module.py").touch()
         control.write_text(re.sub(r"^Version: .*", f"Version: {version}", control.read_text(), flags=re.MULTILINE))
@@ -167,10 +182,11 @@ def test_its_libraries_are_for_its_architecture_and_both_pythons(package: Path) 
 
 @pytest.mark.parametrize("architecture", _WHEEL_MACHINES)
 @pytest.mark.parametrize("python", [PYTHONS[0], PYTHONS[-1]])
-def test_every_library_has_a_pinned_wheel(architecture: str, python: str, tmp_path: Path) -> None:
-    fetch(architecture, python, tmp_path / "wheels")
+def test_every_library_has_a_pinned_wheel(architecture: str, python: str, wheels: Path) -> None:
+    before = set(wheels.iterdir())
+    fetch(architecture, python, wheels)
     machines = ("any", *_WHEEL_MACHINES[architecture])
-    assert [wheel for wheel in (tmp_path / "wheels").iterdir() if not wheel.stem.endswith(machines)] == []
+    assert [wheel for wheel in {*wheels.iterdir()} - before if not wheel.stem.endswith(machines)] == []
 
 
 def test_its_pages_have_no_broken_links(package: Path) -> None:
@@ -193,18 +209,16 @@ def test_the_package_has_no_paths_of_the_build_machine(package: Path) -> None:
             assert content is None or str(_REPOSITORY).encode() not in content.read(), member.name
 
 
-@pytest.mark.timeout(1800)  # dpkg compiles all libraries three times: a minute on an idle machine
-def test_it_is_installed_used_upgraded_removed_and_purged(package: Path, root: BareRoot, tmp_path: Path) -> None:
+@pytest.mark.timeout(1800)  # dpkg compiles all libraries
+def test_it_is_installed_used_upgraded_removed_and_purged(
+    package: Path, without_libraries: Path, root: BareRoot, tmp_path: Path
+) -> None:
     assert "sudo naze-bridge setup" in root.run("dpkg --install /root/naze-bridge.deb")
     assert root.run("id --name --user naze-bridge") == "naze-bridge\n"
     assert "Harakiri source tree" in root.run("/usr/share/doc/naze-bridge/firmware/apply --help")
     # Not enabled by default.
     assert "naze-bridge" not in root.run("ls /etc/systemd/system/multi-user.target.wants")
     # The byte code is installed, because the service cannot write it.
-    assert root.run("find /usr/lib/naze-bridge -name 'daemon.cpython-*.pyc'")
-    # After an upgrade of the system to another Python it is compiled for that.
-    root.run("find /usr/lib/naze-bridge -name '*.pyc' -delete")
-    root.run("dpkg-trigger --no-await --by-package=dpkg /usr/bin/python3 && dpkg --triggers-only --pending")
     assert root.run("find /usr/lib/naze-bridge -name 'daemon.cpython-*.pyc'")
     root.run("echo 'fc = \"sim:\"' >> /etc/naze-bridge/config.toml")
     root.put(_MISSION, "/root/naze-field.waypoints")
@@ -219,11 +233,15 @@ def test_it_is_installed_used_upgraded_removed_and_purged(package: Path, root: B
 
     # An upgrade and a downgrade ask no questions and keep the changed configuration and the missions.
     for version in ("99.0", "99.0~dev7"):
-        root.put(with_version(package, version, tmp_path), "/root/other.deb")
+        root.put(with_version(without_libraries, version, tmp_path), "/root/other.deb")
         printed = root.run("apt-get install --yes --allow-downgrades /root/other.deb </dev/null")
         assert "unable to delete" not in printed
         assert version in root.run("dpkg-query --showformat '${Version} ' --show naze-bridge")
         assert 'fc = "sim:"' in root.run("cat /etc/naze-bridge/config.toml")
+    # After an upgrade of the system to another Python it is compiled for that.
+    root.run("find /usr/lib/naze-bridge -name '*.pyc' -delete")
+    root.run("dpkg-trigger --no-await --by-package=dpkg /usr/bin/python3 && dpkg --triggers-only --pending")
+    assert root.run("find /usr/lib/naze-bridge -name 'daemon.cpython-*.pyc'")
     root.run(_AS_AFTER_SETUP)
     root.run("ln -s /usr/lib/systemd/system/naze-bridge.service /etc/systemd/system/multi-user.target.wants/")
     root.run("dpkg --remove naze-bridge")
@@ -282,9 +300,10 @@ def test_in_a_bare_root_a_card_sets_itself_up_at_its_first_start(
 
 @pytest.mark.timeout(1800)
 def test_the_settings_of_an_older_release_survive_an_upgrade_and_the_way_back(
-    package: Path, root: BareRoot, tmp_path: Path
+    without_libraries: Path, root: BareRoot, tmp_path: Path
 ) -> None:
-    root.put(as_before_0_2_1(package, tmp_path), "/root/old.deb")
+    root.put(as_before_0_2_1(without_libraries, tmp_path), "/root/old.deb")
+    root.put(without_libraries, "/root/naze-bridge.deb")
     root.run("dpkg --install /root/old.deb")
     root.run("sed -i 's/^#sysid.*/sysid = 7/' /etc/naze-bridge/config.toml")
     root.run(f"echo '{_FORMER_ANSWERS}' > /etc/naze-bridge/conf.d/setup.toml")
