@@ -41,8 +41,8 @@ _LIMITS: dict[str, dict[str, float]] = {
     "unpaced": {MAVLINK_ROUTER: 1.1},
 }
 _OTHERS = (FLOOR, MAVLINK_ROUTER, MAVP2P, MAVPROXY)
-#: At the lower rates, reads are gathered for up to 12 ms.
-_MAX_P99_MS = {"150/s": 15.0, "500/s": 15.0, "3000/s": 3.0}
+#: At the lower rates, reads are gathered for up to 30 ms.
+_MAX_P99_MS = {"150/s": 35.0, "500/s": 15.0, "3000/s": 3.0}
 
 
 @dataclass(frozen=True, slots=True)

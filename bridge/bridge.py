@@ -63,12 +63,14 @@ class FcOutput(NamedTuple):
     """For the flight controller's port: the bytes to write, in order, and the speed it must have, None if it has none.
 
     `may_gather`: so much is read that waiting a little for more saves time. `asks`: a reply to this must not wait.
+    `complete_at`: before this time only a part of the replies that telemetry waits for can have arrived.
     """
 
     data: Sequence[bytes]
     speed: int | None
     may_gather: bool
     asks: bool
+    complete_at: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -270,7 +272,8 @@ class Bridge:
         self._session.output.clear()
         # Heartbeats and other broadcasts are not replied to.
         asks = not self.is_passing_through or any(MavlinkFrame(frame).has_target_field for frame in data)
-        return FcOutput(data, state.speed, self.is_passing_through, asks)
+        complete_at = -inf if state.link is None else state.link.complete_at
+        return FcOutput(data, state.speed, self.is_passing_through, asks, complete_at)
 
     @property
     def fc_trouble(self) -> str:

@@ -3,10 +3,12 @@
 import os
 import random
 import signal
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 
 import pytest
 from hypothesis import settings
+
+from service.machine.event_loop import EventLoop
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # A shell starts background jobs with SIGINT ignored, and programs started by tests would inherit that.
@@ -30,6 +32,11 @@ _WAITING = tuple(
     f"tests/{name}/"
     for name in ("service/web", "fleet", "e2e", "attack", "service/cli", "service/links", "service/settings")
 )
+
+
+def pytest_asyncio_loop_factories() -> Mapping[str, type[EventLoop]]:
+    """The daemon's own."""
+    return {"daemon": EventLoop}
 
 
 @pytest.hookimpl(wrapper=True)

@@ -349,7 +349,7 @@ class Ground:
     def multicast(self, packed: Packed, stations: Iterable[GroundStation]) -> None:
         """Send a packed message to several stations that can read it."""
         frame = None
-        is_logged = self.on_frames is not _drop and not self.is_recording
+        is_logged = self.on_frames is not _drop and RECORDER not in self._default_peers
         for station in stations:
             if station.frame_version == 1 and packed.is_v2_only:
                 continue

@@ -49,7 +49,7 @@ class Send:
 
     While an `exclusive` request is pending nothing else is sent: the flight controller may be writing flash.
     `is_kept`: its reply goes into the link's LastReplies. `is_shared`: another program asked; if it gets no reply, that
-    says nothing about the line.
+    says nothing about the line. `may_wait`: its reply may be read a few ms late.
     """
 
     frame: bytes
@@ -58,6 +58,7 @@ class Send:
     exclusive: bool = False
     is_kept: bool = False
     is_shared: bool = False
+    may_wait: bool = False
 
 
 @dataclass(frozen=True, slots=True)

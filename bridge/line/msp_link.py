@@ -37,6 +37,10 @@ _OUTSTANDING_IN_DOUBT = 64
 _FIRST_GUESS_S = 0.03
 #: An incomplete frame is dropped after this long without a byte.
 _LINE_SILENCE_S = 0.05
+#: Awaited replies of at least so many bytes are read when they are complete, but not later than this. A board serves
+#: requests between two cycles of its control loop.
+_LEAST_WAITED_FOR, _LONGEST_WAIT_S = 24, 0.02
+_SERVING_S = 0.002
 _ANY_SIZE = 1 << 16
 _NO_COMMAND = -1
 #: An INAV that lost a frame's header takes the rest for typed characters: '#' followed by 100 ms of silence opens its
@@ -54,7 +58,8 @@ _RESYNC_COMMANDS = (
 )
 #: Asks a board of any kind for a sign of life.
 PROBE = request(Msp.IDENT)
-_DEADLINE, _REPLY_SIZE = attrgetter("deadline"), attrgetter("reply_size")
+_COMMAND, _DEADLINE = attrgetter("command"), attrgetter("deadline")
+_REPLY_SIZE, _MAY_WAIT = attrgetter("reply_size"), attrgetter("may_wait")
 RESYNC = b"".join(request(command) for command in _RESYNC_COMMANDS)
 RESYNC_REPLY_SIZE = sum(_REPLY_SIZES[command] for command in _RESYNC_COMMANDS)
 #: Replies come in order: the reply to this shows that earlier ones are lost. No other code may use this command.
@@ -134,6 +139,7 @@ class _Request:
     #: The frame, if its reply is kept.
     kept: bytes | None = None
     is_shared: bool = False
+    may_wait: bool = False
 
     @property
     def size_in_ring(self) -> int:
@@ -229,7 +235,7 @@ class MspLink:
         """Time out requests; return replies that were hidden behind a false header."""
         if now >= self._follow_up_at:
             self._ask(_QUESTION, now)
-        if not any(now >= sent.deadline for sent in self._sent):
+        if not self._sent or now < min(map(_DEADLINE, self._sent)):
             return []
         hidden = self.parser.reset() if now >= self._last_byte_at + _LINE_SILENCE_S else []
         replies = self._take(hidden, now)
@@ -261,6 +267,22 @@ class MspLink:
     def due(self) -> float:
         """The time of the next `tick`; infinity while nothing is pending."""
         return min(self._follow_up_at, *map(_DEADLINE, self._sent)) if self._sent else self._follow_up_at
+
+    @property
+    def complete_at(self) -> float:
+        """Before this time only a part of the awaited replies can have arrived; -infinity if they must not wait.
+
+        A slow line delivers a long reply in pieces, and several replies one by one. Polled ones are read together.
+        """
+        if not (self.byte_s and self._sent and all(map(_MAY_WAIT, self._sent))):
+            return -inf
+        size = sum(map(_REPLY_SIZE, self._sent)) - self.parser.incomplete_bytes
+        if size < _LEAST_WAITED_FOR:
+            return -inf
+        first, last = self._sent[0], self._sent[-1]
+        begins_at = max(self._last_byte_at, first.sent_at + _SERVING_S)
+        complete_at: float = max(begins_at + size * self.byte_s, last.sent_at + last.reply_size * self.byte_s)
+        return min(complete_at, begins_at + _LONGEST_WAIT_S)
 
     def _timeout_s(self) -> float:
         floor = max(MIN_TIMEOUT_S, self.receiver_timeout_s + 0.02 if self.receiver_timeout_s else 0.0)
@@ -300,10 +322,12 @@ class MspLink:
             self._risky = message.command
             self._follow_up_at = self._line_free_at + _FOLLOW_UP_S
         timeout_s = EXCLUSIVE_TIMEOUT_S if message.exclusive else self._timeout_s()
-        reply_time = (self.outstanding_bytes + message.reply_size) * self.byte_s + len(self._sent) * self.turn_s
+        pending = sum(map(_REPLY_SIZE, self._sent))
+        reply_time = (pending + message.reply_size) * self.byte_s + len(self._sent) * self.turn_s
         deadline = self._line_free_at + reply_time + timeout_s
         sent = _Request(message.command, message.reply_size, self._line_free_at, deadline, message.exclusive)
-        sent.kept, sent.is_shared = message.frame if message.is_kept else None, message.is_shared
+        sent.kept = message.frame if message.is_kept else None
+        sent.is_shared, sent.may_wait = message.is_shared, message.may_wait
         self._sent.append(sent)
 
     def _resync(self, now: float) -> None:
@@ -373,6 +397,8 @@ class MspLink:
 
     def _is_certain(self, answered: _Request) -> bool:
         """False if the reply may be to a later request of the same command, with another index."""
+        if answered.command not in map(_COMMAND, self._sent):
+            return True
         return not any(sent.command == answered.command and sent.kept != answered.kept for sent in self._sent)
 
 

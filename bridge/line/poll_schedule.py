@@ -8,7 +8,7 @@ only after its reply has arrived or timed out, so a long round trip slows the fa
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
 from operator import attrgetter
 
@@ -41,6 +41,8 @@ _CURRENT_S = 1.0
 #: every wake-up costs CPU time. For the same reason a poll that the line does not slow down is due at multiples of its
 #: interval: at the default rates all others join ATTITUDE.
 _EARLY, _EARLIEST_S = 0.2, 0.05
+#: Replies to polls with at least this interval may be read together. Who asks for faster ones needs fresh values.
+_PATIENT_S = 0.08
 #: A lost reply reduces all rates by a tenth, each received one restores a little: 1 % losses change nothing, 10 % halve
 #: the rates.
 _LOSS_FACTOR = 0.9
@@ -128,6 +130,7 @@ class _Slot:
 
     def set_interval(self, interval_s: float) -> None:
         self.interval_s = interval_s
+        self.request = replace(self.request, may_wait=interval_s >= _PATIENT_S)
         self.early_s = min(interval_s * _EARLY, _EARLIEST_S)
         self._set_due()
 

@@ -55,6 +55,8 @@ _ROWS = {row.msgid: row for row in TELEMETRY}
 _DEFAULTS_S = {row.msgid: row.interval_s for row in TELEMETRY}
 _HOME = (make.home_position, make.gps_global_origin)
 _POLLS = (*set(POLL_FOR.values()), Msp.FLIGHT)
+#: A message, and the reading that triggers it; None: the clock.
+_Trigger = tuple[Row, type[Reading] | None]
 _SYS_STATUS = _ROWS[messages.MAVLINK_MSG_ID_SYS_STATUS]
 
 
@@ -79,7 +81,7 @@ class OwnVehicle:
         self._started_at = now
         self.due = self._second_ends = now
         #: The messages that any ground station wants, by the reading that triggers them.
-        self._rows: dict[type[Reading] | None, list[Row]] = {}
+        self._rows: dict[type[Reading] | None, list[_Trigger]] = {}
         self.progress = MissionProgress()
         #: The capability bits of this flight controller, besides the bridge's own.
         self.capabilities: Callable[[], int] = lambda: 0
@@ -126,7 +128,7 @@ class OwnVehicle:
         self._send_due(self._rows.get(None, ()), now)
         if self._session.vehicle.fresh(Health, now, _SILENT_S) is None:
             # No reading triggers it now: the flight controller is lost, or sends FrSky telemetry.
-            self._send_due((_SYS_STATUS,), now)
+            self._send_due([(_SYS_STATUS, None)], now)
         self._announce_home(now)
         self._inform_newcomers(everyone, now)
 
@@ -150,18 +152,19 @@ class OwnVehicle:
         """Send the messages that new readings trigger, where due."""
         if Readiness in news or FlightState in news:
             self.arming_reasons.follow(now)
+        triggered: list[_Trigger] = []
         for reading in news:
-            if rows := self._rows.get(reading):
-                self._send_due(rows, now, reading)
+            triggered += self._rows.get(reading, ())
+        self._send_due(triggered, now)
         if MissionLeg in news:
             self._follow_mission(now)
         if FlightState in news or Mode in news:
             self._follow_state(now)
 
-    def _send_due(self, rows: Iterable[Row], now: float, heard: type[Reading] | None = None) -> None:
+    def _send_due(self, triggered: Iterable[_Trigger], now: float) -> None:
         everyone, fresh = self._ground.everyone(), self._session.vehicle.fresh
         at: Moment | None = None
-        for row in rows:
+        for row, heard in triggered:
             if row.other is heard and row.reading is not None and heard is not None and fresh(row.reading, now):
                 continue
             stations = take_due(everyone, row.msgid, row.interval_s, now)
@@ -279,7 +282,7 @@ class OwnVehicle:
                 interval_s = intervals_s[row.msgid]
                 if interval_s < inf:
                     for trigger in row.readings:
-                        self._rows.setdefault(trigger, []).append(row)
+                        self._rows.setdefault(trigger, []).append((row, trigger))
                 _want(wanted, row.poll, interval_s)
             polls.want(wanted)
         is_polled = self._session.state.link is not None

@@ -108,6 +108,11 @@ class MspParser:
         del buffer[:start]
         return frames
 
+    @property
+    def incomplete_bytes(self) -> int:
+        """The size of the part of a frame that has arrived."""
+        return len(self._buffer)
+
     def reset(self) -> list[MspFrame]:
         """Drop an incomplete frame; return the frames found in its bytes."""
         frames: list[MspFrame] = []

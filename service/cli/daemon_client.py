@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Connects a command to a bridge: the running daemon's, or its own with `--fc`."""
 
-import asyncio
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
@@ -14,6 +13,7 @@ import click
 
 from payloads.mission_data import Json, printable
 from service.daemon.client import FIRMWARE_REQUESTS, ControlError, Interrupted, NoDaemonError, ask_daemon
+from service.machine import event_loop
 from service.settings import SettingsError, default_state_dir
 from service.settings.addresses import AddressError, parse_fc
 from service.settings.load import SERVICE_STATE
@@ -44,7 +44,7 @@ class BridgeClient:
                 return ask_daemon(self.state_dir, request, progress)
             from service.cli.direct_bridge import ask_directly  # the whole daemon: --help does without
 
-            return asyncio.run(ask_directly(parse_fc(self.fc), request, progress))
+            return event_loop.run(ask_directly(parse_fc(self.fc), request, progress))
         except (KeyboardInterrupt, Interrupted) as error:
             complain(_interruption(request, str(error), is_own=self.fc is not None))
             raise SystemExit(INTERRUPTED) from None

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The daemon of `naze-bridge run`, with its control socket, page and zenoh node."""
 
-import asyncio
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
 from pathlib import Path
@@ -13,7 +12,7 @@ from service.daemon.control_server import ControlServer
 from service.daemon.daemon import Daemon
 from service.daemon.lifecycle import run_until_signal
 from service.links.gcs_links import LinkError
-from service.machine.event_loop import EventLoop
+from service.machine import event_loop
 from service.machine.log_setup import set_up_logging
 from service.machine.notify import Notifier
 from service.settings import Settings, SettingsError
@@ -41,8 +40,7 @@ def _serve(settings: Settings, load: Callable[[], Settings]) -> None:
         # An unwritable disk must not prevent a flight: the store reports it, and keeps missions in memory.
         with suppress(StateUnusableError):
             stack.enter_context(state_lock(settings.state_dir))
-        with asyncio.Runner(loop_factory=EventLoop) as runner:
-            runner.run(_main(settings, load, socket_of_daemon(settings.state_dir)))
+        event_loop.run(_main(settings, load, socket_of_daemon(settings.state_dir)))
 
 
 async def _main(settings: Settings, load: Callable[[], Settings], socket_path: Path) -> None:

@@ -7,6 +7,7 @@ from collections import defaultdict
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from math import inf
 from typing import Any, TypeVar
 
 import structlog
@@ -29,6 +30,7 @@ from service.daemon.store_worker import StoreWorker
 from service.links.msp_share import open_share
 from service.links.signing_state import SigningState
 from service.links.traffic import Traffic
+from service.machine.event_loop import EventLoop
 from service.machine.host import Host
 from service.machine.log_setup import warn_once
 from service.machine.package import version
@@ -42,8 +44,6 @@ _FINISH_S = 1.0
 _ABORT_S = 0.6
 _STORE_TIMEOUT_S = 0.2
 _REST_INTERVAL_S = 0.02
-#: A timer that fires earlier than this before the deadline is replaced: it would wake the process for nothing.
-_TOO_EARLY_S = 0.01
 #: Frames are accepted over zenoh only if its transport is authenticated, or the owner waived that.
 _ZENOH = {"zenoh": LinkAccess(may_write=lambda _peer: True)}
 
@@ -72,7 +72,9 @@ class Daemon:
     """Feeds the bridge and carries out its outputs. Must be made on a running event loop."""
 
     def __init__(self, settings: Settings, host: Host | None = None) -> None:
-        self._loop = asyncio.get_running_loop()
+        loop = asyncio.get_running_loop()
+        assert isinstance(loop, EventLoop)
+        self._loop, self._lane = loop, loop.lane
         self._loop.set_exception_handler(self._fault)
         self._warned: set[str] = set()
         self.settings = settings
@@ -111,8 +113,6 @@ class Daemon:
         #: Set when ground stations can connect.
         self.started = asyncio.Event()
         self._followers: list[Follower] = []
-        self._timer: asyncio.TimerHandle | None = None
-        self._deadline = self._loop.time()  # of the next tick
 
     @property
     def recording(self) -> list[str]:
@@ -122,7 +122,7 @@ class Daemon:
     @property
     def is_ticking(self) -> bool:
         """False after a bug in the bridge that a new search did not cure: only received data wakes it then."""
-        return self._timer is not None
+        return self._lane.timer_at < inf
 
     async def run(self) -> None:
         """Run until cancelled. LinkError if a port for ground stations or other programs cannot be opened."""
@@ -132,7 +132,7 @@ class Daemon:
             stack.callback(lambda: self._flight.close(self._loop.time()))
             for part in (self._signing, self._seals, self.store, self.gcs, self.fc):
                 stack.callback(part.close)
-            stack.callback(self._stop_timer)
+            stack.callback(self._lane.stop_timer)
             for address in self.settings.gcs:
                 self.gcs.open(address)
             links = [str(address) for address in self.settings.gcs]
@@ -144,7 +144,7 @@ class Daemon:
                 stack.callback(await open_share(share, self.bridge, self.flush))
             self._signing.start()
             self.started.set()
-            self._tick()
+            self._tick(self._loop.time())
             try:
                 await self.fc.run()
             finally:
@@ -175,14 +175,7 @@ class Daemon:
             self._carry_out(effects.popleft())
         if bridge.flight is not self._flight.saved:
             self._flight.save(bridge.flight)
-        self._deadline = bridge.due
-        if self._timer is not None:
-            if 0 <= self._deadline - self._timer.when() < _TOO_EARLY_S:
-                # Every reply postpones the deadline a little, mostly to that of a request sent later. A timer that
-                # fires too early costs less than a new one each time.
-                return
-            self._timer.cancel()
-        self._timer = self._loop.call_at(self._deadline, self._tick)
+        self._lane.set_timer(bridge.due, self._tick)
 
     def _forward(self) -> None:
         """Carry out only the outputs of pass-through: the rest would cost too much thousands of times a second."""
@@ -257,16 +250,7 @@ class Daemon:
             self.bridge.restart("internal error", self._loop.time())
             self.flush()
 
-    def _stop_timer(self) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
-
-    def _tick(self) -> None:
-        now = self._loop.time()
-        if now < self._deadline:
-            self._timer = self._loop.call_at(self._deadline, self._tick)
-            return
-        self._timer = None
+    def _tick(self, now: float) -> None:
         self.bridge.tick(now)
         self.flush()
 

@@ -4,6 +4,7 @@
 import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, closing
+from math import inf
 
 import serial
 import structlog
@@ -133,6 +134,8 @@ class FcConnection:
             self._port.write(data, asks=output.asks)
             self._traffic.pieces_sent += 1
             self._traffic.bytes_sent += len(data)
+        if output.complete_at > -inf:
+            self._port.hold(output.complete_at)
 
     def happened(self, event: BridgeEvent) -> None:
         if self._finder is not None:

@@ -27,16 +27,11 @@ _RETRY_S = 0.25
 _IN_USE_RETRY_S = 2.0
 #: Unsent bytes above this are dropped: ground stations can send faster than a UART.
 _MAX_UNSENT = 8192
-#: So many reads within a window are gathered from then on, several a wake-up: telemetry that is a few ms older costs
-#: the pilot less than the wake-ups cost the CPU.
-_MANY_READS, _WINDOW_S = 25, 0.25
-#: A little less than a datagram holds (bridge/gcs/ground.py): two cost twice as much.
-_GATHERED_SIZE = 250
-_SHORTEST_DELAY_S, _LONGEST_DELAY_S = 0.002, 0.012
-#: Gathering with a long delay ends at a read of so many bytes.
-_MUCH = 1024
-#: Any gathering ends after such a window with less than this part of the rate at its start.
-_LONG_WINDOW_S, _LEAST_PART = 1.0, 0.4
+#: Passed-through data that arrives at this rate, bytes/s, is gathered: telemetry that is a few ms older costs the pilot
+#: less than the wake-ups cost the CPU. Each read waits for a little less than a datagram holds (bridge/gcs/ground.py:
+#: two cost twice as much), but for no longer than this.
+_GATHERED_RATE, _GATHERED_SIZE = 2400, 220
+_SHORTEST_DELAY_S, _LONGEST_DELAY_S = 0.002, 0.03
 #: After a request, replies are read without delay for this long.
 _REPLIES_S = 0.25
 
@@ -64,7 +59,9 @@ class FcPort:
         self._on_data = on_data
         self._on_close = on_close
         self._traffic = traffic
-        self._loop = asyncio.get_running_loop()
+        loop = asyncio.get_running_loop()
+        assert isinstance(loop, EventLoop)
+        self._loop, self._lane = loop, loop.lane
         self._device: Device | None = None
         self._descriptor = -1
         self._is_tcp = False
@@ -81,13 +78,7 @@ class FcPort:
         self.dropped_bytes = 0
         #: Reads may be delayed by a few ms, unless a reply is pending.
         self.may_gather = False
-        self._is_gathering = False
-        self._gathers_from = 0.0
-        self._window_began = 0.0
-        self._window_bytes = 0  # received before it
-        self._next_look = self._reads_until_look = _MANY_READS
-        self._bytes_per_s = 0.0  # when gathering began
-        self._most = inf
+        self._gathers_from = self._read_at = -inf
 
     async def run(self) -> None:
         """Open the port and keep reopening it; cancel to end."""
@@ -117,7 +108,7 @@ class FcPort:
         self._is_tcp = isinstance(self._device, socket.socket) and self._device.family != socket.AF_UNIX
         self.trouble = ""
         self._closed.clear()
-        self._loop.add_reader(self._descriptor, self._readable)
+        self._lane.watch(self._descriptor, self._read)
         self._on_open()
         return _RETRY_S
 
@@ -152,9 +143,10 @@ class FcPort:
         """Write without blocking; the rest is sent when the port is writable. `asks`: a reply is expected."""
         if self._device is None:
             return
-        if asks and (self.may_gather or self._is_gathering):
-            self._gathers_from = self._loop.time() + _REPLIES_S
-            self._read_at_once()
+        if asks:
+            self._lane.hold(-inf)
+            if self.may_gather:
+                self._gathers_from = self._loop.time() + _REPLIES_S
         if self._unsent:
             if len(self._unsent) + len(data) > _MAX_UNSENT:
                 self.dropped_bytes += len(data)
@@ -181,15 +173,15 @@ class FcPort:
         if not self._unsent and self._device is not None:
             self._loop.remove_writer(self._descriptor)
 
-    def _readable(self) -> None:
-        self._read(self._loop.time())
+    def hold(self, until: float) -> None:
+        """Read nothing before this time, unless something is written that asks for a reply."""
+        if self._device is not None:
+            self._lane.hold(until)
 
     def _read(self, now: float) -> None:
         try:
             data = os.read(self._descriptor, _READ_SIZE)
-        except BlockingIOError:
-            # Gathering: nothing has arrived.
-            self._judge_rate(now)
+        except BlockingIOError:  # after a delay: nothing has arrived
             return
         except OSError as error:
             self._shut(reason(error))
@@ -202,46 +194,15 @@ class FcPort:
         traffic.bytes_received += len(data)
         if self._is_tcp:
             self._acknowledge()
-        if len(data) > self._most:
-            self._read_at_once()  # until the new rate is known
-        elif traffic.pieces_received >= self._next_look:
-            self._judge_rate(now)
+        if self.may_gather:
+            self._gather(len(data), now)
         self._on_data(data, now)
 
-    def _judge_rate(self, now: float) -> None:
-        """Begin to gather after many reads in a short time; end it when less has arrived for longer."""
-        window_s, size = now - self._window_began, self._traffic.bytes_received - self._window_bytes
-        if self._is_gathering:
-            if window_s < _LONG_WINDOW_S:
-                return
-            if not self.may_gather or size < self._bytes_per_s * window_s * _LEAST_PART:
-                self._read_at_once()
-        elif window_s < _WINDOW_S and self.may_gather and now >= self._gathers_from:
-            self._begin_gathering(size / window_s)
-        self._window_began = now
-        self._window_bytes = self._traffic.bytes_received
-        self._next_look = self._traffic.pieces_received + self._reads_until_look
-
-    def _begin_gathering(self, bytes_per_s: float) -> None:
-        if isinstance(self._loop, EventLoop):
-            delay_s = min(max(_GATHERED_SIZE / bytes_per_s, _SHORTEST_DELAY_S), _LONGEST_DELAY_S)
-            self._is_gathering, self._bytes_per_s = True, bytes_per_s
-            self._most = inf if delay_s < 2 * _SHORTEST_DELAY_S else _MUCH
-            self._reads_until_look = int(_LONG_WINDOW_S / delay_s)
-            self._loop.remove_reader(self._descriptor)
-            self._loop.repeat(delay_s, self._read)
-
-    def _read_at_once(self) -> None:
-        if self._is_gathering:
-            self._stop_gathering()
-            self._loop.add_reader(self._descriptor, self._readable)
-
-    def _stop_gathering(self) -> None:
-        if self._is_gathering and isinstance(self._loop, EventLoop):
-            self._is_gathering, self._most = False, inf
-            self._reads_until_look = _MANY_READS
-            self._next_look = self._traffic.pieces_received + _MANY_READS
-            self._loop.stop_repeating()
+    def _gather(self, size: int, now: float) -> None:
+        """Delay the next read if the last one brought much for the time since the one before."""
+        since_s, self._read_at = now - self._read_at, now
+        if size >= _GATHERED_RATE * since_s and now >= self._gathers_from:
+            self._lane.hold(now + min(max(_GATHERED_SIZE / size * since_s, _SHORTEST_DELAY_S), _LONGEST_DELAY_S))
 
     def _acknowledge(self) -> None:
         """Let the TCP connection acknowledge received bytes at once, not 40 ms later.
@@ -256,8 +217,7 @@ class FcPort:
         device, self._device = self._device, None
         if device is None:
             return
-        self._stop_gathering()
-        self._loop.remove_reader(self._descriptor)
+        self._lane.unwatch()
         self._loop.remove_writer(self._descriptor)
         self._descriptor = -1
         self._unsent.clear()

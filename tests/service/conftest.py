@@ -1,19 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
-from service.machine.event_loop import EventLoop
 from tests.support.benches import Starter
 from tests.support.programs import Daemon
-
-
-def pytest_asyncio_loop_factories() -> Mapping[str, type[EventLoop]]:
-    """The daemon's own."""
-    return {"daemon": EventLoop}
 
 
 @pytest.fixture

@@ -2,10 +2,10 @@
 """A daemon with a simulated Naze in simulated time, and the functions that each event of its loop calls."""
 
 import asyncio
-import selectors
+import select
 import socket
 import sys
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -21,6 +21,7 @@ from protocols.mavlink.dialect import Message
 from protocols.mavlink.frame import MavlinkSplitter
 from service.daemon.daemon import Daemon
 from service.daemon.store_worker import StoreWorker
+from service.machine.event_loop import EventLoop, LaneSelector
 from service.settings import Settings
 from service.settings.addresses import SimulatedFc, parse_gcs
 from simulator.board.options import Faults
@@ -34,8 +35,12 @@ _TIMEOUT_S = 30.0
 _POLL_S = 0.001
 _ROOT = f"{Path(__file__).parents[2]}/"
 _PRODUCT = ("bridge/", "protocols/", "reports/", "service/", "storage/")
-#: The messages' classes, which a reader of a walk skips.
-_MESSAGES = ("protocols/mavlink/messages.py", "protocols/mavlink/message_base.py")
+#: The event loop's own functions, and the messages' classes, which a reader of a walk skips.
+_SKIPPED = (
+    "service/machine/event_loop.py",
+    "protocols/mavlink/messages.py",
+    "protocols/mavlink/message_base.py",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,25 +73,23 @@ def measure(*wake_ups: WakeUp) -> Walk:
     return Walk(len(called), returns, len(set(called)))
 
 
-class _Selector(selectors.DefaultSelector):
+class _Loop(EventLoop):
     """Waits in simulated time: if no descriptor is ready, the clock jumps to the next timer."""
 
-    now = 0.0
-
-    def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
-        ready = super().select(0 if timeout is not None else None)
-        if not ready and timeout is not None:
-            self.now += max(timeout, 0.0)
-        return ready
-
-
-class _Loop(asyncio.SelectorEventLoop):
     def __init__(self) -> None:
-        self._clock = _Selector()
-        super().__init__(self._clock)
+        self._now = 0.0
+        super().__init__(LaneSelector(self.time, self._wait))
 
     def time(self) -> float:
-        return self._clock.now
+        return self._now
+
+    def _wait(
+        self, descriptors: Sequence[int], _writers: object, _others: object, seconds: float | None
+    ) -> tuple[Sequence[int], object, object]:
+        ready = select.select(descriptors, (), (), None if seconds is None else 0.0)
+        if not any(ready):
+            self._now += seconds or 0.0
+        return ready
 
 
 class TracedDaemon:
@@ -131,7 +134,7 @@ class TracedDaemon:
         if event not in ("call", "return") or not name.startswith(_ROOT):
             return
         file = name.removeprefix(_ROOT)
-        if not file.startswith(_PRODUCT) or file in _MESSAGES:
+        if not file.startswith(_PRODUCT) or file in _SKIPPED:
             return
         if event == "return":
             self._depth -= 1

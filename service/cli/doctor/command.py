@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`naze-bridge doctor`."""
 
-import asyncio
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -11,6 +10,7 @@ import click
 from payloads.mission_data import Json
 from service.cli.doctor.checked import Checked, Grade, problem
 from service.daemon.client import STATUS, ControlError, ask_daemon
+from service.machine import event_loop
 from service.machine.host import Host
 from service.settings import Settings, SettingsError, load_settings
 from service.settings.load import CONFIG_VARIABLE, SERVICE_CONFIG, SERVICE_STATE
@@ -84,7 +84,7 @@ def _listen(settings: Settings) -> Json:
     from service.cli.direct_bridge import ask_directly  # the whole daemon: --help does without
 
     try:
-        return asyncio.run(ask_directly(settings.fc, STATUS, even_silent=True))
+        return event_loop.run(ask_directly(settings.fc, STATUS, even_silent=True))
     except StoreError as error:
         raise ControlError(str(error)) from error
 

@@ -7,6 +7,7 @@ import threading
 
 from service.daemon.daemon import Daemon
 from service.daemon.lifecycle import run_until_signal
+from service.machine import event_loop
 from service.machine.notify import Notifier
 from service.settings import Settings
 from service.settings.addresses import SimulatedFc
@@ -31,6 +32,6 @@ def test_a_disk_that_hangs_during_a_reload_does_not_hold_up_the_stop() -> None:
         os.kill(os.getpid(), signal.SIGTERM)
         await running
 
-    asyncio.run(main())
+    event_loop.run(main())
     assert not given_up.is_set()
     answers.set()

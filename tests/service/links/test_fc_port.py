@@ -23,6 +23,7 @@ from service.settings.addresses import SerialFc
 from tests.support.packing import pack
 from tests.support.programs import TIMEOUT_S, until_async
 
+HOUR_S = 3600.0
 _writer = FrameWriter(1, 1)
 
 
@@ -51,9 +52,6 @@ class Line:
         )
         self._task = asyncio.get_running_loop().create_task(self.port.run())
         return self.port
-
-    def is_gathering(self) -> bool:
-        return self.port._is_gathering
 
     async def stop(self) -> None:
         self._task.cancel()
@@ -128,9 +126,12 @@ async def test_reads_are_batched_only_at_high_rates(line: Line) -> None:
     for _ in range(3):
         sent = await line.feed_until_gathered(sent)
         # At a lower rate each frame is read on arrival.
-        sent = await line.feed(sent, 50, 50)
-        await line.has_come(sent)
-        await until_async(lambda: not line.is_gathering(), "the end of gathering")
+        before = line.reads
+        for _ in range(20):
+            await asyncio.sleep(0.05)
+            sent = await line.feed(sent, 1, 1_000_000)
+            await line.has_come(sent)
+        assert line.reads - before >= 20
     assert line.numbers() == list(range(sent))
     assert line.lost == []
     assert line.opened == 1
@@ -141,42 +142,13 @@ async def test_gathering_ends_when_a_reply_is_expected(line: Line) -> None:
     port = line.start()
     await until_async(lambda: line.opened, "the port")
     port.may_gather = True
-    sent = 0
-    while not line.is_gathering():
-        sent = await line.feed(sent, 100, 1_000)
-    port.write(b"a heartbeat")
-    assert line.is_gathering()
-    port.write(b"a request", asks=True)
-    assert not line.is_gathering()
-    sent = await line.feed(sent, 30, 1_000)
-    await line.has_come(sent)
-    await line.stop()
-
-
-async def test_gathering_with_a_long_delay_ends_when_much_arrives_at_once(line: Line) -> None:
-    """At the new rate the delay may be too long."""
-    port = line.start()
-    await until_async(lambda: line.opened, "the port")
-    port.may_gather = True
-    sent = 0
-    while not line.is_gathering():
-        sent = await line.feed(sent, 10, 200)
-    await line.has_come(sent)
-    os.write(line.wire, b"".join(map(attitude, range(sent, sent + 30))))
-    await line.has_come(sent + 30)
-    assert not line.is_gathering()
-    await line.stop()
-
-
-async def test_a_port_that_falls_silent_during_batched_reads_is_not_lost(line: Line) -> None:
-    port = line.start()
-    await until_async(lambda: line.opened, "the port")
-    port.may_gather = True
     sent = await line.feed_until_gathered()
-    await until_async(lambda: not line.is_gathering(), "the end of gathering")
-    await line.feed(sent, 1, 50)
-    await line.has_come(sent + 1)
-    assert (line.lost, line.opened) == ([], 1)
+    port.hold(asyncio.get_running_loop().time() + HOUR_S)
+    port.write(b"a heartbeat")
+    sent = await line.feed(sent, 1, 1000)
+    assert len(line.numbers()) == sent - 1
+    port.write(b"a request", asks=True)
+    await line.has_come(sent)
     await line.stop()
 
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A repeated call beside everything else that the event loop does."""
+"""The fast lane beside everything else that the event loop does."""
 
 import asyncio
+import os
 import socket
 import threading
 from collections.abc import Iterator
@@ -9,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from service.machine.event_loop import EventLoop
+from service.machine.event_loop import EventLoop, run
 from tests.support.programs import TIMEOUT_S, until_async
 
 INTERVAL_S = 0.001
@@ -29,41 +30,100 @@ def running() -> EventLoop:
     return loop
 
 
-async def test_a_call_is_repeated_at_its_interval_until_it_is_stopped() -> None:
+class Port:
+    """A pipe whose reading end is in the fast lane; `reads`: the data, and when it was read."""
+
+    def __init__(self, loop: EventLoop) -> None:
+        self.loop = loop
+        self.reads: list[tuple[bytes, float]] = []
+        self._near, self._far = os.pipe()
+        os.set_blocking(self._near, False)
+        loop.lane.watch(self._near, self._read)
+
+    def write(self, data: bytes) -> None:
+        os.write(self._far, data)
+
+    def close(self) -> None:
+        self.loop.lane.unwatch()
+        os.close(self._near)
+        os.close(self._far)
+
+    def _read(self, now: float) -> None:
+        try:
+            data = os.read(self._near, 100)
+        except BlockingIOError:
+            data = b""
+        self.reads.append((data, now))
+
+
+@pytest.fixture
+async def port() -> Any:
+    port = Port(running())
+    yield port
+    port.close()
+
+
+async def test_a_timer_fires_once_and_not_early() -> None:
     loop = running()
     times: list[float] = []
-
-    def note(now: float) -> None:
-        times.append(now)
-        if len(times) == 20:
-            loop.stop_repeating()
-            loop.call_soon(done.set_result, None)
-
-    done = loop.create_future()
-    loop.repeat(INTERVAL_S, note)
-    began = loop.time()
-    async with asyncio.timeout(TIMEOUT_S):
-        await done
+    at = loop.time() + 5 * INTERVAL_S
+    loop.lane.set_timer(loop.time() + HOUR_S, lambda _: times.append(0.0))
+    loop.lane.set_timer(at, times.append)
+    await until_async(lambda: times, "the call")
     await asyncio.sleep(5 * INTERVAL_S)
-    assert len(times) == 20
-    assert all(later - earlier >= INTERVAL_S for earlier, later in zip([began, *times], times, strict=False))
+    assert len(times) == 1
+    assert times[0] >= at
 
 
-async def test_a_later_call_replaces_an_earlier_one() -> None:
+async def test_a_stopped_timer_does_not_fire() -> None:
     loop = running()
-    called: list[str] = []
-    loop.repeat(INTERVAL_S, lambda _: called.append("first"))
-    loop.repeat(INTERVAL_S, lambda _: called.append("second"))
-    await until_async(lambda: len(called) > 3, "the calls")
-    loop.stop_repeating()
-    assert set(called) == {"second"}
+    loop.lane.set_timer(loop.time() + INTERVAL_S, lambda _: pytest.fail("called"))
+    loop.lane.stop_timer()
+    await asyncio.sleep(5 * INTERVAL_S)
+
+
+async def test_data_is_read_on_arrival(port: Port) -> None:
+    for number in range(3):
+        port.write(b"%d" % number)
+        await until_async(lambda number=number: len(port.reads) > number, "the data")  # type: ignore[misc]
+    assert [data for data, _ in port.reads] == [b"0", b"1", b"2"]
+
+
+async def test_held_data_is_read_together_once_the_time_has_come(port: Port) -> None:
+    until = port.loop.time() + 20 * INTERVAL_S
+    port.loop.lane.hold(until)
+    port.write(b"a")
+    await asyncio.sleep(INTERVAL_S)
+    port.write(b"b")
+    await until_async(lambda: port.reads, "the data")
+    data, read_at = port.reads[0]
+    assert data == b"ab"
+    assert read_at >= until
+
+
+async def test_after_a_hold_without_data_the_next_data_is_read_on_arrival(port: Port) -> None:
+    port.loop.lane.hold(port.loop.time() + INTERVAL_S)
+    await until_async(lambda: port.reads, "the end of the hold")
+    port.write(b"late")
+    await until_async(lambda: len(port.reads) > 1, "the data")
+    assert [data for data, _ in port.reads] == [b"", b"late"]
+
+
+async def test_a_hold_can_end_early(port: Port) -> None:
+    port.loop.lane.hold(port.loop.time() + HOUR_S)
+    port.write(b"data")
+    await asyncio.sleep(INTERVAL_S)
+    assert port.reads == []
+    port.loop.lane.hold(port.loop.time())
+    await until_async(lambda: port.reads, "the data")
 
 
 @pytest.mark.parametrize("how", ["call_soon", "call_later", "call_soon_threadsafe"])
-def test_the_loop_does_at_once_what_a_repeated_call_asks_of_it(loop: EventLoop, how: str) -> None:
+def test_the_loop_does_at_once_what_a_call_asks_of_it(loop: EventLoop, how: str) -> None:
     """Otherwise it would wait for its next timer, an hour away."""
 
-    def ask(_now: float) -> None:
+    def ask(now: float) -> None:
+        loop.lane.set_timer(now + INTERVAL_S, lambda _: None)
         if how == "call_soon_threadsafe":
             threading.Thread(target=loop.call_soon_threadsafe, args=(done,)).start()
         elif how == "call_later":
@@ -75,11 +135,11 @@ def test_the_loop_does_at_once_what_a_repeated_call_asks_of_it(loop: EventLoop, 
         loop.stop()
 
     loop.call_later(HOUR_S, done)
-    loop.repeat(INTERVAL_S, ask)
+    loop.lane.set_timer(loop.time() + INTERVAL_S, ask)
     loop.run_forever()
 
 
-async def test_descriptors_and_timers_are_served_meanwhile() -> None:
+async def test_descriptors_and_timers_are_served_beside_a_busy_lane() -> None:
     loop = running()
     near, far = socket.socketpair()
     served: list[str] = []
@@ -87,39 +147,47 @@ async def test_descriptors_and_timers_are_served_meanwhile() -> None:
     def readable() -> None:
         served.append(near.recv(10).decode())
 
+    def again(now: float) -> None:
+        loop.lane.set_timer(now, again)
+
     loop.add_reader(near, readable)
-    loop.repeat(HOUR_S, lambda _: served.append("never"))
+    again(loop.time())
     loop.call_later(INTERVAL_S, served.append, "timer")
     loop.call_later(2 * INTERVAL_S, far.send, b"data")
     await until_async(lambda: served == ["timer", "data"], "both")
     loop.remove_reader(near)
-    loop.stop_repeating()
+    loop.lane.stop_timer()
     near.close()
     far.close()
 
 
-async def test_an_error_in_a_repeated_call_is_reported_and_the_call_is_repeated() -> None:
-    loop = running()
-    reported: list[dict[str, Any]] = []
-    loop.set_exception_handler(lambda _, context: reported.append(context))
+async def test_the_lane_is_served_beside_a_busy_loop(port: Port) -> None:
     called: list[float] = []
+    port.loop.lane.set_timer(port.loop.time() + INTERVAL_S, called.append)
+    port.write(b"data")
+    async with asyncio.timeout(TIMEOUT_S):
+        while not (called and port.reads):  # noqa: ASYNC110 (no wait: always another turn)
+            await asyncio.sleep(0)
 
-    def fail(now: float) -> None:
-        called.append(now)
+
+async def test_an_error_is_reported_with_its_handle(port: Port) -> None:
+    """The daemon restarts the flight controller's line then."""
+    reported: list[dict[str, Any]] = []
+    port.loop.set_exception_handler(lambda _, context: reported.append(context))
+
+    def fail(_now: float) -> None:
         raise ZeroDivisionError
 
-    loop.repeat(INTERVAL_S, fail)
-    await until_async(lambda: len(called) > 2, "the repetition")
-    loop.stop_repeating()
+    port.loop.lane.set_timer(port.loop.time(), fail)
+    await until_async(lambda: reported, "the report")
+    port.write(b"data")
+    await until_async(lambda: port.reads, "the data")
     assert isinstance(reported[0]["exception"], ZeroDivisionError)
     assert reported[0]["handle"]
 
 
-async def test_an_overdue_call_is_made_at_once() -> None:
-    """After a long turn of the loop."""
-    loop = running()
-    called: list[float] = []
-    loop.repeat(INTERVAL_S, called.append)
-    threading.Event().wait(5 * INTERVAL_S)
-    await until_async(lambda: called, "the call")
-    loop.stop_repeating()
+def test_a_coroutine_runs_on_a_loop_with_a_lane() -> None:
+    async def main() -> bool:
+        return isinstance(asyncio.get_running_loop(), EventLoop)
+
+    assert run(main())
