@@ -38,11 +38,14 @@ def until(condition: Callable[[], T | None], what: str) -> T:
 def happens(condition: Callable[[], T | None], seconds: float = TIMEOUT_S) -> T | None:
     """Wait for a true value; return the last value after a timeout."""
     deadline = time.monotonic() + seconds
+    pause_s = 0.02
     while True:
         found = condition()
         if found or time.monotonic() >= deadline:
             return found
-        time.sleep(0.02)
+        time.sleep(pause_s)
+        # A condition may be a script in a browser or a whole log: asked often, it costs more than what it waits for.
+        pause_s = min(pause_s * 1.2, 0.1)
 
 
 async def until_async(condition: Callable[[], T | None], what: str) -> T:
