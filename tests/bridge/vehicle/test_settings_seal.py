@@ -28,7 +28,7 @@ from tests.support.world import GroundStation, Radio, World
 SET_PID, SET_BOX, SET_RC_TUNING, SET_MISC, SET_MODE_RANGE, SET_PID_V2 = 202, 203, 204, 207, 35, 0x2031
 RC_TUNING, PID, BOX, MISC = 111, 112, 113, 114
 #: Longer than the interval between two readings.
-ROUND_S = 75.0
+ROUND_S = 65.0
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ def test_a_change_through_the_bridge_is_not_reported(name: str) -> None:
     reply = ShareProgram(world, may_write=True).outcome(case.command, case.payload)
     assert reply is not None
     assert reply.direction is Direction.REPLY
-    world.run(2 * ROUND_S)
+    world.run(ROUND_S)
     assert world.events("settings.changed_on_board") == []
     assert warnings(station) == []
     assert world.inside.seal.state is not None
@@ -146,7 +146,7 @@ def test_a_change_of_any_other_setting_of_a_patched_harakiri_is_reported_and_all
     client.wait_read()
     world.run(1)
     set_on_the_board(world, "nav_speed_max", 777)
-    world.run(ROUND_S)
+    world.run(ROUND_S + 10)  # the others take some seconds to be read
     (event,) = world.events("settings.changed_on_board")
     assert event.facts["detail"] == "Settings changed elsewhere: other settings"
     assert warnings(station) == [event.facts["detail"]]
@@ -168,13 +168,13 @@ def test_the_radius_set_and_a_calibration_begun_by_a_station_are_not_reported() 
     world, station = sealed(naze)
     SettingsClient(world).wait_read()
     station.send(messages.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", 450, 9))
-    world.run(2 * ROUND_S)
+    world.run(ROUND_S)
     assert SettingsClient(world).value("gps_wp_radius") == 450
     parameters = (0, 0, 0, 0, 4, 0, 0)
     station.send(messages.MAVLink_command_long_message(1, 1, messages.MAV_CMD_PREFLIGHT_CALIBRATION, 0, *parameters))
     world.run(1)
     set_on_the_board(world, "rc_trm_rll", 1)
-    world.run(2 * ROUND_S)
+    world.run(ROUND_S)
     assert world.events("settings.changed_on_board") == []
 
 
@@ -235,7 +235,7 @@ def test_an_armed_board_is_not_asked_and_its_changes_are_reported_after_the_flig
     world.wait_until(lambda world: world.bridge.vehicle.armed is True, 5)
     armed_at = world.now
     on_the_board(world, SET_PID, bytes((41, *NAZE_PIDS[1:])))
-    world.run(2 * ROUND_S)
+    world.run(ROUND_S)
     assert not {PID, RC_TUNING, MISC} & set(requests(world, armed_at))
     assert world.events("settings.changed_on_board") == []
     world.naze.faults.armed = False
@@ -260,10 +260,10 @@ def test_a_few_requests_a_minute() -> None:
     for make in (naze, inav, multiwii):
         world, _ = sealed(make)
         began = world.now
-        world.run(200)
+        world.run(2 * ROUND_S)
         ours = {RC_TUNING, PID, MISC, 34, 0x2003, 0x2007, 0x2030, 0x2070}
         asked = [command for command in requests(world, began) if command in ours]
-        assert 0 < len(asked) <= 5 * 4
+        assert 0 < len(asked) <= 5 * 3
 
 
 def test_a_board_without_the_commands_is_left_alone() -> None:

@@ -71,7 +71,8 @@ def push_under(inject: Injection, seed: int, options: SimOptions | None = None) 
 
 def works_again(world: World) -> None:
     """Without the faults, the same push succeeds and the list reads back."""
-    world.run(4)
+    world.run(1)
+    world.run_until(lambda w: not w._events, 3)  # the last fault has begun and ended
     faults = world.faults
     for name in Faults.__dataclass_fields__:
         setattr(faults, name, getattr(Faults(), name))
