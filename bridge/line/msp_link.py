@@ -39,8 +39,8 @@ _FIRST_GUESS_S = 0.03
 _LINE_SILENCE_S = 0.05
 #: Awaited replies of at least so many bytes are read when they are complete, but not later than this. A board serves
 #: requests between two cycles of its control loop.
-_LEAST_WAITED_FOR, _LONGEST_WAIT_S = 24, 0.02
-_SERVING_S = 0.002
+_LEAST_WAITED_FOR, _LONGEST_WAIT_S = 8, 0.02
+_SERVING_S = 0.004
 _ANY_SIZE = 1 << 16
 _NO_COMMAND = -1
 #: An INAV that lost a frame's header takes the rest for typed characters: '#' followed by 100 ms of silence opens its

@@ -38,7 +38,7 @@ def test_it_is_not_before_the_last_byte_can_be_there() -> None:
     first_request_s = len(request(Msp.STATUS)) * BYTE_S
     assert NOW + first_request_s + len(replies) * BYTE_S <= complete_at
     # The board needs a moment for a request, too.
-    assert complete_at <= NOW + (len(requests) + len(replies)) * BYTE_S + 0.003
+    assert complete_at <= NOW + (len(requests) + len(replies)) * BYTE_S + 0.005
 
 
 def test_after_a_part_only_the_rest_is_waited_for() -> None:
@@ -49,8 +49,6 @@ def test_after_a_part_only_the_rest_is_waited_for() -> None:
 
 
 def test_a_few_bytes_are_read_on_arrival() -> None:
-    link = asking(poll(Msp.ATTITUDE))
-    assert link.complete_at == -inf
     link = asking(poll(Msp.RC))
     link.receive(reply(Msp.RC)[:-5], NOW + 0.002)
     assert link.complete_at == -inf

@@ -19,10 +19,10 @@ def test_a_package_that_is_not_installed_has_no_version() -> None:
 
 
 def test_a_failing_disk_hides_the_version_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(_path: Path) -> None:
+    def fail(_path: Path, _pattern: str) -> None:
         raise OSError
 
-    monkeypatch.setattr("os.scandir", fail)
+    monkeypatch.setattr(Path, "glob", fail)
     assert version() == "unknown"
 
 
