@@ -35,6 +35,7 @@ from protocols.mission_item import Command, Frame, MissionItem, MissionResult
 from protocols.msp.frame import FRAME_OVERHEAD
 from protocols.msp.nav import SAVE_REQUEST, WP_SIZE, NavRecord, encode_read_wp, encode_set_wp
 from service.daemon.daemon import Daemon
+from service.machine import event_loop
 from service.settings import Settings
 from service.settings.addresses import FcAddress, GcsAddress, SerialFc, TcpFc
 from tests.support.inside import inside
@@ -61,7 +62,7 @@ def _over_tcp() -> list[Figure]:
                     _bare_loop(connection.sendall, connection.recv, _records(turn * _RUNS + run), saves=True)
                     for run in range(_RUNS)
                 ]
-            whole += asyncio.run(_write_all_missions(TcpFc(host, port), Path(name), turn))
+            whole += event_loop.run(_write_all_missions(TcpFc(host, port), Path(name), turn))
     name = f"Write of {_COUNT} items to INAV over TCP, from the last item to the ack, {_ROUNDS * _RUNS} runs"
     floor = Floor(statistics.median(bare) * 1000, "a bare loop: write, read back, save")
     worst = Floor(max(bare) * 1000, "the bare loop's")
@@ -76,7 +77,7 @@ def _over_a_uart() -> list[Figure]:
         line = os.open(fc, os.O_RDWR | os.O_NOCTTY)
         bare = [_bare_loop(partial(_send_all, line), partial(os.read, line), _records(run)) for run in range(_RUNS)]
         os.close(line)
-        times = asyncio.run(_push_all(SerialFc(fc, _BAUD), 1))
+        times = event_loop.run(_push_all(SerialFc(fc, _BAUD), 1))
     floor = Floor(_WIRE_S * 1000, f"{_BYTES} bytes at {_BAUD} 8N1")
     name = f"{_COUNT} records to INAV at {_BAUD} baud, each read back, {_RUNS} runs"
     return [

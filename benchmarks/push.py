@@ -28,6 +28,7 @@ from bridge.missions.list_check import check_list
 from bridge.model.refusal import Refusal
 from protocols.msp.mission import RECORD_SIZE, MissionCommand, WpRecord
 from service.daemon.daemon import Daemon
+from service.machine import event_loop
 from service.settings import Settings
 from service.settings.addresses import GcsAddress, SerialFc
 from tests.support.inside import inside
@@ -53,7 +54,7 @@ def measure() -> list[Figure]:
 
 def _times_ms(*options: str) -> list[float]:
     with tempfile.TemporaryDirectory() as name, simulated_naze(Path(name), "--baud", str(_BAUD), *options) as board:
-        return [seconds * 1000 for seconds in asyncio.run(_push_all(board.link))]
+        return [seconds * 1000 for seconds in event_loop.run(_push_all(board.link))]
 
 
 async def _push_all(link: Path) -> list[float]:

@@ -29,6 +29,7 @@ from payloads.keys import TELEMETRY, full
 from payloads.names import DEFAULT_PREFIX
 from reports.vehicle_groups import Group
 from service.daemon.daemon import Daemon
+from service.machine import event_loop
 from service.settings import Settings
 from service.settings.addresses import parse_fc
 from service.settings.zenoh import ZenohSettings
@@ -48,7 +49,7 @@ _ANSWERS_A_TURN = 2000
 def measure() -> list[Figure]:
     with tempfile.TemporaryDirectory() as name, running_router(Path(name)) as router:
         folder, endpoint = Path(name), router.endpoint
-        return [*_latency_and_memory(folder, endpoint), *asyncio.run(_cpu(folder, endpoint))]
+        return [*_latency_and_memory(folder, endpoint), *event_loop.run(_cpu(folder, endpoint))]
 
 
 def _latency_and_memory(folder: Path, endpoint: str) -> list[Figure]:
