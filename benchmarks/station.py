@@ -4,6 +4,7 @@
 import socket
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 from benchmarks.processes import BenchmarkError
@@ -48,6 +49,7 @@ class Station:
         count = messages.MAVLink_mission_count_message(*_VEHICLE, len(items))
         frames = [self._writer.frame(pack(item_message(item, *_VEHICLE, as_int=True)), 2) for item in items]
         steps: list[float] = []
+        self._forget_received()
         began_at = sent_at = self._send(self._writer.frame(pack(count), 2))
         for seq, frame in enumerate(frames):
             request, received_at = self._receive(messages.MAVLINK_MSG_ID_MISSION_REQUEST)
@@ -74,6 +76,14 @@ class Station:
         sent_at = time.perf_counter()
         self._socket.send(frame)
         return sent_at
+
+    def _forget_received(self) -> None:
+        """Drop what has arrived: the final ack of an earlier upload is sent three times."""
+        self._socket.setblocking(False)
+        with suppress(BlockingIOError):
+            while True:
+                self._socket.recv(2048)
+        self._socket.settimeout(_TIMEOUT_S)
 
     def _receive(self, msgid: int) -> tuple[MavlinkFrame, float]:
         """Wait for a message; telemetry is skipped."""
