@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A field of BridgeSettings is all that a setting of the bridge needs: it follows from the file to the bridge."""
 
-import asyncio
 from dataclasses import Field, fields
 from enum import Enum
 from pathlib import Path
@@ -11,6 +10,7 @@ import pytest
 
 from bridge.config import BridgeConfig, BridgeSettings
 from service.daemon import daemon as daemon_module
+from service.machine import event_loop
 from service.settings import load_settings
 
 _HINTS = get_type_hints(BridgeSettings, include_extras=True)
@@ -46,5 +46,5 @@ def test_a_setting_of_the_bridge_reaches_it_from_the_file(
         monkeypatch.setattr(daemon_module, "BridgeConfig", note)
         daemon_module.Daemon(settings)
 
-    asyncio.run(start())
+    event_loop.run(start())
     assert getattr(made[0].settings, field.name) == value != field.default
