@@ -320,7 +320,10 @@ class MissionPlanner:
                         break
 
     def _read_file(self, path: bytes) -> bytes | None:
-        """Reset the sessions, open, and read in bursts of session 0; None without the capability or the file."""
+        """Reset the sessions, open, and read in bursts of session 0; None without the capability or the file.
+
+        The next burst is requested when one is complete, or something of it is missing.
+        """
         if not self.capabilities & messages.MAV_PROTOCOL_CAPABILITY_FTP:
             return None
         self._ask_file(FtpOp.RESET_SESSIONS)
@@ -330,8 +333,11 @@ class MissionPlanner:
         size = int.from_bytes(bytes(opened[12:16]), "little")
         content = b""
         while len(content) < size:
-            answer = self._ask_file(FtpOp.BURST_READ_FILE, size=_READ_SIZE, offset=len(content))
-            content += bytes(answer[12 : 12 + answer[4]])
+            packet: list[int] | None = self._ask_file(FtpOp.BURST_READ_FILE, size=_READ_SIZE, offset=len(content))
+            while packet is not None:
+                content += bytes(packet[12 : 12 + packet[4]])
+                is_complete = packet[6]
+                packet = None if is_complete else self._file_packet(FtpOp.BURST_READ_FILE, len(content))
         return content
 
     def _ask_file(self, opcode: FtpOp, data: bytes = b"", size: int = 0, offset: int = 0) -> list[int]:
@@ -340,13 +346,19 @@ class MissionPlanner:
         payload = list((header + data).ljust(251, b"\0"))
         for _ in range(5):
             self.send(messages.MAVLink_file_transfer_protocol_message(0, *self._target, payload))
-            for message in self._packets(2.0):
-                if message.get_type() != "FILE_TRANSFER_PROTOCOL" or message.payload[5] != opcode:
-                    continue
-                if int.from_bytes(bytes(message.payload[8:12]), "little") == offset:
-                    found: list[int] = message.payload
-                    return found
+            if (found := self._file_packet(opcode, offset)) is not None:
+                return found
         raise TimedOut("no answer to a file request")
+
+    def _file_packet(self, opcode: FtpOp, offset: int) -> list[int] | None:
+        """Wait for an answer, 2 s."""
+        for message in self._packets(2.0):
+            if message.get_type() != "FILE_TRANSFER_PROTOCOL" or message.payload[5] != opcode:
+                continue
+            if int.from_bytes(bytes(message.payload[8:12]), "little") == offset:
+                found: list[int] = message.payload
+                return found
+        return None
 
     # -- writing ---------------------------------------------------------------------------------------------
 
