@@ -222,6 +222,21 @@ def test_a_change_through_the_bridge_survives_a_restart_before_the_next_reading(
     assert again.events("settings.changed_on_board") == []
 
 
+def test_a_change_through_the_bridge_before_the_first_reading_is_not_reported() -> None:
+    """Another run of the bridge has read the board."""
+    seals = SealsOfThisRun()
+    board = naze()
+    sealed(lambda: board, seals)
+    world = World(speeds=(115200,), peer=board, seals=seals)
+    world.wait_ready(40)
+    assert world.inside.seal.state is None
+    on_the_board(world, SET_PID, bytes(30))
+    world.inside.seal.changed_here(world.now)
+    world.wait_until(lambda world: world.inside.seal.state is not None, 20)
+    world.run(1)
+    assert world.events("settings.changed_on_board") == []
+
+
 def test_another_board_is_no_change() -> None:
     seals = SealsOfThisRun()
     for make in (naze, inav, multiwii, naze):
