@@ -37,9 +37,10 @@ _OUTSTANDING_IN_DOUBT = 64
 _FIRST_GUESS_S = 0.03
 #: An incomplete frame is dropped after this long without a byte.
 _LINE_SILENCE_S = 0.05
-#: Awaited replies of at least so many bytes are read when they are complete, but not later than this. A board serves
-#: requests between two cycles of its control loop.
+#: If at least this many bytes of polled replies are missing, the port is not read until they can have arrived, but for
+#: no longer than this.
 _LEAST_WAITED_FOR, _LONGEST_WAIT_S = 8, 0.02
+#: A board serves requests between two cycles of its control loop.
 _SERVING_S = 0.004
 _ANY_SIZE = 1 << 16
 _NO_COMMAND = -1
@@ -272,9 +273,10 @@ class MspLink:
     def complete_at(self) -> float:
         """Before this time only a part of the awaited replies can have arrived; -infinity if they must not wait.
 
-        A slow line delivers a long reply in pieces, and several replies one by one. Polled ones are read together.
+        A slow line delivers a long reply in pieces, and several replies one by one. Polled ones are read together. A
+        queued request is sent as soon as a reply leaves room for it.
         """
-        if not (self.byte_s and self._sent and all(map(_MAY_WAIT, self._sent))):
+        if self._waiting or not (self.byte_s and self._sent and all(map(_MAY_WAIT, self._sent))):
             return -inf
         size = sum(map(_REPLY_SIZE, self._sent)) - self.parser.incomplete_bytes
         if size < _LEAST_WAITED_FOR:
@@ -282,7 +284,9 @@ class MspLink:
         first, last = self._sent[0], self._sent[-1]
         begins_at = max(self._last_byte_at, first.sent_at + _SERVING_S)
         complete_at: float = max(begins_at + size * self.byte_s, last.sent_at + last.reply_size * self.byte_s)
-        return min(complete_at, begins_at + _LONGEST_WAIT_S)
+        # What has arrived is read before a request counts as lost.
+        lost_at: float = min(map(_DEADLINE, self._sent))
+        return min(complete_at, begins_at + _LONGEST_WAIT_S, lost_at)
 
     def _timeout_s(self) -> float:
         floor = max(MIN_TIMEOUT_S, self.receiver_timeout_s + 0.02 if self.receiver_timeout_s else 0.0)

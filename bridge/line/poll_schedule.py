@@ -41,7 +41,7 @@ _CURRENT_S = 1.0
 #: every wake-up costs CPU time. For the same reason a poll that the line does not slow down is due at multiples of its
 #: interval: at the default rates all others join ATTITUDE.
 _EARLY, _EARLIEST_S = 0.2, 0.05
-#: Replies to polls with at least this interval may be read together. Who asks for faster ones needs fresh values.
+#: Replies to polls with at least this interval may be read together. A client of faster ones needs fresh values.
 _PATIENT_S = 0.08
 #: A lost reply reduces all rates by a tenth, each received one restores a little: 1 % losses change nothing, 10 % halve
 #: the rates.

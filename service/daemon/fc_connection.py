@@ -59,6 +59,8 @@ class FcConnection:
         if self._finder is not None:
             self._finder.move_on = self._port.move_on
         self._speed: int | None = None
+        # While replies to polls are gathered.
+        self._is_held = False
         self._search_report: asyncio.TimerHandle | None = None
         #: On the loop's clock; `found_at` None: no flight controller; `lost_at` None: none was lost since.
         self.found_at: float | None = None
@@ -134,7 +136,8 @@ class FcConnection:
             self._port.write(data, asks=output.asks)
             self._traffic.pieces_sent += 1
             self._traffic.bytes_sent += len(data)
-        if output.complete_at > -inf:
+        if output.complete_at > -inf or self._is_held:
+            self._is_held = output.complete_at > -inf
             self._port.hold(output.complete_at)
 
     def happened(self, event: BridgeEvent) -> None:

@@ -31,16 +31,17 @@ class FastLane:
         self.on_readable: _Call | None = None
         self.on_timer: _Call | None = None
         self.timer_at = inf
-        #: Until then the port is not looked at, and then read without a look.
+        #: Until then the port is not polled; at that time it is read without polling.
         self.held_until = -inf
 
     def watch(self, descriptor: int, on_readable: _Call) -> None:
-        """Call each time the port is readable, until `unwatch`. Data may have been read already."""
+        """Call each time the port is readable, until `unwatch`. After a hold there may be no data."""
+        assert self.on_readable is None, "the lane has one port"
         self._port.register(descriptor, select.EPOLLIN)
         self._watched, self.on_readable, self.held_until = descriptor, on_readable, -inf
 
     def unwatch(self) -> None:
-        """Do this before the descriptor is closed."""
+        """Stop watching the port. Its descriptor must still be open."""
         if self.on_readable is not None:
             self._port.unregister(self._watched)
             self.on_readable, self.held_until = None, -inf
@@ -50,7 +51,7 @@ class FastLane:
         self.held_until = until
 
     def set_timer(self, at: float, call: _Call) -> None:
-        """Make a call at that time, in place of an earlier one."""
+        """Make a call at that time. It replaces the timer that was set before."""
         self.timer_at, self.on_timer = at, call
 
     def stop_timer(self) -> None:

@@ -6,7 +6,8 @@ from math import inf
 import pytest
 
 from bridge.line.conversation import Send
-from bridge.line.msp_link import MspLink, byte_time_s
+from bridge.line.msp_link import MAX_OUTSTANDING_BYTES, MspLink, byte_time_s
+from bridge.line.poll_schedule import PollSchedule
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame, frame_size, request
 from protocols.msp.telemetry import STATUS_SIZE
@@ -36,9 +37,16 @@ def test_it_is_not_before_the_last_byte_can_be_there() -> None:
     requests, replies = request(Msp.STATUS) + request(Msp.RC), reply(Msp.STATUS) + reply(Msp.RC)
     complete_at = asking(poll(Msp.STATUS), poll(Msp.RC)).complete_at
     first_request_s = len(request(Msp.STATUS)) * BYTE_S
-    assert NOW + first_request_s + len(replies) * BYTE_S <= complete_at
     # The board needs a moment for a request, too.
+    assert NOW + first_request_s + 0.003 + len(replies) * BYTE_S <= complete_at
     assert complete_at <= NOW + (len(requests) + len(replies)) * BYTE_S + 0.005
+
+
+def test_a_request_that_was_sent_later_is_answered_later() -> None:
+    link = asking(poll(Msp.STATUS))
+    later = NOW + 0.015
+    link.send(poll(Msp.RC), later)
+    assert link.complete_at >= later + (len(request(Msp.RC)) + len(reply(Msp.RC))) * BYTE_S
 
 
 def test_after_a_part_only_the_rest_is_waited_for() -> None:
@@ -80,3 +88,28 @@ def test_a_line_without_a_speed_is_read_on_arrival() -> None:
 
 def test_a_slow_line_is_read_every_20_ms() -> None:
     assert asking(poll(Msp.STATUS), poll(Msp.RC), baud=2400).complete_at <= NOW + 0.05
+
+
+def test_nothing_is_read_late_while_a_request_waits_for_room() -> None:
+    link = asking(poll(Msp.STATUS), poll(Msp.RC))
+    link.send(Send(request(Msp.IDENT), Msp.IDENT, MAX_OUTSTANDING_BYTES), NOW)
+    assert link.awaits(Msp.IDENT)
+    assert link.complete_at == -inf
+
+
+def test_it_is_not_after_the_time_at_which_a_request_counts_as_lost() -> None:
+    link = asking(poll(Msp.STATUS), poll(Msp.RC))
+    lost_at = link.due
+    link.receive(reply(Msp.STATUS)[:3], lost_at - 0.001)
+    assert link.complete_at == lost_at
+
+
+@pytest.mark.parametrize(("interval_s", "may_wait"), [(0.1, True), (0.05, False)])
+def test_only_slow_polls_are_read_late(interval_s: float, *, may_wait: bool) -> None:
+    """A client of fast ones needs fresh values."""
+    link, polls = MspLink(BAUD, [], NOW), PollSchedule()
+    polls.begin(BAUD)
+    polls.want({Msp.ATTITUDE: interval_s})
+    polls.ask(link, NOW, beside_missions=False)
+    assert link.awaits(Msp.ATTITUDE)
+    assert (link.complete_at > NOW) == may_wait

@@ -5,12 +5,12 @@ import asyncio
 import os
 import socket
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import pytest
 
-from service.machine.event_loop import EventLoop, run
+from service.machine.event_loop import EventLoop, LaneSelector, run
 from tests.support.programs import TIMEOUT_S, until_async
 
 INTERVAL_S = 0.001
@@ -191,3 +191,73 @@ def test_a_coroutine_runs_on_a_loop_with_a_lane() -> None:
         return isinstance(asyncio.get_running_loop(), EventLoop)
 
     assert run(main())
+
+
+class Waiting:
+    """A selector in simulated time, and what its lane does. `readable_at`: when the port becomes readable."""
+
+    def __init__(self, *readable_at: float) -> None:
+        self.now = 0.0
+        self.waits = 0
+        self.reads: list[float] = []
+        self.ticks: list[float] = []
+        self._readable_at = [*readable_at]
+        self._port, self._far = os.pipe()
+        self.selector = LaneSelector(lambda: self.now, self._wait)
+        self.lane = self.selector.lane
+        self.lane.watch(self._port, self._read)
+
+    def close(self) -> None:
+        self.selector.close()
+        os.close(self._port)
+        os.close(self._far)
+
+    def _read(self, now: float) -> None:
+        self.reads.append(now)
+        self._readable_at = [at for at in self._readable_at if at > now]
+
+    def _wait(
+        self, descriptors: Sequence[int], _writers: object, _others: object, seconds: float | None
+    ) -> tuple[Sequence[int], object, object]:
+        self.waits += 1
+        assert seconds is not None
+        watched_until = self.now + seconds
+        if self.lane.descriptor in descriptors and self._readable_at and self._readable_at[0] <= watched_until:
+            self.now = max(self.now, self._readable_at[0])
+            return [self.lane.descriptor], (), ()
+        self.now = watched_until
+        return [], (), ()
+
+
+@pytest.fixture
+def waiting(request: pytest.FixtureRequest) -> Iterator[Waiting]:
+    waiting = Waiting(*request.param)
+    yield waiting
+    waiting.close()
+
+
+@pytest.mark.parametrize("waiting", [(0.1, 0.2, 3.0)], indirect=True)
+def test_a_hold_ends_at_its_time_and_the_timer_is_not_early(waiting: Waiting) -> None:
+    waiting.lane.hold(1.0)
+    waiting.lane.set_timer(4.0, waiting.ticks.append)
+    assert waiting.selector.select(5.0) == []
+    assert waiting.reads == [1.0, 3.0]
+    assert waiting.ticks == [4.0]
+    assert waiting.now == 5.0
+
+
+@pytest.mark.parametrize("waiting", [(1.0, 2.0)], indirect=True)
+def test_the_loop_gets_no_turn_for_what_it_was_asked_before(waiting: Waiting) -> None:
+    waiting.selector.has_work = True
+    assert waiting.selector.select(5.0) == []
+    assert waiting.now == 5.0
+    assert waiting.waits == 3
+
+
+@pytest.mark.parametrize("waiting", [(0.1,)], indirect=True)
+def test_a_port_that_was_held_is_closed_with_its_hold(waiting: Waiting) -> None:
+    waiting.lane.hold(3.0)
+    waiting.lane.unwatch()
+    waiting.lane.watch(waiting._port, waiting._read)
+    waiting.selector.select(1.0)
+    assert waiting.reads == [0.1]
