@@ -38,7 +38,7 @@ class FastLane:
         """Call each time the port is readable, until `unwatch`. After a hold there may be no data."""
         assert self.on_readable is None, "the lane has one port"
         self._port.register(descriptor, select.EPOLLIN)
-        self._watched, self.on_readable, self.held_until = descriptor, on_readable, -inf
+        self._watched, self.on_readable = descriptor, on_readable
 
     def unwatch(self) -> None:
         """Stop watching the port. Its descriptor must still be open."""

@@ -6,6 +6,7 @@ import os
 import socket
 import threading
 from collections.abc import Iterator, Sequence
+from math import inf
 from typing import Any
 
 import pytest
@@ -79,6 +80,7 @@ async def test_a_stopped_timer_does_not_fire() -> None:
     loop = running()
     loop.lane.set_timer(loop.time() + INTERVAL_S, lambda _: pytest.fail("called"))
     loop.lane.stop_timer()
+    assert loop.lane.timer_at == inf  # the watchdog looks at it
     await asyncio.sleep(5 * INTERVAL_S)
 
 
@@ -187,10 +189,12 @@ async def test_an_error_is_reported_with_its_handle(port: Port) -> None:
 
 
 def test_a_coroutine_runs_on_a_loop_with_a_lane() -> None:
-    async def main() -> bool:
-        return isinstance(asyncio.get_running_loop(), EventLoop)
+    async def main() -> int:
+        return running().lane.descriptor
 
-    assert run(main())
+    descriptor = run(main())
+    with pytest.raises(OSError, match="Bad file descriptor"):
+        os.fstat(descriptor)
 
 
 class Waiting:
