@@ -8,6 +8,7 @@ import termios
 import tty
 from collections.abc import Iterator
 from contextlib import suppress
+from math import inf
 from pathlib import Path
 
 import pytest
@@ -19,6 +20,7 @@ from protocols.mavlink.frame import MavlinkSplitter
 from service.links.fc_device import device_opener, open_serial
 from service.links.fc_port import FcPort
 from service.links.traffic import Traffic
+from service.machine.event_loop import EventLoop, FastLane
 from service.settings.addresses import SerialFc
 from tests.support.packing import pack
 from tests.support.programs import TIMEOUT_S, until_async
@@ -149,6 +151,69 @@ async def test_gathering_ends_when_a_reply_is_expected(line: Line) -> None:
     assert len(line.numbers()) == sent - 1
     port.write(b"a request", asks=True)
     await line.has_come(sent)
+    await line.stop()
+
+
+class Gathering:
+    """A port that may gather, on a socket: what the test sends is read when the test says."""
+
+    async def open(self) -> socket.socket:
+        near, self._far = socket.socketpair()
+        near.setblocking(False)
+        return near
+
+    async def start(self) -> FcPort:
+        opened = asyncio.Event()
+        self.lane = running_lane()
+        self.port = FcPort(self.open, opened.set, lambda _data, _now: None, lambda _why: None, Traffic())
+        self.port.may_gather = True
+        self._task = asyncio.get_running_loop().create_task(self.port.run())
+        await opened.wait()
+        return self.port
+
+    def delay_s(self, size: int, since_s: float, now: float) -> float:
+        """The hold after a read of `size` bytes, `since_s` after another read; -infinity: none."""
+        assert self.lane.on_readable is not None
+        for part, at in ((1, now - since_s), (size, now)):
+            self.port.hold(-inf)
+            self._far.send(bytes(part))
+            self.lane.on_readable(at)
+        return self.lane.held_until - now
+
+    async def stop(self) -> None:
+        self._task.cancel()
+        await asyncio.wait([self._task])
+        self._far.close()
+
+
+def running_lane() -> FastLane:
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, EventLoop)
+    return loop.lane
+
+
+@pytest.mark.parametrize(
+    ("size", "since_s", "delay_s"),
+    [(50, 0.05, -inf), (110, 0.01, 0.02), (300, 0.1, 0.03), (4000, 0.01, 0.002)],
+    ids=["slow", "until a datagram is full", "30 ms at most", "2 ms at least"],
+)
+async def test_the_next_read_follows_from_the_rate_of_the_last(size: int, since_s: float, delay_s: float) -> None:
+    line = Gathering()
+    port = await line.start()
+    now = asyncio.get_running_loop().time() + HOUR_S
+    assert line.delay_s(size, since_s, now) == pytest.approx(delay_s)
+    port.may_gather = False
+    assert line.delay_s(size, since_s, now + 1) == -inf
+    await line.stop()
+
+
+async def test_after_a_request_nothing_is_gathered_for_a_while() -> None:
+    line = Gathering()
+    port = await line.start()
+    now = asyncio.get_running_loop().time()
+    port.write(b"a request", asks=True)
+    assert line.delay_s(110, 0.01, now + 0.2) == -inf
+    assert line.delay_s(110, 0.01, now + HOUR_S) > 0
     await line.stop()
 
 
