@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An error of the bridge itself while the flight controller's port opens or closes."""
+"""Errors of the bridge itself while the flight controller's port opens or closes, and reads that wait for replies."""
 
 import asyncio
 import os
+from math import inf
 
 import pytest
 
+from bridge.bridge import FcOutput
 from bridge.fc.session import FcSession
 from service.daemon.daemon import Daemon
 from service.links.fc_port import STOPPED, FcPort
 from service.links.traffic import Traffic
+from service.machine.event_loop import EventLoop
 from service.settings import Settings
 from service.settings.addresses import SimulatedFc
 from tests.support.inside import inside
@@ -56,6 +59,25 @@ async def test_a_bug_does_not_prevent_a_stop(monkeypatch: pytest.MonkeyPatch) ->
     running.cancel()
     await asyncio.wait([running], timeout=TIMEOUT_S)
     assert running.done()
+
+
+async def test_the_port_is_held_until_the_replies_to_polls_can_have_arrived() -> None:
+    daemon = Daemon(Settings(SimulatedFc()))
+    running = asyncio.create_task(daemon.run())
+    await until_async(lambda: is_found(daemon), "the flight controller")
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, EventLoop)
+    complete_at = loop.time() + 3600
+    daemon.fc.carry_out(FcOutput([], None, may_gather=False, asks=True, complete_at=complete_at))
+    assert loop.lane.held_until == complete_at
+    daemon.fc.carry_out(FcOutput([], None, may_gather=False, asks=True, complete_at=-inf))
+    assert loop.lane.held_until == -inf
+    # Pass-through gathers by itself.
+    daemon.fc._port.hold(complete_at)
+    daemon.fc.carry_out(FcOutput([], None, may_gather=True, asks=False, complete_at=-inf))
+    assert loop.lane.held_until == complete_at
+    running.cancel()
+    await asyncio.wait([running])
 
 
 class Unclosable:
