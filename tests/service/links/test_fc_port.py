@@ -217,6 +217,15 @@ async def test_after_a_request_nothing_is_gathered_for_a_while() -> None:
     await line.stop()
 
 
+async def test_a_closed_port_is_not_held() -> None:
+    """It would not be read after it was opened again."""
+    line = Gathering()
+    port = await line.start()
+    await line.stop()
+    port.hold(asyncio.get_running_loop().time() + HOUR_S)
+    assert line.lane.held_until == -inf
+
+
 async def test_a_port_that_disconnects_during_batched_reads_is_reopened(line: Line, tmp_path: Path) -> None:
     port = line.start()
     await until_async(lambda: line.opened, "the port")
