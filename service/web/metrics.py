@@ -187,7 +187,8 @@ def vehicle_gauges(report: VehicleReport) -> Mapping[str, tuple[str, float | Non
 def _round_trips(measured: RoundTrips) -> Metric:
     bounds = [*map(str, BOUNDS_S), "+Inf"]
     classes = list(zip(bounds, accumulate(map(float, measured.counts)), strict=True))
-    name, meaning = f"{_PREFIX}fc_round_trip_seconds", "MSP request to reply."
+    name = f"{_PREFIX}fc_round_trip_seconds"
+    meaning = "MSP request to reply, as read: replies to several polls are read together."
     return HistogramMetricFamily(name, meaning, buckets=classes, sum_value=measured.sum_s)
 
 
