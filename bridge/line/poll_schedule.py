@@ -42,7 +42,7 @@ _CURRENT_S = 1.0
 #: interval: at the default rates all others join ATTITUDE.
 _EARLY, _EARLIEST_S = 0.2, 0.05
 #: Replies to polls with at least this interval may be read together. A client of faster ones needs fresh values.
-_PATIENT_S = 0.08
+_MAY_WAIT_S = 0.08
 #: A lost reply reduces all rates by a tenth, each received one restores a little: 1 % losses change nothing, 10 % halve
 #: the rates.
 _LOSS_FACTOR = 0.9
@@ -130,7 +130,7 @@ class _Slot:
 
     def set_interval(self, interval_s: float) -> None:
         self.interval_s = interval_s
-        self.request = replace(self.request, may_wait=interval_s >= _PATIENT_S)
+        self.request = replace(self.request, may_wait=interval_s >= _MAY_WAIT_S)
         self.early_s = min(interval_s * _EARLY, _EARLIEST_S)
         self._set_due()
 
