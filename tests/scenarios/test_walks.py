@@ -22,8 +22,8 @@ from pymavlink.dialects.v20 import ardupilotmega as m
 from protocols.mavlink.dialect import Message
 from tests.support.walks import TracedDaemon, WakeUp, Walk, measure, run_traced
 
-#: Lower these whenever a walk has become shorter. Raised once, by a return each: asking when all replies can have arrived
-#: saves a fifth of all wake-ups.
+#: Lower these whenever a walk has become shorter. Raised once, by a return each: to ask when all replies can be there
+#: saves a fifth of the wake-ups.
 CEILINGS = {
     "attitude": Walk(calls=44, returns=14, files=20),
     "item": Walk(calls=66, returns=25, files=16),
