@@ -110,8 +110,6 @@ def daemon_options(command: Callable[..., None]) -> Callable[..., None]:
 
     @wraps(command)
     def run(*args: Any, state_dir: Path | None, as_json: bool, fc: str | None = None, **options: Any) -> None:
-        if fc is not None and state_dir is not None:
-            raise click.UsageError("--state-dir selects a running daemon: use it without --fc")
         command(BridgeClient(state_dir, as_json, fc), *args, **options)
 
     return state_dir(as_json(run))

@@ -10,7 +10,7 @@ from protocols.mission_item import Command
 from tests.support.benches import Bench
 from tests.support.mavproxy import MavProxy
 from tests.support.plan import HOME, PlanRow, expected_fields, judge, mixed_plan, plain_plan, records_of, waypoint
-from tests.support.programs import happens
+from tests.support.programs import happens, until
 
 
 @pytest.mark.parametrize("version", ["--mav10", "--mav20"])
@@ -43,9 +43,11 @@ def test_float_items_parameters_and_refusals_work(shared: Bench, tmp_path: Path)
         mavproxy.type("param show WPNAV_RADIUS")
         mavproxy.wait_for("200.0")
         mavproxy.type("module load ftp")
-        mavproxy.type(f"ftp get @PARAM/param.pck {tmp_path / 'param.pck'}")
+        file = tmp_path / "param.pck"
+        mavproxy.type(f"ftp get @PARAM/param.pck {file}")
         mavproxy.wait_for("Wrote ")
-        packed = MAVFTP.ftp_param_decode((tmp_path / "param.pck").read_bytes())
+        # It says so before it closes the file.
+        packed = until(lambda: MAVFTP.ftp_param_decode(file.read_bytes()), "the whole file")
         assert len(packed.params) == 237
         # It finds only names in capitals.
         mavproxy.type("param set LED_ARMED 1")

@@ -23,6 +23,8 @@ MEMORY_KB = 3000
 #: The simulated board's counters of harmful events. Not overflows of its receive ring: they are unavoidable if it
 #: hangs during two chunks, and the checksum detects them.
 TRAPS = ("hazard_runs", "tx_overflows", "cli_entered")
+#: Ground stations report a lost link after 3 to 3.5 s.
+LONGEST_GAP_S = 2.0
 #: Each value arms differently.
 TELE_PROTS = (2, 0, 3, 1)
 
@@ -79,7 +81,7 @@ def test_a_daemon_survives_events_and_attacks_at_full_rate(
         print(f"\n{report}")  # noqa: T201 (what a long soak is made for)
     assert all(set(traps.values()) == {0} for traps in boards), report
     assert monitor.damaged == []
-    assert max(monitor.gaps_s) <= 1.5
+    assert max(monitor.gaps_s) <= LONGEST_GAP_S
     assert len(set(descriptors)) == 1, report
     assert memory_kb[-1] - memory_kb[0] <= MEMORY_KB, report
     assert "Traceback" not in daemon.printed

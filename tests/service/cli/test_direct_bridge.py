@@ -57,11 +57,6 @@ def test_a_missing_port_is_one_sentence(tmp_path: Path) -> None:
     assert_one_sentence(run_naze_bridge("status", "--fc", tmp_path / "naze"), 1, "is missing", str(tmp_path))
 
 
-def test_a_state_folder_belongs_to_a_daemon(board: Board, tmp_path: Path) -> None:
-    refused = run_naze_bridge("status", "--fc", board.link, "--state-dir", tmp_path)
-    assert_one_sentence(refused, 2, "--state-dir", "without --fc")
-
-
 def test_a_port_used_by_another_program_is_one_sentence(board: Board) -> None:
     script = "import serial, sys; port = serial.Serial(sys.argv[1], exclusive=True); print('open', flush=True); input()"
     with subprocess.Popen(
