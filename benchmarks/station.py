@@ -49,7 +49,7 @@ class Station:
         count = messages.MAVLink_mission_count_message(*_VEHICLE, len(items))
         frames = [self._writer.frame(pack(item_message(item, *_VEHICLE, as_int=True)), 2) for item in items]
         steps: list[float] = []
-        self._forget_received()
+        drain(self._socket)  # the final ack of an earlier upload is sent three times
         began_at = sent_at = self._send(self._writer.frame(pack(count), 2))
         for seq, frame in enumerate(frames):
             request, received_at = self._receive(messages.MAVLINK_MSG_ID_MISSION_REQUEST)
@@ -77,14 +77,6 @@ class Station:
         self._socket.send(frame)
         return sent_at
 
-    def _forget_received(self) -> None:
-        """Drop what has arrived: the final ack of an earlier upload is sent three times."""
-        self._socket.setblocking(False)
-        with suppress(BlockingIOError):
-            while True:
-                self._socket.recv(2048)
-        self._socket.settimeout(_TIMEOUT_S)
-
     def _receive(self, msgid: int) -> tuple[MavlinkFrame, float]:
         """Wait for a message; telemetry is skipped."""
         while True:
@@ -95,3 +87,12 @@ class Station:
                     return frame, received_at
                 if frame.msgid == messages.MAVLINK_MSG_ID_MISSION_ACK:
                     raise BenchmarkError("the upload was refused")
+
+
+def drain(ground: socket.socket) -> None:
+    """Drop all datagrams received so far; the following ones are waited for."""
+    ground.setblocking(False)
+    with suppress(BlockingIOError):
+        while True:
+            ground.recv(2048)
+    ground.settimeout(_TIMEOUT_S)

@@ -26,6 +26,7 @@ from pathlib import Path
 from benchmarks.figure import Figure, Floor
 from benchmarks.idle import cpu_percents, listener, udpout
 from benchmarks.processes import cpu_s, daemon, floor_program, simulated_naze
+from benchmarks.station import drain
 from bridge.bridge import Bridge
 from bridge.config import BridgeConfig
 from bridge.gcs.station import Peer
@@ -220,16 +221,6 @@ def _request(ground: socket.socket, rates_hz: Mapping[int, float]) -> None:
 
 def _frame(message: Message) -> bytes:
     return FrameWriter(255, 190).frame(pack(message), 2)
-
-
-def drain(ground: socket.socket) -> None:
-    """Read all datagrams received so far, and the following ones."""
-    ground.setblocking(False)
-    try:
-        while True:
-            ground.recv(2048)
-    except BlockingIOError:
-        ground.settimeout(10)
 
 
 def _count_attitudes(ground: socket.socket) -> int:

@@ -22,7 +22,8 @@ import zenoh
 from benchmarks.figure import Figure, Floor
 from benchmarks.idle import LIBRARIES, libraries_mb, listener, resident_mb, udpout
 from benchmarks.processes import BenchmarkError, daemon, running, wait_for
-from benchmarks.telemetry import ATTITUDES, POLLS_HZ, Controller, drain, instant_controller, request_rates
+from benchmarks.station import drain
+from benchmarks.telemetry import ATTITUDES, POLLS_HZ, Controller, instant_controller, request_rates
 from benchmarks.zenoh_programs import ALL_TELEMETRY, configuration
 from bridge.model.vehicle import Orientation
 from payloads.keys import TELEMETRY, full

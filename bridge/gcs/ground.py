@@ -260,11 +260,6 @@ class Ground:
         sender = self._heard.get(station.peer)
         return inf if sender is None or sender.host is None else sender.host.wrote_at
 
-    @property
-    def is_recording(self) -> bool:
-        """True while a flight is logged at the default rates, independent of the stations' requests."""
-        return RECORDER in self._default_peers
-
     def record_flight(self, *, on: bool) -> None:
         """Log everything that a connected ground station would get, even if there is none."""
         if on and self._logs_flights:
@@ -349,6 +344,7 @@ class Ground:
     def multicast(self, packed: Packed, stations: Iterable[GroundStation]) -> None:
         """Send a packed message to several stations that can read it."""
         frame = None
+        # A flight is logged at the default rates, independent of the stations' requests.
         is_logged = self.on_frames is not _drop and RECORDER not in self._default_peers
         for station in stations:
             if station.frame_version == 1 and packed.is_v2_only:

@@ -384,7 +384,7 @@ class MspLink:
         if oldest.reply is not _Reply.AWAITED:
             equal = (sent for sent in self._sent if sent.command == command and sent.reply is _Reply.AWAITED)
             answered = next(equal, None)
-        elif oldest.kept and (not self._sent or self._is_certain(oldest)):
+        elif oldest.kept and (command not in map(_COMMAND, self._sent) or self._is_certain(oldest)):
             self.replies.heard(oldest.kept, reply, now)
         if answered is None:
             return
@@ -401,8 +401,6 @@ class MspLink:
 
     def _is_certain(self, answered: _Request) -> bool:
         """False if the reply may be to a later request of the same command, with another index."""
-        if answered.command not in map(_COMMAND, self._sent):
-            return True
         return not any(sent.command == answered.command and sent.kept != answered.kept for sent in self._sent)
 
 

@@ -30,7 +30,7 @@ from service.daemon.store_worker import StoreWorker
 from service.links.msp_share import open_share
 from service.links.signing_state import SigningState
 from service.links.traffic import Traffic
-from service.machine.event_loop import EventLoop
+from service.machine import event_loop
 from service.machine.host import Host
 from service.machine.log_setup import warn_once
 from service.machine.package import version
@@ -72,9 +72,8 @@ class Daemon:
     """Feeds the bridge and carries out its outputs. Must be made on a running event loop."""
 
     def __init__(self, settings: Settings, host: Host | None = None) -> None:
-        loop = asyncio.get_running_loop()
-        assert isinstance(loop, EventLoop)
-        self._loop, self._lane = loop, loop.lane
+        self._loop = event_loop.running()
+        self._lane = self._loop.lane
         self._loop.set_exception_handler(self._fault)
         self._warned: set[str] = set()
         self.settings = settings

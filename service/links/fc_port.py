@@ -13,7 +13,7 @@ import structlog
 
 from service.links.fc_device import DEVICE_ERRORS, Device, PortError, PortInUseError, send_last_frame
 from service.links.traffic import Traffic
-from service.machine.event_loop import EventLoop
+from service.machine import event_loop
 from storage.os_error import reason
 
 #: The reason given to `on_close` at the end of the daemon.
@@ -59,9 +59,8 @@ class FcPort:
         self._on_data = on_data
         self._on_close = on_close
         self._traffic = traffic
-        loop = asyncio.get_running_loop()
-        assert isinstance(loop, EventLoop)
-        self._loop, self._lane = loop, loop.lane
+        self._loop = event_loop.running()
+        self._lane = self._loop.lane
         self._device: Device | None = None
         self._descriptor = -1
         self._is_tcp = False

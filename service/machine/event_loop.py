@@ -136,6 +136,13 @@ class LaneSelector(selectors.EpollSelector):
                 self.on_error(call, error)
 
 
+def running() -> EventLoop:
+    """The loop that this call runs on."""
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, EventLoop)
+    return loop
+
+
 def run(main: Coroutine[Any, Any, T]) -> T:
     """Run a coroutine on an event loop of its own, as asyncio.run does."""
     with asyncio.Runner(loop_factory=EventLoop) as runner:

@@ -12,7 +12,7 @@ from bridge.fc.session import FcSession
 from service.daemon.daemon import Daemon
 from service.links.fc_port import STOPPED, FcPort
 from service.links.traffic import Traffic
-from service.machine.event_loop import EventLoop
+from service.machine import event_loop
 from service.settings import Settings
 from service.settings.addresses import SimulatedFc
 from tests.support.inside import inside
@@ -65,8 +65,7 @@ async def test_the_port_is_held_until_the_replies_to_polls_can_have_arrived() ->
     daemon = Daemon(Settings(SimulatedFc()))
     running = asyncio.create_task(daemon.run())
     await until_async(lambda: is_found(daemon), "the flight controller")
-    loop = asyncio.get_running_loop()
-    assert isinstance(loop, EventLoop)
+    loop = event_loop.running()
     complete_at = loop.time() + 3600
     daemon.fc.carry_out(FcOutput([], None, may_gather=False, asks=True, complete_at=complete_at))
     assert loop.lane.held_until == complete_at

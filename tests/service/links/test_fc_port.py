@@ -20,7 +20,7 @@ from protocols.mavlink.frame import MavlinkSplitter
 from service.links.fc_device import device_opener, open_serial
 from service.links.fc_port import FcPort
 from service.links.traffic import Traffic
-from service.machine.event_loop import EventLoop, FastLane
+from service.machine.event_loop import running
 from service.settings.addresses import SerialFc
 from tests.support.packing import pack
 from tests.support.programs import TIMEOUT_S, until_async
@@ -164,7 +164,7 @@ class Gathering:
 
     async def start(self) -> FcPort:
         opened = asyncio.Event()
-        self.lane = running_lane()
+        self.lane = running().lane
         self.port = FcPort(self.open, opened.set, lambda _data, _now: None, lambda _why: None, Traffic())
         self.port.may_gather = True
         self._task = asyncio.get_running_loop().create_task(self.port.run())
@@ -184,12 +184,6 @@ class Gathering:
         self._task.cancel()
         await asyncio.wait([self._task])
         self._far.close()
-
-
-def running_lane() -> FastLane:
-    loop = asyncio.get_running_loop()
-    assert isinstance(loop, EventLoop)
-    return loop.lane
 
 
 @pytest.mark.parametrize(

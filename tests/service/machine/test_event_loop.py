@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from service.machine.event_loop import EventLoop, LaneSelector, run
+from service.machine.event_loop import EventLoop, LaneSelector, run, running
 from tests.support.programs import TIMEOUT_S, until_async
 
 INTERVAL_S = 0.001
@@ -23,12 +23,6 @@ def loop() -> Iterator[EventLoop]:
     loop = EventLoop()
     yield loop
     loop.close()
-
-
-def running() -> EventLoop:
-    loop = asyncio.get_running_loop()
-    assert isinstance(loop, EventLoop)
-    return loop
 
 
 class Port:
