@@ -7,7 +7,7 @@ same vehicle.
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import partial
-from math import inf
+from math import floor, inf
 
 from bridge.fc.msp_telemetry import POLL_FOR
 from bridge.fc.session import FcSession
@@ -118,7 +118,8 @@ class OwnVehicle:
         self.due = min(self._second_ends, self._newcomers_due, self._polls_due)
 
     def _end_second(self, now: float) -> None:
-        self._second_ends = max(self._second_ends + _TICK_S, now)
+        # At whole seconds the polls are due, too: one wake-up serves both.
+        self._second_ends = floor(now) + _TICK_S
         everyone = self._ground.everyone()
         share_out(everyone)
         self._set_polls(everyone)

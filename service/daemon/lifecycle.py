@@ -9,6 +9,7 @@ from dataclasses import fields, replace
 
 import structlog
 
+from reports.vehicle_groups import Group, Link, Status
 from service.daemon.daemon import Daemon
 from service.machine.log_setup import set_log_level
 from service.machine.notify import Notifier
@@ -79,21 +80,22 @@ class _Reporting:
     def _report(self) -> None:
         if self._daemon.is_ticking:
             self._notifier.alive()
-        self._notifier.status(link_line(self._daemon))
-        self._timer = asyncio.get_running_loop().call_later(self._interval_s, self._report)
+        loop = asyncio.get_running_loop()
+        self._notifier.status(_link_line(self._daemon, loop.time()))
+        self._timer = loop.call_later(self._interval_s, self._report)
 
 
-def link_line(daemon: Daemon) -> str:
+def _link_line(daemon: Daemon, now: float) -> str:
     """The flight controller and the ground stations in one line."""
-    report = daemon.report()
-    link = report.link
+    link: Link = daemon.bridge.group(Group.LINK, now)
+    status: Status = daemon.bridge.group(Group.STATUS, now)
     if daemon.fc.trouble:
         where = daemon.fc.trouble
     elif link.flight_controller is None:
         where = f"looking for a flight controller on {daemon.fc.where}"
     else:
         speed = "" if link.speed_baud is None else f", {link.speed_baud} baud"
-        armed = {None: "", True: ", armed", False: ", disarmed"}[report.status.armed]
+        armed = {None: "", True: ", armed", False: ", disarmed"}[status.armed]
         where = f"{link.flight_controller} ({link.state}{speed}{armed})"
     count = len(link.ground_stations)
     return f"{where}; {count} ground station{'' if count == 1 else 's'}"

@@ -99,10 +99,9 @@ async def test_held_data_is_read_together_once_the_time_has_come(port: Port) -> 
 
 async def test_after_a_hold_without_data_the_next_data_is_read_on_arrival(port: Port) -> None:
     port.loop.lane.hold(port.loop.time() + INTERVAL_S)
-    await until_async(lambda: port.reads, "the end of the hold")
+    await asyncio.sleep(2 * INTERVAL_S)
     port.write(b"late")
-    await until_async(lambda: len(port.reads) > 1, "the data")
-    assert [data for data, _ in port.reads] == [b"", b"late"]
+    await until_async(lambda: b"late" in [data for data, _ in port.reads], "the data")
 
 
 async def test_a_hold_can_end_early(port: Port) -> None:
