@@ -48,7 +48,7 @@ _REFUSED = {
     messages.MAV_CMD_COMPONENT_ARM_DISARM: "Arm and disarm with the transmitter sticks",
     messages.MAV_CMD_DO_SET_MODE: "Modes are set with the transmitter switches",
     messages.MAV_CMD_MISSION_START: "A mission is started with the transmitter",
-    messages.MAV_CMD_DO_SET_MISSION_CURRENT: "The current waypoint cannot be set",
+    messages.MAV_CMD_DO_SET_MISSION_CURRENT: "Set WP: needs INAV 9.1",
     messages.MAV_CMD_DO_PAUSE_CONTINUE: "A mission is paused with the transmitter",
     messages.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: "The flight controller cannot be rebooted from here",
     messages.MAV_CMD_NAV_TAKEOFF: "Take off with the transmitter",

@@ -44,7 +44,7 @@ class BridgeClient:
                 return ask_daemon(self.state_dir, request, progress)
             from service.cli.direct_bridge import ask_directly  # the whole daemon: --help does without
 
-            return event_loop.run(ask_directly(parse_fc(self.fc), request, progress))
+            return event_loop.run(ask_directly(parse_fc(self.fc), request, progress, state_dir=self.state_dir))
         except (KeyboardInterrupt, Interrupted) as error:
             complain(_interruption(request, str(error), is_own=self.fc is not None))
             raise SystemExit(INTERRUPTED) from None

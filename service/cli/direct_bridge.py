@@ -4,6 +4,7 @@
 import asyncio
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 from payloads.mission_data import Json
@@ -24,21 +25,28 @@ _TELEMETRY_TIMEOUT_S = 3.0
 _HEARTBEAT_TIMEOUT_S = 1.5
 _INTERVAL_S = 0.05
 _UNCONFIRMED = "interrupted; the flight controller has not confirmed that it keeps its mission: see `naze-bridge pull`"
-_KNOWN_LATER = ("armed", "battery_v", "satellites", "mission_records")
+_SHOWN = ("armed", "battery_v", "satellites", "mission_records")
+_FORBID_FLASHING = ("armed", "battery_v")
 
 
 async def ask_directly(
-    fc: FcAddress, request: Json, progress: Callable[[Any], None] = lambda _: None, *, even_silent: bool = False
+    fc: FcAddress,
+    request: Json,
+    progress: Callable[[Any], None] = lambda _: None,
+    *,
+    state_dir: Path | None = None,
+    even_silent: bool = False,
 ) -> Json:
     """Send a request to our own bridge on this port; ControlError or StoreError if there is no reply.
 
-    `even_silent`: a port without a flight controller is no error; the status has the number of bytes received.
+    `state_dir`: for backups of firmware. `even_silent`: a port without a flight controller is no error; the status has
+    the number of bytes received.
 
     If cancelled, a push is aborted, and Interrupted says how it ended.
     """
     set_up_logging("error")
     daemon = Daemon(Settings(fc, takeoff_max_m=takeoff_limit_m()))
-    api = DaemonApi(daemon)
+    api = DaemonApi(daemon, state_dir)
     running = asyncio.create_task(daemon.run())
     job: asyncio.Future[Json] | None = None
     try:
@@ -53,7 +61,10 @@ async def ask_directly(
             raise ControlError(f"no flight controller answers on {where}: check its power, the wiring and the speed")
         # The controller is identified before its telemetry arrives, and some never send all of it.
         if request == STATUS:
-            await _wait(lambda: None not in map(api.status().get, _KNOWN_LATER), _TELEMETRY_TIMEOUT_S)
+            await _wait(lambda: None not in map(api.status().get, _SHOWN), _TELEMETRY_TIMEOUT_S)
+        elif request["do"] in FIRMWARE_REQUESTS:
+            if daemon.fc.found_at is not None:
+                await _wait(lambda: None not in map(api.status().get, _FORBID_FLASHING), _TELEMETRY_TIMEOUT_S)
         else:
             await _wait(lambda: api.status()["armed"] is not True, _HEARTBEAT_TIMEOUT_S)
         job = asyncio.ensure_future(api.do(request, lambda answer: progress(answer["progress"])))

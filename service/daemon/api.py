@@ -4,6 +4,7 @@
 import asyncio
 from collections.abc import Callable
 from dataclasses import fields
+from pathlib import Path
 from typing import TypeVar
 
 from bridge.missions.mission_service import DeliveryResult, HeldMission
@@ -28,13 +29,16 @@ T = TypeVar("T")
 
 
 class DaemonApi:
-    """The requests to a daemon, as coroutines with plain data."""
+    """The requests to a daemon, as coroutines with plain data.
 
-    def __init__(self, daemon: Daemon) -> None:
+    `state_dir`: for backups of firmware, if the daemon itself has none.
+    """
+
+    def __init__(self, daemon: Daemon, state_dir: Path | None = None) -> None:
         self._daemon = daemon
         self._loop = asyncio.get_running_loop()
         self.settings = SettingsApi(daemon)
-        self.firmware = FirmwareApi(daemon, self.settings)
+        self.firmware = FirmwareApi(daemon, self.settings, daemon.settings.state_dir or state_dir)
 
     async def do(self, request: Json, progress: Callable[[Json], None]) -> Json:
         """Handle a request; `progress` is called with each step. ControlError, StoreError or ValueError on failure."""

@@ -56,11 +56,12 @@ _log = structlog.get_logger()
 
 
 class FirmwareApi:
-    """The requests, as coroutines with plain data; ControlError if one fails."""
+    """The requests, as coroutines with plain data; ControlError if one fails. `state_dir`: for backups."""
 
-    def __init__(self, daemon: Daemon, settings: SettingsApi) -> None:
+    def __init__(self, daemon: Daemon, settings: SettingsApi, state_dir: Path | None) -> None:
         self._daemon = daemon
         self._settings = settings
+        self._state_dir = state_dir
         self._loop = asyncio.get_running_loop()
 
     async def do(self, request: Json, progress: Progress) -> Json:
@@ -156,7 +157,7 @@ class FirmwareApi:
     async def _store(self, contents: bytes, dump: str) -> Path:
         """Store the flash before it is changed, and the settings as text. ControlError."""
         try:
-            folder = (self._daemon.settings.state_dir or default_state_dir()) / FIRMWARE_FOLDER
+            folder = (self._state_dir or default_state_dir()) / FIRMWARE_FOLDER
             path = folder / time.strftime("%Y-%m-%d-%H%M%S.bin")
 
             def write() -> None:

@@ -89,6 +89,25 @@ def test_after_an_unplugged_cable_the_board_waits_and_the_backup_leads_back(flas
     assert flashing.controller == "Harakiri without the mission extension"
 
 
+def test_without_a_daemon_the_backup_goes_to_the_given_folder(start: Starter) -> None:
+    board, image, state_dir = start.board(*_BOARD), start.directory / "patched.bin", start.directory / "mine"
+    image.write_bytes(stand_in(patched=True))
+    words = ("--battery", "--fc", str(board.link), "--state-dir", str(state_dir))
+    program = start.program("flash.log", "firmware", "flash", str(image), *words)
+    backups = state_dir / "firmware"
+    assert happens(lambda: not program.is_alive or any(backups.glob("*.bin")), _LONGEST_S), program.printed
+    assert any(backups.glob("*.bin")), program.printed
+
+
+def test_without_a_daemon_a_battery_is_noticed_before_the_first_change(start: Starter) -> None:
+    # At 9600 baud a round of polls takes longer than identifying the flight controller.
+    board, image = start.board(*_BOARD, "--baud", "9600"), start.directory / "patched.bin"
+    image.write_bytes(stand_in(patched=True))
+    ended = run_naze_bridge("firmware", "flash", image, "--fc", f"{board.link},9600")
+    assert (ended.returncode, "a battery is connected" in ended.stderr) == (1, True), ended
+    assert not board.stats()["bootloader_entered"]
+
+
 def test_an_armed_board_and_one_with_a_battery_are_refused_and_not_touched(flashing: FlashingBench) -> None:
     bench = flashing.bench
     until(lambda: (bench.daemon.status() or {}).get("battery_v"), "the battery's voltage")
