@@ -17,11 +17,10 @@ _HEAD = """\
 # Payloads over zenoh
 
 The fields of each payload of [zenoh](zenoh.md), from the JSON Schemas in
-[`payloads/schemas/`](../payloads/schemas/). "?": may be null, "not known", also if the flight
-controller cannot measure it. Ignore fields that you do not know: new ones do not change the
-version.
+[`payloads/schemas/`](../payloads/schemas/). "?": may be null, if the value is unknown or
+the flight controller cannot measure it. Ignore unknown fields: new ones do not change the version.
 
-Every payload begins with the first three; those of `v1/telemetry/` but link end with the last:
+Every payload begins with the first three; those of `v1/telemetry/`, except link, end with the last:
 """
 _WIDTH = 100
 #: A command's reply is described in docs/zenoh.md: one of several objects.
