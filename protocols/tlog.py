@@ -6,7 +6,7 @@ Our logs never contain signatures, which Mission Planner could only check with t
 SETUP_SIGNING, which carries the key.
 """
 
-from collections.abc import Container, Iterator
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass
 
 from fastcrc.crc16 import mcrf4xx
@@ -37,15 +37,16 @@ class TlogRecord:
     frame: MavlinkFrame
 
 
-def tlog_record(frame: bytes, at_us: int) -> bytes:
-    """The record of a complete, valid frame of the dialect; empty for one that must not be logged."""
-    # MAVLink 1 has neither signatures nor SETUP_SIGNING.
-    if frame[0] == MAGIC_V2:
-        if frame[_MSGID] == _SETUP_SIGNING:
-            return b""
-        if frame[2] & _SIGNED:
-            frame = _without_signature(frame)
-    return (at_us & ~_LINK_BITS).to_bytes(STAMP_SIZE, "big") + frame
+def tlog_records(frames: Iterable[bytes], at_us: int) -> bytes:
+    """The records of complete, valid frames of the dialect, sent or received at one time.
+
+    Those that must not be logged are left out.
+    """
+    stamp = (at_us & ~_LINK_BITS).to_bytes(STAMP_SIZE, "big")
+    # No call for most frames, of which there may be thousands a second: MAVLink 1 has neither signatures nor
+    # SETUP_SIGNING, and in MAVLink 2 they have flags (byte 2) or an id above 255 (byte 8).
+    logged = [each if each[0] == MAGIC_V1 or not (each[2] or each[8]) else _loggable(each) for each in frames]
+    return b"".join([stamp + each for each in logged if each])
 
 
 def read_tlog(data: bytes, msgids: Container[int] | None = None) -> Iterator[TlogRecord]:
@@ -97,6 +98,13 @@ def _frame_end(data: bytes, start: int) -> int | None:
 def _begins(data: bytes, start: int) -> bool:
     """True if a frame may begin at `start`, or the log has ended."""
     return start >= len(data) or data[start] in _HEADERS
+
+
+def _loggable(frame: bytes) -> bytes:
+    """A MAVLink 2 frame as it is logged; empty if it must not be."""
+    if frame[_MSGID] == _SETUP_SIGNING:
+        return b""
+    return _without_signature(frame) if frame[2] & _SIGNED else frame
 
 
 def _without_signature(frame: bytes) -> bytes:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from protocols.mavlink.dialect import messages
-from protocols.tlog import heartbeat_type, tlog_record
+from protocols.tlog import heartbeat_type, tlog_records
 from service.recording.disk_writer import DiskWriter
 from service.recording.tlog_folder import TlogFolder
 from service.settings import TlogLimits
@@ -74,9 +74,8 @@ class TlogRecorder:
 
     def _records(self, taken: list[_Taken]) -> Iterator[bytes]:
         for at_ns, _, frames in taken:
-            at_us = self._epoch_us + at_ns // 1000
-            for frame in self._from_vehicle_on(frames) if self._awaits_vehicle else frames:
-                yield tlog_record(frame, at_us)
+            logged = self._from_vehicle_on(frames) if self._awaits_vehicle else frames
+            yield tlog_records(logged, self._epoch_us + at_ns // 1000)
 
     def _from_vehicle_on(self, frames: Sequence[bytes]) -> Sequence[bytes]:
         found: list[bytes] = []

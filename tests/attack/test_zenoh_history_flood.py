@@ -11,7 +11,7 @@ from typing import Any
 import zenoh
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from protocols.tlog import tlog_record
+from protocols.tlog import tlog_records
 from service.recording.tlog_recorder import TLOG_FOLDER
 from tests.support.benches import Starter
 from tests.support.programs import TIMEOUT_S, until
@@ -33,7 +33,7 @@ def write_logs(folder: Path) -> None:
     ]
     for number in range(LOGS):
         begun_s = time.time() - 3000 + 60 * number
-        records = b"".join(tlog_record(frame, round(begun_s * 1e6)) for frame in frames)
+        records = tlog_records(frames, round(begun_s * 1e6))
         path = folder / f"{datetime.fromtimestamp(begun_s, UTC):%Y-%m-%d %H-%M-%S}.tlog"
         path.write_bytes(records * (LOG_BYTES // len(records)))
         os.utime(path, (begun_s + 50, begun_s + 50))

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from protocols.tlog import read_tlog, tlog_record
+from protocols.tlog import read_tlog, tlog_records
 
 NOON_US = 1_795_262_400_000_000
 KEY = hashlib.sha256(b"a passphrase").digest()
@@ -55,7 +55,7 @@ def test_pymavlink_reads_the_written_records(tmp_path: Path) -> None:
             at_us = NOON_US + len(written) * 40_000
             frame = bytes(message.pack(codec, force_mavlink1=version == 1))
             assert (frame[2] & 1 == 1 and version == 2) == signing
-            log += tlog_record(frame, at_us)
+            log += tlog_records([frame], at_us)
             written.append((at_us * 1e-6, message))
     path = tmp_path / "flight.tlog"
     path.write_bytes(log)
@@ -71,7 +71,7 @@ def test_a_signing_key_is_never_logged() -> None:
     for signing in (False, True):
         frame = bytes(messages.MAVLink_setup_signing_message(1, 1, KEY, 1).pack(sender(signing=signing)))
         assert KEY in frame
-        assert tlog_record(frame, NOON_US) == b""
+        assert tlog_records([frame], NOON_US) == b""
 
 
 def test_a_frame_with_an_unknown_flag_or_a_wrong_checksum_is_no_record() -> None:
@@ -87,7 +87,8 @@ def test_a_frame_with_an_unknown_flag_or_a_wrong_checksum_is_no_record() -> None
 def test_records_around_damage_are_read(data: st.DataObject) -> None:
     """With any bytes lost or changed, exactly the intact records are read."""
     codec = sender()
-    records = [tlog_record(bytes(message.pack(codec)), NOON_US + 1000 * n) for n, message in enumerate(some_messages())]
+    frames = [bytes(message.pack(codec)) for message in some_messages()]
+    records = [tlog_records([frame], NOON_US + 1000 * n) for n, frame in enumerate(frames)]
     garbage = data.draw(st.lists(st.binary(max_size=40), min_size=len(records) + 1, max_size=len(records) + 1))
     log = b"".join(noise + record for noise, record in zip(garbage, [*records, b""], strict=True))
     assert list(map(as_record, read_tlog(log))) == records
@@ -97,4 +98,4 @@ def test_records_around_damage_are_read(data: st.DataObject) -> None:
 
 
 def as_record(record: Any) -> bytes:
-    return tlog_record(record.frame.raw, record.at_us)
+    return tlog_records([record.frame.raw], record.at_us)

@@ -15,7 +15,7 @@ from protocols.mavlink.codec import FrameWriter, Packed
 from protocols.mavlink.dialect import CRC_EXTRA, Message
 from protocols.mavlink.signing import TICKS_PER_S, TOLERANCE, Check, Signing, Timestamps, key_from_passphrase, ticks
 from protocols.mission_item import MissionResult
-from protocols.tlog import tlog_record
+from protocols.tlog import tlog_records
 from tests.bridge.fc.states.test_pass_through import Autopilot
 from tests.support.conversations import (
     Download,
@@ -503,7 +503,7 @@ def test_signed_frames_reach_the_autopilot_unchanged() -> None:
 def test_setup_signing_is_never_forwarded(access: LinkAccess) -> None:
     logged: list[bytes] = []
     world, autopilot = passing({"udp": access})
-    world.inside.ground.on_frames = lambda frames: logged.extend(tlog_record(frame, 0) for frame in frames)
+    world.inside.ground.on_frames = lambda frames: logged.append(tlog_records(frames, 0))
     GroundStation(world, "other", sysid=250).send(READS[0])
     world.run(0.1)
     autopilot.received.clear()

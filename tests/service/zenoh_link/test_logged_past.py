@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from payloads.mission_data import Json
 from protocols.mavlink.dialect import Message
-from protocols.tlog import tlog_record
+from protocols.tlog import tlog_records
 from service.daemon.api import DaemonApi
 from service.daemon.daemon import Daemon
 from service.settings import Settings
@@ -45,7 +45,7 @@ def write(folder: Path, begun_s: float, *records: tuple[float, Message], compid:
     name = datetime.fromtimestamp(begun_s, UTC).strftime("%Y-%m-%d %H-%M-%S") + " flight" * flight + ".tlog"
     codec = messages.MAVLink(None, srcSystem=1, srcComponent=compid)
     path = folder / name
-    path.write_bytes(b"".join(tlog_record(bytes(each.pack(codec)), round(at_s * 1e6)) for at_s, each in records))
+    path.write_bytes(b"".join(tlog_records([bytes(each.pack(codec))], round(at_s * 1e6)) for at_s, each in records))
     ended_s = max(at_s for at_s, _ in records)
     os.utime(path, (ended_s, ended_s))
     return path
