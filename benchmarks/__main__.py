@@ -49,7 +49,7 @@ def main() -> int:
     if unknown:
         print(f"There is no benchmark {unknown[0]!r}; there are {', '.join(_BENCHMARKS)}.", file=sys.stderr)
         return 2
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(os.EX_TEMPFAIL))  # ends the measured programs, too
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(os.EX_TEMPFAIL))  # also ends the measured programs
     structlog.configure(wrapper_class=structlog.make_filtering_bound_logger(logging.ERROR))
     load, cores = os.getloadavg()[0], os.cpu_count() or 1
     if load > cores / 2:

@@ -49,7 +49,7 @@ _REQUESTED_HZ = {
     messages.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 21,
     messages.MAVLINK_MSG_ID_VFR_HUD: 21,
 }
-#: The same as polls, for the floor.
+#: The polls' requests, for the floor.
 _POLLS_HZ = {Msp.ATTITUDE: 50, Msp.RAW_GPS: 21, Msp.ALTITUDE: 21}
 _ATTITUDES_HZ = 50
 _ONLY_ATTITUDES_HZ = {row.msgid: 0 for row in TELEMETRY} | {messages.MAVLINK_MSG_ID_ATTITUDE: _ATTITUDES_HZ}
@@ -271,7 +271,7 @@ class Controller:
 
 @contextmanager
 def instant_controller(link: Path) -> Iterator[Controller]:
-    """Run one behind a pseudo-terminal: each reply is there at once, but only after the previous one has been sent."""
+    """Run one on a pseudo-terminal: each reply is ready at once, but only after the previous one has been sent."""
     near, far = os.openpty()
     tty.setraw(far)
     link.symlink_to(os.ttyname(far))

@@ -186,7 +186,7 @@ class Bridge:
         self.missions = LocalMissions(missions, self._uploads, ground, emit, incidents)
         self._watch = MissionWatch(missions, ground, emit)
         fence, rally = messages.MAV_MISSION_TYPE_FENCE, messages.MAV_MISSION_TYPE_RALLY
-        # The check of a mission uses them, too.
+        # The check of a mission also uses them.
         changed = missions.settings_changed
         self._fences = PlaceLists(fence, "Fence", self.vehicle, runner, changed)
         self._rally = PlaceLists(rally, "Rally points", self.vehicle, runner, changed)
@@ -251,7 +251,7 @@ class Bridge:
         self._session.opened(now)
 
     def fc_closed(self, now: float, why: str | None) -> None:
-        """The port is gone; `why` is None if the bridge closed it itself."""
+        """The port was lost; `why` is None if the bridge closed it itself."""
         self._has_line_changed = True
         self._session.closed(now, why)
 

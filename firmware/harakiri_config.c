@@ -11,14 +11,14 @@
 
 enum {
     SETTINGS_SIZE = offsetof(config_t, FDUsedDatasets), /* of the staged part of cfg: all but the list and the checksum */
-    LIST_AT = SETTINGS_SIZE,                            /* then the list's copy that goes with it: CRC-32, count */
+    LIST_AT = SETTINGS_SIZE,                            /* then the identity of the list's copy in cfg: CRC-32, count */
     STAGED_SIZE = LIST_AT + 6,
     PLACE_PAGE = 1 + NM_PAGES,
     PLACE_SIZE = FLASH_PAGES_FORCONFIG * NS_PAGE_SIZE
 };
 
 typedef char settings_fit_their_page[STAGED_SIZE + NS_HEADER_SIZE <= NS_PAGE_SIZE && SETTINGS_SIZE % 2 == 0 ? 1 : -1];
-typedef char header_fits_behind_the_configuration[sizeof(config_t) + NS_HEADER_SIZE <= PLACE_SIZE ? 1 : -1];
+typedef char header_fits_after_the_configuration[sizeof(config_t) + NS_HEADER_SIZE <= PLACE_SIZE ? 1 : -1];
 
 static const ns_flash_t flash = {FlashErasePage, FlashProgram, FlashAddress};
 static const ns_slot_t staged = {0, 1, NS_PAGE_SIZE - NS_HEADER_SIZE, 0, 1, STAGED_SIZE};
@@ -33,7 +33,7 @@ static uint32_t last_sequence(void)
     return one - other < 0x80000000u ? one : other;
 }
 
-/* False while the place is not whole, or older than the first slot: a write was interrupted. */
+/* False if the place is incomplete, or older than the first slot: a write was interrupted. */
 static bool place_is_newest(void)
 {
     return ns_valid(&flash, SELF, &place) && ns_sequence(&flash, SELF, &place) == last_sequence();

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * Which MSP requests Harakiri evaluates. The patches ask before every request reaches evaluateCommand() (serial.c).
+ * Decides which MSP requests Harakiri evaluates. The patches ask before a request reaches evaluateCommand() (serial.c).
  *
- * Harakiri's handlers take a request's payload from a buffer that keeps what the request before left in it, and they do not
- * look at its size or at the armed flag. So a setter without payload would store stale bytes, and a calibration, a reset of
+ * Harakiri's handlers take a request's payload from a buffer that still holds bytes of the previous request, and check neither
+ * its size nor the armed flag. So a setter without payload would store stale bytes, and a calibration, a reset of
  * the settings or a flash write would stop a flying craft's main loop for 0.15 to 25 s, or reset it.
  */
 #ifndef HARAKIRI_GUARD_H
@@ -18,7 +18,7 @@
  *   - a command without payload that calibrates, resets the settings or writes the flash, with a payload;
  *   - any of the latter while the motors may run, or when it would write the configuration and the write budget is spent
  *     (ConfigSpendWrite()).
- * Every other request passes, unknown commands too: Harakiri answers those with an error itself.
+ * Every other request passes, even an unknown command: Harakiri itself answers those with an error.
  */
 bool GuardAccepts(uint8_t command, uint8_t size);
 

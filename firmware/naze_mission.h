@@ -19,10 +19,10 @@
  *   read blank are not erased, and a list that is already stored is not written again. nm_t.sequence (INFO's last field)
  *   counts the lists written.
  *
- *   A companion in a loop must not wear out the flash: BEGINs that need an erase and requests that write the
- *   configuration (nm_spend_write()) share a budget of NM_WRITE_BURST writes after a reset and one more every NM_WRITE_INTERVAL_MS, up to
- *   NM_WRITE_BURST again. With the budget spent they return NM_BUSY, and INFO reports it (flag bit 3). At that rate 10,000
- *   erases take 34 days of continuous power. nm_store() is not limited: it must not lose a list.
+ *   A companion stuck in a loop must not wear out the flash: BEGINs that need an erase and requests that write the
+ *   configuration (nm_spend_write()) share a budget of NM_WRITE_BURST writes after a reset and one more every
+ *   NM_WRITE_INTERVAL_MS, up to NM_WRITE_BURST again. With the budget spent they return NM_BUSY, and INFO reports it (flag
+ *   bit 3). At that rate 10,000 erases take 34 days of continuous power. nm_store() is not limited: it must not lose a list.
  *
  * USE
  *   nm_start() once, when the flash can be read; nm_poll() in every main loop; nm_handle() for every valid MSP request with an

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * Slots of flash whose contents are complete or invalid, never in between, wherever the power is cut. The mission core keeps
- * its lists in two of them, and Harakiri's side its configuration (harakiri_config.h).
+ * Flash slots whose contents are either complete or invalid, whenever the power is cut. The mission core keeps its lists in two
+ * of them, and Harakiri's side its configuration (harakiri_config.h).
  *
  * A slot is some pages with data and a header of NS_HEADER_SIZE bytes, each anywhere in them:
  *

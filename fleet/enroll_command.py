@@ -74,4 +74,4 @@ def expel(name: str, folder: Path) -> None:
     except EnrolmentError as error:
         fail(error)
     click.echo(f"{name} is expelled.\n\nNow restart the router in {fleet.path} with router.json5.")
-    click.echo(f"Until then {name}'s sessions go on, and it can open new ones.")
+    click.echo(f"Until then {name}'s sessions continue, and new ones can be opened.")

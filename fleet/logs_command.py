@@ -13,15 +13,15 @@ from fleet.roll_call import alive, chosen
 from storage.os_error import reason
 from terminal.options import PATH
 from terminal.printing import print_json
-from terminal.sentences import fail
+from terminal.sentences import fail, say
 
 
 @click.command("logs", short_help="List and fetch a vehicle's telemetry logs.")
 @click.argument("vehicle")
 @click.argument("names", metavar="[LOG]...", nargs=-1)
-@click.option("--folder", type=PATH, default=Path(), help="Where to save them; by default the current folder.")
+@click.option("--folder", type=PATH, default=Path(), help="Folder to save them in; by default the current one.")
 @click.option(
-    "--rate", type=click.FloatRange(1), default=20.0, show_default=True, help="At most so many kB/s over the link."
+    "--rate", type=click.FloatRange(1), default=20.0, show_default=True, help="The maximum rate over the link, kB/s."
 )
 @address_options
 @json_option
@@ -56,5 +56,8 @@ def fleet_logs(vehicle: str, names: tuple[str, ...], folder: Path, rate: float, 
         return
     if as_json:
         print_json({"logs": [asdict(log) for log in logs.values()]})
-    for log in () if as_json else logs.values():
+        return
+    for log in logs.values():
         click.echo(f"{log.name}  {log.size / 1000:,.0f} kB")
+    if not logs:
+        say(f"{vehicle} has no telemetry logs", to_error=True)

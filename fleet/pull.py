@@ -30,7 +30,7 @@ class Held:
 
 
 def pull(session: zenoh.Session, prefix: str, names: Collection[str], bridges: Collection[BridgeId]) -> list[Held]:
-    """Read the missions; one result per vehicle, sorted by name. Replies of storages are ignored."""
+    """Read the missions; one result per vehicle, in the order of `names`. Replies of storages are ignored."""
     meant = [bridge for bridge in bridges if bridge.vehicle in names]
     used = Counter(bridge.vehicle for bridge in meant)
     # One query to all takes no longer than one to the slowest.

@@ -94,7 +94,7 @@ def _trouble(endpoint: str, files: TlsFiles) -> str:
 
 
 def _tls_trouble(connection: socket.socket, host: str, files: TlsFiles) -> str:
-    """Continue with TLS as zenoh does; SSLError or OSError describe the problem, too."""
+    """Continue with TLS as zenoh does; SSLError or OSError also describe the problem."""
     context = ssl.create_default_context()
     for path in (files.root_ca_certificate, files.connect_certificate, files.connect_private_key):
         if path is not None and not os.access(path, os.R_OK):

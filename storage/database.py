@@ -180,7 +180,7 @@ def _log_was_lost(path: Path) -> bool:
             header = file.read(_LOG_HEADER.size)
         if not any(header):
             return False
-        if path.stat().st_size <= 1:  # SQLite takes one byte for empty, too
+        if path.stat().st_size <= 1:  # SQLite treats one byte as empty
             return True
     except OSError:
         return False  # no log, or unreadable, for which SQLite has a better message

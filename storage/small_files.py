@@ -14,7 +14,7 @@ def read_bounded(path: Path, most: int) -> bytes:
 
 
 def read_untrusted(path: Path, most: int) -> bytes:
-    """The same for root, in a folder that another user controls: OSError for a link, a pipe or a device, too."""
+    """Like read_bounded, for root in a folder that another user controls: OSError also for a link, pipe or device."""
     with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NOFOLLOW | os.O_NONBLOCK)) as file:
         if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
             raise OSError("it is not a regular file")

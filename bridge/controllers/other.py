@@ -16,7 +16,7 @@ from protocols.rights.msp import Firmware
 
 #: IDENT's capability bit of all descendants of baseflight; MultiWii's own boards have 8 bits.
 _32_BIT = 1 << 31
-#: IDENT's capability bit of baseflight. Cleanflight 1 sets it, too, but has a variant.
+#: IDENT's capability bit of baseflight. Cleanflight 1 also sets it, but has a variant.
 _BASEFLIGHT = 1 << 30
 _BETAFLIGHT = "BTFL"
 _FIRMWARE = {_BETAFLIGHT: Firmware.BETAFLIGHT, "CLFL": Firmware.CLEANFLIGHT, "INAV": Firmware.INAV}

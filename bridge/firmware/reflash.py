@@ -24,7 +24,7 @@ from protocols.stm32_boot_loader import (
     write_memory,
 )
 
-#: Called with what is being done, how much of it is done, and the total.
+#: Called with the name of the step, the amount done, and the total.
 Progress = Callable[[str, int, int], None]
 
 _ATTEMPTS = 3

@@ -3,7 +3,7 @@
 
 A station that has proven its rights has a budget of its own, and so have the first 16 other hosts, each for all of its
 stations. All hosts that come later share one total in equal parts. A seat among the 16 may be lost in the first
-seconds, to a host that stays connected: made-up addresses do not.
+seconds, to a host that stays connected, as forged addresses do not.
 """
 
 from collections import OrderedDict

@@ -22,7 +22,7 @@ from protocols.mission_item import MissionResult
 
 #: A UDP station that is silent for this long has left; a TCP station leaves with its connection.
 EXPIRY_S = 60.0
-#: The same for a station whose ids have all moved to another address, as after Wi-Fi roaming.
+#: This time applies to a station whose ids have all moved to another address, as after Wi-Fi roaming.
 MOVED_S = 5.0
 #: A connected station, whether or not it transfers a mission, is never silent for this long.
 _STILL_S = 1.0
@@ -394,7 +394,7 @@ class Ground:
         self._emit(GcsText(text=text))
         recorder = self.station(RECORDER)
         if stations and recorder is not None and recorder not in stations:
-            stations = [*stations, recorder]  # a text for one station is part of the flight's log, too
+            stations = [*stations, recorder]  # the log also has the texts for one station
         self._text_id = self._text_id % _MAX_TEXT_ID + 1
         # MAVSDK joins the pieces with nothing in between, and shows padding as a gap.
         self._send_pieces(severity, cut_text(text), [station for station in stations if station.is_like_mavsdk])
@@ -402,7 +402,7 @@ class Ground:
 
     def _send_pieces(self, severity: Severity, pieces: Sequence[str], stations: Sequence[GroundStation]) -> None:
         for chunk, piece in enumerate(pieces):
-            # With an id, MAVSDK, MAVProxy and QGroundControl join the pieces; Mission Planner shows each by itself.
+            # With an id, MAVSDK, MAVProxy and QGroundControl join the pieces; Mission Planner shows each separately.
             text_id = self._text_id if len(pieces) > 1 else 0
             message = messages.MAVLink_statustext_message(severity, piece.encode("ascii", "replace"), text_id, chunk)
             self.multicast(pack(message), stations)

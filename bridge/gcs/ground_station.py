@@ -25,7 +25,7 @@ _RETURNS_S = 3.0
 #: A station is steady once it has been heard this often, with pauses of at least `_BEAT_S`, like heartbeats at 1 Hz.
 _STEADY_BEATS = 3
 _BEAT_S = 0.7
-#: Ids remembered behind one address: a router may carry a fleet, but made-up ids must not fill the memory.
+#: Ids remembered for one address: a router may carry a fleet, but forged ids must not fill the memory.
 _MAX_SPEAKERS = 64
 _SETUP = "set the key in naze-bridge's settings"
 _ADDRESS = "this address may only read"
@@ -33,7 +33,7 @@ _ADDRESS = "this address may only read"
 _NOT_OVER_OPEN_LINK = "open link; see pass_through in settings"
 #: Ground stations and radios repeat these.
 _ROUTINE = Effect.RATE, Effect.SILENCE
-#: A frame with a number this little behind the newest one was delayed by the network.
+#: A frame whose number is at most this far behind the newest one was delayed by the network.
 _MOST_LATE = 32
 #: After such a silence a sender may have been restarted, and numbers its frames from 0 again.
 _RESTARTED_S = 1.0
@@ -67,9 +67,9 @@ class Speaker:
         self.frames = 0
         self._missing: list[int] = []
         self.last_lost = -1
-        #: The last frame was sent before one that arrived earlier. It was the same frame again, doubled by the network.
+        #: is_late: the last frame was sent before one that arrived earlier. is_copy: the network delivered it twice.
         self.is_late = self.is_copy = False
-        #: What its last transfers left behind, by MAV_MISSION_TYPE.
+        #: State kept after its last transfers, by MAV_MISSION_TYPE.
         self.transfers: dict[int, TransferMemory] = defaultdict(TransferMemory)
 
     def heard(self, frame: MavlinkFrame, now: float) -> None:
@@ -98,18 +98,18 @@ class Speaker:
 
 
 class GroundStation:
-    """A ground station that the bridge sends to: it was heard, or it is configured.
+    """A ground station that the bridge sends to, because it was heard or is configured.
 
     It is one address, a UDP peer or a TCP connection, because rights, limits, MAVLink version and message rates belong
     to an address. Several MAVLink ids may speak from there, behind a radio or a router: `speakers` has them all, and
     the short-lived `Station` names one of them where a message must be addressed. All that is known about a station is
-    here, so dropping this object forgets it; only its `host` is remembered longer.
+    here, so dropping this object forgets it, except for its `host`, which is remembered longer.
     """
 
     def __init__(self, peer: Peer, access: LinkAccess, sysid: int, compid: int, host: HostBudget | None = None) -> None:
         self.peer = peer
         self.access = access
-        #: None until a datagram was accepted: made-up addresses must cost no memory.
+        #: None until a datagram was accepted: forged addresses must cost no memory.
         self.host = host
         self._own_budget: Budget | None = None
         #: It has sent a valid signature.
@@ -118,9 +118,9 @@ class GroundStation:
         self.splitter = MavlinkSplitter()
         self.writer = FrameWriter(sysid, compid, access.signer)
         self.is_heard = False
-        #: Those of its link among which it has one; None until it is heard.
+        #: The places of its link, of which it holds one; None until it is heard.
         self.places: Places | None = None
-        #: The highest MAVLink version that it has sent, and the one of answers: everything signed is MAVLink 2.
+        #: The highest MAVLink version that it has sent, and the version of replies: everything signed is MAVLink 2.
         self.version = 0
         self.frame_version = 2
         self.came_at = self.heard_at = -inf
@@ -138,14 +138,14 @@ class GroundStation:
         #: A newcomer gets more heartbeats until this time, then home and the reasons not to arm.
         self.greeted_until = -inf
         self.is_informed = True
-        #: A mission of it was accepted: it knows that fences are not stored.
+        #: One of its missions was accepted: it has been told that fences are not stored.
         self.has_written = False
 
     # Rights and limits.
 
     def refusal(self, frame: MavlinkFrame, effect: Effect) -> FrameRefusal | None:
         """The reason for refusing a frame with this effect; None if it is accepted. Every frame passes here first."""
-        # Read requests are checked, too: each valid one invalidates older recordings.
+        # Read requests are also checked: each valid one invalidates older recordings.
         signing = self.access.signing
         check = Check.VALID if signing is None else signing.check(frame)
         if signing is not None and check is Check.VALID:
@@ -160,7 +160,7 @@ class GroundStation:
         return FrameRefusal(why, effect in _ROUTINE)
 
     def passing_refusal(self, effect: Effect) -> FrameRefusal | None:
-        """The reason for not passing an accepted frame to an autopilot that speaks MAVLink itself; for Set WP, too."""
+        """The reason for not passing an accepted frame to an autopilot in pass-through; also used for Set WP."""
         if effect in self.rights.autopilot:
             return None
         if self.is_listener:
@@ -168,7 +168,7 @@ class GroundStation:
         return FrameRefusal(_NOT_OVER_OPEN_LINK, effect in _ROUTINE)
 
     def _has_shown_key(self) -> None:
-        """Its first valid signature. It loses the place of a listener, and takes another as soon as it is heard."""
+        """Its first valid signature. It gives up its place as a listener, and takes another once it is heard."""
         if self.places is not None:
             self.places.remove(self)
             self.leaves()
@@ -182,7 +182,7 @@ class GroundStation:
 
     @property
     def has_own_budget(self) -> bool:
-        """True if strangers cannot use up the station's limits."""
+        """True if other hosts cannot use up the station's limits."""
         return self._own_budget is not None or (self.is_heard and self.host is not None and self.host.seat is not None)
 
     def allows(self, cost: Cost, now: float | None = None) -> bool:
@@ -238,5 +238,5 @@ class GroundStation:
 
     @property
     def is_like_mavsdk(self) -> bool:
-        """True for a station that asks by commands only, and in MAVLink 2, as MAVSDK does from its connection on."""
+        """True for a station that requests messages only by commands, in MAVLink 2, as MAVSDK does."""
         return self.version == 2 and self.uses_commands and not self.uses_streams

@@ -11,16 +11,16 @@ from bridge.gcs.station import Peer
 
 #: As many as a network has hosts whose addresses differ in the last byte.
 MAX_PEERS = 256
-#: The same for stations that may only read, so that they take no place from those with the key.
+#: Places for stations that may only read, which so take none from those with the key.
 MAX_LISTENERS = 8
-#: The same for one host, which may change its ports.
+#: Places for one host, which may change its ports.
 MAX_OF_HOST = 16
 #: The number of refused addresses that are remembered: at 20,000 a second, most of them for a second or more.
 _REMEMBERED = 1 << 16
 
 
 class Places:
-    """A full link admits a newcomer at its second frame, because made-up addresses are used once.
+    """A full link admits a newcomer at its second frame, because forged addresses are used once.
 
     The longest-silent station without a budget of its own then goes. A full host makes room among its own.
     """

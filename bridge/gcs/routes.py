@@ -2,7 +2,7 @@
 """Routes frames between an autopilot that speaks MAVLink itself and its ground stations, unchanged. Sans-IO.
 
 Routing as MAVLink describes it (https://mavlink.io/en/guide/routing.html): a frame without a target goes to everyone
-but its sender; one with a target only to where that system (and component) was heard. Frames for a system that was
+except its sender; one with a target only to where that system (and component) was heard. Frames for a system that was
 not heard yet go to the autopilot.
 """
 
@@ -57,7 +57,7 @@ class Routes:
         return frame.sender in self._aboard
 
     def from_station(self, station: GroundStation, frame: MavlinkFrame, *, to_stations: bool) -> bool:
-        """Send an accepted frame on to other stations; True if it is for the autopilot, too.
+        """Send an accepted frame on to other stations; True if it is also for the autopilot.
 
         `to_stations` False: it reaches no other station.
         """

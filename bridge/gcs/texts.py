@@ -18,7 +18,7 @@ def cut_text(text: str) -> list[str]:
 def split_text(text: str) -> list[str]:
     """Split at spaces into pieces of 50 characters, padded with at least one space; the last one is shorter.
 
-    A piece shorter than 50 ends the text for clients that join them with nothing in between (STATUSTEXT.chunk_seq).
+    A piece shorter than 50 ends the text for clients that join pieces without a separator (STATUSTEXT.chunk_seq).
     """
     pieces: list[str] = []
     while len(text) > _SIZE - bool(pieces):

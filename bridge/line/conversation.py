@@ -100,7 +100,7 @@ class Save:
 
 @dataclass(frozen=True, slots=True)
 class BeginSave:
-    """Start to store a received mission, and go on meanwhile. Answer: None."""
+    """Start to store a received mission, and continue meanwhile. Answer: None."""
 
     save: Save
 

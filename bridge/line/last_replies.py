@@ -11,7 +11,7 @@ _MOST = 256
 
 
 class LastReplies:
-    """The last reply to each request, by the request's frame; errors, too."""
+    """The last reply to each request, including errors, by the request's frame."""
 
     def __init__(self) -> None:
         self._replies: dict[bytes, tuple[MspFrame, float]] = {}  # the one heard least recently first

@@ -150,7 +150,7 @@ class MissionService:
     def run(
         self, conversation: Conversation[T | Refusal], on_done: Callable[[T | Refusal, float], None], now: float
     ) -> None:
-        """Run a conversation; `on_done` gets its result and the time. A lost line is a refusal, too."""
+        """Run a conversation; `on_done` gets its result and the time. A lost line is also a refusal."""
 
         def done(result: T | Refusal | LinkLost, at: float) -> None:
             if isinstance(result, LinkLost):

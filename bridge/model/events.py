@@ -23,7 +23,7 @@ class BridgeEvent:
     level: Level = "info"
 
     def __init_subclass__(cls) -> None:
-        """Each kind of event below is a dataclass, too."""
+        """Each kind of event below is also a dataclass."""
         dataclass(frozen=True, kw_only=True)(cls)
 
     def facts(self) -> dict[str, object]:
@@ -37,7 +37,7 @@ Emit = Callable[[BridgeEvent], None]
 
 
 class PortLost(BridgeEvent):
-    """The flight controller's port is gone; not if the bridge closed it itself."""
+    """The flight controller's port was lost; not sent if the bridge closed it itself."""
 
     name_in_log = "fc.port_lost"
     level: Level = "warning"

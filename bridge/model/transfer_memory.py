@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a ground station's mission transfers leave behind, for its repeated messages."""
+"""State kept after a ground station's mission transfers, to answer its repeated messages."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -40,7 +40,7 @@ _LOOK_AGAIN_S = 0.1
 _REPORT_INTERVAL_S = 30.0
 _REPORTS = Rate(0.2, 5)
 _MAX_REPORTED = 64
-#: SET_RTC and COMMON_SET_TZ: mwp sets an INAV's clock each time it connects, and goes on after an error.
+#: SET_RTC and COMMON_SET_TZ: mwp sets an INAV's clock each time it connects, and continues after an error.
 _CLOCK = frozenset((247, 0x1002))
 _NO_REPLY = "no reply from the flight controller"
 
@@ -231,7 +231,7 @@ class MspSharing:
             program.close()
 
     def _level(self, program: Program, command: str, why: str, now: float, *, is_change: bool) -> Level:
-        """Count a request that got no reply; "warning" if that is news."""
+        """Count a request that got no reply; the level of its log line."""
         kind = program.host, is_change
         self._count(f"{command}: {why}")
         if now < self._reported.get(kind, -inf) + _REPORT_INTERVAL_S or not self._reports.take(now):

@@ -302,7 +302,7 @@ class UploadQueue:
         self.uploads.remove(upload)
 
     def due(self, now: float) -> float:
-        """When an upload's state is due, or a waiting one may go on although others are arriving."""
+        """When an upload's state is due, or a waiting one may continue although others are arriving."""
         turn = self._arriving_since + _ALONE_S
         times = [upload.state.due for upload in self.uploads]
         return min([*times, turn] if now < turn and self.within(Waiting) else times, default=inf)

@@ -111,7 +111,7 @@ class MissionUploads:
             if upload.count:
                 self._handle(upload, Cancelled(), now)
         elif count != upload.count or state.received or isinstance(state, Delivering):
-            # Perhaps the same list: its sender has begun it again, too.
+            # Perhaps the same list, which its sender has also begun again.
             self._handle(upload, _AGAIN, now)
             self._begin(station, count, now)
         elif isinstance(state, Receiving):
@@ -194,7 +194,7 @@ class MissionUploads:
         self.answers.tick(now)
         waiting = self._queue.within(Waiting, Complete)
         if len(waiting) > 1:
-            # First that of the host that has waited longest.
+            # The host that has waited longest comes first.
             waiting.sort(key=lambda upload: self._ground.wrote_at(upload.station))
         for upload in waiting:
             event = self._turn(upload, now)
@@ -203,7 +203,7 @@ class MissionUploads:
         self.due = min(self.due, self._queue.due(now), self.answers.due)
 
     def _wake(self) -> None:
-        """A transfer has ended: perhaps an upload may go on at once."""
+        """A transfer has ended: perhaps an upload may continue at once."""
         if self._queue.within(Waiting, Complete):
             self.due = 0.0
 

@@ -77,7 +77,7 @@ class BoardSettings:
         self.table: SettingTable | None = None
         #: The settings that were changed here, and not saved since.
         self.unsaved: dict[str, Value] = {}
-        #: True if the board's flash holds what is in its RAM, as far as is known here.
+        #: True if the board's flash is known to hold the settings in its RAM.
         self.is_saved = False
         #: Called after each reading of the whole table; when the table has changed; after a save; after a change here
         #: that others must not mistake for one from elsewhere.
@@ -290,7 +290,7 @@ class BoardSettings:
         def done(result: SettingTable | SettingRefusal | LinkLost, at: float) -> None:
             self._is_changing = False
             self._line_free_at = at + self._pace(_CHANGE_SIZE)
-            # Without an answer it may be changed all the same.
+            # Without a reply it may still have changed.
             self.on_change(at)
             # What was read before may be out of date.
             self._reader.stop()

@@ -13,11 +13,11 @@ from bridge.gcs.station import Severity
 
 #: Silence that counts as a loss; a switch of protocol takes less.
 _LOST_S = 3.0
-#: The same at the start: sensing the speed takes a few seconds.
+#: Silence that counts as a loss at the start: sensing the speed takes a few seconds.
 _NOT_FOUND_S = 10.0
 #: Mission Planner shows a text for 10 s.
 _REPEAT_S = 9.0
-#: The same while no flight controller was ever found, which cannot be in the air then.
+#: While no flight controller was ever found: it cannot be in the air then.
 _NOT_FOUND_REPEAT_S = 30.0
 
 
@@ -42,7 +42,7 @@ class LinkAnnouncer:
         self._was_found = was_found
         self._silent_since: float | None = now
         self.due = now + (_LOST_S if was_found else _NOT_FOUND_S)
-        #: No loss is reported until then: the silence was asked for.
+        #: No loss is reported until then: the silence is expected.
         self._quiet_until = -inf
         #: True from the first text about a loss until the flight controller is back.
         self.is_lost = False

@@ -118,7 +118,7 @@ class OwnVehicle:
         self.due = min(self._second_ends, self._newcomers_due, self._polls_due)
 
     def _end_second(self, now: float) -> None:
-        # At whole seconds the polls are due, too: one wake-up serves both.
+        # Polls are also due at whole seconds: one wake-up serves both.
         self._second_ends = floor(now) + _TICK_S
         everyone = self._ground.everyone()
         share_out(everyone)

@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterable, Mapping
 from zlib import crc32
 
 LONGEST = 16
-#: Harakiri's own parameters of these names end behind the 16th character, so that several are equal.
+#: Harakiri's own MAVLink cuts these names after the 16th character, so that several are equal.
 _NAMES = {
     "LED_ControlChannel": "LED_CtrlChannel",
     "LED_Toggle_Delay1": "LED_Tog_Delay1",
@@ -41,7 +41,7 @@ def parameter_names(settings: Iterable[str], taken: Collection[str] = ()) -> Map
 
 
 def _short(name: str) -> str:
-    """Without vowels inside of words, from the last word on, until it is short enough."""
+    """Drop the vowels inside words, last word first, until the name is short enough."""
     if len(name) <= LONGEST:
         return name
     if name in _NAMES:

@@ -85,7 +85,7 @@ class SettingsSeal:
             self.due = now + _AFTER_CHANGE_S
 
     def armed(self) -> None:
-        """The pilot has decided to fly: stations that connect from now on are not told of an earlier change."""
+        """The pilot has decided to fly: stations that connect later get no text about an earlier change."""
         self._tell_newcomers("")
 
     def tick(self, now: float) -> None:

@@ -35,7 +35,7 @@ class TableReader:
         return max(self.line_free_at, self._retry_at)
 
     def read_on(self, fc_settings: FcSettings, previous: SettingTable | None, is_doubtful: bool, now: float) -> None:
-        """Begin to read the table, or go on up to the next pause. previous, is_doubtful: see FcSettings.read."""
+        """Begin to read the table, or continue until the next pause. previous, is_doubtful: see FcSettings.read."""
         if self._reading is None:
             self._reading = fc_settings.read(previous, TableReading(self._pace, is_doubtful))
         reading, self.is_asking = self._reading, True

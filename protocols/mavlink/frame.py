@@ -182,7 +182,7 @@ class MavlinkSplitter:
         return [*map(MavlinkFrame, self.split(data, is_end=is_end))]
 
     def split(self, data: bytes, *, is_end: bool = False) -> list[bytes]:
-        """The same for frames that are only forwarded.
+        """Like feed, for frames that are only forwarded.
 
         One loop, with no call per frame except the CRC's: this is the main cost of forwarding a frame.
         """

@@ -57,7 +57,7 @@ class FwApproach(NamedTuple):
 
 
 class Safehome(NamedTuple):
-    """A place to return to instead of home; degrees * 1e7. number: from 0, its approach's, too.
+    """A place to return to instead of home; degrees * 1e7. number: from 0, also that of its approach.
 
     approach: None if the version has none, or if it was not read.
     """
@@ -120,7 +120,7 @@ class Geozone:
         return 2 if self.is_circle else len(self.corners)
 
     def pack(self) -> bytes:
-        """The payload of SET_GEOZONE, and behind it of each SET_GEOZONE_VERTEX."""
+        """The payloads of SET_GEOZONE and then of each SET_GEOZONE_VERTEX."""
         return self.head() + b"".join(self.vertex(number) for number in range(len(self.corners)))
 
     def head(self) -> bytes:

@@ -122,6 +122,6 @@ def _text(text: str) -> bytes:
 
 
 def _take_text(data: bytes) -> tuple[str, bytes | None]:
-    """A text and the bytes behind it; None if its end is missing."""
+    """A text and the bytes after it; None if its end is missing."""
     text, end, rest = data.partition(b"\0")
     return text.decode("ascii", "replace"), rest if end else None

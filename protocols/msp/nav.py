@@ -18,7 +18,7 @@ _STATUS = struct.Struct("<BBBBBH")
 WP_SIZE = _WP.size
 INFO_SIZE = _INFO.size
 NAV_STATUS_SIZE = _STATUS.size
-#: MSP_NAV_CONFIG in MultiWii 2.4, and its limits, behind two bytes of flags and the waypoint radius.
+#: MSP_NAV_CONFIG in MultiWii 2.4, and its limits, after two bytes of flags and the waypoint radius.
 NAV_CONFIG_SIZE = 22
 _LIMITS_AT, _LIMITS = 2, struct.Struct("<HHH")
 _HIGHEST_NUMBER = 254
@@ -79,7 +79,7 @@ class NavRecord:
     flag: int = 0
 
     def pack(self) -> bytes:
-        """The 20 bytes behind the number; struct.error if a field does not fit, which is a bug in the caller."""
+        """The 20 bytes after the number; struct.error if a field does not fit, which is a bug in the caller."""
         return _BODY.pack(self.action, self.lat_e7, self.lon_e7, self.alt_cm, self.p1, self.p2, self.p3, self.flag)
 
 

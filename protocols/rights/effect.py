@@ -14,7 +14,7 @@ class Effect(StrEnum):
     READ = "read"
     #: Changes its settings, mission, calibration or memory.
     CHANGE = "change"
-    #: Arms or moves the craft, restarts it, or stands in for its transmitter, sensors, receiver or port.
+    #: Arms or moves the craft, restarts it, or replaces its transmitter, sensors, receiver or port.
     MOVE = "move"
     #: No firmware's handler is known for it.
     UNKNOWN = "unknown"

@@ -33,7 +33,7 @@ _SLOWEST_US = 1e6
 def _interval(payload: bytes) -> Effect:
     """SET_MESSAGE_INTERVAL's param2: -1 stops the message, 0 is the default rate."""
     (interval_us,) = _FLOAT.unpack_from(payload, 4)
-    return Effect.RATE if 0 <= interval_us <= _SLOWEST_US else Effect.SILENCE  # NaN, too
+    return Effect.RATE if 0 <= interval_us <= _SLOWEST_US else Effect.SILENCE  # also for NaN
 
 
 def _stream(payload: bytes) -> Effect:
@@ -94,7 +94,7 @@ MESSAGES: Mapping[int, Effect | FieldRule] = {
     m.MAVLINK_MSG_ID_MISSION_ITEM_INT: _OF_ITEM,
     m.MAVLINK_MSG_ID_COMMAND_INT: _OF_COMMAND,
     m.MAVLINK_MSG_ID_COMMAND_LONG: _OF_COMMAND,
-    # ArduPilot's accelerometer calibration goes on with it.
+    # It continues ArduPilot's accelerometer calibration.
     m.MAVLINK_MSG_ID_COMMAND_ACK: Effect.CHANGE,
     m.MAVLINK_MSG_ID_MANUAL_SETPOINT: Effect.MOVE,
     m.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: Effect.MOVE,

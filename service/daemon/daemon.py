@@ -58,7 +58,7 @@ class Follower:
         """New values in these groups, which were requested with `Bridge.watch`."""
 
     def happened(self, event: BridgeEvent) -> None:
-        """Something happened that the log has, too."""
+        """An event, which is also logged."""
 
     def mission_ended(self, mission: ArrivedMission, delivery: DeliveryResult) -> None:
         """A received mission was completed or rejected."""

@@ -18,7 +18,7 @@ def explain_port_error(path: str, error: OSError) -> str:
     code = error.errno
     cause = error.__cause__ or error.__context__
     if code is None and isinstance(cause, OSError | termios.error):
-        # pyserial hides the number; termios.error has one, too, but is not an OSError.
+        # pyserial hides the number; termios.error also has one, but is not an OSError.
         code = cause.args[0]
     if not Path(path).exists():
         return f"{path} is missing: plug the flight controller in, or name another port (fc)"

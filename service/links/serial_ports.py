@@ -20,7 +20,7 @@ USB_CHIPS = {
     ("1209", "5740"): "ArduPilot USB",
     ("1209", "5741"): "ArduPilot USB",
 }
-#: Parts of product and manufacturer names that only radios and GPS receivers have. The udev rules use them, too.
+#: Parts of product and manufacturer names that only radios and GPS receivers have. The udev rules also use them.
 OTHER_PRODUCTS = ("gps", "gnss", "u-blox", "radio", "telemetry", "sik")
 
 

@@ -18,7 +18,7 @@ _READ_SIZE = 512
 #: Unsent bytes for a stalled client. Above this its telemetry is dropped, oldest first.
 _MAX_UNSENT = 65536
 _KERNEL_BUFFER = 32768
-#: A client that acknowledges nothing for this long is gone: out of Wi-Fi range it cannot close the connection.
+#: A client that acknowledges nothing for this long is lost: out of Wi-Fi range it cannot close the connection.
 _STALL_MS = 60000
 #: Each costs a copy of the telemetry.
 _MAX_CLIENTS = 32

@@ -37,7 +37,7 @@ class LogLine(NamedTuple):
 
 
 class _StandardError:
-    """Prints a line, or drops it: a full disk or pipe behind the log must not stop the bridge."""
+    """Prints a line, or drops it: a full disk or pipe must not stop the bridge."""
 
     def __init__(self) -> None:
         self._is_broken_off = False

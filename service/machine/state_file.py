@@ -40,7 +40,7 @@ class StateFile:
             return read(json.loads(read_bounded(self._path, _MAX_BYTES)))
         except FileNotFoundError:
             return None
-        except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
+        except (OSError, ValueError, TypeError, LookupError, ArithmeticError, AttributeError, RecursionError) as error:
             _log.warning("state.lost", file=str(self._path), why=str(error), what=self._without)
             return None
 

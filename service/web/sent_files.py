@@ -30,7 +30,7 @@ from storage.store_error import StoreError
 
 _PAUSE_S = 0.25
 _MAX_NAME = 80
-#: An ELF file has symbols, too: 300 kB.
+#: An ELF file also has symbols: 300 kB.
 _MAX_IMAGE = 1 << 20
 _log = structlog.get_logger()
 

@@ -30,7 +30,7 @@ def _handler(file: Path, image_origin: Callable[[], str]) -> Handler:
 
     async def serve(request: Request) -> Response:
         policy = content_policy(image_origin())
-        # Of the policy, too: Chromium keeps that of its stored copy if it is told that nothing has changed.
+        # Also of the policy: Chromium keeps its stored copy's policy after a reply that nothing has changed.
         etag = f'"{hashlib.sha256(body + policy.encode()).hexdigest()[:16]}"'
         # Never cached, so that a page does not mix files of two versions.
         headers = {"ETag": etag, "Cache-Control": "no-cache", "Content-Security-Policy": policy}

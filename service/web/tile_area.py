@@ -7,7 +7,7 @@ from dataclasses import dataclass
 #: Tiles by zoom, x and y.
 Place = tuple[int, int, int]
 FINEST_SHOWN = 19
-#: 0.4 m per pixel at 48 degrees: trees and paths can be told apart. Each finer level has four times the tiles.
+#: 0.4 m per pixel at 48 degrees: trees and paths can be distinguished. Each finer level has four times the tiles.
 _FINEST_KEPT = 18
 #: A view that was enlarged stays visible when it shrinks again.
 _COARSER = 4

@@ -21,7 +21,7 @@ _MAX_WAITING = 64
 
 
 class MavlinkLink:
-    """Implements GcsLink. `others`: bridges with the same name. They get all frames, too, so none is taken."""
+    """Implements GcsLink. `others`: bridges with the same name. They also get all frames, so none is accepted."""
 
     name = "zenoh"
 

@@ -76,7 +76,7 @@ class SampleRates:
         return not self._is_metered or self._state.admits(marks, now)
 
     def admits_overview(self, marks: object, now: float) -> bool:
-        """The same in both profiles."""
+        """Equal in both profiles."""
         return self._overview.admits(marks, now)
 
     def _is_news(self, group: Group, sample: Any, now: float) -> bool:

@@ -72,7 +72,7 @@ class MspReceiver:
 
     @property
     def buffer(self) -> bytes:
-        """The payload of the last request, and behind it what earlier ones left."""
+        """The payload of the last request, followed by leftovers of earlier ones."""
         return bytes(self._buffer)
 
     def overwrite(self, data: bytes) -> None:

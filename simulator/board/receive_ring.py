@@ -33,7 +33,7 @@ class ReceiveRing:
         self._unread.clear()
 
     def receive(self, data: bytes, now: float) -> None:
-        """Put bytes on the RX wire, behind those already there."""
+        """Put bytes on the RX wire, after those already there."""
         if data:
             start = max(now, self._wire_free_at)
             self._wire.append((start, data))

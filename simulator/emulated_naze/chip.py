@@ -118,7 +118,7 @@ class Chip:
         return int(self._library.chip_baud(self._native, usart - 1))
 
     def receive(self, usart: int, data: bytes) -> None:
-        """Put bytes on a USART's RX wire, behind those already there."""
+        """Put bytes on a USART's RX wire, after those already there."""
         self._library.chip_receive(self._native, usart - 1, data, len(data))
 
     def take_sent(self, usart: int) -> bytes:

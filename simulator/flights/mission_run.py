@@ -11,7 +11,7 @@ from simulator.flights.pilot import HIGH, LOW, MIDDLE, Pilot
 from simulator.flights.track import Track
 
 _EVERY_S = 0.2
-#: The time to go on watching after an end without landing, and after a stop.
+#: The time to keep watching after an end without landing, and after a stop.
 _WATCH_S, _WATCH_STOPPED_S = 15.0, 5.0
 #: The slowest flight that is waited for: m/s, and s for each record.
 _SLOWEST, _FOR_RECORD_S = 0.4, 60.0
@@ -51,7 +51,7 @@ class MissionRun:
         return next((r.progress.reason for r in reversed(self.reports) if r.progress.reason), FlightReason.NONE)
 
     def reached_at(self, number: int) -> float | None:
-        """When the board reported a record as reached, or one behind it."""
+        """When the board reported this record, or a later one, as reached."""
         for report in self.reports:
             reached = report.progress.reached
             if reached is not None and reached >= number:
@@ -101,7 +101,7 @@ def fly_mission(pilot: Pilot, records: Sequence[WpRecord], intervene: Interventi
 
 
 def _ends(progress: FlightProgress, has_landed: bool) -> float | None:
-    """How long to go on watching if the flight has come to its end; None if it goes on."""
+    """The time to keep watching if the flight has ended; None if it continues."""
     if has_landed:
         return 1.0
     if progress.state in (FlightPhase.DONE, FlightPhase.STAY):

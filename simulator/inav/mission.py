@@ -51,7 +51,7 @@ class InavMission:
         return self._total if self._total and not armed else self.count
 
     def __getitem__(self, index: int) -> NavWaypoint:
-        """A waypoint of the loaded mission by its index from 0, as flown: a JUMP's p1 is an index, too."""
+        """A waypoint of the loaded mission by its index from 0, as flown: a JUMP's p1 is also an index."""
         return self._list[min(self._start + index, CAPACITY - 1)]
 
     @property

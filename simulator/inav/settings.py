@@ -22,7 +22,7 @@ _ARM, _ANGLE, _NAV_WP = 0, 1, 28
 
 MODE_RANGES, SET_MODE_RANGE, PIDNAMES, UID = 34, 35, 117, 160
 INAV_MISC, RATE_PROFILE, SET_RATE_PROFILE, PID_V2, SET_PID_V2, EZ_TUNE = 0x2003, 0x2007, 0x2008, 0x2030, 0x2031, 0x2070
-#: Bytes of each value in the EEPROM, behind one that is set once they were saved.
+#: Bytes of each value in the EEPROM, after a byte that is set once they were saved.
 _STORED_SIZE = 16
 SETTINGS_SIZE = 1 + _STORED_SIZE * len(SETTINGS)
 _CHECKED_BELOW = (InavType.INT8, InavType.INT16, InavType.FLOAT)
@@ -100,7 +100,7 @@ class InavSettings:
         return value
 
     def _find(self, payload: bytes) -> tuple[InavSetting | None, bytes]:
-        """The setting that a request names, by a text or behind a zero by its index, and what follows."""
+        """The setting that a request names, by a text or by a zero and its index, and the bytes that follow."""
         name, end, data = payload.partition(b"\0")
         if name or len(data) < 2:
             return self._settings.get(name.decode("ascii", "replace")) if end else None, data
@@ -109,12 +109,12 @@ class InavSettings:
         return settings[index] if index < len(settings) else None, data[2:]
 
     def _set(self, setting: InavSetting, data: bytes) -> bool:
-        """An unsigned value below the minimum is taken; bytes behind the value are not looked at."""
+        """An unsigned value below the minimum is accepted; bytes after the value are ignored."""
         value = decode_value(setting.type, data)
         if value is None:
             return False
         if isinstance(value, str):
-            # Written over the old text, with a zero behind it.
+            # Written over the old text, followed by a zero.
             new = data[: setting.maximum] + b"\0"
             value = _text((new + setting.pack()[len(new) :])[: setting.maximum])
         elif value > setting.maximum or (value < setting.minimum and setting.type in _CHECKED_BELOW):
@@ -140,5 +140,5 @@ class InavSettings:
 
 
 def _text(stored: bytes) -> str:
-    """All of a text's place: INAV keeps bytes behind its end."""
+    """The whole field of a text: INAV keeps the bytes after its end."""
     return stored.decode("ascii", "replace").rstrip("\0")

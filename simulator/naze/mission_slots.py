@@ -170,7 +170,7 @@ class StoredConfig:
             self.program(staged[0], kept, sealed=True)
 
     def stage(self, wp_radius_cm: int, settings: bytes = b"") -> None:
-        """Keep what is about to be written. FlashError, PowerCutError."""
+        """Stage the configuration about to be written. FlashError, PowerCutError."""
         self._flash.erase(self._place + 1, self._seconds / 4)
         self._program(self._place + 1, wp_radius_cm, settings, _CONFIG_SEAL, self._seconds / 4)
 

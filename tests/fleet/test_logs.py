@@ -66,6 +66,13 @@ def test_a_fetch_keeps_to_its_rate(fleet: Fleet, tmp_path: Path, monkeypatch: py
     assert sum(pauses) == pytest.approx(133, rel=0.1)
 
 
+def test_a_vehicle_without_logs_is_reported_as_such(fleet: Fleet) -> None:
+    fleet.start("jay", commands=I_KNOW)
+    fleet.wait("kite", "owl", "jay")
+    listed = fleet.ask("logs", "jay")
+    assert (listed.returncode, listed.stdout, listed.stderr) == (0, "", "jay has no telemetry logs\n")
+
+
 def test_what_cannot_be_fetched_is_one_sentence(fleet: Fleet, tmp_path: Path) -> None:
     unknown = fleet.ask("logs", "kite", "2020-01-01 00-00-00.tlog", "--folder", tmp_path)
     assert (unknown.returncode, "kite has no log '2020-01-01 00-00-00.tlog'" in unknown.stderr) == (1, True)

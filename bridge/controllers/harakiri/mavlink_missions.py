@@ -66,7 +66,7 @@ class HarakiriMavlinkMissions(HarakiriStore):
 
     def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Conversation[PushResult]:
         if self._vehicle.armed is not False:
-            # Nothing is sent to a craft that may be armed; the firmware would refuse it, too.
+            # Nothing is sent to a craft that may be armed; the firmware would also refuse it.
             return PushResult(PushFailure.ARMED)
         items = [_message(seq, item) for seq, item in enumerate(items_from_records(records))] or _NOTHING
         failure = PushFailure.NO_ANSWER

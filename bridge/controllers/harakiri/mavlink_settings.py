@@ -26,7 +26,7 @@ _LISTS, _SILENT_LISTS = 5, 2
 _SILENCE_S = 1.0
 #: More than any build has: the number is the board's own.
 _MOST = 1000
-#: Values without a pause for others, who then wait for a second or two.
+#: Values read without a pause; other requests then wait for a second or two.
 _AT_ONCE = 10
 _NAME_SIZE = 16
 #: REAL32.

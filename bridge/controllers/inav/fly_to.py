@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Set waypoint: an INAV that flies its mission is told to fly to another record of it (MSP2_INAV_SET_WP_INDEX).
+"""Set waypoint: makes an INAV that flies its mission fly to another of its records (MSP2_INAV_SET_WP_INDEX).
 
 INAV checks that it is armed, in waypoint mode, and that its list has the record. It also accepts a new record while it
 lands and lands nevertheless, and would take off again after a landing: both are refused here. Its reply proves nothing,
@@ -28,7 +28,7 @@ from protocols.msp.nav import (
     encode_fly_to,
 )
 
-#: Records that it flies to; INAV carries out the others and goes on to the next of these.
+#: Actions that it flies to; INAV executes the others and continues to the next of these.
 FLOWN_TO = LEGS | {NavAction.RTH}
 #: The first version with the request.
 _FIRST = 9, 1, 0

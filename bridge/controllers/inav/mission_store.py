@@ -67,7 +67,7 @@ class InavMissions(NavMissions, FliesToItems):
     """The mission store of one INAV. Record 1 wipes all missions, and no list is valid before its last record."""
 
     reads_armed = True
-    #: The other missions that are written again behind a new list.
+    #: The other missions, which are written again after a new list.
     _kept: tuple[Mission, ...] = ()
     #: All records in the store, as last read or written while disarmed.
     _stored: Mission = ()
@@ -109,7 +109,7 @@ class InavMissions(NavMissions, FliesToItems):
         return erased(self.others, self._profile.capacity - len(records or NOTHING))
 
     def push(self, records: Mission, progress: PushProgress) -> Conversation[PushResult]:
-        """Write the list, with the other missions behind it, and verify it."""
+        """Write the list, followed by the other missions, and verify it."""
         result = yield from super().push(records, progress)
         if result.failure is None:
             self._approaches = self._approaches and self._wanted_approaches
@@ -298,7 +298,7 @@ class InavMissions(NavMissions, FliesToItems):
         self._previous_approaches = self._approaches or ()
         if (yield from self._is_unchanged((yield from self._look()))):
             return before
-        # Another client has written or loaded a list since: its other missions must be kept, too.
+        # Another client has written or loaded a list since: its other missions must also be kept.
         if (yield from self.pull()) is None:
             raise PushFailed(PushFailure.NO_ANSWER)
         return None

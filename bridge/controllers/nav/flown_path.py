@@ -12,13 +12,13 @@ _ENDLESS = -1
 
 
 def flown_size(records: Sequence[NavRecord]) -> int:
-    """The number of records without those behind an RTH that no jump reaches: an RTH ends a mission."""
+    """The number of records up to the RTH that ends the mission: later ones that no jump reaches are not counted."""
     starts, end = {0}, -1
     while True:
         before, end = end, max(_reached(records, starts))
         if end == before:
             break
-        # A jump that is never flown needs a target, too, or INAV does not arm.
+        # Even a jump that is never flown needs a target, or INAV does not arm.
         starts |= {record.p1 - 1 for record in records[: end + 1] if record.action == NavAction.JUMP}
     return end + 1 if records[end].action == NavAction.RTH else len(records)
 

@@ -75,7 +75,7 @@ def sent_seqs(records: Sequence[NavRecord], record_seqs: Iterable[int], speed_se
 
 
 def _shown_speeds(records: Sequence[NavRecord]) -> dict[int, int]:
-    """The DO_CHANGE_SPEED before a record, by its place: wherever the speed changes on any path to it."""
+    """The DO_CHANGE_SPEED before a record, by its place, for each record at which the speed changes on any path."""
     after = _speeds_after(records)
     shown = {place: speed for place, speed in enumerate(after) if speed != (after[place - 1] if place else 0)}
     for place, record in enumerate(records):

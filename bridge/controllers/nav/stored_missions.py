@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Several missions in one store of INAV: one behind the other, each ended by the flag LAST."""
+"""Several missions in one store of INAV: one after another, each ended by the flag LAST."""
 
 from collections.abc import Sequence
 from itertools import accumulate
@@ -10,7 +10,7 @@ Mission = tuple[NavRecord, ...]
 
 
 def split_missions(records: Sequence[NavRecord]) -> list[Mission]:
-    """The missions in a store; records behind the last flag belong to none."""
+    """The missions in a store; records after the last flag belong to none."""
     missions: list[Mission] = []
     start = 0
     for end, record in enumerate(records, 1):

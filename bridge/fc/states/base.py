@@ -29,7 +29,7 @@ class PortOpened:
 
 @dataclass(frozen=True, slots=True)
 class PortClosed:
-    """The port is gone. `why` is None if the bridge closed it itself."""
+    """The port was lost. `why` is None if the bridge closed it itself."""
 
     why: str | None
 

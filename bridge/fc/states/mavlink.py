@@ -70,7 +70,7 @@ class MavlinkLine(State):
     def tick(self, now: float) -> Event | None:
         event = None
         if self._splitter.is_waiting and now >= self._last_byte_at + _LINE_SILENCE_S:
-            # Frames may be hidden behind a false header.
+            # A false header may hide frames.
             event = self.receive(b"", now, is_end=True)
         # Checked ten times a second rather than after each byte: a timer per byte would cost more than the frames.
         self._look_at = now + _LINE_SILENCE_S

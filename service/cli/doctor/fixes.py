@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The remedies that the status page's "Fix it" carries out, as changes of setup: its undo reverts them, too."""
+"""The remedies that the status page's "Fix it" carries out, as changes of setup, whose undo also reverts them."""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -24,7 +24,7 @@ _PIECE = 1 << 16
 _DPKG_INFO = "/var/lib/dpkg/info"
 _CONTROL_FILES = ("postinst", "prerm", "postrm", "triggers", "md5sums", "conffiles")
 _TIMEOUT_S = 900
-#: The new daemon answers by then, on a Pi Zero, too.
+#: By then the new daemon answers, even on a Pi Zero.
 _START_S = 60
 _SHOW = ("dpkg-deb", "--show", "--showformat", "${Package}\n${Version}\n${Architecture}")
 _APT = (

@@ -29,7 +29,7 @@ class _Setup(TypedDict):
 
 
 class UndoLog:
-    """The changes of this setup, saved after each, behind those of earlier ones."""
+    """The changes of this setup, saved after each one, following those of earlier setups."""
 
     def __init__(self, host: Host, machine: Machine) -> None:
         self._host = host
@@ -49,7 +49,7 @@ class UndoLog:
             self._machine.carry_out(change)
             self._now["files"].append({"path": change.path, "before": before, "after": None, "secret": is_secret})
         for file in self._now["files"]:
-            file["after"] = _text(self._host, file["path"])  # raspi-config changes cmdline.txt, too
+            file["after"] = _text(self._host, file["path"])  # raspi-config also changes cmdline.txt
         if self._now["files"] or self._now["commands"]:
             _write(self._machine, [*self._earlier, self._now])
 

@@ -10,6 +10,17 @@ from service.links.port_memory import PORTS_FILE, PortMemory
 from service.machine.state_file import StateFile
 
 
+@pytest.mark.parametrize("content", ["[" * 100_000, "[1, 2]", "1e999"])
+def test_any_damage_is_reported_and_ignored(tmp_path: Path, content: str) -> None:
+    (tmp_path / "state.json").write_text(content)
+    with capture_logs() as logged:
+        assert (
+            StateFile(tmp_path, "state.json", "").load(lambda kept: kept[2] if isinstance(kept, list) else int(kept))
+            is None
+        )
+    assert [entry["event"] for entry in logged] == ["state.lost"]
+
+
 @pytest.mark.parametrize("content", ["", "[]", '{"others": {}}', '{"flight_controller": "", "others": []}', "\xff"])
 def test_a_damaged_file_is_reported_and_ignored(tmp_path: Path, content: str) -> None:
     (tmp_path / PORTS_FILE).write_bytes(content.encode("latin-1"))
