@@ -83,7 +83,7 @@ def _place(_ctx: click.Context, _param: click.Parameter, text: str | None) -> tu
 @click.option(
     "--capacity",
     type=click.IntRange(2, 65535),
-    help=f"Records that it holds. Default: Harakiri {USUAL_CAPACITY}, home included, INAV {INAV_CAPACITY}, "
+    help=f"Number of records that fit. Default: Harakiri {USUAL_CAPACITY}, home included, INAV {INAV_CAPACITY}, "
     f"MultiWii {MULTIWII_CAPACITY}.",
 )
 @click.option(
@@ -91,7 +91,7 @@ def _place(_ctx: click.Context, _param: click.Parameter, text: str | None) -> tu
     "settings_file",
     type=PATH,
     metavar="FILE",
-    help="The settings of an INAV, which decide about arming, heights and places to land at: its `dump` or `diff all`, "
+    help="An INAV's settings, which affect arming, heights and landing places: its `dump` or `diff all`, "
     "or a .param file.",
 )
 @click.option(

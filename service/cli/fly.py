@@ -75,7 +75,7 @@ def fly(
 
     Needs a TestCode3 with mission flight (docs/howto/try-a-mission.md). Nothing is sent to a real craft.
 
-    Exit code 1: the mission was not flown as the file says.
+    Exit code 1: the mission was not flown as in the file.
     """
     records = _records(file)
     try:

@@ -28,7 +28,7 @@ _BOARD = "board"
 def settings() -> None:
     """Read, change, save, back up and restore the flight controller's settings.
 
-    A change acts at once, and is lost with the power unless it is saved. Nothing is written while the craft is armed.
+    A change acts at once, and is lost at power-off unless it is saved. Nothing is written while the craft is armed.
     """
 
 
@@ -62,7 +62,7 @@ def get_setting(client: BridgeClient, name: str) -> None:
 @click.argument("value")
 @bridge_options
 def set_setting(client: BridgeClient, name: str, value: str) -> None:
-    """Change the setting NAME to VALUE, until the flight controller's power is off."""
+    """Change the setting NAME to VALUE, until power-off unless it is saved."""
     changed = client.ask({"do": "set-setting", "name": name, "value": value})
     client.show(changed, lambda: say(changed["text"]))
 
