@@ -135,14 +135,14 @@ class Calibration:
         if self._missions.runner.needs_line or self._missions.acquire(self) is not None:
             return ActionResult.OCCUPIED
 
-        def done(result: ActionResult | LinkLost, _at: float) -> None:
+        def done(result: ActionResult | LinkLost, at: float) -> None:
             self._asked_for = None
             self._missions.release(self)
             if isinstance(result, LinkLost):
                 result = ActionResult.NO_ANSWER
             elif result is ActionResult.DONE and controller.profile.restarts_after_calibration:
                 result = ActionResult.FREEZES
-            self._asked(station, command, action, result, now)
+            self._asked(station, command, action, result, at)
 
         self._asked_for = action
         self._missions.runner.start(_act(action, controller.arm_bit), done, now)

@@ -196,6 +196,15 @@ def test_a_multiwii_calibrates_while_it_answers() -> None:
     assert pages.acks(m.MAV_CMD_PREFLIGHT_CALIBRATION) == [IN_PROGRESS, ACCEPTED]
 
 
+def test_the_usual_time_counts_from_the_boards_reply() -> None:
+    pages = CalibrationPages(make_board("multiwii", faults=Faults(boxes=0)))
+    pages.start_compass()
+    pages.world.run(35)
+    times = {message.get_type(): at for at, message in pages.station.received}
+    # MultiWii collects compass values for 30 s.
+    assert times["MAG_CAL_REPORT"] - times["COMMAND_ACK"] >= 31.0
+
+
 def test_what_a_board_cannot_do_says_so() -> None:
     pages = CalibrationPages(FakeInav())
     pages.start_accelerometer(WIZARD)
