@@ -3,7 +3,7 @@
 
 PIDs, modes, rates and MISC, and the checksum of all settings where the board has one, are read when the board is found,
 and again while it is disarmed and the line is idle. The seal of each board is remembered, so that a change between two
-flights is noticed, too.
+flights is also noticed.
 """
 
 from collections.abc import Callable
@@ -80,7 +80,7 @@ class SettingsSeal:
         """A program changed settings through the bridge: the next reading is compared with no earlier one."""
         self._is_ours = True
         if self._board is not None:
-            self._memory.keep(self._board, Seal({}))  # the daemon may end before
+            self._memory.keep(self._board, Seal({}))  # the daemon may end before that reading
         if self._controller is not None:
             self.due = now + _AFTER_CHANGE_S
 
@@ -127,12 +127,13 @@ class SettingsSeal:
             self._board = yield from self._identify(controller)
             self.on_identified(self._board)
         is_ours, self._is_ours = self._is_ours, False
-        former = None if is_ours else self._memory.recall(self._board)
+        if is_ours:
+            self._memory.keep(self._board, Seal({}))  # the line may be lost before the end of this reading
+        former = self._memory.recall(self._board)
         parts = {} if former is None else dict(former.parts)
         changed: list[ChangedPart] = []
         for wanted in SETTINGS[controller.firmware]:
             if not self._may_ask():
-                self._is_ours |= is_ours
                 return None
             before = parts.get(wanted.part)
             after = yield from self._part(wanted, controller.firmware, before)

@@ -237,6 +237,25 @@ def test_a_change_through_the_bridge_before_the_first_reading_is_not_reported() 
     assert world.events("settings.changed_on_board") == []
 
 
+def test_a_first_reading_that_is_cut_off_does_not_forget_a_change_through_the_bridge() -> None:
+    seals = SealsOfThisRun()
+    board = naze()
+    sealed(lambda: board, seals)
+    world = World(speeds=(115200,), peer=board, seals=seals)
+    world.wait_ready(40)
+    on_the_board(world, SET_PID, bytes(30))
+    world.inside.seal.changed_here(world.now)
+    began_at = world.now
+    world.wait_until(lambda world: PID in requests(world, began_at), 20)
+    assert world.inside.seal.state is None
+    world.unplug()
+    world.run(1)
+    world.plug()
+    world.wait_until(lambda world: world.inside.seal.state is not None, 40)
+    world.run(1)
+    assert world.events("settings.changed_on_board") == []
+
+
 def test_another_board_is_no_change() -> None:
     seals = SealsOfThisRun()
     for make in (naze, inav, multiwii, naze):
