@@ -51,7 +51,7 @@ ln -sf {_UNIT} /etc/systemd/system/multi-user.target.wants/
 """
 _FIRST_BOOT = """\
 #!/bin/sh
-# Written by `naze-bridge card`. What it does is in {log}.
+# Written by `naze-bridge card`. Its log is {log}.
 set -eu
 here=$(dirname "$(realpath "$0")")
 exec >>{log} 2>&1

@@ -22,13 +22,15 @@ _PAYLOAD = "the query's payload"
 #: and so have the 650 settings of an INAV.
 _MAX_BYTES = 1 << 18
 _MAX_ITEMS = 1000
+#: Parsed on the event loop. So short a text cannot be nested too deeply either.
+_MAX_LOG_REQUEST = 256
 _LOG_FORM = 'the payload must be {"name": "2026-05-01 10-00-00.tlog", "start": 0}'
 
 
 class CommandQueries:
     """Handles the commands through DaemonApi, like all other interfaces. `others`: bridges with the same name.
 
-    They get each command, too, so none that changes a mission or settings is obeyed. Telemetry logs are read by
+    They also get each command, so none that changes a mission or settings is executed. Telemetry logs are read by
     commands, because they reveal the flights.
     """
 
@@ -104,7 +106,7 @@ class CommandQueries:
     async def _read_log(self, question: Question) -> Json:
         """One piece, for a slow uplink."""
         try:
-            wanted = json.loads(question.payload())
+            wanted = json.loads(question.payload() if question.size <= _MAX_LOG_REQUEST else b"")
             name, start = wanted["name"], whole_number(wanted, "start", 0, MOST)
         except (ValueError, LookupError, TypeError) as error:
             raise QueryRefused(_LOG_FORM) from error

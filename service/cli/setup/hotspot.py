@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Wi-Fi hotspot: a NetworkManager connection, opened by a process of its own.
+"""The Wi-Fi hotspot: a NetworkManager connection, opened by a separate process.
 
 Opening it ends the Wi-Fi connection over which setup may be run. So setup reports everything first and then starts
 this module as a transient unit: `python -m service.cli.setup.hotspot`. If no device joins in time, the previous network
@@ -63,7 +63,7 @@ def hotspot_steps(host: Host, hotspot: tuple[str, str] | None) -> Iterator[Step]
 
 
 def switch_step(*, is_on: bool) -> Step:
-    """Open or close the hotspot of an earlier setup, in a process of its own."""
+    """Open or close the hotspot of an earlier setup, in a separate process."""
     program = (sys.executable, "-I", "-m", "service.cli.setup.hotspot", *(() if is_on else (_CLOSE,)))
     purpose = f"{'open' if is_on else 'close'} the hotspot"
     return Step(purpose, [Run(later(program, _DELAY_S, CONNECTION))], cuts_network=True)

@@ -55,7 +55,7 @@ class UndoLog:
 
 
 def undo_steps(host: Host) -> tuple[list[Step], list[str]]:
-    """The steps that revert the last setup, and the files that stay because they were changed since."""
+    """The steps that revert the last setup, and the files that are kept because they have changed since."""
     if not (kept := _read(host)):
         return [], []
     files = list(reversed(kept[-1]["files"]))
@@ -96,7 +96,7 @@ def _read(host: Host) -> list[_Setup]:
         kept: list[_Setup] = json.loads(text) if text else []
         list(_commands(kept))
     except (ValueError, TypeError, KeyError) as error:
-        raise SetupError(f"{UNDO_FILE} is damaged: remove it to go on without undo") from error
+        raise SetupError(f"{UNDO_FILE} is damaged: remove it to continue without undo") from error
     return kept
 
 

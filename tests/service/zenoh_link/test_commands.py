@@ -119,6 +119,15 @@ def test_an_invalid_mission_is_refused_with_a_reason(commanded: tuple[Bench, zen
     assert bench.board.records() == before
 
 
+@pytest.mark.parametrize("payload", [b"", b"[]", b'{"name": "x"}', b"[" * 100_000, b" " * 10_000_000])
+def test_an_invalid_request_for_a_log_is_refused_with_the_form(
+    commanded: tuple[Bench, zenoh.Session], payload: bytes
+) -> None:
+    bench, opened = commanded
+    assert "the payload must be" in error(ask(opened, f"{COMMANDS}/log/read", payload))
+    assert "daemon.fault" not in bench.daemon.printed
+
+
 @pytest.mark.parametrize(
     "parameters", ["", "?number=", "?number=0", "?number=-1", "?number=1e3", "?number=" + "9" * 99]
 )
