@@ -77,7 +77,7 @@ def _one_value(name: str, text: object) -> str:
     try:
         if isinstance(text, str) and len(text) <= _MAX_TEXT and "\n" not in text:
             return toml_text(tomllib.loads(f"value = {text}")["value"])
-    except ValueError:
+    except (ValueError, RecursionError):
         pass
     raise HelperRefusal(f"{name}: this is no value: text needs quotes, a list brackets.")
 

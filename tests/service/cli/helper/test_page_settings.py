@@ -62,7 +62,9 @@ def test_settings_that_cannot_be_used_leave_the_file(pi: FixablePi, values: dict
     assert pi.ran == []
 
 
-@pytest.mark.parametrize("text", ["", "word", "1\nsysid = 2", '"a', 7, ["a"], "x" * 5000, "{a = 1", "1979-05-27x"])
+@pytest.mark.parametrize(
+    "text", ["", "word", "1\nsysid = 2", '"a', 7, ["a"], "x" * 5000, "{a = 1", "1979-05-27x", "[" * 900]
+)
 def test_what_is_no_value_is_refused(pi: FixablePi, text: object) -> None:
     with pytest.raises(HelperRefusal, match="sysid: this is no value"):
         pi.ask("settings", values={"sysid": text})
