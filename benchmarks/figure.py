@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Floor:
-    """The lowest value possible on this machine, in the figure's unit, and what it measures."""
+    """The lowest value possible on this machine, in the figure's unit, and its description."""
 
     value: float
     of: str

@@ -95,7 +95,7 @@ def _watch(endpoint: str, count: int) -> None:
 
 
 def _are_up(session: zenoh.Session, count: int) -> bool:
-    """True if the router knows the last token of each session. To list all would take it half a second each time."""
+    """True if the router knows the last token of each session. Listing all takes it half a second each time."""
     time.sleep(1.0)
     last = map(light_vehicles.name, range(max(count - light_vehicles.SESSIONS, 0), count))
     return all(any(session.liveliness().get(f"fleet/{each}/v1/alive/*", timeout=30)) for each in last)

@@ -56,7 +56,7 @@ def wait_for(condition: Callable[[], bool], what: str, timeout_s: float = _TIMEO
 
 @dataclass(frozen=True, slots=True)
 class Board:
-    """A simulated Naze behind a pseudo-terminal that keeps the pace of a UART."""
+    """A simulated Naze on a pseudo-terminal that keeps the pace of a UART."""
 
     link: Path
     control: Path

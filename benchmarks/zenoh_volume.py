@@ -23,7 +23,7 @@ from tests.support.zenoh_router import client, running_router
 
 _SECONDS = 60.0
 _HEADERS = 52
-#: By what is subscribed to: the keys.
+#: The keys of each kind of subscription.
 _READERS = {
     "nothing": (),
     "overview": ("overview",),

@@ -251,7 +251,7 @@ _ENDS_DOWNLOAD = (
 
 
 class _RemoteMissions(MissionService):
-    """A mission store behind the link. `is_local`: missions are received here."""
+    """A mission store at the other end of the link. `is_local`: missions are received here."""
 
     def __init__(
         self, vehicle: Vehicle, runner: Runner, ground: Ground, write: Callable[[Sequence[MissionItem]], object]

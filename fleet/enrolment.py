@@ -90,7 +90,7 @@ class FleetFolder:
     path: Path
 
     def members(self) -> dict[str, Member]:
-        """By name, also the expelled ones. A vehicle without a system id gets one."""
+        """By name, including expelled ones. A vehicle without a system id gets one."""
         try:
             found = json.loads(self._read(_MEMBERS) or "{}")
             return _with_sysids({name: _member(data) for name, data in found.items()})

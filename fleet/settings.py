@@ -37,7 +37,7 @@ class SettingVariant:
 
 @dataclass(slots=True)
 class SettingsTrial:
-    """What a restore would do on one vehicle; `plan`: of SettingsApi.plan, None with an error."""
+    """The plan of a restore on one vehicle; `plan`: of SettingsApi.plan, None with an error."""
 
     vehicle: str
     plan: Json | None = None
@@ -62,7 +62,7 @@ def read_settings(session: zenoh.Session, prefix: str, names: Collection[str]) -
 
 
 def try_settings(session: zenoh.Session, prefix: str, names: Collection[str], file: bytes) -> list[SettingsTrial]:
-    """What a restore of this .param file would do on each vehicle."""
+    """The plans of restoring this .param file, for each vehicle."""
     trials = {name: SettingsTrial(name) for name in names}
     for name, reply in ask_each(session, prefix, names, SETTINGS_PLAN.suffix, _TIMEOUT_S, file):
         if reply is not None:

@@ -18,7 +18,7 @@ from pymavlink.dialects.v20 import ardupilotmega
 _PROJECT = Path(__file__).resolve().parent.parent
 _MODULE, _NAME = "protocols.mavlink.dialect", "messages"
 _ID, _CLASS = "MAVLINK_MSG_ID_", "MAVLink_{}_message"
-#: What messages.py has besides pymavlink's names.
+#: Names that messages.py has besides pymavlink's.
 _OURS = {"COMMAND_NAMES", "KINDS"}
 _HEAD = '''# SPDX-License-Identifier: GPL-3.0-or-later
 """The messages and constants that we use, by pymavlink's names. Made by `make messages` from pymavlink, not by hand.

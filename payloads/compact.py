@@ -41,7 +41,7 @@ def read_schema(name: str) -> Json:
 
 
 def object_schema(schema: Json) -> Json:
-    """The object's schema, also out of a choice of several types."""
+    """The object's schema, possibly one of several types."""
     for choice in schema.get("anyOf", ()):
         if "properties" in choice or "items" in choice:
             found: Json = choice

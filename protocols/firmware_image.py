@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Firmware images for a Naze32, as ELF, Intel HEX and binary files; how a Harakiri with our patch is recognised.
 
-An image is the flash's contents from its first byte; an ELF file has symbols, too.
+An image is the flash's contents from its first byte; an ELF file also has symbols.
 """
 
 import struct

@@ -52,7 +52,7 @@ class FrskyParser:
     """Finds values and groups among other bytes."""
 
     def __init__(self) -> None:
-        #: Consecutive values without a foreign byte in between.
+        #: Consecutive values without a foreign byte between them.
         self.values_in_a_row = 0
         self._group: list[tuple[int, int]] = []
         self._value = bytearray()

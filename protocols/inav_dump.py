@@ -14,7 +14,7 @@ from protocols.msp.inav_places import Safehome
 from protocols.param_file import read_param_file
 
 _SET = re.compile(r"set (\w+) = (\S*)", re.ASCII)
-_SAFEHOME = re.compile(r"safehome (\d+) ([01]) (-?\d+) (-?\d+)", re.ASCII)
+_SAFEHOME = re.compile(r"safehome (\d{1,9}) ([01]) (-?\d{1,10}) (-?\d{1,10})", re.ASCII)
 _MAX_SIZE = 1 << 20
 
 

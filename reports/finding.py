@@ -99,7 +99,7 @@ class Finding:
 
 
 def without_defaults(findings: Iterable[Finding]) -> list[Finding]:
-    """The findings that are news to the pilot: filled-in defaults are not."""
+    """The findings that matter to the pilot, without filled-in defaults."""
     return [finding for finding in findings if finding.news != News.NONE]
 
 

@@ -317,5 +317,5 @@ def _damaged_line(number: int) -> MissionSummary:
 
 
 def _text(text: str) -> str:
-    r"""What SQLite can hold: the lone surrogates of a file name that is not UTF-8 become \udcXX."""
+    r"""The text as SQLite can hold it: the lone surrogates of a file name that is not UTF-8 become \udcXX."""
     return text.encode(errors="backslashreplace").decode()

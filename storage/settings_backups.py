@@ -123,7 +123,7 @@ class SettingsBackups:
         ]
 
     def _last(self, board: str, kind: str) -> SettingsBackup | None:
-        """The board's last backup; None also if it is damaged: then the next one is stored whole."""
+        """The board's last backup; None if there is none or it is damaged: the next one is then stored in any case."""
         number = self._newest("board = ? AND kind = ?", board, kind)
         try:
             return None if number is None else self.get(number)

@@ -10,7 +10,7 @@ from terminal.sentences import complain
 
 
 def load_mission(path: Path) -> list[MissionItem]:
-    """Read the mission file at `path`; MissionFileError also if the disk fails. Notes go to standard error."""
+    """Read the mission file at `path`; MissionFileError if it or the disk is damaged. Notes go to standard error."""
     name = shown_path(path)
 
     def note(text: str) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every flight controller that the bridge knows. The first profile that recognises a board is used."""
+"""All supported flight controllers. The first profile that recognises a board is used."""
 
 from bridge.controllers import other
 from bridge.controllers.harakiri import profile as harakiri

@@ -23,7 +23,7 @@ class CommandLineError(Exception):
 
 
 def read_dump() -> Dialogue[str]:
-    """Open the command line; return what its command `dump` prints. CommandLineError: it is closed again."""
+    """Open the command line; return the output of `dump`. CommandLineError: it is closed again."""
     if not (yield Exchange(_OPEN, _OPEN_S, _is_prompt)).endswith(PROMPT):
         raise CommandLineError("its command line does not open: switch it off and on, then try again")
     printed = yield Exchange(b"dump\r", _DUMP_S, _is_prompt)

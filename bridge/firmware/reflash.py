@@ -58,7 +58,7 @@ def read_flash(progress: Progress) -> Dialogue[bytes]:
 
 
 def rewrite_flash(present: bytes, wanted: bytes, progress: Progress) -> Dialogue[None]:
-    """Turn the whole flash from `present` into `wanted`, and read back what was written. FlashingError."""
+    """Turn the whole flash from `present` into `wanted`, and read the written pages back. FlashingError."""
     failed = [page for page in range(_PAGES) if _page(present, page) != _page(wanted, page)]
     for _ in range(_ATTEMPTS):
         if not failed:

@@ -106,7 +106,7 @@ class Ground:
         return self._heard.get(peer) or self._unheard.get(peer)
 
     def speaker(self, station: Station) -> Speaker:
-        """What is known of a station. Beyond the remembered senders of an address: nothing."""
+        """The sender with the station's ids; an empty one if its address has too many to remember."""
         there = self._heard.get(station.peer)
         return (there and there.speakers.get((station.sysid, station.compid))) or Speaker()
 
@@ -228,7 +228,7 @@ class Ground:
             self.on_frames([frame.raw])
 
     def displaced(self, peers: Mapping[Peer, float]) -> Peer:
-        """The connection of a full link to drop: the longest-silent one, those with their own budget last.
+        """The connection of a full link to drop: the one silent for longest, those with their own budget last.
 
         `peers`: when each was last heard.
         """
@@ -396,7 +396,7 @@ class Ground:
         if stations and recorder is not None and recorder not in stations:
             stations = [*stations, recorder]  # the log also has the texts for one station
         self._text_id = self._text_id % _MAX_TEXT_ID + 1
-        # MAVSDK joins the pieces with nothing in between, and shows padding as a gap.
+        # MAVSDK joins the pieces without a separator, and shows padding as a gap.
         self._send_pieces(severity, cut_text(text), [station for station in stations if station.is_like_mavsdk])
         self._send_pieces(severity, split_text(text), [station for station in stations if not station.is_like_mavsdk])
 

@@ -22,12 +22,12 @@ _REMEMBERED = 1 << 16
 class Places:
     """A full link admits a newcomer at its second frame, because forged addresses are used once.
 
-    The longest-silent station without a budget of its own then goes. A full host makes room among its own.
+    The station silent for longest, without a budget of its own, then leaves. A full host makes room among its own.
     """
 
     def __init__(self, size: int) -> None:
         self._size = size
-        #: The longest-silent first: a station that is heard is moved to the end.
+        #: The one silent for longest first: a station that is heard is moved to the end.
         self.stations: OrderedDict[Peer, GroundStation] = OrderedDict()
         self._hosts: Counter[Hashable] = Counter()
         self._turned_away = array("I")

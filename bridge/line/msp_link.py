@@ -233,7 +233,7 @@ class MspLink:
         return self._take(frames, now) if frames else frames
 
     def tick(self, now: float) -> list[MspFrame]:
-        """Time out requests; return replies that were hidden behind a false header."""
+        """Time out requests; return replies that a false header had hidden."""
         if now >= self._follow_up_at:
             self._ask(_QUESTION, now)
         if not self._sent or now < min(map(_DEADLINE, self._sent)):
@@ -284,7 +284,7 @@ class MspLink:
         first, last = self._sent[0], self._sent[-1]
         begins_at = max(self._last_byte_at, first.sent_at + _SERVING_S)
         complete_at: float = max(begins_at + size * self.byte_s, last.sent_at + last.reply_size * self.byte_s)
-        # What has arrived is read before a request counts as lost.
+        # Received bytes are read before a request counts as lost.
         lost_at: float = min(map(_DEADLINE, self._sent))
         return min(complete_at, begins_at + _LONGEST_WAIT_S, lost_at)
 

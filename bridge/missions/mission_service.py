@@ -197,7 +197,7 @@ class MissionService:
 
     @property
     def on_board(self) -> HeldMission | None:
-        """The flight controller's list, if it is known; also while it is armed and cannot be read."""
+        """The flight controller's list, if it is known; even while it is armed and cannot be read."""
         return None if isinstance(self.fc_store, Refusal) else self._verified_before_arming()
 
     @property

@@ -31,7 +31,7 @@ class PlaceLists(MissionService):
         self.fc_store, self.are_stored = NO_PLACES, False
 
     def use(self, store: AnyFcMissionStore | Refusal, now: float, *, is_same_board: bool) -> None:
-        """Switch to another flight controller. One that stores no such lists is refused for that, also once lost."""
+        """Switch to another flight controller. The refusal for one that stores no such lists stays once it is lost."""
         if isinstance(store, Refusal) and store is not NO_PLACES and not self.are_stored:
             store = NO_PLACES
         self.are_stored = store is not NO_PLACES

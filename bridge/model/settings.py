@@ -66,7 +66,7 @@ class SettingsState:
 
 
 class SealMemory(Protocol):
-    """Remembers the seal of each board, also after a restart of the daemon."""
+    """Remembers the seal of each board, even after a restart of the daemon."""
 
     def recall(self, board: BoardId) -> Seal | None: ...
 

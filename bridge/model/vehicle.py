@@ -299,7 +299,7 @@ class Vehicle:
             self._end_flight()
 
     def _end_flight(self) -> None:
-        """Forget what was known from an earlier flight."""
+        """Forget the values from an earlier flight."""
         self.home, self.is_home_settled, self.armed_at = None, False, None
         self.armed, self._is_resumed = None, False
         for kind in (Switches, FlightState, Mode):

@@ -39,7 +39,7 @@ class Cause(Enum):
 
 @dataclass(frozen=True, slots=True)
 class SettingRefusal:
-    """The reason for a person, in one sentence. After NO_ANSWER it is not known what the board has done."""
+    """The reason, in one sentence for people. After NO_ANSWER the board may or may not have acted."""
 
     cause: Cause
     text: str
@@ -100,7 +100,7 @@ class FcSettings(ABC):
     def change(
         self, table: SettingTable, setting: BoardSetting, value: Value
     ) -> Conversation[SettingTable | SettingRefusal]:
-        """Change one setting in RAM; the table after reading back what the board holds then.
+        """Change one setting in RAM; the table with the value read back from the board.
 
         A value that the board does not take is no refusal here: the table has the old one.
         """

@@ -33,7 +33,7 @@ class _Question:
 
 
 class MissionDownloads:
-    """Every ground station reads its own snapshot, so an upload in between cannot mix two lists."""
+    """Every ground station reads its own snapshot, so an upload meanwhile cannot mix two lists."""
 
     def __init__(self, missions: MissionService, ground: Ground) -> None:
         self._missions = missions

@@ -23,7 +23,7 @@ _REMINDERS_S = (2.0, 4.0)
 #: QGroundControl waits 1.5 s for the final ack, and MAVSDK 2.5 s; neither asks for it again. So it is sent three times.
 _ACK_AGAIN_S = (0.4, 0.9)
 _NOT_WHOLE = Refusal(MissionResult.UNSUPPORTED, "A mission can only be written as a whole")
-#: QGroundControl leaves out what the vehicle does not offer to store, and says nothing.
+#: QGroundControl silently leaves out lists that the vehicle does not offer to store.
 _ONLY_MISSIONS = "Fences and rally points are not stored here"
 _UNKNOWN_UPLOAD = Refusal(MissionResult.OPERATION_CANCELLED, "Unknown upload: write it again")
 

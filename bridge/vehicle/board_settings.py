@@ -292,7 +292,7 @@ class BoardSettings:
             self._line_free_at = at + self._pace(_CHANGE_SIZE)
             # Without a reply it may still have changed.
             self.on_change(at)
-            # What was read before may be out of date.
+            # The values read so far may be out of date.
             self._reader.stop()
             self.is_saved = False
             if isinstance(result, SettingTable) and self._fc_settings is fc_settings:

@@ -206,7 +206,7 @@ class CommandService:
         return CommandResult.UNSUPPORTED
 
     def _store(self, station: Station, command: int, what: float, now: float) -> None:
-        """MAV_CMD_PREFLIGHT_STORAGE. Mission Planner sends it 10 s after any PARAM_SET, also in flight."""
+        """MAV_CMD_PREFLIGHT_STORAGE. Mission Planner sends it 10 s after any PARAM_SET, even in flight."""
         settings = self._settings
         if what != _SAVE:
             self._ground.say(Severity.ERROR, "Settings are only saved, not loaded or reset", station)

@@ -80,7 +80,7 @@ class OwnVehicle:
         self._unix_time_s = unix_time_s
         self._started_at = now
         self.due = self._second_ends = now
-        #: The messages that any ground station wants, by the reading that triggers them.
+        #: The messages that any ground station requests, by the reading that triggers them.
         self._rows: dict[type[Reading] | None, list[_Trigger]] = {}
         self.progress = MissionProgress()
         #: The capability bits of this flight controller, besides the bridge's own.

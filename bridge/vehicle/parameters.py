@@ -44,7 +44,7 @@ _ERRORS = {
 
 @dataclass(slots=True)
 class _Dialogue:
-    """What a station has got. next: the index of the list that it is sent; None: of none. count: of the last list."""
+    """The parameters sent to a station. next: the index in the list being sent, or None. count: of the last list."""
 
     station: Station
     session: FtpSession

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads a board's settings in the background: one request at a time, so that others can use the line in between."""
+"""Reads a board's settings in the background: one request at a time, which leaves room for others on the line."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -249,7 +249,7 @@ def _rounded(value: float | None) -> float | None:
 
 
 def _direction(value: float | None) -> float | None:
-    """0 up to 360, also after rounding."""
+    """From 0 to below 360, even after rounding."""
     return None if value is None else round(value, 2) % 360
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Problems in mission files of all formats: the error, the notes about what was fixed, and common checks."""
+"""Problems in mission files of all formats: the error, the notes about fixes, and common checks."""
 
 import math
 from collections.abc import Callable, Iterable

@@ -26,7 +26,7 @@ class Part(Enum):
     OTHERS = "other settings"
 
 
-#: (name, bytes) from the first byte on; "": it has no name. None: it counts by itself and is not a setting.
+#: (name, bytes) from the first byte on; "": it has no name. None: the board itself counts it, and it is not a setting.
 Layout = Sequence[tuple[str | None, int]]
 
 
@@ -146,7 +146,7 @@ RANGE_SIZE = 4
 
 
 def fields(request: SettingsRequest, payload: bytes, names: SettingNames) -> tuple[Field, ...]:
-    """The settings in a reply, each with a name of its own; bytes without a name are left out."""
+    """The settings in a reply, each with a unique name; bytes without a name are left out."""
     match request.part:
         case Part.PIDS:
             size, letters = request.pid_size, "PIDF"

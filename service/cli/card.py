@@ -35,7 +35,7 @@ _IN_FIRSTRUN = f"({_FIND.format('enable.sh')})"
 _IN_USER_DATA = "[sh, /boot/firmware/naze-bridge/enable.sh, start]"
 _ENABLE = f"""\
 #!/bin/sh
-# Written by `naze-bridge card`: enables the unit that sets the bridge up, also after a start that failed.
+# Written by `naze-bridge card`: enables the unit that sets the bridge up, and repeats it after a start that failed.
 cat >{_UNIT} <<'UNIT'
 [Unit]
 Description=Set naze-bridge up from the boot partition, once
@@ -62,7 +62,7 @@ install -d -o naze-bridge -m 700 $state
 [ -e $state/web-token ] || install -o naze-bridge -m 600 "$here/web-token" $state/web-token
 # Status 1 is also doctor's, for a flight controller that is not connected yet.
 naze-bridge setup --yes {options} || [ -e /etc/naze-bridge/setup.toml ]
-# The hotspot is opened by a process of its own.
+# A separate process opens the hotspot.
 while systemctl is-active --quiet naze-bridge-hotspot.timer || systemctl is-active --quiet naze-bridge-hotspot; do
     sleep 1
 done
@@ -153,7 +153,7 @@ def prepare(boot: Path, package: Path, options: list[str], secrets: dict[str, st
 
 
 def _write(path: Path, text: str) -> None:
-    path.write_bytes(text.encode())  # also on Windows without carriage returns
+    path.write_bytes(text.encode())  # without carriage returns, even on Windows
 
 
 def _hooked(boot: Path) -> tuple[Path, str]:

@@ -38,7 +38,7 @@ _CONNECT_TIMEOUT_S = 30.0
 @click.option("--port", type=click.IntRange(1, 65535), default=14550, show_default=True, help="UDP port.")
 def demo(file: Path, once: bool, port: int) -> None:
     """Start the daemon on a simulated Naze, write a mission FILE to it over UDP, and show the result."""
-    # The daemon is a child of this program, so that both end together, also when the terminal is closed.
+    # The daemon is a child of this program, so that both end together, even when the terminal is closed.
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda number, _frame: sys.exit(128 + number))
     try:

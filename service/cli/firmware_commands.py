@@ -19,7 +19,7 @@ from terminal.files import read_file, shown_path
 from terminal.options import PATH
 from terminal.sentences import UNREADABLE, fail, say
 
-#: What both trees' Makefile builds.
+#: The image that both trees' Makefiles build.
 _BUILT = "obj/baseflight_NAZE.hex"
 _COMPILER = "arm-none-eabi-gcc"
 _TOOLS = {_COMPILER: "gcc-arm-none-eabi", "make": "make"}

@@ -113,7 +113,7 @@ class FleetRelay:
         self._relays.gcs_gone(peer, self._loop.time())
 
     def displaced(self, peers: Mapping[Peer, float]) -> Peer:
-        """The longest-silent connection."""
+        """The connection silent for longest."""
         return min(peers, key=peers.__getitem__)
 
     def _remove(self, name: str) -> None:

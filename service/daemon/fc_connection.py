@@ -86,7 +86,7 @@ class FcConnection:
         return {} if self._finder is None else self._finder.status()
 
     async def run(self) -> None:
-        """Keep the port open, also after a bug; cancel to end."""
+        """Keep the port open, even after a bug; cancel to end."""
         task = asyncio.current_task()
         assert task is not None
         while not task.cancelling():  # a bug while the port closes replaces the CancelledError

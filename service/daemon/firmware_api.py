@@ -75,7 +75,7 @@ class FirmwareApi:
     async def flash(
         self, image: bytes, progress: Progress, *, with_battery: bool = False, is_backup: bool = False
     ) -> Json:
-        """Flash a program, or a backup of the whole flash. `with_battery`: also with a battery connected."""
+        """Flash a program, or a backup of the whole flash. `with_battery`: even with a battery connected."""
         try:
             (check_backup if is_backup else check_patched)(image)
         except ImageError as error:
@@ -173,7 +173,7 @@ class FirmwareApi:
         return path
 
     async def _restore_settings(self, path: Path) -> str:
-        """Restore what the board printed before, if the new firmware has begun with its defaults."""
+        """Restore the settings printed before, if the new firmware has begun with its defaults."""
         try:
             before = settings_in(await asyncio.to_thread(path.read_text))
             plan = await self._settings.plan(before, "")

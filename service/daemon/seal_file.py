@@ -15,7 +15,7 @@ _MOST = 32
 
 
 class SealFile:
-    """A SealMemory. A board without a number of its own is known by its port. Without a `folder` nothing is stored."""
+    """A SealMemory. A board without a unique number is identified by its port. Without a `folder` nothing is stored."""
 
     def __init__(self, folder: Path | None, port: Callable[[], str]) -> None:
         self._port = port

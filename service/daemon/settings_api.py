@@ -64,7 +64,7 @@ class SettingsApi:
         return {"text": "Settings saved"}
 
     async def plan(self, values: SettingValues, board: str, *, is_checked: bool = True) -> Json:
-        """What a restore would write, and what it cannot write. board: the one the values are from; "": unknown.
+        """The values that a restore would write, and those it cannot. board: the source of the values; "": unknown.
 
         is_checked False: compare with the table as last read, without using the flight controller's line.
         """

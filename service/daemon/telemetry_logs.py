@@ -20,7 +20,7 @@ _TIMEOUT_S = 5.0
 
 
 class TelemetryLogs:
-    """The logs in `folder`; None: no logs are written. Every method may raise OSError, also if the disk hangs."""
+    """The logs in `folder`; None: no logs are written. Every method may raise OSError, even for a hanging disk."""
 
     def __init__(self, folder: Path | None) -> None:
         self._folder = folder

@@ -47,7 +47,7 @@ class PortInUseError(PortError):
 
 
 def device_opener(address: FcAddress) -> Callable[[], Awaitable[Device]]:
-    """A function that opens the device, also again after a loss. For AutoFc see PortFinder."""
+    """A function that opens the device, and reopens it after a loss. For AutoFc see PortFinder."""
     assert not isinstance(address, AutoFc)
     if isinstance(address, SerialFc):
         path = address.path

@@ -144,6 +144,6 @@ def running() -> EventLoop:
 
 
 def run(main: Coroutine[Any, Any, T]) -> T:
-    """Run a coroutine on an event loop of its own, as asyncio.run does."""
+    """Run a coroutine on a new event loop, as asyncio.run does."""
     with asyncio.Runner(loop_factory=EventLoop) as runner:
         return runner.run(main)

@@ -36,7 +36,7 @@ class AutoFc:
 
 @dataclass(frozen=True, slots=True)
 class TcpFc:
-    """A flight controller behind TCP: a simulator, or a Wi-Fi serial adapter."""
+    """A flight controller over TCP: a simulator, or a Wi-Fi serial adapter."""
 
     host: str
     port: int

@@ -30,7 +30,7 @@ Handler = Callable[[Request], Awaitable[Response]]
 
 
 def content_policy(image_origin: str = "") -> str:
-    """What a page may load; `image_origin`: another origin, from which it may also load pictures."""
+    """The origins that a page may load from; `image_origin`: another origin, from which it may also load pictures."""
     sources = f"'self' {image_origin}".strip()
     return (
         f"default-src 'none'; script-src 'self'; style-src 'self'; img-src {sources};"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the page draws over time: the track of this flight or the last one, and the serial line's last minutes."""
+"""Histories that the page draws: the track of this flight or the last one, and the serial line's last minutes."""
 
 from collections import deque
 from dataclasses import asdict, dataclass

@@ -107,7 +107,7 @@ class MapTiles:
         return json_reply(self.state)
 
     async def _keep(self, request: Request) -> Response:
-        """Fetch an area, also in finer levels; the progress is in the state."""
+        """Fetch an area and its finer levels; the progress is in the state."""
         check_disarmed(self._daemon)
         with refusing(ValueError, HTTPStatus.UNPROCESSABLE_ENTITY):
             self._keeping.begin(TileArea.from_query(request.query_params))

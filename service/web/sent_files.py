@@ -117,7 +117,7 @@ class SentFiles:
         return begun(self._writer.begin(name, partial(self._api.push, items, f"{name}, from the page")))
 
     async def _flash(self, request: Request) -> Response:
-        """With `battery=1` flash also with a battery connected."""
+        """With `battery=1` flash even with a battery connected."""
         name, body = await _received(request)
         with refusing(ImageError, HTTPStatus.UNPROCESSABLE_ENTITY, lambda why: f"{name}: {why}"):
             image = (await asyncio.to_thread(parse_image, body, name)).program

@@ -21,7 +21,7 @@ from storage.os_error import reason
 
 #: An access point's address may appear after the daemon's start: binding is retried.
 _RETRY_S = 2.0
-#: New connections are accepted a few at a time; in between the links are served.
+#: New connections are accepted a few at a time, so that the links are served in turn.
 _BACKLOG = 16
 _log = structlog.get_logger()
 

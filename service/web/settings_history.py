@@ -39,7 +39,7 @@ class SettingsHistory:
         return json_reply(await self._api.backups(_LISTED))
 
     async def _show(self, request: Request) -> Response:
-        """What changed in a backup, and what restoring it would change now."""
+        """The changes in a backup, and the changes that restoring it would make now."""
 
         async def make() -> tuple[str, bool]:
             backup = await self._find(request)

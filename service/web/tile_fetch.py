@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fetches map tiles into files: a program of its own, so that neither the daemon nor its stop waits for a network.
+"""Fetches map tiles into files: a separate program, so that neither the daemon nor its stop waits for a network.
 
     python -m service.web.tile_fetch < REQUEST
 

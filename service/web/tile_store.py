@@ -74,7 +74,7 @@ class TileCache:
 
 
 class TileStore:
-    """The tiles of one source. `folder`: of all sources. Every method may raise OSError, also if the disk hangs."""
+    """The tiles of one source. `folder`: of all sources. Every method may raise OSError, even for a hanging disk."""
 
     def __init__(self, folder: Path, source: TileSource) -> None:
         self.folder = folder

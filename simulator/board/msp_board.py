@@ -114,7 +114,7 @@ class MspBoard(SimulatedBoard):
             else:
                 self._run_task(at)
         if self._firmware and self._next_task <= now:
-            # Nothing is pending: skip the runs in between.
+            # Nothing is pending: skip the runs until then.
             self._next_task = self._task_at(now) + self.options.serial_task_ms / 1000
 
     def _start(self, at: float) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`naze-bridge sim --play`: the flight controller of a UART capture, behind a pseudo-terminal."""
+"""`naze-bridge sim --play`: the flight controller of a UART capture, on a pseudo-terminal."""
 
 import asyncio
 import signal

@@ -11,7 +11,7 @@ _IDENT = 100
 
 
 class ConsoleError(Exception):
-    """The board did not do what was asked; one sentence."""
+    """The board did not carry out a command; one sentence."""
 
 
 class Console:

@@ -24,7 +24,7 @@ FLYING_BOOT_S = 20.0
 _GPS_USART = 2
 #: How often the GPS module listens.
 _SLICE_NS = 20_000_000
-#: The converter's value for a volt of the battery, behind a divider by 11.
+#: The converter's value for a volt of the battery, after a divider by 11.
 _PER_VOLT = 4095 / 3.3 / 11
 
 

@@ -31,7 +31,7 @@ class Report:
 
 @dataclass(slots=True)
 class MissionRun:
-    """What happened: the board's reports, and the true track since the switch."""
+    """The result: the board's reports, and the true track since the switch."""
 
     records: Sequence[WpRecord]
     begun_s: float

@@ -22,7 +22,7 @@ _DEADLINE_S = 60.0
 
 
 class PilotError(Exception):
-    """The craft did not do what the pilot wanted; one sentence."""
+    """The craft did not follow the pilot; one sentence."""
 
 
 class Pilot:

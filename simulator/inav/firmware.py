@@ -195,7 +195,7 @@ class InavFirmware(MspFirmware):
             case MspCommand.WP:
                 return reply(command, self._waypoint(payload))
             case InavCommand.SET_NAME:
-                # Any length up to the longest, also an empty one.
+                # Any length up to the longest, even an empty one.
                 if len(payload) > _LONGEST_NAME:
                     return error(command)
                 self._settings["name"] = payload.decode("ascii", "replace")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A simulated Naze within the daemon's process, behind one end of a socket pair (`--fc sim:`)."""
+"""A simulated Naze within the daemon's process, on one end of a socket pair (`--fc sim:`)."""
 
 import asyncio
 import socket

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A simulated board behind a TCP port, like INAV's own simulator and Wi-Fi serial adapters."""
+"""A simulated board on a TCP port, like INAV's own simulator and Wi-Fi serial adapters."""
 
 import asyncio
 import socket

@@ -105,7 +105,7 @@ class Firmware:
         self._answers = MspAnswers(lambda: self.craft_at(self._clock), options.tree)
         self._mavlink = MavlinkSplitter()
         self._sender = MavlinkSender()
-        # Harakiri's own list and MAVLink upload, also alongside the extension.
+        # Harakiri's own list and MAVLink upload, even alongside the extension.
         self._parameters = Parameters(self._board, self._settings, spend_write, self._send_message)
         self._own_missions = OwnMissionStore(
             flash, self._board, self._missions, self._send_message, self._parameters.reset

@@ -27,7 +27,7 @@ def frames(flight: FlightState, number: int, uptime: float) -> bytes:
     """The frames of the `number`th period, from 1, each a group of values."""
     groups = [list(zip(_ACCELERATION, _gravity_mg(flight), strict=True))]
     if number % _HEIGHT == 0:
-        # Harakiri truncates fractions, also of a heading of -180..180.
+        # Harakiri truncates fractions, even of a heading of -180..180.
         height_cm = max(int(flight.height_m * 100), 0)
         height = [(_ALTITUDE_M, height_cm // 100), (_ALTITUDE_CM, height_cm % 100)]
         heading = int((flight.heading + 180) % 360 - 180) % 360

@@ -58,7 +58,7 @@ class Body:
         self.attitude: Quaternion = facing(heading_deg)
         #: rad/s, body axes.
         self.rates: Vector = ZERO
-        #: What an accelerometer measures, m/s2, body axes.
+        #: The specific force that an accelerometer measures, m/s2, body axes.
         self.felt: Vector = (0.0, 0.0, GRAVITY)
         #: Each motor's thrust, N: rear right, front right, rear left, front left.
         self.thrusts = [0.0] * 4

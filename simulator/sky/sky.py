@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Body, wind and battery in one time, and what the sensors on the board measure of them."""
+"""Body, wind and battery in one time, and the sensors' measurements of them."""
 
 import random
 from collections.abc import Callable
@@ -34,7 +34,7 @@ class Weather:
 
 @dataclass(slots=True)
 class Motion:
-    """What the IMU measures: m/s2 and rad/s in body axes."""
+    """The IMU's measurements: m/s2 and rad/s in body axes."""
 
     acceleration: Vector = (0.0, 0.0, GRAVITY)
     rates: Vector = field(default=(0.0, 0.0, 0.0))

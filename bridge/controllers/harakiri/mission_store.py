@@ -158,7 +158,7 @@ class HarakiriMissions(HarakiriStore):
         return PushResult(failure)
 
     def pull(self) -> Conversation[tuple[WpRecord, ...] | None]:
-        """Read the whole list and compare its checksum; once more if the list changed during the reading."""
+        """Read the whole list and compare its checksum; again if the list changed meanwhile."""
         for _ in range(2):
             info = yield from self._read_info()
             if info is None:

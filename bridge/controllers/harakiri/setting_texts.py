@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Harakiri's settings are, with their units, for ground stations. From config.c of both trees."""
+"""Descriptions and units of Harakiri's settings, for ground stations. From config.c of both trees."""
 
 _AXES = {"roll": "roll", "pitch": "pitch", "yaw": "yaw", "alt": "altitude hold", "level": "ANGLE and HORIZON"}
 _LOOPS = {"pos": "the held position", "posr": "the speed to it", "nav": "the speed to a waypoint"}

@@ -141,7 +141,7 @@ class HarakiriFcSettings(FcSettings):
                 if after is None:
                     return NO_ANSWER
                 return None if after.checksum == whole.checksum else NOT_SAVED
-            # The reply is lost, or a value has changed in between.
+            # The reply is lost, or a value has changed meanwhile.
         return NO_ANSWER
 
 

@@ -36,7 +36,7 @@ class InavPlaceStore(FcMissionStore[RecordT]):
         self._arm_bit = controller.arm_bit
         #: As last read; None: unknown.
         self._known: tuple[RecordT, ...] | None = None
-        #: True if what the board holds in RAM may not be in its flash.
+        #: True if the board's RAM may differ from its flash.
         self._is_unsaved = False
 
     def report(self) -> Conversation[StoreReport | None]:

@@ -30,7 +30,7 @@ _NOT_MOVED_M = 1.0
 
 
 def read_safehomes() -> Conversation[tuple[Safehome, ...] | None]:
-    """All of them, also those that are off; none from a version without them. None: no answer, or one about others."""
+    """All of them, including disabled ones; none on a version without them. None: no reply, or one about another."""
     found: list[Safehome] = []
     for number in range(SAFEHOMES):
         reply = yield from ask(encode_read_safehome(number), SAFEHOME, SAFEHOME_SIZE)

@@ -101,7 +101,7 @@ class MultiwiiMissions(NavMissions):
                 yield from ask(encode_set_wp(_NOT_STORED, _CLEARED), Nav.SET_WP, 0)
 
     def _order(self, wanted: tuple[NavRecord, ...]) -> list[tuple[int, NavRecord]]:
-        """Write a single RTH first and the real record 1 last: a list interrupted in between only flies home."""
+        """Write a single RTH first and the real record 1 last: a list interrupted midway only flies home."""
         first, *rest = enumerate(wanted, 1)
         return [(1, NOTHING[0]), *rest, first] if rest else [first]
 

@@ -208,7 +208,7 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
         yield from ()
 
     def _compare(self, number: int, record: NavRecord) -> Conversation[None]:
-        """Read a record back; once more if it differs: the 8-bit checksum misses some damage."""
+        """Read a record back, and again if it differs: the 8-bit checksum misses some damage."""
         for _ in range(2):
             held = yield from self.read(number)
             if held is None:

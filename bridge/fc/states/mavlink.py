@@ -187,7 +187,7 @@ class HarakiriMavlink(MavlinkLine):
 
 
 class _HarakiriSender:
-    """Makes frames without three equal hazard bytes in a row, also across the boundary to the previous frame.
+    """Makes frames without three equal hazard bytes in a row, even across the boundary to the previous frame.
 
     Three 0x0D enter the CLI in any protocol; '#' and 'R' count only in AUTOSENSE, but it can fall back to that at any
     moment. Unlike our MSP extension, MAVLink has no mask: only the sequence number can be chosen, which also changes

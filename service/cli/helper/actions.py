@@ -130,7 +130,7 @@ def set_clock(pi: ThisPi, *, unix_s: int) -> Json:
 
 
 def install(pi: ThisPi, *, size: int) -> Json:
-    """The body is a package of this program: check it, and install it in a process of its own."""
+    """The body is a package of this program: check it, and install it in a separate process."""
     if not 0 < size <= MAX_PACKAGE:
         raise HelperRefusal(f"A package has at most {MAX_PACKAGE >> 20} MB.")
     return {"version": receive(pi, size)}

@@ -91,7 +91,7 @@ def version_of(path: Path, machine: Machine) -> str | None:
 
 
 def start_update(pi: ThisPi, package: str) -> None:
-    """Install a checked package in a process of its own, after the reply."""
+    """Install a checked package in a separate process, after the reply."""
     program = (sys.executable, "-I", "-m", "service.cli.helper.packages", package)
     Machine(pi.host).carry_out(Run(later(program, DELAY_S, "naze-bridge-update")))
 

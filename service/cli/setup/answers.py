@@ -60,7 +60,7 @@ def current_key(host: Host) -> str:
 
 
 def settings_text(host: Host, answers: SetupChoices) -> str:
-    """The settings file with the choices; what was not said is not in it."""
+    """The settings file with the choices that were made."""
     lines = ["# Written by `naze-bridge setup`, which can be run again. config.toml, in this folder, overrides this."]
     if answers.fc is not None:
         lines.append(f"fc = {json.dumps(answers.fc, ensure_ascii=False)}")  # also valid TOML

@@ -52,7 +52,7 @@ Change = WriteFile | RemoveFile | Run
 
 
 def later(command: Sequence[str], delay_s: int, unit: str = "") -> tuple[str, ...]:
-    """The command that runs another one after a delay, in a unit of its own."""
+    """The command that runs another one after a delay, in a separate unit."""
     named = (f"--unit={unit}",) if unit else ()
     # A timer's default accuracy is a minute.
     when = (f"--on-active={delay_s}", "--timer-property=AccuracySec=100ms")

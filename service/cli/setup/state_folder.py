@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What setup, as root, takes from the state folder of the service.
+"""The data that setup, as root, reads from the state folder of the service.
 
 The service has no privileges, but a program that takes it over can write anything there: links, pipes, and texts meant
 for root's terminal or for udev.

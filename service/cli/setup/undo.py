@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What each setup changed, so that `naze-bridge setup --undo` can revert the last one."""
+"""The changes of each setup, so that `naze-bridge setup --undo` can revert the last one."""
 
 import json
 from collections.abc import Iterator
