@@ -95,13 +95,13 @@ class MspBoard(SimulatedBoard):
         firmware = self._firmware
         if firmware is None or self.faults.hang:
             return None
-        wanted = [self._ring.next_arrival()]
+        arrival = self._ring.next_arrival()
+        earliest = inf if arrival is None else arrival
         if self.faults.armed != firmware.armed:
-            wanted.append(self._next_look)
+            earliest = min(earliest, self._next_look)
         if self._pending and self.power is Power.RUNNING:
-            wanted.append(self._last_byte + (firmware.habits.cli_guard_s or 0.0))
-        earliest = min((at for at in wanted if at is not None), default=None)
-        return None if earliest is None else self._task_at(earliest)
+            earliest = min(earliest, self._last_byte + (firmware.habits.cli_guard_s or 0.0))
+        return None if earliest == inf else self._task_at(earliest)
 
     def _task_at(self, earliest: float) -> float:
         period = self.options.serial_task_ms / 1000

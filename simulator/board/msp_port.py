@@ -85,25 +85,25 @@ class MspReceiver:
 
     def push(self, byte: int) -> tuple[int, bytes] | None:
         """Take a byte; returns command and payload if it completes a request with a valid checksum."""
-        match self._state:
-            case 0 | 1 | 2:
-                self._state = self._state + 1 if byte == b"$M<"[self._state] else 0
-            case 3:
-                self._state = 0 if byte > len(self._buffer) else 4
-                self._size = self._checksum = byte
-                self._offset = 0
-            case 4:
-                self._state = 5
-                self._command = byte
-                self._checksum ^= byte
-            case _ if self._offset < self._size:
-                self._buffer[self._offset] = byte
-                self._offset += 1
-                self._checksum ^= byte
-            case _:
-                self._state = 0
-                if self._checksum == byte:
-                    return self._command, bytes(self._buffer[: self._size])
+        state = self._state
+        if state < 3:
+            self._state = state + 1 if byte == b"$M<"[state] else 0
+        elif state == 3:
+            self._state = 0 if byte > len(self._buffer) else 4
+            self._size = self._checksum = byte
+            self._offset = 0
+        elif state == 4:
+            self._state = 5
+            self._command = byte
+            self._checksum ^= byte
+        elif self._offset < self._size:
+            self._buffer[self._offset] = byte
+            self._offset += 1
+            self._checksum ^= byte
+        else:
+            self._state = 0
+            if self._checksum == byte:
+                return self._command, bytes(self._buffer[: self._size])
         return None
 
 

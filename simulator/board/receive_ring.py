@@ -51,7 +51,12 @@ class ReceiveRing:
 
     def read(self, now: float) -> int | None:
         """The next unread byte; None if there is none."""
-        return self._unread.pop(0) if self.arrive(now) else None
+        if self._wire:
+            self._leave_wire(now)
+        unread = self._unread
+        if len(unread) >= self._size:
+            self.arrive(now)
+        return unread.pop(0) if unread else None
 
     def arrive(self, now: float) -> int:
         """Fill the ring; returns the number of unread bytes.

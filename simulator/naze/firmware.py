@@ -63,6 +63,10 @@ class Protocol(Enum):
     MAVLINK = auto()
 
 
+# Looked up once: each byte is compared with them, and access through the enumeration takes several times as long.
+_AUTOSENSE, _MSP, _MAVLINK = Protocol
+
+
 class Firmware:
     """Runs one main loop at a time; idle loops may be skipped."""
 
@@ -231,21 +235,20 @@ class Firmware:
             self._msp.forget()
         while self._resets_at is None and (byte := self._uart.read(self._clock)) is not None:
             self._last_byte = self._clock
-            match self._trap(byte):
-                case Trap.CLI:
-                    self._enter_cli()
-                    return
-                case Trap.RESET:
+            if trap := self._trap(byte):
+                if trap is Trap.RESET:
                     raise ResetError(to_boot_loader=True)
+                self._enter_cli()
+                return
             if self._completes_packet(byte):
                 self._last_valid = self._clock
 
     def _trap(self, byte: int) -> Trap | None:
         """The effect of a byte outside of any protocol; with the extension, bytes of an MSP frame have none."""
-        if self._missions and self._msp.is_past_header and self.protocol is not Protocol.MAVLINK:
+        if self._missions and self._msp.is_past_header and self.protocol is not _MAVLINK:
             self._traps.clear()
             return None
-        return self._traps.count(byte, self.protocol is Protocol.AUTOSENSE, self.armed)
+        return self._traps.count(byte, self.protocol is _AUTOSENSE, self.armed)
 
     def _choose_protocol(self) -> None:
         if not self.armed:
@@ -269,10 +272,10 @@ class Firmware:
     def _telemetry_due(self) -> float | None:
         """The next time that the firmware sends, or changes its protocol, by itself."""
         stream = change = None
-        if self.protocol is not Protocol.MSP:
-            stream = self._schedule.next_due(self.protocol is Protocol.AUTOSENSE)
+        if self.protocol is not _MSP:
+            stream = self._schedule.next_due(self.protocol is _AUTOSENSE)
         if not self.armed:
-            if self.protocol is not Protocol.AUTOSENSE and not self._parameters.is_listing:
+            if self.protocol is not _AUTOSENSE and not self._parameters.is_listing:
                 change = self._last_valid + _AUTOSENSE_SECONDS
         elif self._options.tele_prot is TelemetryProtocol.FRSKY_9600:
             change = self._frsky_time + frsky.PERIOD_SECONDS
@@ -305,14 +308,14 @@ class Firmware:
 
     def _completes_packet(self, byte: int) -> bool:
         """Pass a byte to the active receivers."""
-        if self.protocol is not Protocol.MSP:
+        if self.protocol is not _MSP:
             for frame in self._mavlink.feed(bytes((byte,))):
                 if frame.version == 1:
                     self._switch(Protocol.MAVLINK)
                     self._own_missions.take(frame, self._clock)
                     self._parameters.take(frame, self._clock)
                     return True
-        if self.protocol is not Protocol.MAVLINK and self._faults.msp and (request := self._msp.push(byte)):
+        if self.protocol is not _MAVLINK and self._faults.msp and (request := self._msp.push(byte)):
             self._switch(Protocol.MSP)
             self._answer(*request)
             return True

@@ -366,12 +366,8 @@ class World:
             assert effect_of(sent) in (Effect.READ, Effect.DIALOGUE, Effect.CHANGE), sent
         else:
             rubbed_out = b"\x7f" if isinstance(self.inside.session.state, Cli) else b""
-            frames = MspParser().feed(data)
-            assert b"".join(frame.encode() for frame in frames) == data.rstrip(rubbed_out), (
-                f"not whole frames: {data.hex()}"
-            )
             assert is_clean(data) or self.kind in _TAKES_ANY_BYTE, data.hex()
-            for frame in frames:
+            for frame in _whole_frames(data.rstrip(rubbed_out)):
                 self._assert_has_right(frame)
         speed = self.inside.session.state.speed
         self.written.append((self.now, speed, data))
@@ -399,7 +395,15 @@ class World:
         self.log_event.append(Event(self.now, event.level, event.name_in_log, event.facts()))
 
 
-@lru_cache(1024)  # the same few requests are sent over and over
+@lru_cache(4096)  # the same few requests are sent over and over
+def _whole_frames(data: bytes) -> tuple[MspFrame, ...]:
+    """The frames in these bytes, which must be nothing else."""
+    frames = tuple(MspParser().feed(data))
+    assert b"".join(frame.encode() for frame in frames) == data, f"not whole frames: {data.hex()}"
+    return frames
+
+
+@lru_cache(4096)
 def _effect(firmware: Firmware, command: int, payload: bytes) -> Effect:
     return msp_right(firmware, command, payload).effect
 
