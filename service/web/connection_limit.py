@@ -79,7 +79,7 @@ class BoundedConnection(H11Protocol):
         self._address = ""
         self._admitted: asyncio.Transport | None = None
         self._end: asyncio.TimerHandle | None = None
-        self._turn: asyncio.TimerHandle | None = None
+        self._turn: asyncio.Handle | None = None
         self._is_served = False
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
@@ -92,11 +92,12 @@ class BoundedConnection(H11Protocol):
         self._admitted = transport
         self._limit.transports.add(transport)
         self._end = self.loop.call_later(self._limit.lifetime_s, transport.abort)
-        transport.pause_reading()
-        self._await_turn(transport)
+        # Python 3.11.2, which Debian 12 has, begins to read after this call even if it was told to pause.
+        self._turn = self.loop.call_soon(self._await_turn, transport)
 
     def _await_turn(self, transport: asyncio.Transport) -> None:
         if not self._limit.take_turn(self._address, self.loop.time()):
+            transport.pause_reading()
             self._turn = self.loop.call_later(_TURN_S, self._await_turn, transport)
             return
         self._is_served = True

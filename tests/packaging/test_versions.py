@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Versions from git tags, and a release, each in a copy of this repository."""
 
-import io
 import itertools
 import os
 import shutil
 import subprocess
 import sys
-import tarfile
 import tomllib
 from pathlib import Path
 
@@ -96,9 +94,9 @@ def test_a_version_comes_from_the_tag_and_the_commits_after_it(clone: Clone) -> 
 def test_without_git_an_archive_has_its_commits_version_or_the_newest_releases(clone: Clone, tmp_path: Path) -> None:
     clone.run("git", "tag", "7.1.0")
     folder = tmp_path / "archive"
+    folder.mkdir()
     packed = subprocess.run(["git", "-C", clone.folder, "archive", "HEAD"], capture_output=True, check=True).stdout
-    with tarfile.open(fileobj=io.BytesIO(packed)) as archive:
-        archive.extractall(folder, filter="data")
+    subprocess.run(["tar", "-x", "-C", folder], input=packed, check=True)
     ask = (sys.executable, "-m", "hatchling", "version")
     told = subprocess.run(ask, cwd=folder, capture_output=True, text=True, check=True)
     assert told.stdout.strip() == "7.1.0"
@@ -138,8 +136,7 @@ def test_a_release_is_tagged_built_and_summed(clone: Clone) -> None:
     subprocess.run(["sha256sum", "--check", "--quiet", "SHA256SUMS"], cwd=folder, check=True)
     assert (folder / "NOTES.md").read_text() == "### Added\n\n- A thing.\n\n### Fixed\n\n- A fault."
     # The source archive builds the same version without git.
-    with tarfile.open(folder / "naze_bridge-97.0.0.tar.gz") as archive:
-        archive.extractall(clone.folder.parent, filter="data")
+    subprocess.run(["tar", "-xf", folder / "naze_bridge-97.0.0.tar.gz", "-C", clone.folder.parent], check=True)
     ask = (sys.executable, "-m", "hatchling", "version")
     source = clone.folder.parent / "naze_bridge-97.0.0"
     assert subprocess.run(ask, cwd=source, capture_output=True, text=True, check=True).stdout.strip() == "97.0.0"
