@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 
+import gc
 import os
 import random
 import signal
@@ -37,6 +38,17 @@ _WAITING = tuple(
 def pytest_asyncio_loop_factories() -> Mapping[str, type[EventLoop]]:
     """The daemon's own."""
     return {"daemon": EventLoop}
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Collect the tests, which stay to the end, without looking for garbage among them then or later."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 @pytest.hookimpl(wrapper=True)
