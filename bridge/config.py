@@ -41,7 +41,8 @@ class BridgeSettings:
     pass_through: Annotated[
         PassThroughRule,
         "Messages for an autopilot in pass-through from links with neither key_file nor writers: "
-        '"missions" (and parameters and requests), or "everything": arming, modes, control and Set WP on an INAV, too.',
+        '"missions" (and parameters and requests), or "everything", including arming, modes, control and Set WP on an'
+        " INAV.",
     ] = PassThroughRule.MISSIONS
 
 

@@ -121,7 +121,7 @@ def card(
     click.echo(f"Status page, with its token: {url}#token={token}")
     segno.make(f"{url}#token={token}", error="l").terminal(compact=True)
     if key:
-        click.echo(f"The key, for ground stations that may change something: {key}")
+        click.echo(f"The key, for ground stations that may make changes: {key}")
 
 
 def prepare(boot: Path, package: Path, options: list[str], secrets: dict[str, str]) -> None:

@@ -120,7 +120,7 @@ def setup(
         _carry_out([step for step in steps if not step.cuts_network], log)
     _print_addresses(host, answers)
     if new_key:
-        click.echo(f"\nThe key, for ground stations that may change something: {answers.key}")
+        click.echo(f"\nThe key, for ground stations that may make changes: {answers.key}")
         click.echo("In Mission Planner: Setup, Advanced, MAVLink Signing, Add")
         _print_code(str(answers.key))
     is_well = True
@@ -144,7 +144,7 @@ def _switch_network(steps: list[Step], log: UndoLog, hotspot: str | None, *, ask
         return
     click.echo(
         f"\nNow the Wi-Fi changes to the hotspot {hotspot!r}, and a connection over the present Wi-Fi network ends.\n"
-        f"Join it within {JOIN_S // 60} minutes: if no device does, the Pi returns to the present network."
+        f"Join it within {JOIN_S // 60} minutes: if no device does, the Pi returns to the current network."
     )
     if ask:
         click.prompt("Press Enter when you have noted the above", default="", show_default=False)

@@ -50,7 +50,7 @@ export function showTileTools(state, view) {
 
 function sentences(on, host, canKeep) {
   const kept = tiles.tiles ? [`${tiles.tiles} tiles, ${size(tiles.bytes)}, are kept on the Pi.`] : [];
-  if (!on) return [`Off: the map is drawn on plain ground. On, this browser asks ${host} for the tiles of what you look at.`, ...kept];
+  if (!on) return [`Off: the map is drawn on plain ground. When on, this browser fetches the tiles of the places that you view from ${host}.`, ...kept];
   const keepable = canKeep ? `The Pi can keep the tiles of this view for a field without a network.` : `The Pi keeps no tiles: ${host} does not allow that. Name another server in the setting web.map_tiles.`;
   return [`Tiles come from the Pi, else from ${host}.`, keepable, ...kept];
 }

@@ -18,12 +18,12 @@ export function answersPanel(pi, refresh) {
     const warnings = trial.warnings.map((text) => make("p", { class: "bad" }, text));
     if (!trial.steps.length) {
       plan.replaceChildren(...warnings);
-      return "Everything is set up like this already.";
+      return "Everything is already set up like this.";
     }
-    const network = trial.cuts_network ? [make("p", {}, "The Wi-Fi changes to the hotspot. Join it within 3 minutes: if no device does, the Pi returns to the present network.")] : [];
+    const network = trial.cuts_network ? [make("p", {}, "The Wi-Fi changes to the hotspot. Join it within 3 minutes: if no device does, the Pi returns to the current network.")] : [];
     const act = action("Make these changes", result, async () => {
       const made = await askPi({ action: "answer", ...answers });
-      plan.replaceChildren(...(made.key ? [make("p", {}, "The key, for ground stations that may change something: ", make("b", { class: "secret" }, made.key)), make("p", {}, "In Mission Planner: Setup, Advanced, MAVLink Signing, Add. Note it now: it is not shown again.")] : []));
+      plan.replaceChildren(...(made.key ? [make("p", {}, "The key, for ground stations that may make changes: ", make("b", { class: "secret" }, made.key)), make("p", {}, "In Mission Planner: Setup, Advanced, MAVLink Signing, Add. Write it down now: it is not shown again.")] : []));
       if (!made.key && !made.cuts_network) await refresh();
       return aftermath(made);
     });

@@ -18,7 +18,7 @@ export function settingsPanel({ keys, settings }, refresh) {
     return text;
   };
   const all = form({}, () => pressed(save, result, write), ...rows.map(({ element }) => element), make("div", { class: "row" }, save, result));
-  return make("details", {}, make("summary", {}, "Settings of the bridge"), make("p", {}, "Empty: the default. The bridge takes them over at once, or restarts."), all);
+  return make("details", {}, make("summary", {}, "Settings of the bridge"), make("p", {}, "Empty: the default. The bridge applies changes at once, or restarts."), all);
 }
 
 function row({ name, meaning, default: preset, example }, given) {

@@ -16,7 +16,7 @@ export function updatePanel({ version, previous }) {
   const update = form({ class: "row" }, () => pressed(send, result, () => install(file.files[0], bar, result)),
     make("label", {}, "Package (.deb) ", file), send, bar, result);
   const back = action(`Back to version ${previous}`, result, () => askPi({ action: "downgrade" }).then(() => LATER));
-  return make("details", {}, make("summary", {}, "Update"), make("p", {}, `This is version ${version}. A version that does not run is replaced by this one again.`), update, ...(previous ? [back] : []));
+  return make("details", {}, make("summary", {}, "Update"), make("p", {}, `This is version ${version}. If the new version does not run, this one is reinstalled.`), update, ...(previous ? [back] : []));
 }
 
 async function install(file, bar, result) {
