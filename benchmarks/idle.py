@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The cost of an idle daemon: CPU, memory, and the time from its start to its first heartbeat.
 
-It polls a simulated Naze behind a pseudo-terminal at 115200 baud and sends telemetry to one UDP address: first no
+It polls a simulated Naze on a pseudo-terminal at 115200 baud and sends telemetry to one UDP address: first no
 station answers from there, then one that requests nothing, then one that requests Mission Planner's rates. The Naze
 runs in another process and is not counted.
 """

@@ -35,14 +35,18 @@ class BenchmarkError(Exception):
 
 @contextmanager
 def running(command: Sequence[str], log: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """Run a program with its output in `log`; end it with SIGTERM."""
+    """Run a program with its output in `log`; end it with SIGTERM, or SIGKILL if it hangs."""
     with log.open("wb") as output:
         process = subprocess.Popen(command, cwd=ROOT, env=ENVIRONMENT, stdout=output, stderr=output)
     try:
         yield process
     finally:
         process.terminate()
-        process.wait()
+        try:
+            process.wait(_TIMEOUT_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
 
 
 def wait_for(condition: Callable[[], bool], what: str, timeout_s: float = _TIMEOUT_S) -> None:
