@@ -27,7 +27,7 @@ from tests.support.programs import NAZE_BRIDGE, free_port
 from tests.support.zenoh_router import client, running_router
 
 _COUNT = 10_000
-#: Of the overviews.
+#: The period of the overviews.
 _PERIOD_S = 10.0
 _WATCHED_S = 30.0
 _LISTS = 3

@@ -70,7 +70,7 @@ def _print(title: str, before: dict[str, int], now: dict[str, int], seconds: flo
 
 
 def _counters(pid: int, port: int) -> dict[str, int]:
-    """Of the daemon's connection to the router."""
+    """The counters of the daemon's connection to the router."""
     command = ["/usr/bin/ss", "-tinpH", f"dport = {port}"]
     found = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     (_, after) = found.split(f"pid={pid},", 1)

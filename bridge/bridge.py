@@ -75,7 +75,7 @@ class FcOutput(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Counters:
-    """Since the start; those of the flight controller since it was found, None without MSP."""
+    """Counted since the start; those of the flight controller since it was found, None without MSP."""
 
     ground_stations: int
     #: Frames of ground stations, by link and message id; damaged ones; refused ones, by link and reason.

@@ -34,7 +34,7 @@ _EXPRESSIONS = ("**", "**/@adv/**", "@cmd/**", "@mavlink/**")
 _VIEWED = ("*/v1/**", "*/v1/**/@adv/**")
 
 
-#: Of vehicles; ground stations have the others.
+#: System ids of vehicles; ground stations have the others.
 SYSIDS = range(1, 251)
 #: NAME.json5, NAME.pem and NAME.key are the router's, or those of the certificate authority.
 _RESERVED = ("router", "ca")

@@ -18,7 +18,7 @@ from payloads.keys import LOG_LIST, LOG_READ, ZenohKey
 from payloads.mission_data import Json
 
 _TIMEOUT_S = 30.0
-#: Of a piece; a bridge sends 64 kB.
+#: The limit for a piece; a bridge sends 64 kB.
 _MOST_BYTES = 1 << 20
 #: After a piece without a reply, for example because the link is down.
 _TRIES, _PAUSE_S = 5, 2.0

@@ -18,7 +18,7 @@ from fleet.vehicle import FleetVehicle
 from payloads.mission_data import Json
 
 _UNKNOWN = "-"
-#: Of many vehicles with the same problem, so many are named.
+#: The number of vehicles named if many have the same problem.
 _NAMED = 5
 _ANSWERS = {
     True: Text("yes", style="green"),

@@ -30,7 +30,7 @@ Progress = Callable[[str, int, int], None]
 _ATTEMPTS = 3
 _PAGES = FLASH_SIZE // PAGE_SIZE
 _BLANK = b"\xff"
-#: Of the stack pointer and the start address.
+#: The size of the stack pointer and the start address, bytes.
 _START_SIZE = 8
 
 T = TypeVar("T")

@@ -298,7 +298,7 @@ class Ground:
             and new.came_at >= old.heard_at
         )
 
-    # Sent to them.
+    # Messages to stations.
 
     def take_datagrams(self) -> list[tuple[Peer, bytes]]:
         """The datagrams to send; each holds whole frames. Those of one station are in order."""

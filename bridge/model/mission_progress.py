@@ -96,7 +96,7 @@ class MissionProgress:
         return range(reached + 1, report.reached + 1)
 
     def _take_status(self, status: NavStatus) -> int | None:
-        """Of several records reached since the last reply only the last is known."""
+        """If several records were reached since the last reply, only the last is known."""
         before, action = self.number, self._action
         if status.number == self.set_to > 0:
             before = self._reached = self.set_to = 0

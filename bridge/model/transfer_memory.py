@@ -34,7 +34,7 @@ class Download:
 
 @dataclass(slots=True)
 class TransferMemory:
-    """Of one station and mission type: its running download, and the answer to its last upload."""
+    """One station's running download, and the answer to its last upload, of one mission type."""
 
     download: Download | None = None
     final_ack: FinalAck | None = None

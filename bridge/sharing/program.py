@@ -12,7 +12,7 @@ from protocols.msp.frame import Direction, MspFrame, MspParser, request
 _LIMIT = Rate(200, 200)
 #: Programs mostly wait for a reply before they ask again.
 _MAX_WAITING = 16
-#: Of one read from a connection.
+#: The part of one read from a connection that is parsed, bytes.
 _READ_SIZE = 512
 #: A request waits for the line for this long. INAV Configurator repeats an unanswered request after 3 s.
 _WAIT_S = 3.0

@@ -47,7 +47,7 @@ _STATUS_CHECKS = 2
 _ASKS_AFTER_ACTION = 12
 #: After a restart the first readings may still settle.
 _SETTLED_S, _LEVEL_CHECKS, _LEVEL_INTERVAL_S = 1.0, 5, 0.1
-#: Of 1 g: 3 degrees. An uncalibrated sensor is off by as much.
+#: In g: 3 degrees. An uncalibrated sensor is off by as much.
 _MAX_TILT = 0.05
 
 

@@ -79,7 +79,7 @@ class MessageRouter:
         self._vehicle = vehicle
         self._commands = commands
         self._transfers = transfers
-        #: Of mission messages, by the type of their lists.
+        #: The handlers of mission messages, by the type of their lists.
         self._of_type = {kind: self._mission_handlers(each.uploads, each.downloads) for kind, each in transfers.items()}
         self.handlers: Mapping[int, _Handler] = {
             **self._of_type[m.MAV_MISSION_TYPE_MISSION],

@@ -134,7 +134,7 @@ class OwnVehicle:
         self._inform_newcomers(everyone, now)
 
     def _greet(self, now: float) -> None:
-        """Of a crowd, greet a few: the others get a heartbeat a second."""
+        """Greet a few newcomers of a crowd: the others get a heartbeat a second."""
         newcomers = [station for station in self._ground.everyone() if now < station.greeted_until][:SEATS]
         self._newcomers_due = now + _NEWCOMER_INTERVAL_S if newcomers else inf
         self._ground.beat(self._heartbeat(now), newcomers)

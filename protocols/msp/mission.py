@@ -62,10 +62,10 @@ class InfoFlag(IntFlag):
 
 _RECORD = struct.Struct("<iihhBBbB")
 _INFO = struct.Struct("<BBBBBBHHIHHHI")
-#: Of BEGIN, CHUNK and COMMIT.
+#: Replies to BEGIN, CHUNK and COMMIT.
 _PROGRESS = struct.Struct("<BHI")
 _LIST = struct.Struct("<HI")
-#: Of READ, ahead of the records: the first one's number. Of RADIUS: the radius.
+#: Reply to READ, before the records: the first one's number. Reply to RADIUS: the radius.
 _SHORT = struct.Struct("<BH")
 
 #: Payload size of an INFO reply of version 1.

@@ -105,8 +105,8 @@ def backup(client: BridgeClient, file: Path) -> None:
 def restore(client: BridgeClient, source: str, dry_run: bool) -> None:
     """Write the settings of SOURCE to the flight controller, save them, and verify them.
 
-    SOURCE is a .param file or the number of a backup. Everything that differs is shown first, and in a terminal you are
-    asked. Exit code 1: the flight controller does not hold all settings of SOURCE.
+    SOURCE is a .param file or the number of a backup. All differences are shown first, and in a
+    terminal the command asks before it writes. Exit code 1: the flight controller does not hold all settings of SOURCE.
     """
     values, board = _source(client, source)
     request: Json = {"do": "plan-settings", "values": dict(values), "board": board}

@@ -13,7 +13,7 @@ from payloads.mission_data import Json, to_json
 #: A doctor on a Pi Zero takes 10 s; apt compares all packages before it accepts one.
 _REPLY_TIMEOUT_S = 120.0
 _MAX_REPLY = 1 << 20
-#: Of an update, bytes.
+#: The largest update, bytes.
 MAX_PACKAGE = 128 << 20
 
 

@@ -84,7 +84,7 @@ class Pilot:
         self.naze.faults.aux2 = HIGH if place else MIDDLE
 
     def fly_forward(self, metres: float) -> None:
-        """Fly forward until so far from the launch place, then hold. PilotError."""
+        """Fly forward until this far from the launch place, then hold. PilotError."""
         switches = self.naze.faults
         self.hold(place=False)
         switches.pitch = _FORWARD

@@ -116,7 +116,7 @@ class InavPlaces:
                 return self._vertex(zone, payload[1])
             case 10 | 14 if command == SET_GEOZONE_VERTEX:
                 _, number, lat, lon = _PLACE.unpack_from(payload)
-                # Of a circle it reads a radius even from a request that has none.
+                # For a circle it reads a radius even from a request that has none.
                 radius = int.from_bytes((payload + behind)[10:14], "little", signed=True)
                 is_circle = self._zones[zone][1] == _CIRCLE
                 is_added = self._add(zone, number, lat, lon) and (not is_circle or self._add(zone, number + 1, radius))

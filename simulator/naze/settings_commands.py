@@ -25,7 +25,7 @@ _TRIMS = [_NAMES.index(name) for name in ("rc_trm_rll", "rc_trm_ptch")]
 _ALIGNMENT = ("align_gyro", "align_acc", "align_mag")
 #: A running firmware may crash with another value.
 CRASHING = frozenset(name for name in _NAMES if name == "gbl_flg" or name.startswith(_ALIGNMENT))
-#: Of all values in the configuration, bytes.
+#: The size of all values in the configuration, bytes.
 STORED_SIZE = 4 * len(SETTINGS)
 
 

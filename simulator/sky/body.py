@@ -70,7 +70,7 @@ class Body:
         return self.position[2] <= 0.0
 
     def step(self, dt: float, pulses_us: tuple[int, ...], wind: Vector) -> None:
-        """Move on by `dt` (about a millisecond) with these motor pulses and this wind (m/s)."""
+        """Advance by `dt` (about a millisecond) with these motor pulses and this wind (m/s)."""
         frame = self.frame
         follow = 1 - exp(-dt / frame.motor_lag_s)
         thrusts = self.thrusts

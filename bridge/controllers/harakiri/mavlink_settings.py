@@ -18,9 +18,9 @@ from protocols.mavlink.frame import MavlinkFrame
 
 _REQUEST = pack(m.MAVLink_param_request_list_message(1, 200))
 _VALUE = m.MAVLINK_MSG_ID_PARAM_VALUE
-#: A board that has just disarmed answers the next probe for MSP: it must not be kept from it.
+#: A board that has just disarmed answers the next probe for MSP, which must not be delayed.
 _SETTLED_S = 1.2
-#: The list is requested at most so often, and twice without any answer.
+#: The maximum number of requests for the list, in all and without any answer.
 _LISTS, _SILENT_LISTS = 5, 2
 #: Without a value for this long, the list has ended.
 _SILENCE_S = 1.0

@@ -162,7 +162,7 @@ class FenceCheck(ListCheck):
         super().__init__(count)
         self._rules = rules
         self._zones: list[Geozone] = []
-        #: Of the polygon that is arriving.
+        #: The corners of the polygon that is arriving.
         self._corners: list[Corner] = []
         self._first: MissionItem | None = None
 

@@ -216,7 +216,7 @@ class _ForeignBytes:
 
 
 def _identify(profiles: Sequence[Profile]) -> Conversation[FlightController | None]:
-    """Interview the board; None if a question stayed unanswered or no profile recognised it."""
+    """Identify the board; None if it left a request unanswered or no profile recognised it."""
     board = Interview()
     try:
         for profile in profiles:

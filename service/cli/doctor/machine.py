@@ -30,7 +30,7 @@ _LEAST_FREE = 64 << 20
 _LIBRARIES = ("pyserial", "eclipse-zenoh")
 _HWMON = "/sys/class/hwmon"
 _THROTTLED = ("vcgencmd", "get_throttled")
-#: Of its reply: undervoltage now, and since the start.
+#: Bits of its reply: undervoltage now, and since the start.
 _NOW, _SINCE_START = 1 << 0, 1 << 16
 _BETTER_SUPPLY = "use the Pi's own supply or a BEC of 5.1 V and 3 A, with short, thick wires"
 
