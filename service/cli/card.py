@@ -25,6 +25,8 @@ from terminal.options import PATH
 from terminal.sentences import complain, fail
 
 FOLDER = "naze-bridge"
+#: deb(5): an ar archive whose first member is debian-binary.
+_DEB = b"!<arch>\ndebian-binary"
 _LOG = "/var/log/naze-bridge-card.log"
 _UNIT = "/etc/systemd/system/naze-bridge-card.service"
 #: The boot partition's place: from bookworm on, and before.
@@ -133,7 +135,7 @@ def prepare(boot: Path, package: Path, options: list[str], secrets: dict[str, st
         raise CardError(
             f"{boot} is not the boot partition of a Raspberry Pi OS card: it has no cmdline.txt or config.txt"
         )
-    if package.suffix != ".deb" or not package.is_file():
+    if package.suffix != ".deb" or not package.is_file() or not _is_package(package):
         raise CardError(f"{package} is not a package: build one with `make deb`, or take one from the releases")
     hook, text = _hooked(boot)
     folder = boot / FOLDER
@@ -150,6 +152,11 @@ def prepare(boot: Path, package: Path, options: list[str], secrets: dict[str, st
     _write(folder / "first-boot.sh", _FIRST_BOOT.format(log=_LOG, unit=_UNIT, options=words))
     _write(folder / "enable.sh", _ENABLE)
     _write(hook, text)  # last: a card that was pulled out before it starts as if untouched
+
+
+def _is_package(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(len(_DEB)) == _DEB
 
 
 def _write(path: Path, text: str) -> None:

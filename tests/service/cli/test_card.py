@@ -18,6 +18,9 @@ _SYSTEMD_RUN = "systemd.run=/boot/firstrun.sh systemd.run_success_action=reboot 
 _FIRSTRUN = "#!/bin/bash\n\nset +e\n\necho kite >/etc/hostname\nrm -f /boot/firstrun.sh\nexit 0\n"
 _USER_DATA = "#cloud-config\nhostname: kite\nusers:\n- name: pilot\n  shell: /bin/bash\n"
 
+#: The beginning of a Debian package.
+_PACKAGE = b"!<arch>\ndebian-binary   1700000000  "
+
 
 class Card:
     def __init__(self, folder: Path) -> None:
@@ -26,7 +29,7 @@ class Card:
         for name, text in (("cmdline.txt", "console=tty1 rootwait"), ("config.txt", "[all]\n")):
             (self.boot / name).write_text(text)
         self.package = folder / "naze-bridge_1.0_arm64.deb"
-        self.package.write_bytes(b"a package")
+        self.package.write_bytes(_PACKAGE)
         self.password = folder / "password"
         self.password.write_text("long-enough\n")
 
@@ -107,7 +110,7 @@ def test_the_folder_has_the_package_the_answers_and_valid_scripts(card: Card) ->
     card.trixie()
     done = card.prepare("--new-key", "--name", "kite")
     folder = card.boot / "naze-bridge"
-    assert (folder / "naze-bridge.deb").read_bytes() == b"a package"
+    assert (folder / "naze-bridge.deb").read_bytes() == _PACKAGE
     assert (folder / "password").read_text() == "long-enough\n"
     key, token = ((folder / name).read_text().strip() for name in ("key", "web-token"))
     assert f": {key}" in done.output
@@ -126,6 +129,8 @@ def test_the_folder_has_the_package_the_answers_and_valid_scripts(card: Card) ->
     [
         (lambda card: (card.boot / "config.txt").unlink(), "is not the boot partition"),
         (lambda card: card.package.unlink(), "is not a package"),
+        (lambda card: card.package.write_bytes(b""), "is not a package"),
+        (lambda card: card.package.write_bytes(b"<html>"), "is not a package"),
         (lambda card: (card.boot / "user-data").unlink(), "Raspberry Pi Imager"),
         (lambda card: (card.boot / "user-data").write_text("x: 1\n"), "is not cloud-init's"),
         (lambda card: (card.boot / "user-data").write_text("#cloud-config\nruncmd: [ls]\n"), "list of lines"),
