@@ -78,7 +78,7 @@ class Control:
                 faults = self._board.faults
                 try:
                     setattr(faults, name, type(getattr(faults, name))(float(value)))
-                except (TypeError, ValueError):
+                except (TypeError, ValueError, OverflowError):
                     return f"error: {name} takes a number, not {value!r}"
             case _:
                 return f"error: unknown line {line.strip()!r}"

@@ -178,6 +178,7 @@ def test_control_switches_faults_and_power(start: Callable[..., Simulator]) -> N
         assert ask(port, IDENT, SILENCE_S) is None
         assert simulator.stats()["power"] == "OFF"
     assert simulator.control("bit_error_rate much") == "error: bit_error_rate takes a number, not 'much'"
+    assert simulator.control("boxes inf") == "error: boxes takes a number, not 'inf'"
     assert simulator.control("sing") == "error: unknown line 'sing'"
 
 
