@@ -65,6 +65,18 @@ def test_arming_and_modes_are_reported_at_once(switch: str, position: int) -> No
     assert bool(heartbeat.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED) is (switch == "boxes")
 
 
+def test_a_heartbeat_is_sent_with_a_poll() -> None:
+    """It needs no wake-up of its own: polls are due at whole seconds, whenever the bridge started."""
+    world = World()
+    world.restart_bridge(away_s=2.345)
+    world.wait_ready()
+    station = listening(world)
+    world.run(10)
+    times = [at for at, message in station.received if message.get_type() == "HEARTBEAT"][-5:]
+    polled = {round(at, 2) for at, _, _ in world.written}
+    assert polled.issuperset(round(at, 2) for at in times)
+
+
 def test_a_disarmed_craft_is_on_the_ground() -> None:
     world, station = flown(3)
     assert station.take("EXTENDED_SYS_STATE")[-1].landed_state == m.MAV_LANDED_STATE_IN_AIR
