@@ -130,7 +130,9 @@ class _Slot:
 
     def set_interval(self, interval_s: float) -> None:
         self.interval_s = interval_s
-        self.request = replace(self.request, may_wait=interval_s >= _MAY_WAIT_S)
+        may_wait = interval_s >= _MAY_WAIT_S
+        if may_wait is not self.request.may_wait:
+            self.request = replace(self.request, may_wait=may_wait)
         self.early_s = min(interval_s * _EARLY, _EARLIEST_S)
         self._set_due()
 
