@@ -23,6 +23,8 @@ _UNKNOWN_COMMAND = b"### ERROR: Unknown command, try 'help'"
 _CLI_LEFT = b"\r\nLeaving CLI mode, unsaved changes lost.\r\nRebooting"
 _CLI_LINE_SIZE = 64
 _NO_SPEED = 115200
+#: Those that INAV obeys outside of frames.
+_LETTERS = b"#R"
 #: How often the pilot retries a refused arming.
 _ARM_RETRY_S = 0.1
 
@@ -176,7 +178,7 @@ class MspBoard(SimulatedBoard):
     def _serve_msp(self, firmware: MspFirmware, at: float) -> None:
         """Read until a request is complete: one each time."""
         while (byte := self._ring.read(at)) is not None:
-            is_frames = self._receiver.in_frame or byte == ord("$")
+            is_letter = byte in _LETTERS and not self._receiver.in_frame
             request = self._receiver.push(byte)
             if request:
                 command, payload = request
@@ -187,7 +189,7 @@ class MspBoard(SimulatedBoard):
                 if answer is not None:
                     self._ring.write(answer, at + (self._busy if command in firmware.habits.writes_first else 0.0))
                 return
-            if not is_frames and not firmware.armed:
+            if is_letter and not firmware.armed:
                 self._hear_letter(firmware, chr(byte))
 
     def _hear_letter(self, firmware: MspFirmware, letter: str) -> None:

@@ -3,7 +3,6 @@
 
 import struct
 from collections.abc import Callable
-from dataclasses import replace
 
 from protocols.msp.frame import Direction, MspFrame
 from simulator.board.flight import Craft
@@ -116,18 +115,18 @@ class MspAnswers:
         self._unknown_e7 = 0 if tree is Tree.TESTCODE3 else 1_900_000_000
         boxes = [box for box in _BOXES if box != "PASSTHRU" or tree is Tree.TESTCODE3]
         self._sensors = SensorReplies(dict(enumerate(boxes)), _CYCLE_TIME_US)
-        self._defaults = {
+        self._defaults: dict[int, bytes] = {
             MspCommand.RC_TUNING: bytes((90, 65, 0, 0, 0, 50, 0)),
             MspCommand.PID: bytes((40, 30, 23)) * len(_PIDS),
             MspCommand.BOX: box_activation(len(boxes)),
         }
-        self._settings = dict(self._defaults)
+        #: The switch positions that arm.
+        self.arm_switches = 0
+        self._use(dict(self._defaults))
 
-    @property
-    def arm_switches(self) -> int:
-        """The switch positions that arm."""
-        word: int = struct.unpack_from("<H", self._settings[MspCommand.BOX], 2 * _ARM_BIT)[0]
-        return word
+    def _use(self, settings: dict[int, bytes]) -> None:
+        self._settings = settings
+        (self.arm_switches,) = struct.unpack_from("<H", settings[MspCommand.BOX], 2 * _ARM_BIT)
 
     @property
     def box_size(self) -> int:
@@ -143,10 +142,10 @@ class MspAnswers:
             values = buffer[: len(self._settings[setting])]
             if command == MspCommand.SET_PID:
                 values = bytes(max(byte, 1) if at in _CLAMPED_PIDS else byte for at, byte in enumerate(values))
-            self._settings[setting] = values
+            self._use({**self._settings, setting: values})
             return reply(command)
         if command == MspCommand.RESET_CONF:
-            self._settings = dict(self._defaults)
+            self._use(dict(self._defaults))
             return reply(command)
         if command in _ACKNOWLEDGED:
             return reply(command)
@@ -156,7 +155,7 @@ class MspAnswers:
     def _read(self, command: int) -> bytes | None:
         craft = self._craft()
         flags = craft.boxes & ~(1 << _ARM_BIT) | craft.armed << _ARM_BIT
-        usual = self._sensors.payload(command, replace(craft, boxes=flags))
+        usual = self._sensors.payload(command, Craft(craft.flight, craft.armed, flags, craft.home, craft.acc))
         match command:
             case MspCommand.IDENT:
                 return struct.pack("<BBBI", _VERSION, _QUADX, _MSP_VERSION, _CAPABILITY)

@@ -130,8 +130,9 @@ class InavFirmware(MspFirmware):
         """Fly until `now`, arm and disarm. CrashError: the check before arming found a JUMP with an invalid target."""
         self._fly_until(now)
         self._follow_sticks(now)
-        blockers = self._arming_blockers()
-        if self._faults.armed and not self.armed and not blockers:
+        # Without this request only a JUMP has an effect: it may crash INAV.
+        looks = not self.armed and (self._faults.armed or self._mission.had_jumps)
+        if looks and not self._arming_blockers() and self._faults.armed:
             self.armed = True
             self._mission.follow_selection()
             self._home = self._craft.position

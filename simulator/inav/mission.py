@@ -29,7 +29,7 @@ class InavMission:
         # Deleted waypoints stay in memory; only the counts change.
         self._list = [NavWaypoint(action=0, flag=0)] * CAPACITY
         #: False if no JUMP was ever written, so that none need be looked for.
-        self._had_jumps = False
+        self.had_jumps = False
         #: nav_wp_multi_mission_index: the number of the mission to fly, from 1. The pilot's sticks change it.
         self.selected = 1
         self._forget()
@@ -77,7 +77,7 @@ class InavMission:
         if number == 1:
             self._forget()
         if waypoint.action == NavAction.JUMP:
-            self._had_jumps = True
+            self.had_jumps = True
             waypoint = replace(waypoint, p1=wrap16(waypoint.p1 - 1))
         self._list[number - 1] = waypoint
         self.count = number
@@ -124,7 +124,7 @@ class InavMission:
 
     def is_flyable(self) -> bool:
         """True if INAV allows arming with these JUMPs; checked whenever it is disarmed. CrashError."""
-        if not self._had_jumps:
+        if not self.had_jumps:
             return True
         jump = int(NavAction.JUMP)
         for index, waypoint in enumerate(self._list[self._start : self._start + self.count]):

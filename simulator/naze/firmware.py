@@ -182,8 +182,8 @@ class Firmware:
     def _pilot_is_obeyed(self) -> bool:
         """Arming is refused while a configuration write is scheduled."""
         switches = switch_positions(self._faults.armed, self._faults.boxes)
-        arm_is_on = bool(self._answers.arm_switches & switches)
-        return arm_is_on != self.armed and (self.armed or self._board.config_write_due is None)
+        arm_is_on, armed = bool(self._answers.arm_switches & switches), self._board.armed
+        return arm_is_on != armed and (armed or self._board.config_write_due is None)
 
     def _follow_pilot(self) -> None:
         """Arm or disarm; the UART's speed follows (initFRSKYTelemetry, initMinimOSDTelemetry)."""

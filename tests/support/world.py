@@ -59,6 +59,7 @@ from tests.support.inside import Inside
 #: Limit on waiting conversations: a flood of requests must not fill the bridge's memory.
 MAX_QUEUED = 12
 _MAX_TICKS_AT_ONCE = 8
+_RIGHTS_IN_SEARCH, _RIGHTS = frozenset((Effect.READ,)), frozenset((Effect.READ, Effect.CHANGE))
 #: Their parsers act on no byte inside a frame.
 _TAKES_ANY_BYTE = (inav.PROFILE, multiwii.PROFILE, other.CLEANFLIGHT, other.OLD_MULTIWII)
 
@@ -380,9 +381,9 @@ class World:
             assert controller is not None
             assert (controller.firmware, self.bridge.vehicle.armed) == (Firmware.INAV, True)
             return
-        boards = Firmware if controller is None else (controller.firmware,)
-        effects = {_effect(firmware, frame.command, frame.payload) for firmware in boards}
-        assert effects & ({Effect.READ} if controller is None else {Effect.READ, Effect.CHANGE}), (boards, frame)
+        firmware = None if controller is None else controller.firmware
+        rights = _RIGHTS_IN_SEARCH if controller is None else _RIGHTS
+        assert not rights.isdisjoint(_effects(firmware, frame.command, frame.payload)), (firmware, frame)
 
     def _carry_out(self, effect: StoreEffect) -> None:
         def answer() -> None:
@@ -404,8 +405,10 @@ def _whole_frames(data: bytes) -> tuple[MspFrame, ...]:
 
 
 @lru_cache(4096)
-def _effect(firmware: Firmware, command: int, payload: bytes) -> Effect:
-    return msp_right(firmware, command, payload).effect
+def _effects(firmware: Firmware | None, command: int, payload: bytes) -> frozenset[Effect]:
+    """The effect of a request on this board; on each possible one if it is None."""
+    boards = Firmware if firmware is None else (firmware,)
+    return frozenset(msp_right(board, command, payload).effect for board in boards)
 
 
 def ready_world() -> World:
@@ -446,7 +449,9 @@ class GroundStation:
         self.peer = Peer("udp", name)
         self.version = version
         self.radio = radio or Radio()
-        self.received: list[tuple[float, Message]] = []
+        self._received: list[tuple[float, Message]] = []
+        # pymavlink takes a twentieth of a test's time, so it decodes only frames that are looked at.
+        self._undecoded: list[tuple[float, bytes]] = []
         self.frames: list[bytes] = []
         self.on_message: list[Callable[[Message], None]] = []
         self._mavlink = messages.MAVLink(None, srcSystem=sysid, srcComponent=compid)
@@ -454,6 +459,13 @@ class GroundStation:
         self._decoder = every_message.MAVLink(None)
         self.sysid, self.compid = sysid, compid
         world.stations[self.peer] = self
+
+    @property
+    def received(self) -> list[tuple[float, Message]]:
+        """All received messages, each with its time."""
+        self._received += [(at, self._decoder.decode(bytearray(frame))) for at, frame in self._undecoded]
+        self._undecoded.clear()
+        return self._received
 
     def send(self, message: Message) -> None:
         data = self.pack(message)
@@ -501,10 +513,11 @@ class GroundStation:
         assert len(found) == 1 or len(frame) <= MAX_DATAGRAM_SIZE
         for each in found:
             self.frames.append(each.raw)
-            message = self._decoder.decode(bytearray(each.raw))
-            self.received.append((self.world.now, message))
-            for react in self.on_message:
-                react(message)
+            self._undecoded.append((self.world.now, each.raw))
+            if self.on_message:
+                message = self.received[-1][1]
+                for react in self.on_message:
+                    react(message)
 
     def _transmit(self, arrive: Callable[[], None]) -> None:
         chance, radio = self.world.random, self.radio
