@@ -12,10 +12,17 @@ from selenium.webdriver import Chrome, ChromeOptions, ChromeService
 from selenium.webdriver.common.by import By
 from selenium.webdriver.remote.webelement import WebElement
 
-from tests.support.programs import TIMEOUT_S, until
+from tests.support.programs import TIMEOUT_S, happens, until
 
 PHONE = (360, 740)
 LAPTOP = (1280, 900)
+_WATCH_CLICK = """
+    const wanted = document.querySelector(arguments[0]);
+    window.missed = true;
+    const look = click => { window.missed = !wanted.contains(click.target) };
+    document.addEventListener("click", look, {once: true, capture: true});
+    wanted.scrollIntoView({block: "center"});
+"""
 
 
 class Browser:
@@ -53,12 +60,16 @@ class Browser:
         return str(self.run(script, selector))
 
     def wait_text(self, selector: str, text: str) -> None:
-        until(lambda: text in self.text(selector), f"{text!r} in {selector}")
+        assert happens(lambda: text in self.text(selector)), f"no {text!r} in {selector}, but {self.text(selector)!r}"
 
     def press(self, selector: str) -> None:
-        """Scroll it into view and click it."""
-        self.run("document.querySelector(arguments[0]).scrollIntoView({block: 'center'})", selector)
+        """Scroll it into view and click it; again if the page moved meanwhile and something else was hit."""
+        until(lambda: self._hits(selector), f"a click on {selector}")
+
+    def _hits(self, selector: str) -> bool:
+        self.run(_WATCH_CLICK, selector)
         self.find(selector).click()
+        return not self.run("return window.missed")  # undefined if the click has opened another page
 
     def value(self, name: str) -> str:
         """The value of a name in the overview."""
