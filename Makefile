@@ -122,7 +122,7 @@ define set_up
 	@$(PYTHON) -c 'import ensurepip, venv' || { \
 	    echo 'naze-bridge needs the venv module of $(PYTHON); on Debian: apt-get install python3-venv' >&2; exit 1; }
 	@echo 'Installing $< in $(VENV)'
-	@$(PYTHON) -m venv $(VENV)
+	@test -x $(BIN)/pip || $(PYTHON) -m venv $(VENV)
 	@$(PIP_INSTALL) --require-hashes --only-binary=:all: -r $<
 	@$(PIP_INSTALL) --no-build-isolation --editable .
 	@touch $@
