@@ -28,7 +28,7 @@
 #   make zenoh-schemas  regenerate payloads/schemas/ from the payload types
 #   make clean          remove all generated files that are not in git
 
-# The system's first: the Debian package runs on it, and it is built with optimizations, as many others are not.
+# The system's first: the Debian package runs on it, and unlike many others it is built with optimizations.
 PYTHON ?= $(shell for python in /usr/bin/python3 python3; do \
     $$python -c 'import sys, ensurepip, venv; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && break; done; echo $$python)
 UV ?= uv

@@ -22,7 +22,7 @@ _PAYLOAD = "the query's payload"
 #: and so have the 650 settings of an INAV.
 _MAX_BYTES = 1 << 18
 _MAX_ITEMS = 1000
-#: Parsed on the event loop. So short a text cannot be nested too deeply either.
+#: Parsed on the event loop. A text this short cannot be nested too deeply either.
 _MAX_LOG_REQUEST = 256
 _LOG_FORM = 'the payload must be {"name": "2026-05-01 10-00-00.tlog", "start": 0}'
 
@@ -105,8 +105,10 @@ class CommandQueries:
 
     async def _read_log(self, question: Question) -> Json:
         """One piece, for a slow uplink."""
+        if question.size > _MAX_LOG_REQUEST:
+            raise QueryRefused(_LOG_FORM)
         try:
-            wanted = json.loads(question.payload() if question.size <= _MAX_LOG_REQUEST else b"")
+            wanted = json.loads(question.payload())
             name, start = wanted["name"], whole_number(wanted, "start", 0, MOST)
         except (ValueError, LookupError, TypeError) as error:
             raise QueryRefused(_LOG_FORM) from error

@@ -28,7 +28,7 @@ class InavMission:
         self._eeprom = eeprom
         # Deleted waypoints stay in memory; only the counts change.
         self._list = [NavWaypoint(action=0, flag=0)] * CAPACITY
-        #: False if no JUMP was ever written, so that none need be looked for.
+        #: False if no JUMP was ever written: then none is searched for.
         self.had_jumps = False
         #: nav_wp_multi_mission_index: the number of the mission to fly, from 1. The pilot's sticks change it.
         self.selected = 1
@@ -126,9 +126,9 @@ class InavMission:
         """True if INAV allows arming with these JUMPs; checked whenever it is disarmed. CrashError."""
         if not self.had_jumps:
             return True
-        jump = int(NavAction.JUMP)
-        for index, waypoint in enumerate(self._list[self._start : self._start + self.count]):
-            if waypoint.action != jump:
+        for index in range(self.count):
+            waypoint = self[index]
+            if waypoint.action != NavAction.JUMP:
                 continue
             target = waypoint.p1
             is_near = index - 2 < target < index + 2

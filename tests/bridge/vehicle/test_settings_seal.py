@@ -222,8 +222,8 @@ def test_a_change_through_the_bridge_survives_a_restart_before_the_next_reading(
     assert again.events("settings.changed_on_board") == []
 
 
-def test_a_change_through_the_bridge_before_the_first_reading_is_not_reported() -> None:
-    """Another run of the bridge has read the board."""
+def changed_before_the_first_reading() -> World:
+    """A bridge through which settings are changed before it has read the board, as another run of it has."""
     seals = SealsOfThisRun()
     board = naze()
     sealed(lambda: board, seals)
@@ -232,19 +232,18 @@ def test_a_change_through_the_bridge_before_the_first_reading_is_not_reported() 
     assert world.inside.seal.state is None
     on_the_board(world, SET_PID, bytes(30))
     world.inside.seal.changed_here(world.now)
+    return world
+
+
+def test_a_change_through_the_bridge_before_the_first_reading_is_not_reported() -> None:
+    world = changed_before_the_first_reading()
     world.wait_until(lambda world: world.inside.seal.state is not None, 20)
     world.run(1)
     assert world.events("settings.changed_on_board") == []
 
 
 def test_a_first_reading_that_is_cut_off_does_not_forget_a_change_through_the_bridge() -> None:
-    seals = SealsOfThisRun()
-    board = naze()
-    sealed(lambda: board, seals)
-    world = World(speeds=(115200,), peer=board, seals=seals)
-    world.wait_ready(40)
-    on_the_board(world, SET_PID, bytes(30))
-    world.inside.seal.changed_here(world.now)
+    world = changed_before_the_first_reading()
     began_at = world.now
     world.wait_until(lambda world: PID in requests(world, began_at), 20)
     assert world.inside.seal.state is None
