@@ -51,6 +51,10 @@ class NavAction(IntEnum):
     LAND = 8
 
 
+#: The time of a POSHOLD_TIME that replaces an endless hold, which INAV lacks: nine hours.
+ENDLESS_S = 32767
+#: INAV ignores lower speeds, cm/s.
+LEAST_SPEED_CMS = 50
 #: Actions that fly to a place.
 LEGS = frozenset((NavAction.WAYPOINT, NavAction.POSHOLD_UNLIM, NavAction.POSHOLD_TIME, NavAction.LAND))
 #: Actions that only turn the craft.

@@ -17,7 +17,6 @@ from bridge.controllers.inav.limits import SETTING_NAMES, InavLimits
 from bridge.controllers.inav.safehomes import read_safehomes, with_approaches
 from bridge.controllers.inav.settings import read_values
 from bridge.controllers.nav.check import NavRules
-from bridge.controllers.nav.items import item_seqs
 from bridge.controllers.nav.mission_store import NOTHING, NavMissions
 from bridge.controllers.nav.rules import NavProfile
 from bridge.controllers.nav.stored_missions import Mission, erased, flown, split_missions
@@ -49,6 +48,7 @@ from protocols.msp.nav import (
     NavRecord,
     decode_info,
 )
+from protocols.msp.nav_items import item_seqs
 from protocols.msp.telemetry import decode_channels
 
 _MAX_SAVES = 3

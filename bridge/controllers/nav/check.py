@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from bridge.controllers.nav.flown_path import flown_size, jump_within_jump, lands_after_rth
-from bridge.controllers.nav.items import GROUND_SPEED, home_item, items_from_records, leg_speed, sent_seqs
 from bridge.controllers.nav.judgement import Departure, Judgement
 from bridge.controllers.nav.jumps import Jumps
 from bridge.controllers.nav.landing import placed_landing
@@ -37,6 +36,7 @@ from bridge.missions.list_check import (
 from protocols.float32 import is_single
 from protocols.mission_item import ROI_COMMANDS, Command, MissionItem, MissionResult
 from protocols.msp.nav import LAST, LEGS, TURNS, NavAction, NavRecord
+from protocols.msp.nav_items import GROUND_SPEED, home_item, items_from_records, leg_speed, sent_seqs
 from reports.finding import DROPPED, Finding, News, RejectingFinding, reject, reject_list
 from reports.verdict import Result, Verdict
 

@@ -4,11 +4,11 @@
 import math
 from dataclasses import dataclass, field
 
-from bridge.controllers.nav.items import AS_SET, GROUND_SPEED
-from bridge.controllers.nav.rules import LEAST_SPEED_CMS
 from bridge.missions.list_check import given
 from protocols.float32 import is_single
 from protocols.mission_item import MissionItem
+from protocols.msp.nav import LEAST_SPEED_CMS
+from protocols.msp.nav_items import AS_SET, GROUND_SPEED
 from reports.finding import Note
 
 _MAX_SPEED_CMS = 32767

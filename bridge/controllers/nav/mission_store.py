@@ -12,7 +12,6 @@ from dataclasses import replace
 from math import ceil
 
 from bridge.controllers.nav.check import NavRules
-from bridge.controllers.nav.items import home_item, item_seqs, items_from_records
 from bridge.controllers.nav.rules import NavProfile
 from bridge.fc.profile import FlightController
 from bridge.line.conversation import Conversation, LinkLost, Receive, Send, Stopped, ask, ask_armed, send
@@ -39,6 +38,7 @@ from protocols.msp.nav import (
     encode_read_wp,
     encode_set_wp,
 )
+from protocols.msp.nav_items import home_item, item_seqs, items_from_records
 
 #: The replacement for an empty list, which cannot be written.
 NOTHING = (NavRecord(NavAction.RTH, flag=LAST),)

@@ -9,15 +9,11 @@ from bridge.controllers.nav.judgement import BoardLimits
 from bridge.controllers.nav.leg_limits import LegLimits
 from bridge.missions.list_check import UNUSED, Range
 from protocols.mission_item import ROI_COMMANDS, Command
-from protocols.msp.nav import NavAction
+from protocols.msp.nav import ENDLESS_S, NavAction
 
-#: The time of a POSHOLD_TIME that replaces an endless hold, which INAV lacks: nine hours.
-ENDLESS_S = 32767
 #: The capacity in records: of every INAV, and of MultiWii's navigation build, whose boards report theirs.
 INAV_CAPACITY = 120
 MULTIWII_CAPACITY = 178
-#: INAV ignores lower speeds, cm/s.
-LEAST_SPEED_CMS = 50
 #: The height above home that replaces 0, metres.
 LEAST_HEIGHT_M = 2
 HOLD = Range(0, ENDLESS_S - 1, f"seconds 0..{ENDLESS_S - 1}")

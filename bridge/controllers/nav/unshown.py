@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import zip_longest
 
-from bridge.controllers.nav.items import HIGHEST_HEADING, leg_speed
 from protocols.msp.nav import FLY_HOME, LEGS, NavAction, NavRecord
+from protocols.msp.nav_items import HIGHEST_HEADING, leg_speed
 
 _ABOVE_SEA = 1
 #: The fields of a record that items do not show, by its action; of these, only a LAND's p2 changes a flight.

@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.controllers.nav.check import NavRules
-from bridge.controllers.nav.items import home_item, items_from_records
-from bridge.controllers.nav.rules import ENDLESS_S, inav_profile
+from bridge.controllers.nav.rules import inav_profile
 from bridge.missions.list_check import check_list
 from protocols.mavlink.codec import item_from_float_message
 from protocols.mission_item import MissionItem, MissionResult
-from protocols.msp.nav import FLY_HOME, LAST, LEGS, NavAction, NavRecord, decode_wp, encode_set_wp
+from protocols.msp.nav import ENDLESS_S, FLY_HOME, LAST, LEGS, NavAction, NavRecord, decode_wp, encode_set_wp
+from protocols.msp.nav_items import home_item, items_from_records
 from reports.finding import DROPPED, News
 from reports.verdict import Result
 from tests.bridge.controllers.harakiri.test_rules import degrees, numbers

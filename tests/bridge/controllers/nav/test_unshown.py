@@ -7,11 +7,11 @@ from dataclasses import replace
 import pytest
 
 from bridge.controllers.nav.check import NavRules
-from bridge.controllers.nav.items import home_item, items_from_records
 from bridge.controllers.nav.rules import inav_profile
 from bridge.missions.list_check import check_list
 from protocols.mission_item import MissionItem
 from protocols.msp.nav import FLY_HOME, LAST, NavRecord
+from protocols.msp.nav_items import home_item, items_from_records
 from reports.finding import News
 from tests.support.nav_lists import LAT, LON, A
 

@@ -9,10 +9,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import accumulate
 from types import MappingProxyType
 
-from bridge.controllers.nav.rules import ENDLESS_S, LEAST_SPEED_CMS
 from protocols.mission_item import ROI_COMMANDS, Command, Frame, MissionItem
-from protocols.msp.nav import NavAction, NavRecord
-from reports.verdict import SentSeqs
+from protocols.msp.nav import ENDLESS_S, LEAST_SPEED_CMS, NavAction, NavRecord
 
 _NONE_KNOWN: Mapping[int, int] = MappingProxyType({})
 _UNKNOWN_COMMAND = 0
@@ -56,7 +54,9 @@ def item_seqs(records: Sequence[NavRecord]) -> list[int]:
     return list(accumulate(2 if place in speeds else 1 for place in range(len(records))))
 
 
-def sent_seqs(records: Sequence[NavRecord], record_seqs: Iterable[int], speed_seqs: Iterable[int]) -> SentSeqs:
+def sent_seqs(
+    records: Sequence[NavRecord], record_seqs: Iterable[int], speed_seqs: Iterable[int]
+) -> tuple[int | None, ...]:
     """The numbers as sent of the items that these records are read back as.
 
     `record_seqs`: of the item that each record was made from; `speed_seqs`: of the changes of speed, ascending.
