@@ -2,10 +2,7 @@
 """Payloads: plain data in JSON or compact CBOR, with a version, a sequence number and a time."""
 
 import json
-from collections.abc import Callable, Hashable
-from dataclasses import fields, is_dataclass
-from functools import cache
-from operator import attrgetter
+from collections.abc import Callable
 from typing import Any
 
 import zenoh
@@ -15,7 +12,6 @@ from payloads.keys import COMMAND_KEYS, OVERVIEW, VERSION, PayloadEncoding, Zeno
 from payloads.mission_data import Json, to_json
 
 _write_json = json.JSONEncoder(separators=(",", ":"), allow_nan=False).encode
-_SCALARS = frozenset((float, int, str, bool, type(None)))
 _SCHEMA = f"naze-bridge/v{VERSION}/"
 
 
@@ -80,23 +76,3 @@ class Payloads:
             return to_json(body).encode()
         seq = max(self._next.get(key.suffix, 0) - 1, 0)
         return self.encode(key, self._envelope(key, seq) | body)
-
-
-def plain(thing: Any) -> Json:
-    """Turn a dataclass into plain data, recursively. asdict() copies everything and takes five times as long."""
-    names, values = _layout(type(thing))  # type: ignore[arg-type]  # a class can be hashed
-    return dict(zip(names, map(_plain_value, values(thing)), strict=True))
-
-
-def _plain_value(value: Any) -> Any:
-    if type(value) in _SCALARS:
-        return value
-    if isinstance(value, tuple):
-        return list(value)
-    return plain(value) if is_dataclass(value) else value
-
-
-@cache
-def _layout(kind: Hashable) -> tuple[tuple[str, ...], Callable[[Any], tuple[Any, ...]]]:
-    names = tuple(each.name for each in fields(kind))  # type: ignore[arg-type]
-    return names, attrgetter(*names)

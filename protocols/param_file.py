@@ -25,6 +25,8 @@ _MISSION = "QGC WPL"
 #: Digits that show any single-precision number exactly.
 _MOST_DIGITS = 9
 _MOST_WHOLE = 2**32
+#: Twice as many as the largest board has, an INAV with all its mode ranges. A daemon compares them on its event loop.
+MOST_SETTINGS = 2000
 
 
 class ParamFileError(FileError):
@@ -63,6 +65,9 @@ def read_param_file(data: bytes, name: str) -> ParamFile:
             what = f"{setting} is {shown_value(values[setting])} in line {first} and {shown_value(value)} here"
             raise ParamFileError(name, f"line {number}", what, "delete one of the lines")
         values[setting] = value
+        if len(values) > MOST_SETTINGS:
+            what = f"the file has over {MOST_SETTINGS} settings, more than any flight controller"
+            raise ParamFileError(name, f"line {number}", what, "give the settings of one board")
     if not values:
         raise ParamFileError(name, "", "the file has no settings", "save it again")
     return ParamFile(values, board)

@@ -51,8 +51,9 @@ def plan_restore(
     changes: list[PlannedChange] = []
     left_out: list[LeftOut] = []
     found: set[str] = set()
+    settings = table.find_all(wanted)
     for name, value in wanted.items():
-        setting = table.find(name)
+        setting = settings.get(name)
         if setting is None:
             left_out.append(LeftOut(name, value, None, "the board has no such setting"))
             continue

@@ -8,7 +8,7 @@ from typing import TypeVar
 
 from bridge.settings.board_setting import BoardSetting, Value, ValueKind, shown
 from bridge.settings.fc_settings import SettingRefusal
-from payloads.mission_data import MOST, Json, whole_number
+from payloads.mission_data import MOST, Json, plain, whole_number
 from payloads.settings_comparison import SettingValues, setting_values, settings_difference
 from service.daemon.client import ControlError
 from service.daemon.daemon import Daemon
@@ -69,7 +69,7 @@ class SettingsApi:
         is_checked False: compare with the table as last read, without using the flight controller's line.
         """
         plan = partial(self._daemon.bridge.settings.plan, values, board, is_checked=is_checked)
-        return asdict(await self._answer(plan))
+        return plain(await self._answer(plan))
 
     async def restore(self, values: SettingValues, board: str, client: str, progress: Progress) -> Json:
         """Set, save and verify; `progress` is called with the number of settings set so far."""
@@ -78,7 +78,7 @@ class SettingsApi:
             progress({"progress": count})
 
         restore = partial(self._daemon.bridge.settings.restore, values, board, client, set_so_far)
-        return asdict(await self._answer(restore))
+        return plain(await self._answer(restore))
 
     async def backups(self, limit: int) -> Json:
         return await self._daemon.store.ask(lambda store: backups_listed(store, limit))

@@ -11,9 +11,8 @@ from bridge.bridge import Bridge
 from bridge.missions.mission_service import DeliveryResult, HeldMission
 from bridge.model.mission_log import ArrivedMission
 from payloads import keys
-from payloads.mission_data import Json, strict
+from payloads.mission_data import Json, plain, strict
 from payloads.overview import overview_of
-from payloads.payload import plain
 from service.daemon.api import DaemonApi, delivery_data
 from service.zenoh_link.history import History
 from service.zenoh_link.queries import Answerer, Question

@@ -6,12 +6,14 @@ import base64
 import json
 import zlib
 from collections.abc import Callable, Set
+from typing import TypeVar
 
 from payloads import keys
 from payloads.mission_data import ACCEPTED, MOST, Json, whole_number
-from protocols.mission_file import MissionFileError, read_mission_file
+from protocols.file_error import FileError
+from protocols.mission_file import read_mission_file
 from protocols.mission_item import MissionItem
-from protocols.param_file import ParamFile, ParamFileError, read_param_file
+from protocols.param_file import ParamFile, read_param_file
 from service.daemon.api import DaemonApi
 from service.daemon.telemetry_logs import TelemetryLogs
 from service.zenoh_link.liveliness import RENAME
@@ -25,6 +27,7 @@ _MAX_ITEMS = 1000
 #: Parsed on the event loop. A text this short cannot be nested too deeply either.
 _MAX_LOG_REQUEST = 256
 _LOG_FORM = 'the payload must be {"name": "2026-05-01 10-00-00.tlog", "start": 0}'
+T = TypeVar("T")
 
 
 class CommandQueries:
@@ -88,11 +91,11 @@ class CommandQueries:
         return {"result": {"board": table["board"], "values": values}}
 
     async def _plan_settings(self, question: Question) -> Json:
-        file = _param_file(question)
+        file = await self._param_file(question)
         return {"result": await self._api.settings.plan(file.values, file.board)}
 
     async def _restore_settings(self, question: Question) -> Json:
-        file = _param_file(question)
+        file = await self._param_file(question)
         question.send({"progress": 0, "of": len(file.values)})
         total = len((await self._api.settings.plan(file.values, file.board))["changes"])
         result = await self._api.settings.restore(file.values, file.board, "zenoh", _progress_of(question, total))
@@ -119,12 +122,7 @@ class CommandQueries:
 
     async def _items(self, question: Question) -> list[MissionItem]:
         """Parse the mission in the payload, with the formats, reader and messages of `naze-bridge check`."""
-        payload = _payload(question, "mission")
-        try:
-            async with self._one_at_a_time:
-                items = await asyncio.to_thread(read_mission_file, payload, _PAYLOAD)
-        except MissionFileError as error:
-            raise QueryRefused(str(error)) from None
+        items = await self._read(read_mission_file, question, "mission")
         if not items:
             raise QueryRefused(f"{_PAYLOAD} holds no mission; mission/clear clears the one on the craft")
         if len(items) > _MAX_ITEMS:
@@ -132,18 +130,18 @@ class CommandQueries:
             raise QueryRefused(f"{held}, more than any flight controller stores: shorten it")
         return items
 
+    async def _param_file(self, question: Question) -> ParamFile:
+        return await self._read(read_param_file, question, ".param")
 
-def _payload(question: Question, kind: str) -> bytes:
-    if question.size > _MAX_BYTES:
-        raise QueryRefused(f"{_PAYLOAD} is larger than {_MAX_BYTES >> 10} KiB: send a {kind} file")
-    return question.payload()
-
-
-def _param_file(question: Question) -> ParamFile:
-    try:
-        return read_param_file(_payload(question, ".param"), _PAYLOAD)
-    except ParamFileError as error:
-        raise QueryRefused(str(error)) from None
+    async def _read(self, reader: Callable[[bytes, str], T], question: Question, kind: str) -> T:
+        """Read the file in the payload, not on the event loop."""
+        if question.size > _MAX_BYTES:
+            raise QueryRefused(f"{_PAYLOAD} is larger than {_MAX_BYTES >> 10} KiB: send a {kind} file")
+        try:
+            async with self._one_at_a_time:
+                return await asyncio.to_thread(reader, question.payload(), _PAYLOAD)
+        except FileError as error:
+            raise QueryRefused(str(error)) from None
 
 
 def _progress_of(question: Question, count: int) -> Callable[[Json], None]:

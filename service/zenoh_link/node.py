@@ -21,9 +21,9 @@ from bridge.model.mission_log import ArrivedMission
 from payloads import keys
 from payloads.endpoints import connect_endpoints, endpoint_trouble, tls_files
 from payloads.keys import ZenohKey
-from payloads.mission_data import Json
+from payloads.mission_data import Json, plain
 from payloads.overview import overview_of
-from payloads.payload import Payloads, plain
+from payloads.payload import Payloads
 from reports.vehicle_groups import Group
 from service.daemon.api import DaemonApi
 from service.daemon.daemon import Daemon, Follower

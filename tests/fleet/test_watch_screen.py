@@ -12,8 +12,9 @@ from fleet.watch import Watch, watching
 from fleet.watch_screen import ScreenRow, screen
 from payloads import compact
 from payloads.keys import OVERVIEW, PayloadEncoding
+from payloads.mission_data import plain
 from payloads.overview import Overview
-from payloads.payload import encoding_of, plain
+from payloads.payload import encoding_of
 from tests.support.programs import until
 
 

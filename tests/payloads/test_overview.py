@@ -4,8 +4,9 @@
 from bridge.model.flight_mode import FlightMode
 from payloads import compact
 from payloads.keys import OVERVIEW, PayloadEncoding
+from payloads.mission_data import plain
 from payloads.overview import overview_of
-from payloads.payload import Payloads, plain
+from payloads.payload import Payloads
 from reports.vehicle_groups import (
     Attitude,
     Battery,

@@ -47,7 +47,9 @@ def test_the_difference_is_symmetric(left: dict[str, float], right: dict[str, fl
     assert there == back
 
 
-@pytest.mark.parametrize("data", [None, [], {"a": True}, {"a": math.nan}, {"a": math.inf}])
+@pytest.mark.parametrize(
+    "data", [None, [], {"a": True}, {"a": math.nan}, {"a": math.inf}, {f"a{n}": n for n in range(2001)}]
+)
 def test_plain_data_that_is_no_table_is_refused(data: object) -> None:
     with pytest.raises(ValueError, match="must be"):
         setting_values(data)

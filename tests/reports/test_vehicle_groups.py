@@ -36,7 +36,8 @@ from bridge.model.vehicle import (
 from bridge.vehicle import vehicle_messages as make
 from bridge.vehicle.vehicle_messages import Maker
 from payloads.keys import TELEMETRY, PayloadEncoding
-from payloads.payload import Payloads, decoded, plain
+from payloads.mission_data import plain
+from payloads.payload import Payloads, decoded
 from protocols.mavlink.codec import FrameWriter, pack
 from protocols.msp.telemetry import Sensor
 from reports.vehicle_groups import Group

@@ -14,9 +14,8 @@ from typing import Any
 import pytest
 
 from fleet.vehicle import BridgeId, FleetVehicle, vehicle_of
-from payloads.mission_data import Json
+from payloads.mission_data import Json, plain
 from payloads.overview import overview_of, state_of
-from payloads.payload import plain
 from protocols.mavlink.dialect import Message
 from reports.vehicle_groups import Group
 from service.web.metrics import vehicle_gauges

@@ -16,8 +16,9 @@ import zenoh
 
 from payloads import compact
 from payloads.keys import OVERVIEW, PayloadEncoding
+from payloads.mission_data import plain
 from payloads.overview import Overview
-from payloads.payload import encoding_of, plain
+from payloads.payload import encoding_of
 
 SESSIONS = 20
 _ENCODING = encoding_of(OVERVIEW, PayloadEncoding.CBOR)

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from bridge.settings.board_setting import BoardSetting, SettingTable, Value, ValueKind, table_of
 from bridge.settings.fc_settings import SettingRefusal
 from bridge.settings.restore_plan import LeftOut, PlannedChange, RestorePlan, plan_restore
-from protocols.param_file import is_equal
+from protocols.param_file import MOST_SETTINGS, is_equal
+from tests.support.work import LOOP_BUDGET, work
 
 INTEGER, FLOAT, TEXT = ValueKind.INTEGER, ValueKind.FLOAT, ValueKind.TEXT
 TABLE = table_of(
@@ -94,3 +95,9 @@ def test_every_setting_is_written_left_out_or_equal(wanted: dict[str, Value]) ->
         assert setting.accepts(change.becomes)
         assert not setting.fixed
         assert not is_equal(setting.value, change.becomes)
+
+
+def test_the_longest_file_is_compared_with_the_largest_board_within_the_loops_budget() -> None:
+    table = table_of(*(BoardSetting(f"nav_setting_{n}", INTEGER, 0, 200, 35) for n in range(1000)))
+    wanted: dict[str, Value] = {f"NAV_SETTING_{n}": 5.0 for n in range(MOST_SETTINGS)}
+    assert work(lambda: plan(wanted, table=table)) < LOOP_BUDGET
