@@ -11,8 +11,6 @@ from service.settings.addresses import AddressError, host_port, parse_host_port
 from service.settings.key import Example, Unfit, file_name, several, text
 
 _FORMS = 'write "0.0.0.0:8080" for the whole network, "127.0.0.1:8080" for this machine only'
-#: Its policy permits browsing and forbids saving areas for later: https://operations.osmfoundation.org/policies/tiles/
-_VIEW_ONLY = "openstreetmap.org"
 _PARTS = ("{z}", "{x}", "{y}")
 _HOST = re.compile(r"[A-Za-z0-9-]+(\.[A-Za-z0-9-]+)*(:(?P<port>[0-9]{1,5}))?")
 #: The path of a template.
@@ -22,10 +20,7 @@ _TILE_FORMS = 'write an address like "https://tiles.example.org/{z}/{x}/{y}.png"
 
 @dataclass(frozen=True, slots=True)
 class TileSource:
-    """A server of map tiles. `template`: a tile's address with {z}, {x} and {y}, as map programs write it.
-
-    `origin`: its scheme and host; `target`: the rest.
-    """
+    """A server of map tiles. `template`: a tile's address with {z}, {x} and {y}, as map programs write it."""
 
     template: str = "https://tile.openstreetmap.org/{z}/{x}/{y}.png"
 
@@ -33,24 +28,10 @@ class TileSource:
         return self.template
 
     @property
-    def host(self) -> str:
-        return urlsplit(self.template).netloc
-
-    @property
     def origin(self) -> str:
-        return self.template.partition(self.host)[0] + self.host
-
-    @property
-    def is_openstreetmap(self) -> bool:
-        """True if it is OpenStreetMap's own server: the Pi must keep nothing of it."""
-        return f".{self.host.partition(':')[0].lower()}".endswith(f".{_VIEW_ONLY}")
-
-    def target(self, zoom: int, x: int, y: int) -> str:
-        """The address of a tile, without the origin."""
-        text = self.template.removeprefix(self.origin)
-        for part, value in zip(_PARTS, (zoom, x, y), strict=True):
-            text = text.replace(part, str(value))
-        return text
+        """The scheme and the host."""
+        scheme, host, *_ = urlsplit(self.template)
+        return f"{scheme}://{host}"
 
 
 def parse_tile_source(given: str) -> TileSource:
@@ -111,8 +92,7 @@ class WebSettings:
     map_tiles: Annotated[
         TileSource,
         text('"https://HOST/{z}/{x}/{y}.png"', parse_tile_source),
-        "Server of the map's tiles. They are off until you switch them on in the page; the Pi keeps none from"
-        " OpenStreetMap's own.",
+        "Server of the map's tiles, which a browser fetches itself once they are switched on in it.",
     ] = TileSource()  # frozen
     map_credit: Annotated[
         str | None,

@@ -30,7 +30,6 @@ from service.settings.web import WebSettings
 from service.web.access import check_token, refusing, route
 from service.web.connect_help import connect_help, page_urls, qr_code
 from service.web.histories import INTERVAL_S, FlownTrack, LinkHistory
-from service.web.map_tiles import MapTiles
 from service.web.metrics import CONTENT_TYPE, Metrics
 from service.web.pi_control import PiControl
 from service.web.replies import ResponseCache, begun, json_reply, path_number, text_reply, whole
@@ -56,7 +55,7 @@ class Api:
         self._files = SentFiles(self._api, self._writer)
         self._settings = SettingsHistory(self._api.settings, self._writer, self._cache)
         self._pi = PiControl(daemon, self._writer)
-        self._map = MapTiles(daemon, settings)
+        self._map = {"tiles": str(settings.map_tiles), "credit": settings.map_credit}
         self._history = LinkHistory(daemon)
         self._track = FlownTrack(daemon)
         self._sampling: asyncio.TimerHandle | None = None
@@ -76,12 +75,7 @@ class Api:
             self._sampling.cancel()
         await self._writer.close()
         await self._pi.close()
-        await self._map.close()
         self._logs.close()
-
-    def image_origin(self) -> str:
-        """See access.content_policy."""
-        return self._map.image_origin
 
     def routes(self) -> list[Route]:
         return [
@@ -101,7 +95,6 @@ class Api:
             *self._settings.routes(),
             *self._files.routes(),
             *self._pi.routes(),
-            *self._map.routes(),
         ]
 
     async def _state(self, _request: Request) -> Response:
@@ -131,7 +124,7 @@ class Api:
                 "lost_s": None if daemon.fc.lost_at is None else round(now - daemon.fc.lost_at, 1),
                 "transfer": None if transfer is None else asdict(transfer) | {"step": transfer.step.value},
                 "write": self._writer.state,
-                "map": self._map.state,
+                "map": self._map,
             }
         )
 

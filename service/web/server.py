@@ -35,7 +35,7 @@ class WebServer:
     def __init__(self, daemon: Daemon, settings: WebSettings) -> None:
         self._address = settings.listen
         self._api = Api(daemon, settings)
-        self._config = _config(self._api, settings.hosts, _token(daemon, settings))
+        self._config = _config(self._api, settings, _token(daemon, settings))
         self._state = ServerState()
         self._limit = ConnectionLimit()
         self._listening: asyncio.Task[None] | None = None
@@ -79,10 +79,10 @@ class WebServer:
         _log.info("web.listening", address=str(self._address))
 
 
-def _config(api: Api, hosts: tuple[str, ...], token: Token | TokenError) -> Config:
-    routes = [*api.routes(), *(route("GET", *each) for each in static_files(api.image_origin))]
+def _config(api: Api, settings: WebSettings, token: Token | TokenError) -> Config:
+    routes = [*api.routes(), *(route("GET", *each) for each in static_files(settings.map_tiles.origin))]
     app = Starlette(routes=routes, exception_handlers=EXCEPTION_HANDLERS)
-    app.state.hosts, app.state.token = hosts, token
+    app.state.hosts, app.state.token = settings.hosts, token
     # uvicorn would log only the errors of browsers; ours are logged by `failed`.
     return Config(
         SafeHeaders(app),

@@ -2,7 +2,6 @@
 """A server of map tiles on this machine: its tiles show where a place is, by their own arithmetic."""
 
 import math
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -38,7 +37,6 @@ class TileServer:
         self.template = f"http://127.0.0.1:{port}/{{z}}/{{x}}/{{y}}.png"
         self.host = f"127.0.0.1:{port}"
         self.reply: Callable[[int, int, int], Reply] = lambda *_: (200, {}, plain())
-        self.pause_s = 0.0
         self.asked: list[tuple[int, int, int]] = []
         self.headers: dict[str, str] = {}
 
@@ -61,7 +59,6 @@ def tile_server() -> Iterator[TileServer]:
             assert len(tile) == 3
             tiles.asked.append(tile)
             tiles.headers = dict(self.headers)
-            time.sleep(tiles.pause_s)
             status, headers, body = tiles.reply(*tile)
             self.send_response(status)
             for name, value in ({"Content-Length": str(len(body)), "Content-Type": "image/png"} | headers).items():

@@ -1,159 +1,105 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Map tiles under a map: those kept on the Pi, else the source's own if this browser has a network, else plain ground.
-import { ask } from "./daemon.js";
-import { make, setText } from "./dom.js";
-import { columnOf, latOf, lonOf, rowOf, zoomFor } from "./mercator.js";
+// Map tiles under a map, fetched and cached by this browser if its user has switched them on; else plain ground.
+import { byId, make, setText } from "./dom.js";
 
-const TIMEOUT_MS = 15000, RETRY_MS = 60000;
-let tiles = { on: false }; // of /api/state
-let wasOn = null; // when this page was loaded: only then the browser may load pictures from the source
+const RETRY_MS = 60000, FINEST = 19, OSM = "openstreetmap.org";
+const TILE_PX = 256, EQUATOR_M = 40075016.686, MOST_LAT = 85.051128; // there the square ends
+const choice = byId("tiles-on");
+let source = null; // of /api/state: { tiles, credit }
+
+choice.checked = localStorage.getItem("tiles") === "on";
+choice.addEventListener("change", () => localStorage.setItem("tiles", choice.checked ? "on" : "off"));
 
 export function followTiles(state) {
-  tiles = state.map;
-  wasOn ??= tiles.on;
+  source = state.map;
+  setText(byId("tiles-about"), `This browser fetches them from ${host()}, for the places that you view.`);
 }
 
-// What a layer's pictures depend on.
-export const tilesVersion = () => [tiles.on, tiles.tiles];
+const host = () => new URL(source.tiles).host;
+const period = () => Math.floor(performance.now() / RETRY_MS);
+
+// What a layer's pictures depend on: the choice, and the time, because failed tiles are tried again.
+export const tilesVersion = () => choice.checked && period();
 
 export class TileLayer {
   element = make("div", { class: "map-tiles" });
   note = make("p", { class: "map-credit", role: "status" });
-  #pictures = new Map(); // by zoom/x/y: { box, zoom, x, y, isShown, pending }
-  #kept = new Map(); // by x/y: the zoom of the tile kept on the Pi
-  #area = null;
-  #requested = "";
-  #failed = new Map(); // addresses, and when
+  #images = new Map(); // by zoom/x/y
 
-  // The tiles in view: { zoom, x, y, columns, rows }; null if there are none.
-  get area() {
-    return this.#area;
+  // map: of drawMap. Returns true if tiles are drawn.
+  draw(map) {
+    const places = choice.checked && map !== null ? placesIn(map) : [], wanted = new Set(places.map(({ key }) => key));
+    for (const [key, image] of this.#images) if (!wanted.has(key) || image.dataset.failed < period()) this.#drop(key, image);
+    this.element.hidden = places.length === 0;
+    if (places.length) this.element.style.height = `${map.height}px`;
+    for (const place of places) this.#place(place, map.view);
+    this.#updateNote();
+    return places.length > 0;
   }
 
-  // map: of drawMap.
-  draw(map) {
-    this.#area = tiles.on && map !== null ? areaOf(map) : null;
-    this.element.hidden = this.#area === null;
-    const places = this.#area === null ? [] : placesIn(this.#area), wanted = new Set(places.map(({ key }) => key));
-    for (const [key, { box }] of this.#pictures) {
-      if (wanted.has(key)) continue;
-      box.remove();
-      this.#pictures.delete(key);
-    }
-    if (this.#area === null) {
-      this.#requested = "";
-      setText(this.note, "");
-      return;
-    }
-    this.element.style.height = `${map.height}px`;
-    for (const place of places) this.#place(place, map.view);
-    this.#lookUp();
+  #drop(key, image) {
+    image.remove();
+    this.#images.delete(key);
   }
 
   #place({ key, zoom, column, row }, view) {
-    if (!this.#pictures.has(key)) {
-      const box = make("div", { class: "map-tile" });
-      this.element.append(box);
-      this.#pictures.set(key, { box, zoom, x: column & (2 ** zoom - 1), y: row, isShown: false, pending: 0 });
-    }
+    if (!this.#images.has(key)) this.#load(key, source.tiles.replace("{z}", zoom).replace("{x}", ((column % 2 ** zoom) + 2 ** zoom) % 2 ** zoom).replace("{y}", row));
     // Edges are rounded, not sizes: neighbours then meet.
     const [left, top] = view({ lat: latOf(row, zoom), lon: lonOf(column, zoom) }).map(Math.round);
     const [right, bottom] = view({ lat: latOf(row + 1, zoom), lon: lonOf(column + 1, zoom) }).map(Math.round);
-    Object.assign(this.#pictures.get(key).box.style, { left: `${left}px`, top: `${top}px`, width: `${right - left}px`, height: `${bottom - top}px` });
+    Object.assign(this.#images.get(key).style, { left: `${left}px`, top: `${top}px`, width: `${right - left}px`, height: `${bottom - top}px` });
   }
 
-  // Asks the Pi which of the tiles it has: once for each view.
-  async #lookUp() {
-    const query = new URLSearchParams(this.#area).toString(), request = `${query} ${tilesVersion()} ${this.#period()}`;
-    if (request === this.#requested) return;
-    this.#requested = request;
-    try {
-      const { kept } = await ask(`/api/map/kept?${query}`);
-      this.#kept = new Map(kept.map(([x, y, zoom]) => [`${x}/${y}`, zoom]));
-    } catch {
-      this.#kept = new Map();
-    }
-    if (request === this.#requested) for (const picture of this.#pictures.values()) this.#fill(picture);
-  }
-
-  // After a while failed tiles are tried again.
-  #period() {
-    const since = performance.now() - RETRY_MS;
-    for (const [address, at] of this.#failed) if (at < since) this.#failed.delete(address);
-    return this.#failed.size > 0;
-  }
-
-  #fill(picture) {
-    const { box, zoom, x, y } = picture, kept = this.#kept.get(`${x}/${y}`);
-    const own = `/api/map/tiles/${zoom}/${x}/${y}`;
-    const source = tiles.source.replace("{z}", zoom).replace("{x}", x).replace("{y}", y);
-    if (kept === zoom) this.#load(picture, own);
-    else {
-      if (kept !== undefined && !box.children.length) this.#load(picture, ...coarser(x, y, zoom, kept));
-      if (wasOn) this.#load(picture, source);
-    }
-    this.#updateNote();
-  }
-
-  // part: of the picture that fills the box: { left, top, size }, in boxes.
-  #load(picture, address, part = { left: 0, top: 0, size: 1 }) {
-    if (this.#failed.has(address) || [...picture.box.children].some((each) => each.dataset.address === address)) return;
-    const end = () => {
-      clearTimeout(timer);
-      picture.pending -= 1;
-      this.#updateNote();
-    };
-    const fail = () => {
-      this.#failed.set(address, performance.now());
-      image.remove();
-      end();
-    };
+  #load(key, address) {
     // OpenStreetMap's policy: requests must carry the page's origin.
-    const image = make("img", { alt: "", "data-address": address, referrerpolicy: "strict-origin-when-cross-origin", draggable: "false", onload: () => {
-      picture.isShown = true;
-      image.classList.add("loaded");
-      end();
-    }, onerror: fail });
-    Object.assign(image.style, { left: `${-100 * part.left}%`, top: `${-100 * part.top}%`, width: `${100 * part.size}%`, height: `${100 * part.size}%` });
-    const timer = setTimeout(() => image.isConnected && !image.complete && fail(), TIMEOUT_MS);
-    picture.pending += 1;
-    picture.box.append(image);
+    const image = make("img", { alt: "", referrerpolicy: "strict-origin-when-cross-origin", draggable: "false", onload: () => {
+      image.className = "loaded";
+      this.#updateNote();
+    }, onerror: () => {
+      image.dataset.failed = period();
+      this.#updateNote();
+    } });
+    this.#images.set(key, image);
+    this.element.append(image);
     image.src = address;
   }
 
-  // The credit, or once why there are no tiles.
+  // The credit, or why there are no tiles.
   #updateNote() {
-    const pictures = [...this.#pictures.values()];
-    if (pictures.some(({ isShown }) => isShown)) {
-      if (this.note.dataset.credit !== tiles.credit) this.note.replaceChildren(tiles.credit_page ? make("a", { href: tiles.credit_page, rel: "noreferrer", target: "_blank" }, tiles.credit) : tiles.credit);
-      this.note.dataset.credit = tiles.credit;
-      return;
-    }
-    delete this.note.dataset.credit;
-    if (pictures.some(({ pending }) => pending)) return;
-    const why = wasOn ? `this browser gets none from ${tiles.host}` : `after a reload this browser asks ${tiles.host}`;
-    setText(this.note, `No map tiles here: the Pi keeps none of this area, and ${why}.`);
+    const images = [...this.#images.values()];
+    if (images.some((image) => image.className)) this.note.replaceChildren(credit());
+    else setText(this.note, images.some((image) => image.dataset.failed) ? `No map tiles: this browser gets none from ${host()}.` : "");
   }
 }
 
-// A tile within the coarser one that is kept.
-function coarser(x, y, zoom, kept) {
-  const size = 2 ** (zoom - kept), column = Math.floor(x / size), row = Math.floor(y / size);
-  return [`/api/map/tiles/${kept}/${column}/${row}`, { left: x - column * size, top: y - row * size, size }];
+function credit() {
+  const isOsm = `.${host()}`.endsWith(`.${OSM}`);
+  if (source.credit || !isOsm) return source.credit ?? host();
+  return make("a", { href: `https://www.${OSM}/copyright`, rel: "noreferrer", target: "_blank" }, "© OpenStreetMap contributors");
 }
 
-function areaOf({ view, width, height }) {
+function placesIn({ view, width, height }) {
   const northWest = view.placeAt(0, 0), southEast = view.placeAt(width, height);
-  const zoom = zoomFor(view.pixelsPerMetre, (northWest.lat + southEast.lat) / 2, tiles.finest), side = 2 ** zoom;
-  const left = Math.floor(columnOf(northWest.lon, zoom)), right = Math.floor(columnOf(southEast.lon, zoom));
-  const y = Math.max(Math.floor(rowOf(northWest.lat, zoom)), 0), bottom = Math.min(Math.floor(rowOf(southEast.lat, zoom)), side - 1);
-  return { zoom, x: ((left % side) + side) % side, y, columns: Math.min(right - left + 1, side), rows: bottom - y + 1 };
-}
-
-function placesIn({ zoom, x, y, columns, rows }) {
+  const zoom = zoomFor(view.pixelsPerMetre, (northWest.lat + southEast.lat) / 2), side = 2 ** zoom;
+  const left = Math.floor(columnOf(northWest.lon, zoom)), right = Math.min(Math.floor(columnOf(southEast.lon, zoom)), left + side - 1);
+  const top = Math.max(Math.floor(rowOf(northWest.lat, zoom)), 0), bottom = Math.min(Math.floor(rowOf(southEast.lat, zoom)), side - 1);
   const places = [];
-  for (let row = y; row < y + rows; row += 1) {
-    for (let column = x; column < x + columns; column += 1) places.push({ key: `${zoom}/${column}/${row}`, zoom, column, row });
+  for (let row = top; row <= bottom; row += 1) {
+    for (let column = left; column <= right; column += 1) places.push({ key: `${zoom}/${column}/${row}`, zoom, column, row });
   }
   return places;
 }
+
+// In tiles, with fractions, from the north-west corner of the world, whose side has 2^zoom tiles (Web Mercator).
+const columnOf = (lon, zoom) => ((lon + 180) / 360) * 2 ** zoom;
+const rowOf = (lat, zoom) => (0.5 - Math.asinh(Math.tan((clamp(lat) * Math.PI) / 180)) / (2 * Math.PI)) * 2 ** zoom;
+const lonOf = (column, zoom) => (column / 2 ** zoom) * 360 - 180;
+const latOf = (row, zoom) => (Math.atan(Math.sinh((0.5 - row / 2 ** zoom) * 2 * Math.PI)) * 180) / Math.PI;
+
+// The zoom whose tiles are drawn nearest to their own size.
+function zoomFor(pixelsPerMetre, lat) {
+  const tile_m = TILE_PX / pixelsPerMetre, around_m = EQUATOR_M * Math.cos((clamp(lat) * Math.PI) / 180);
+  return Math.min(Math.max(Math.round(Math.log2(around_m / tile_m)), 0), FINEST);
+}
+
+const clamp = (lat) => Math.min(Math.max(lat, -MOST_LAT), MOST_LAT);

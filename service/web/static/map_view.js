@@ -37,11 +37,6 @@ export class MapView {
     this.#draw();
   }
 
-  // Of TileLayer.
-  get tileArea() {
-    return this.#tiles.area;
-  }
-
   #draw() {
     if (this.#contents === null) return;
     const width = Math.max(this.#canvas.clientWidth, 200);
@@ -51,8 +46,7 @@ export class MapView {
     const map = drawMap(this.#contents, width, this.#camera);
     this.#tools.hidden = map === null;
     this.#canvas.replaceChildren(map?.svg ?? "Neither a mission nor a position is known yet.");
-    this.#tiles.draw(map);
-    this.#canvas.classList.toggle("on-tiles", this.#tiles.area !== null);
+    this.#canvas.classList.toggle("on-tiles", this.#tiles.draw(map));
     // Until it is zoomed, one finger scrolls the page.
     this.#canvas.classList.toggle("zoomed", this.#camera.zoom > 1);
   }

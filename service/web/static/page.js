@@ -7,7 +7,6 @@ import "./firmware.js";
 import { FlownTrack } from "./flown_track.js";
 import { showLinkPlot } from "./link_plot.js";
 import "./logs.js";
-import { showTileTools } from "./map_keep.js";
 import { followTiles } from "./map_tiles.js";
 import { MapView } from "./map_view.js";
 import { followFile } from "./mission_file.js";
@@ -41,7 +40,6 @@ async function look() {
     showOverview(state);
     showWires(state);
     followTiles(state);
-    showTileTools(state, map);
     followWrites(state, askedAt);
     followFile(state);
     await showHeld(state);

@@ -1,46 +1,44 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Map tiles on the page: off, on, in the right place, kept for the field, and without any network."""
+"""Map tiles on the page: fetched by the browser once they are switched on in it, and in the right place."""
 
 from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 from tests.support.axe import violations
+from tests.support.benches import Starter
 from tests.support.chromium import LAPTOP, PHONE, Browser, Browsers
 from tests.support.png import pixels
 from tests.support.programs import until
-from tests.support.tile_bench import TileBench, tile_bench
-from tests.support.tile_server import QUARTERS
+from tests.support.tile_server import QUARTERS, TileServer, plain, tile_server
+from tests.support.web_bench import WebBench, web_daemon
 
 pytest_plugins = ("tests.support.web_fixtures",)
 
 
+@dataclass(frozen=True)
+class TileBench:
+    """A daemon whose page has its tiles from `tiles`."""
+
+    web: WebBench
+    tiles: TileServer
+
+
 @pytest.fixture
 def bench(tmp_path: Path) -> Iterator[TileBench]:
-    with tile_bench(tmp_path) as bench:
-        bench.web.push_example()
-        yield bench
-
-
-def switch_on(page: Browser, bench: TileBench) -> None:
-    """As a pilot does: with the token, on the page."""
-    page.press("#map-tiles summary")
-    page.find("#map-tiles input").send_keys(bench.web.token)
-    page.press("#map-tiles button")
-    until(lambda: shown(page) > 3, "the tiles")
+    with ExitStack() as stack, tile_server() as tiles:
+        start = Starter(tmp_path, stack)
+        board = start.board()
+        web = web_daemon(start, str(board.link), f'map_tiles = "{tiles.template}"\n')
+        web.push_example()
+        yield TileBench(web, tiles)
 
 
 def shown(page: Browser) -> int:
-    return len(page.all("#map .map-tile img.loaded"))
-
-
-def press(page: Browser, text: str) -> None:
-    page.run("document.querySelector('#map-tiles').open = true")
-    page.run(
-        "[...document.querySelectorAll('#map-tiles button')].find((each) => each.innerText === arguments[0]).click()",
-        text,
-    )
+    return len(page.all("#map .map-tiles img.loaded"))
 
 
 def show_waypoint(bench: TileBench) -> None:
@@ -89,58 +87,37 @@ def test_tiles_lie_under_the_places_that_they_show(browsers: Browsers, bench: Ti
         page.open()
         until(lambda: len(page.all("#map .point")) > 2, "the waypoints")
         assert bench.tiles.asked == []
-        switch_on(page, bench)
+        page.press("#tiles-on")
+        until(lambda: shown(page) > 3, "the tiles")
         assert bench.tiles.headers["Referer"] == page.url  # OpenStreetMap refuses browsers that hide it
         for _ in range(2):
-            until(lambda: shown(page) == len(page.all("#map .map-tile")), "all tiles")
+            until(lambda: shown(page) == len(page.all("#map .map-tiles img")), "all tiles")
             found, expected = crossing(page), waypoint(page)
             assert found == pytest.approx(expected, abs=2.5)  # the pixels of a tile, enlarged, and of the screen
             page.press("#map .map-tools button")
         assert page.errors() == []
 
 
-def test_an_area_is_kept_for_a_field_without_a_network(browsers: Browsers, bench: TileBench) -> None:
-    with browsers.tab(bench.web.port, LAPTOP) as page:
+def test_the_browser_keeps_the_choice_and_says_why_there_are_no_tiles(browsers: Browsers, bench: TileBench) -> None:
+    bench.tiles.reply = lambda *_: (503, {}, b"")
+    with browsers.tab(bench.web.port, LAPTOP, dark=True) as page:
         page.open()
-        until(lambda: len(page.all("#map .point")) > 2, "the waypoints")
-        switch_on(page, bench)
-        assert page.text("#map .map-credit") == bench.tiles.host
-        press(page, "Keep this area for the field")
-        page.wait_text("#map-tiles", "tiles of this area are kept.")
+        page.press("#tiles-on")
+        page.wait_text("#map .map-credit", f"No map tiles: this browser gets none from {bench.tiles.host}.")
+        bench.tiles.reply = lambda *_: (200, {}, plain())
+        page.open()
+        page.wait_text("#map .map-credit", bench.tiles.host)
         assert violations(page) == []
-        # In the field neither the Pi nor the phone reaches the source.
-        bench.tiles.reply = lambda *_: (503, {}, b"")
-        page.open()
-        until(lambda: shown(page) > 3, "the kept tiles")
-        page.run("document.querySelector('#map-tiles').open = true")
-        page.find("#map-tiles input").send_keys(bench.web.token)
-        press(page, "Delete the kept tiles")
-        page.wait_text("#map-tiles .result", "Deleted.")
-        page.driver.execute_cdp_cmd("Network.clearBrowserCache", {})
-        page.open()
-        page.wait_text("#map .map-credit", "No map tiles here")
-        assert violations(page) == []
-        assert all(bench.tiles.host in message for message in page.errors())
-
-
-def test_the_pilot_stops_keeping_and_returns_to_plain_ground(browsers: Browsers, bench: TileBench) -> None:
-    with browsers.tab(bench.web.port, PHONE, dark=True) as page:
-        page.open()
-        until(lambda: len(page.all("#map .point")) > 2, "the waypoints")
-        switch_on(page, bench)
-        bench.tiles.pause_s = 2
-        press(page, "Keep this area for the field")
-        until(lambda: page.find("#keep-bar").is_displayed(), "the progress")
-        assert violations(page) == []
-        press(page, "Stop")
-        page.wait_text("#map-tiles .result", "Stopped.")
-        bench.tiles.pause_s = 0
-        press(page, "Show plain ground")
-        until(lambda: not bench.state()["on"], "the end of the tiles")
-        page.wait_for_updates(2)
+        page.press("#tiles-on")
+        until(lambda: not page.all("#map .map-tiles img"), "the plain ground")
         asked = len(bench.tiles.asked)
         page.open()
         page.wait_for_updates(2)
         assert (shown(page), len(bench.tiles.asked)) == (0, asked)
-        assert page.run("return document.documentElement.scrollWidth") <= PHONE[0]
-        assert page.errors() == []
+        assert all(bench.tiles.host in message for message in page.errors())
+
+
+def test_the_page_may_load_pictures_only_from_the_source_in_the_settings(bench: TileBench) -> None:
+    policy = bench.web.ask("/").headers["content-security-policy"]
+    assert f"img-src 'self' http://{bench.tiles.host};" in policy
+    assert policy.count("http:") == 1

@@ -12,6 +12,7 @@ from starlette.routing import Route
 from structlog.testing import capture_logs
 
 from service.daemon.client import ControlError
+from service.settings.web import WebSettings
 from service.web.access import route
 from service.web.api import Api
 from service.web.server import _config
@@ -22,9 +23,6 @@ from storage.store_error import StoreError
 class _BrokenApi:
     def __init__(self, error: Exception) -> None:
         self._error = error
-
-    def image_origin(self) -> str:
-        return ""
 
     def routes(self) -> list[Route]:
         async def fail(_request: Request) -> Response:
@@ -43,7 +41,7 @@ async def ask(error: Exception) -> tuple[MutableMapping[str, Any], Any]:
     async def receive() -> MutableMapping[str, Any]:
         return {"type": "http.request", "body": b"", "more_body": False}
 
-    config = _config(cast("Api", _BrokenApi(error)), (), TokenError("none"))
+    config = _config(cast("Api", _BrokenApi(error)), WebSettings(), TokenError("none"))
     scope = {"type": "http", "method": "GET", "path": "/api/state", "headers": [(b"host", b"127.0.0.1")]}
     # Starlette passes a fault on to uvicorn, whose log is off.
     with suppress(KeyError):
