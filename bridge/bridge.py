@@ -33,25 +33,25 @@ from bridge.model.events import Armed, Disarmed, Emit
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.settings import SettingsState
 from bridge.model.vehicle import FlightState, Health, MissionLeg, Readiness
+from bridge.settings.board_settings import BoardSettings
+from bridge.settings.local_settings import LocalSettings
+from bridge.settings.own_parameters import OwnParameters
+from bridge.settings.parameters import Parameters
+from bridge.settings.settings_backups import BackupTaker, OnBackup
+from bridge.settings.settings_seal import SettingsSeal
 from bridge.sharing.msp_sharing import MspSharing
 from bridge.sharing.program import Program
 from bridge.transfers.downloads import MissionDownloads
 from bridge.transfers.local_missions import LocalMissions
 from bridge.transfers.mission_watch import MissionWatch
 from bridge.transfers.uploads import FC_LOST, STOPPED, MissionUploads
-from bridge.vehicle.board_settings import BoardSettings
 from bridge.vehicle.calibration import Calibration
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.incoming import Incoming
 from bridge.vehicle.link_announcer import LinkAnnouncer
-from bridge.vehicle.local_settings import LocalSettings
 from bridge.vehicle.message_router import MessageRouter, Transfers
-from bridge.vehicle.own_parameters import OwnParameters
 from bridge.vehicle.own_vehicle import OwnVehicle
-from bridge.vehicle.parameters import Parameters
 from bridge.vehicle.set_waypoint import SetWaypoint
-from bridge.vehicle.settings_backups import BackupTaker, OnBackup
-from bridge.vehicle.settings_seal import SettingsSeal
 from bridge.vehicle.vehicle_report import VehicleReporter
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MavlinkFrame

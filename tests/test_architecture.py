@@ -21,10 +21,10 @@ BRIDGE = {
     "bridge.model": set[str](),
     "bridge.line": {"bridge.model"},
     "bridge.missions": {"bridge.line", "bridge.model"},
-    "bridge.settings": {"bridge.line", "bridge.model"},
-    "bridge.fc": {"bridge.settings", "bridge.missions", "bridge.line", "bridge.model"},
-    "bridge.controllers": {"bridge.fc", "bridge.settings", "bridge.missions", "bridge.line", "bridge.model"},
+    "bridge.fc": {"bridge.missions", "bridge.line", "bridge.model"},
+    "bridge.controllers": {"bridge.fc", "bridge.missions", "bridge.line", "bridge.model"},
     "bridge.gcs": {"bridge.model"},
+    "bridge.settings": {"bridge.gcs", "bridge.fc", "bridge.missions", "bridge.line", "bridge.model"},
     "bridge.sharing": {"bridge.gcs", "bridge.fc", "bridge.missions", "bridge.line", "bridge.model"},
     "bridge.transfers": {"bridge.gcs", "bridge.missions", "bridge.line", "bridge.model"},
     "bridge.vehicle": {

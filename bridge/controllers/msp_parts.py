@@ -7,10 +7,10 @@ A part is always written whole: it is read again right before, so that only one 
 from dataclasses import replace
 from typing import NamedTuple
 
+from bridge.fc.fc_settings import NO_ANSWER, NOT_TAKEN, FcSettings, SettingRefusal, TableReading, fixed
 from bridge.fc.profile import FlightController
 from bridge.line.conversation import Conversation, Pause, ask, ask_surely
-from bridge.settings.board_setting import BoardSetting, SettingTable, Value, ValueKind, table_of
-from bridge.settings.fc_settings import NO_ANSWER, NOT_TAKEN, FcSettings, SettingRefusal, TableReading, fixed
+from bridge.model.board_setting import BoardSetting, SettingTable, Value, ValueKind, table_of
 from protocols.msp.command_line import is_clean
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, request

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
+from bridge.fc.fc_settings import FcSettings
 from bridge.fc.interview import Interview
 from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import POLLS, Poll
@@ -19,7 +20,6 @@ from bridge.model.airframe import Airframe
 from bridge.model.flight_mode import ARM_BOX
 from bridge.model.refusal import Refusal
 from bridge.model.vehicle import Vehicle
-from bridge.settings.fc_settings import FcSettings
 from protocols.inav_dump import SavedSettings
 from protocols.mission_item import MissionResult
 from protocols.msp.mission import Info

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The flight controller's own settings: read as a whole, changed one by one, and saved."""
+"""The flight controller's settings: read, watched, changed and saved; as parameters, and for local clients."""

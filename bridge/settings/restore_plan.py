@@ -4,8 +4,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from bridge.settings.board_setting import BoardSetting, SettingTable, Value, ValueKind
-from bridge.settings.fc_settings import Cause, SettingRefusal
+from bridge.fc.fc_settings import Cause, SettingRefusal
+from bridge.model.board_setting import BoardSetting, SettingTable, Value, ValueKind
 from protocols.param_file import is_equal, shown_value
 
 

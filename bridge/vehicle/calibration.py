@@ -19,7 +19,7 @@ from bridge.gcs.ground import Ground
 from bridge.gcs.station import Severity, Station
 from bridge.line.conversation import Conversation, LinkLost, Pause, Receive, ask, ask_status, send
 from bridge.missions.mission_service import MissionService
-from bridge.vehicle.board_settings import BoardSettings
+from bridge.settings.board_settings import BoardSettings
 from bridge.vehicle.link_announcer import LinkAnnouncer
 from protocols.mavlink.command import CommandResult
 from protocols.mavlink.dialect import messages as m

@@ -9,6 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from bridge.fc.fc_settings import Cause, SettingRefusal
 from bridge.fc.profile import Spoken
 from bridge.fc.session import FcSession
 from bridge.gcs.flash_budget import TOO_MANY_WRITES
@@ -17,11 +18,10 @@ from bridge.gcs.station import Severity, Station
 from bridge.model.flight_mode import MISSION_BOXES
 from bridge.model.refusal import Refusal
 from bridge.model.vehicle import MissionLeg, Switches
-from bridge.settings.fc_settings import Cause, SettingRefusal
-from bridge.vehicle.board_settings import BoardSettings
+from bridge.settings.board_settings import BoardSettings
+from bridge.settings.parameters import Parameters
 from bridge.vehicle.calibration import CALIBRATE_ACCELEROMETER, CALIBRATE_COMPASS, Calibration, FcAction
 from bridge.vehicle.own_vehicle import OwnVehicle
-from bridge.vehicle.parameters import Parameters
 from bridge.vehicle.set_waypoint import SetWaypoint
 from bridge.vehicle.vehicle_messages import auto_mode
 from protocols.mavlink.command import CommandResult

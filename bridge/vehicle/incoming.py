@@ -13,8 +13,8 @@ from bridge.gcs.rights import FrameRefusal
 from bridge.gcs.routes import Routes
 from bridge.gcs.station import Peer, Severity, Station
 from bridge.model.events import Emit, GcsRefused
+from bridge.settings.parameters import Parameters
 from bridge.vehicle.message_router import MessageRouter
-from bridge.vehicle.parameters import Parameters
 from protocols.mavlink.codec import decode
 from protocols.mavlink.command import CommandResult
 from protocols.mavlink.dialect import MESSAGE_FORMATS, Message

@@ -12,11 +12,11 @@ from bridge.gcs.ground_station import GroundStation
 from bridge.gcs.station import Severity, Station
 from bridge.missions.mission_service import MissionService
 from bridge.missions.place_lists import NO_PLACES
+from bridge.settings.parameters import Parameters
 from bridge.transfers.downloads import MissionDownloads
 from bridge.transfers.uploads import MissionUploads
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.own_vehicle import OwnVehicle
-from bridge.vehicle.parameters import Parameters
 from protocols.mavlink.codec import decode, item_from_float_message, item_from_int_message
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m

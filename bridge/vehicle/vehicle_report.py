@@ -14,7 +14,7 @@ from bridge.model import vehicle as v
 from bridge.model.flight_mode import FlightMode
 from bridge.model.ground_track import bearing_deg, distance_m
 from bridge.model.mission_progress import MissionProgress
-from bridge.vehicle.settings_seal import SettingsSeal
+from bridge.settings.settings_seal import SettingsSeal
 from protocols.msp.telemetry import Sensor
 from reports.vehicle_groups import (
     Attitude,

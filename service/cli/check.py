@@ -14,7 +14,7 @@ from bridge.controllers.nav.rules import INAV_CAPACITY, MULTIWII_CAPACITY
 from bridge.controllers.table import PROFILES
 from bridge.fc.profile import RuleSettings
 from bridge.missions.list_check import MissionRules, check_list
-from bridge.vehicle.parameter_names import parameter_names
+from bridge.settings.parameter_names import parameter_names
 from payloads.mission_data import verdict_data
 from protocols.file_error import FileError
 from protocols.inav_dump import InavDumpError, SavedSettings, read_inav_settings

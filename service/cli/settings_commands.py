@@ -82,7 +82,7 @@ def backup(client: BridgeClient, file: Path) -> None:
     """Write the settings to FILE in Mission Planner's .param format; - is standard output."""
     if client.as_json and file == _STANDARD_OUTPUT:
         raise click.UsageError("the file and --json cannot both go to standard output: omit one of them")
-    from bridge.vehicle.local_settings import by_parameter
+    from bridge.settings.local_settings import by_parameter
 
     held = _held(client)
     now = datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %z")
@@ -141,7 +141,7 @@ def diff(client: BridgeClient, first: str, second: str) -> None:
     Each is a .param file, a backup's number, or `board` for the flight controller's present settings (the default of
     SECOND).
     """
-    from bridge.vehicle.local_settings import by_setting  # other commands do without the bridge
+    from bridge.settings.local_settings import by_setting  # other commands do without the bridge
 
     (left, _), (right, _) = (_source(client, each) for each in (first, second))
     rows = settings_difference(by_setting(left, right), by_setting(right, left))

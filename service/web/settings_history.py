@@ -7,7 +7,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
-from bridge.vehicle.local_settings import by_parameter
+from bridge.settings.local_settings import by_parameter
 from payloads.mission_data import ACCEPTED, Json, to_json
 from protocols.param_file import write_param_file
 from service.daemon.client import ControlError

@@ -3,8 +3,8 @@
 
 import pytest
 
-from bridge.settings.board_setting import SettingTable, Value, ValueKind
-from bridge.vehicle.local_settings import RestoreResult
+from bridge.model.board_setting import SettingTable, Value, ValueKind
+from bridge.settings.local_settings import RestoreResult
 from protocols.firmware_image import Image
 from simulator.emulated_naze.board import EmulatedNaze
 from tests.support.real_bench import Figure

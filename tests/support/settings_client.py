@@ -4,8 +4,8 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from bridge.settings.board_setting import BoardSetting, SettingTable, Value
-from bridge.settings.fc_settings import Cause, SettingRefusal
+from bridge.fc.fc_settings import Cause, SettingRefusal
+from bridge.model.board_setting import BoardSetting, SettingTable, Value
 from protocols.msp.frame import MspParser
 from simulator.board.options import Faults, SimOptions
 from simulator.commands.fc_kinds import make_board

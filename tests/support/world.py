@@ -36,8 +36,8 @@ from bridge.model.events import BridgeEvent, Level
 from bridge.model.flight_memory import FlightMemory
 from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission, RecalledMission
 from bridge.model.settings import SealMemory, SealsOfThisRun
+from bridge.settings.settings_backups import TakenBackup
 from bridge.sharing.program import Program
-from bridge.vehicle.settings_backups import TakenBackup
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.frame import MAGIC_V1, MavlinkSplitter
 from protocols.mission_record import ListIdentity, identify

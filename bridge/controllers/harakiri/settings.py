@@ -6,10 +6,7 @@ from dataclasses import replace
 
 from bridge.controllers.harakiri.setting_texts import TEXTS
 from bridge.controllers.msp_parts import MspPartSettings
-from bridge.fc.profile import FlightController
-from bridge.line.conversation import Conversation, Pause, ask, ask_surely
-from bridge.settings.board_setting import BoardSetting, SettingTable, Value, ValueKind, table_of
-from bridge.settings.fc_settings import (
+from bridge.fc.fc_settings import (
     ARMED,
     BUSY,
     NO_ANSWER,
@@ -21,6 +18,9 @@ from bridge.settings.fc_settings import (
     TableReading,
     fixed,
 )
+from bridge.fc.profile import FlightController
+from bridge.line.conversation import Conversation, Pause, ask, ask_surely
+from bridge.model.board_setting import BoardSetting, SettingTable, Value, ValueKind, table_of
 from protocols.msp import mission as ext
 from protocols.msp.frame import FRAME_OVERHEAD, Direction
 from protocols.msp.mission import InfoFlag, MissionCommand, ReplyStatus

@@ -7,6 +7,7 @@ The old ones stay in its flash until the new ones are read back equal; if they a
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 
+from bridge.fc.fc_settings import write_eeprom
 from bridge.fc.profile import FlightController
 from bridge.line.conversation import Conversation, LinkLost, ask, ask_armed
 from bridge.missions.fc_mission_store import (
@@ -18,7 +19,6 @@ from bridge.missions.fc_mission_store import (
     StoreState,
 )
 from bridge.missions.list_check import MissionRules
-from bridge.settings.fc_settings import write_eeprom
 from protocols.mission_item import MissionItem
 from protocols.msp.frame import Direction, request
 from reports.verdict import RecordT

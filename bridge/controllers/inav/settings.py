@@ -5,10 +5,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from bridge.controllers.msp_parts import MspPartSettings
-from bridge.fc.profile import FlightController
-from bridge.line.conversation import Conversation, Pause, ask
-from bridge.settings.board_setting import BoardSetting, SettingTable, Value, ValueKind, table_of
-from bridge.settings.fc_settings import (
+from bridge.fc.fc_settings import (
     NO_ANSWER,
     NOT_TAKEN,
     FcSettings,
@@ -16,6 +13,9 @@ from bridge.settings.fc_settings import (
     TableReading,
     fixed,
 )
+from bridge.fc.profile import FlightController
+from bridge.line.conversation import Conversation, Pause, ask
+from bridge.model.board_setting import BoardSetting, SettingTable, Value, ValueKind, table_of
 from protocols.msp.frame import Direction, MspFrame, frame_size, request
 from protocols.msp.inav_settings import (
     COMMON_SET_SETTING,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-from bridge.settings.fc_settings import Cause
+from bridge.fc.fc_settings import Cause
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction
 from tests.support.fake_controllers import HARAKIRI_CAPABILITY, MspFake, ident

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.settings.board_setting import BoardSetting, SettingTable, Value, ValueKind, table_of
-from bridge.settings.fc_settings import SettingRefusal
+from bridge.fc.fc_settings import SettingRefusal
+from bridge.model.board_setting import BoardSetting, SettingTable, Value, ValueKind, table_of
 from bridge.settings.restore_plan import LeftOut, PlannedChange, RestorePlan, plan_restore
 from protocols.param_file import MOST_SETTINGS, is_equal
 from tests.support.work import LOOP_BUDGET, work

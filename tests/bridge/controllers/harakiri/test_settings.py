@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import pytest
 
-from bridge.settings.fc_settings import Cause
+from bridge.fc.fc_settings import Cause
 from protocols.msp.setting_table import HeldSetting, SettingCommand, table_checksum
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from simulator.naze.setting_table import SETTINGS as NAZE_SETTINGS

@@ -5,8 +5,8 @@ import lzma
 
 from pymavlink.mavftp import MAVFTP
 
-from bridge.settings.board_setting import BoardSetting, ValueKind
-from bridge.vehicle.parameter_files import ParameterFiles
+from bridge.model.board_setting import BoardSetting, ValueKind
+from bridge.settings.parameter_files import ParameterFiles
 from protocols.mavlink.ftp import file_crc32
 
 SETTINGS = {

@@ -5,8 +5,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
+from bridge.model.board_setting import SettingTable, Value
 from bridge.model.settings import BoardId
-from bridge.settings.board_setting import SettingTable, Value
 
 
 class Occasion(Enum):

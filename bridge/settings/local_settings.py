@@ -8,13 +8,13 @@ before the save leaves the saved settings as they were.
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from bridge.fc.fc_settings import Cause, SettingRefusal
 from bridge.fc.session import FcSession
-from bridge.settings.board_setting import BoardSetting, SettingTable, Value
-from bridge.settings.fc_settings import Cause, SettingRefusal
+from bridge.model.board_setting import BoardSetting, SettingTable, Value
+from bridge.settings.board_settings import READ_WITHIN_S, BoardSettings
+from bridge.settings.parameter_names import parameter_names
 from bridge.settings.restore_plan import LeftOut, PlannedChange, RestorePlan, is_restored, plan_restore
-from bridge.vehicle.board_settings import READ_WITHIN_S, BoardSettings
-from bridge.vehicle.parameter_names import parameter_names
-from bridge.vehicle.setting_clients import OnTable
+from bridge.settings.setting_clients import OnTable
 
 _MOST_NAMES = 8
 _NO_BOARD = SettingRefusal(Cause.NO_LINK, "The flight controller is not connected")

@@ -2,11 +2,11 @@
 
 from collections.abc import Callable
 
+from bridge.fc.fc_settings import NO_ANSWER, FcSettings, SettingRefusal, TableReading
 from bridge.line.conversation import Conversation, Pause
 from bridge.line.runner import Runner
-from bridge.settings.board_setting import BoardSetting, SettingTable, Value, table_of
-from bridge.settings.fc_settings import NO_ANSWER, FcSettings, SettingRefusal, TableReading
-from bridge.vehicle.table_reader import TableReader
+from bridge.model.board_setting import BoardSetting, SettingTable, Value, table_of
+from bridge.settings.table_reader import TableReader
 
 TABLE = table_of()
 

@@ -9,13 +9,7 @@ may have changed it. Changes are in the board's RAM until they are saved.
 from collections.abc import Callable
 from math import inf
 
-from bridge.fc.profile import FlightController
-from bridge.fc.session import FcSession
-from bridge.line.conversation import LinkLost
-from bridge.missions.mission_service import MissionService
-from bridge.model.events import Emit, SettingChanged, SettingsRead, SettingsSaved
-from bridge.settings.board_setting import BoardSetting, SettingTable, Value, shown
-from bridge.settings.fc_settings import (
+from bridge.fc.fc_settings import (
     ARMED,
     NO_ANSWER,
     Cause,
@@ -25,8 +19,14 @@ from bridge.settings.fc_settings import (
     out_of_range,
     while_disarmed,
 )
-from bridge.vehicle.setting_clients import Change, Changes, OnChanged, OnTable, TableClients
-from bridge.vehicle.table_reader import TableReader
+from bridge.fc.profile import FlightController
+from bridge.fc.session import FcSession
+from bridge.line.conversation import LinkLost
+from bridge.missions.mission_service import MissionService
+from bridge.model.board_setting import BoardSetting, SettingTable, Value, shown
+from bridge.model.events import Emit, SettingChanged, SettingsRead, SettingsSaved
+from bridge.settings.setting_clients import Change, Changes, OnChanged, OnTable, TableClients
+from bridge.settings.table_reader import TableReader
 
 #: After the board was found: its list is read first.
 _FIRST_S, _RETRY_S, _AFTER_CHANGE_S = 0.2, 0.3, 5.0

@@ -5,12 +5,12 @@ from collections.abc import Callable
 
 import pytest
 
-from bridge.settings.board_setting import SettingTable, Value
-from bridge.settings.fc_settings import Cause, SettingRefusal
-from bridge.vehicle.local_settings import RestoreResult, by_parameter, by_setting
+from bridge.fc.fc_settings import Cause, SettingRefusal
+from bridge.model.board_setting import SettingTable, Value
+from bridge.settings.local_settings import RestoreResult, by_parameter, by_setting
 from protocols.msp.frame import MspParser
 from simulator.board.options import Faults
-from tests.bridge.vehicle.test_board_settings import restart
+from tests.bridge.settings.test_board_settings import restart
 from tests.support.settings_client import BOARDS, ready, value_of
 from tests.support.world import World
 

@@ -4,8 +4,8 @@
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from bridge.settings.board_setting import BoardSetting, Value, shown
-from bridge.settings.fc_settings import Cause, SettingRefusal
+from bridge.fc.fc_settings import Cause, SettingRefusal
+from bridge.model.board_setting import BoardSetting, Value, shown
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from protocols.msp.setting_table import SettingCommand
 from simulator.board.options import Faults

@@ -13,7 +13,7 @@ from math import isfinite
 from typing import ClassVar, TypeVar
 
 from bridge.line.conversation import Conversation, ask, ask_armed, ask_status
-from bridge.settings.board_setting import BoardSetting, SettingTable, Value, ValueKind, shown
+from bridge.model.board_setting import BoardSetting, SettingTable, Value, ValueKind, shown
 from protocols.msp.frame import Direction, request
 
 T = TypeVar("T")

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 
-from bridge.settings.board_setting import SettingTable, table_of
-from bridge.settings.fc_settings import NO_ANSWER, SettingRefusal
-from bridge.vehicle.setting_clients import Change, Changes, TableClients
+from bridge.fc.fc_settings import NO_ANSWER, SettingRefusal
+from bridge.model.board_setting import SettingTable, table_of
+from bridge.settings.setting_clients import Change, Changes, TableClients
 
 
 def change(value: float, client: str) -> Change:

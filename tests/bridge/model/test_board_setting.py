@@ -4,8 +4,8 @@ from math import inf, nan
 
 import pytest
 
-from bridge.settings.board_setting import BoardSetting, Value, ValueKind, shown, table_of
-from bridge.settings.fc_settings import out_of_range
+from bridge.fc.fc_settings import out_of_range
+from bridge.model.board_setting import BoardSetting, Value, ValueKind, shown, table_of
 
 P_ROLL = BoardSetting("p_roll", ValueKind.INTEGER, 1, 200, 35)
 LAG = BoardSetting("bar_lag", ValueKind.FLOAT, 0, 10, 0.30000001192092896, "s")

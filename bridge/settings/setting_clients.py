@@ -5,8 +5,8 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from bridge.settings.board_setting import BoardSetting, SettingTable, Value
-from bridge.settings.fc_settings import SettingRefusal
+from bridge.fc.fc_settings import SettingRefusal
+from bridge.model.board_setting import BoardSetting, SettingTable, Value
 
 #: Changes that wait: of one client, which repeats them, and of all.
 _MOST_OF_ONE, _MOST_WAITING = 8, 64

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 
-from bridge.vehicle.parameter_names import LONGEST, parameter_names
+from bridge.settings.parameter_names import LONGEST, parameter_names
 from simulator.inav.setting_table import SETTINGS as INAV_SETTINGS
 from simulator.naze.setting_table import SETTINGS as NAZE_SETTINGS
 

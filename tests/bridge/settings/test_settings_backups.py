@@ -2,7 +2,7 @@
 """A backup is taken when a board is met, when its settings were saved, and when they changed without the bridge."""
 
 from simulator.board.options import Faults, SimOptions
-from tests.bridge.vehicle.test_board_settings import restart
+from tests.bridge.settings.test_board_settings import restart
 from tests.support.inside import inside
 from tests.support.settings_client import BOARDS, ready, value_of
 from tests.support.world import World

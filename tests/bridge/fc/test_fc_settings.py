@@ -2,8 +2,8 @@
 
 import pytest
 
+from bridge.fc.fc_settings import ARMED, NO_ANSWER, SettingRefusal, while_disarmed
 from bridge.line.conversation import Conversation, Pause, Receive
-from bridge.settings.fc_settings import ARMED, NO_ANSWER, SettingRefusal, while_disarmed
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame
 

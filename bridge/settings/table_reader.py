@@ -4,10 +4,10 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from bridge.fc.fc_settings import FcSettings, TableReading
 from bridge.line.conversation import Conversation, LinkLost, Pause
 from bridge.line.runner import Runner
-from bridge.settings.board_setting import SettingTable
-from bridge.settings.fc_settings import FcSettings, TableReading
+from bridge.model.board_setting import SettingTable
 
 #: After a failure; doubled after each further one.
 _RETRY_S, _MOST_RETRY_S = 0.3, 60.0

@@ -12,16 +12,16 @@ from dataclasses import dataclass
 from math import inf, isfinite
 from weakref import WeakKeyDictionary
 
+from bridge.fc.fc_settings import Cause, SettingRefusal
 from bridge.gcs.cost import Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import GroundStation
 from bridge.gcs.station import Severity, Station
-from bridge.settings.board_setting import BoardSetting, SettingTable, ValueKind, shown
-from bridge.settings.fc_settings import Cause, SettingRefusal
-from bridge.vehicle.board_settings import BoardSettings
-from bridge.vehicle.own_parameters import OwnParameters
-from bridge.vehicle.parameter_files import GENERAL_URI, ParameterFiles
-from bridge.vehicle.parameter_names import parameter_names
+from bridge.model.board_setting import BoardSetting, SettingTable, ValueKind, shown
+from bridge.settings.board_settings import BoardSettings
+from bridge.settings.own_parameters import OwnParameters
+from bridge.settings.parameter_files import GENERAL_URI, ParameterFiles
+from bridge.settings.parameter_names import parameter_names
 from protocols.float32 import single
 from protocols.mavlink.codec import pack
 from protocols.mavlink.dialect import Message, messages
