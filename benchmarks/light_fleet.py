@@ -41,7 +41,7 @@ def state_of(key):
 for number in range(first, first + count):
     session, own = zenoh.open(config), f"fleet/light-{number}/v1"
     queryables = [session.declare_queryable(f"{own}/{key}", state_of(f"{own}/{key}"))
-                  for key in ("state", "mission/current", "mission/list", "history")]
+                  for key in ("state", "mission/current", "mission/list")]
     token = session.liveliness().declare_token(f"{own}/alive/{session.zid()}")
     publishers = [(session.declare_publisher(f"{own}/{key}", congestion_control=zenoh.CongestionControl.DROP), size)
                   for key, size in (("state", 900), ("telemetry/position", 280))]

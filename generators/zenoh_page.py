@@ -37,7 +37,6 @@ _INNER = {
     "mission": "mission",
     "settings": "settings",
     "last_heard": "last heard",
-    "positions": "logged position",
     "events": "event",
 }
 _TYPES = {

@@ -36,7 +36,6 @@ _ENVELOPE: Json = {
         "description": "when the bridge made the sample, seconds since 1970 (UTC); see time_source in the state",
     },
 }
-_LOGGED_PLACE = ("lat_deg", "lon_deg", "altitude_m", "height_m")
 _NUMBER: Json = {"type": ["number", "null", "string"], "description": "null: not given; inf or -inf as text"}
 _PLACE: Json = {"type": ["integer", "null"], "description": "degrees * 1e7; null: not given"}
 _MAV_NUMBER: Json = {"type": "integer", "description": "MAVLink's number"}
@@ -79,7 +78,6 @@ _WHAT = {
     "overview": "The state in 80 bytes, for programs that watch thousands of vehicles: always CBOR, whole numbers. "
     "null: not known, or stale.",
     "event": "An event, as in the daemon's log.",
-    "history": "The reply to a query about a time range.",
     "mission_current": "The flight controller's mission. All fields are null while it is unknown.",
     "mission_list": "The stored missions, newest first.",
     "mission_report": "The result of an upload.",
@@ -144,28 +142,6 @@ def schemas() -> dict[str, Json]:
         summary[f"{name}_s"] = summary.pop(name) | {"description": "seconds since 1970 (UTC)"}
     missions = {"missions": {"type": "array", "items": _object(summary), "description": "newest first"}}
     made["mission_list"] = missions
-    number = _ENVELOPE["seq"] | {"type": ["integer", "null"], "description": "null: from a telemetry log"}
-    place = {name: field for name, field in made["position"].items() if name in _LOGGED_PLACE}
-    made["history"] = {
-        "events": {
-            "type": "array",
-            "items": _object(_ENVELOPE | {"seq": number} | made["event"]),
-            "description": "oldest first, the newest 2,000; from before the daemon's start vehicle.armed, "
-            "vehicle.disarmed and gcs.text, from the telemetry logs",
-        },
-        **missions,
-        "positions": {
-            "type": "array",
-            "items": _object({"time_s": _ENVELOPE["time_s"]} | place),
-            "description": "if asked for: from the telemetry logs, spread evenly over the range, at most one a second",
-        },
-        "logs_from_s": {
-            "type": ["number", "null"],
-            "description": "the time from which the telemetry logs were read; null: none was. Reading, newest first, "
-            "stops after 5 s, or sooner if other queries wait: if this is later than the range's start, ask for a "
-            "shorter one",
-        },
-    }
     made["mission_report"] = upload | {"source": {"type": "string", "description": "the sender"}}
     files = {name: _file(name, _ENVELOPE | body) for name, body in made.items()}
     files["command_reply"] = _reply(_object(upload, required=("ack", "text")), items, findings)

@@ -69,7 +69,6 @@ TELEMETRY = {group: ZenohKey(f"{_V}/telemetry/{group.value}", group.value, Sampl
 STATE = ZenohKey(f"{_V}/state", "state", SampleDelivery.DROP, kept=1)
 OVERVIEW = ZenohKey(f"{_V}/overview", "overview", SampleDelivery.DROP, encoding=PayloadEncoding.CBOR)
 EVENT = ZenohKey(f"{_V}/event", "event", SampleDelivery.RELIABLE, kept=256)
-HISTORY = ZenohKey(f"{_V}/history", "history", SampleDelivery.REPLY)
 MISSION_CURRENT = ZenohKey(f"{_V}/mission/current", "mission_current", SampleDelivery.RELIABLE, kept=1)
 MISSION_LIST = ZenohKey(f"{_V}/mission/list", "mission_list", SampleDelivery.REPLY)
 MISSION_REPORT = ZenohKey(f"{_V}/mission/report", "mission_report", SampleDelivery.RELIABLE, kept=16)
@@ -105,7 +104,6 @@ KEYS = (
     STATE,
     OVERVIEW,
     EVENT,
-    HISTORY,
     MISSION_CURRENT,
     MISSION_LIST,
     MISSION_REPORT,

@@ -6,15 +6,14 @@ Our logs never contain signatures, which Mission Planner could only check with t
 SETUP_SIGNING, which carries the key.
 """
 
-from collections.abc import Container, Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable
 
 from fastcrc.crc16 import mcrf4xx
 
 from protocols.mavlink.dialect import CRC_EXTRA, messages
-from protocols.mavlink.frame import MAGIC_V1, MAGIC_V2, MavlinkFrame, whole_frame
+from protocols.mavlink.frame import MAGIC_V1, MavlinkFrame
 
-STAMP_SIZE = 8
+_STAMP_SIZE = 8
 #: pymavlink uses the two lowest bits as a link number.
 _LINK_BITS = 0b11
 _CRC_SIZE = 2
@@ -26,15 +25,6 @@ _MSGID = slice(7, 10)
 _HEARTBEAT_SIZE = 9
 _HEARTBEAT_TYPE = 4
 _SETUP_SIGNING = messages.MAVLINK_MSG_ID_SETUP_SIGNING.to_bytes(3, "little")
-_HEADERS = {MAGIC_V1: 6, MAGIC_V2: 10}
-
-
-@dataclass(frozen=True, slots=True)
-class TlogRecord:
-    """A frame, and the time it was sent or received, in microseconds since the Unix epoch."""
-
-    at_us: int
-    frame: MavlinkFrame
 
 
 def tlog_records(frames: Iterable[bytes], at_us: int) -> bytes:
@@ -42,33 +32,11 @@ def tlog_records(frames: Iterable[bytes], at_us: int) -> bytes:
 
     Those that must not be logged are left out.
     """
-    stamp = (at_us & ~_LINK_BITS).to_bytes(STAMP_SIZE, "big")
+    stamp = (at_us & ~_LINK_BITS).to_bytes(_STAMP_SIZE, "big")
     # No call for most frames, of which there may be thousands a second: MAVLink 1 has neither signatures nor
     # SETUP_SIGNING, and in MAVLink 2 they have flags (byte 2) or an id above 255 (byte 8).
     logged = [each if each[0] == MAGIC_V1 or not (each[2] or each[8]) else _loggable(each) for each in frames]
     return b"".join([stamp + each for each in logged if each])
-
-
-def read_tlog(data: bytes, msgids: Container[int] | None = None) -> Iterator[TlogRecord]:
-    """Yield the records of a log, or only those of some messages. Incomplete and damaged records are skipped.
-
-    The checksums of other messages are not computed, which makes a search ten times as fast.
-    """
-    at = 0
-    while at < len(data) - STAMP_SIZE:
-        start = at + STAMP_SIZE
-        end = _frame_end(data, start)
-        if end is None:
-            at += 1
-            continue
-        frame = MavlinkFrame(data[start:end])
-        if msgids is not None and frame.msgid not in msgids and _begins(data, end + STAMP_SIZE):
-            at = end
-        elif whole_frame(frame.raw) is None:
-            at += 1
-        else:
-            yield TlogRecord(first_stamp_us(data[at:start]), frame)
-            at = end
 
 
 def heartbeat_type(frame: bytes) -> int | None:
@@ -82,22 +50,7 @@ def heartbeat_type(frame: bytes) -> int | None:
 
 def first_stamp_us(records: bytes) -> int:
     """The time of the first record, in microseconds since the Unix epoch."""
-    return int.from_bytes(records[:STAMP_SIZE], "big")
-
-
-def _frame_end(data: bytes, start: int) -> int | None:
-    """The end of the frame at `start`; None if none begins there."""
-    header = _HEADERS.get(data[start])
-    if header is None or len(data) < start + header:
-        return None
-    signature = _SIGNATURE_SIZE if header == _HEADERS[MAGIC_V2] and data[start + 2] & _SIGNED else 0
-    end = start + header + data[start + 1] + _CRC_SIZE + signature
-    return None if end > len(data) else end
-
-
-def _begins(data: bytes, start: int) -> bool:
-    """True if a frame may begin at `start`, or the log has ended."""
-    return start >= len(data) or data[start] in _HEADERS
+    return int.from_bytes(records[:_STAMP_SIZE], "big")
 
 
 def _loggable(frame: bytes) -> bytes:

@@ -227,10 +227,6 @@ class MissionStore:
         """The `limit` newest missions, newest first."""
         return self._summaries("ORDER BY number DESC LIMIT ?", limit)
 
-    def received_between(self, start: float, end: float, limit: int) -> builtins.list[MissionSummary]:
-        """The `limit` newest missions received in a time range (unix seconds), newest first."""
-        return self._summaries("WHERE received_at BETWEEN ? AND ? ORDER BY number DESC LIMIT ?", start, end, limit)
-
     def _summaries(self, which: str, *values: float) -> builtins.list[MissionSummary]:
         with explained(f"cannot list {self._path}"):
             rows = self._connection.execute(f"SELECT {SUMMARY}, crc32 FROM missions {which}", values).fetchall()  # noqa: S608 - constants

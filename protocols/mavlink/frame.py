@@ -136,17 +136,6 @@ def is_disarmed_heartbeat(frame: MavlinkFrame) -> bool:
     return is_plausible_heartbeat(frame) and not frame.payload[_BASE_MODE] & _SAFETY_ARMED
 
 
-def whole_frame(raw: bytes) -> MavlinkFrame | None:
-    """The frame that these bytes are, complete with CRC and signature; None if its header or CRC is wrong."""
-    if raw[0] == MAGIC_V1:
-        crc_at, crc_extra = _HEADER_V1 + raw[1], _CRC_EXTRA_V1.get((raw[1], raw[5]))
-    else:
-        crc_at, crc_extra = _HEADER_V2 + raw[1], _CRC_EXTRA_V2.get(raw[7:10]) if raw[2] <= _SIGNED else None
-    if crc_extra is None or mcrf4xx(raw[1:crc_at] + crc_extra + raw[crc_at : crc_at + _CRC_SIZE]):
-        return None
-    return MavlinkFrame(raw)
-
-
 class MavlinkSplitter:
     """Finds frames in a byte stream. Never raises: other bytes are counted and skipped.
 

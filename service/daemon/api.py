@@ -146,10 +146,6 @@ class DaemonApi:
     async def list_missions(self, limit: int) -> Json:
         return await self._daemon.store.ask(lambda store: listed(store, limit))
 
-    async def missions_between(self, start_s: float, end_s: float, limit: int) -> Json:
-        """List the missions received in a time range (unix seconds), newest first."""
-        return await self._daemon.store.ask(lambda store: _listed(store.received_between(start_s, end_s, limit)))
-
     async def show_mission(self, number: int) -> Json:
         return await self._daemon.store.ask(lambda store: shown(store, number))
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Queries about the vehicle: state, overview, history, mission/current and mission/list.
+"""Queries about the vehicle: state, overview, mission/current and mission/list.
 
 docs/zenoh-payloads.md describes the bodies.
 """
@@ -14,26 +14,22 @@ from payloads import keys
 from payloads.mission_data import Json, plain, strict
 from payloads.overview import overview_of
 from service.daemon.api import DaemonApi, delivery_data
-from service.zenoh_link.history import History
 from service.zenoh_link.queries import Answerer, Question
 
 _USUAL_LIMIT, _MAX_LIMIT = 20, 200
-_MAX_POSITIONS = 1000
 _TIMES = ("received_at", "concluded_at")
 
 
 class Answers:
     """The bodies of the replies. `state`: the vehicle's, as published."""
 
-    def __init__(self, state: Callable[[], Json], bridge: Bridge, api: DaemonApi, history: History) -> None:
+    def __init__(self, state: Callable[[], Json], bridge: Bridge, api: DaemonApi) -> None:
         self._bridge = bridge
         self._vehicle_state = state
         self._api = api
-        self._history = history
         self.answerers: dict[keys.ZenohKey, Answerer] = {
             keys.STATE: self._state,
             keys.OVERVIEW: self._overview,
-            keys.HISTORY: self._past,
             keys.MISSION_CURRENT: self._mission_current,
             keys.MISSION_LIST: self._mission_list,
         }
@@ -43,11 +39,6 @@ class Answers:
 
     async def _overview(self, _: Question) -> Json:
         return plain(overview_of(self._vehicle_state()))
-
-    async def _past(self, question: Question) -> Json:
-        most = question.whole_number("positions", 0, _MAX_POSITIONS)
-        found = await self._history.answer(question.parameter("_time"), most)
-        return found | {"missions": [_with_units(each) for each in found["missions"]]}
 
     async def _mission_current(self, _: Question) -> Json:
         return mission_current(self._bridge.missions.held)

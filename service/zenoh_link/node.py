@@ -33,7 +33,6 @@ from service.settings.zenoh import ZenohProfile, ZenohSettings
 from service.settings.zenoh_config import make_config
 from service.zenoh_link.answers import Answers, mission_current, mission_report
 from service.zenoh_link.commands import CommandQueries
-from service.zenoh_link.history import History
 from service.zenoh_link.liveliness import Liveliness
 from service.zenoh_link.mavlink_link import MavlinkLink
 from service.zenoh_link.publisher import Publisher
@@ -68,8 +67,7 @@ class Node(Follower):
         logs = None if daemon.settings.state_dir is None else daemon.settings.state_dir / TLOG_FOLDER
         self._rates = SampleRates(is_metered=settings.profile is ZenohProfile.METERED)
         self._logs = TelemetryLogs(logs)
-        self._history = History(api, logs, self._clock.unix_s)
-        self._answerers = Answers(self._state, daemon.bridge, api, self._history).answerers
+        self._answerers = Answers(self._state, daemon.bridge, api).answerers
         if settings.commands:
             self._answerers |= CommandQueries(api, self._presence.others, self._logs).answerers
         self._held: HeldMission | None = None
@@ -107,7 +105,6 @@ class Node(Follower):
         """Publish an event, and soon after it the changed state."""
         about = {"level": event.level, "event": event.name_in_log, "facts": event.facts()}
         body = self._payloads.head(keys.EVENT) | about
-        self._history.add(body)
         self._thread.submit(lambda: self._publisher.put_raw(keys.EVENT, self._payloads.encode(keys.EVENT, body)))
         if event.level != "debug":
             self._publish_soon()

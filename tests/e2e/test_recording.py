@@ -13,10 +13,10 @@ import pytest
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from protocols.tlog import TlogRecord, read_tlog
 from protocols.uart_capture import UartAction, read_capture
 from tests.support.benches import Starter
 from tests.support.programs import Daemon, run_naze_bridge, until
+from tests.support.tlog import TlogRecord, read_tlog
 
 STATION = 250
 HEARTBEAT = 0

@@ -14,7 +14,6 @@ from protocols.gps_receiver import GpsWatch
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.msp.command_line import EchoWatch
 from protocols.msp.frame import MAX_REPLY, MspParser
-from protocols.tlog import read_tlog
 from protocols.uart_capture import read_capture
 
 SIZE = 10_000
@@ -66,15 +65,13 @@ def msp(data: bytes, size: int) -> None:
     parser.reset()
 
 
-OF_FILES = {"tlog", "tlog of heartbeats", "capture"}
+OF_FILES = {"capture"}
 PARSERS: dict[str, Callable[[bytes, int], None]] = {
     "MAVLink": mavlink,
     "MSP": msp,
     "FrSky": lambda data, size: in_pieces(FrskyParser().feed)(data, size),
     "GPS": lambda data, size: in_pieces(GpsWatch().feed)(data, size),
     "echo": lambda data, size: in_pieces(EchoWatch().feed)(data, size),
-    "tlog": lambda data, _: [*read_tlog(data)].clear(),
-    "tlog of heartbeats": lambda data, _: [*read_tlog(data, {0})].clear(),
     "capture": lambda data, _: read_capture(data).clear(),
 }
 CASES = [(name, size) for name in PARSERS for size in (1, 64, SIZE) if size == SIZE or name not in OF_FILES]

@@ -5,13 +5,10 @@ import hashlib
 from pathlib import Path
 from typing import Any
 
-from fastcrc.crc16 import mcrf4xx
-from hypothesis import given
-from hypothesis import strategies as st
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from protocols.tlog import read_tlog, tlog_records
+from protocols.tlog import tlog_records
 
 NOON_US = 1_795_262_400_000_000
 KEY = hashlib.sha256(b"a passphrase").digest()
@@ -72,30 +69,3 @@ def test_a_signing_key_is_never_logged() -> None:
         frame = bytes(messages.MAVLink_setup_signing_message(1, 1, KEY, 1).pack(sender(signing=signing)))
         assert KEY in frame
         assert tlog_records([frame], NOON_US) == b""
-
-
-def test_a_frame_with_an_unknown_flag_or_a_wrong_checksum_is_no_record() -> None:
-    frame = bytes(messages.MAVLink_heartbeat_message(2, 3, 81, 0, 3, 3).pack(sender()))
-    flagged = frame[:2] + b"\x02" + frame[3:]
-    flagged = flagged[:-2] + mcrf4xx(flagged[1:-2] + b"\x32").to_bytes(2, "little")
-    damaged = frame[:-1] + bytes((frame[-1] ^ 1,))
-    log = b"".join(NOON_US.to_bytes(8, "big") + each for each in (flagged, damaged, frame))
-    assert [record.frame.raw for record in read_tlog(log)] == [frame]
-
-
-@given(st.data())
-def test_records_around_damage_are_read(data: st.DataObject) -> None:
-    """With any bytes lost or changed, exactly the intact records are read."""
-    codec = sender()
-    frames = [bytes(message.pack(codec)) for message in some_messages()]
-    records = [tlog_records([frame], NOON_US + 1000 * n) for n, frame in enumerate(frames)]
-    garbage = data.draw(st.lists(st.binary(max_size=40), min_size=len(records) + 1, max_size=len(records) + 1))
-    log = b"".join(noise + record for noise, record in zip(garbage, [*records, b""], strict=True))
-    assert list(map(as_record, read_tlog(log))) == records
-    cut = data.draw(st.integers(0, sum(map(len, records))))
-    whole = [record for n, record in enumerate(records) if sum(map(len, records[: n + 1])) <= cut]
-    assert list(map(as_record, read_tlog(b"".join(records)[:cut]))) == whole
-
-
-def as_record(record: Any) -> bytes:
-    return tlog_records([record.frame.raw], record.at_us)

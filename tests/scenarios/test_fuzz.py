@@ -20,9 +20,7 @@ from hypothesis.database import DirectoryBasedExampleDatabase
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from payloads.mission_data import to_json
-from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mission_file import MissionFileError, read_mission_file
-from protocols.tlog import read_tlog, tlog_records
 from protocols.uart_capture import read_capture
 from reports.vehicle_groups import Group
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
@@ -108,12 +106,9 @@ def test_no_mission_file_raises(seed: int) -> None:
 
 
 @_fuzz
-def test_no_log_or_capture_raises(seed: int) -> None:
+def test_no_capture_raises(seed: int) -> None:
     inputs = FuzzInputs(seed)
     for _ in range(AT_ONCE // 2):
-        frames = MavlinkSplitter().feed(b"".join(inputs.from_a_ground_station() for _ in range(3)))
-        log = b"".join(tlog_records([frame.raw], number) for number, frame in enumerate(frames))
-        list(read_tlog(inputs.damaged(log), {0, 30} if inputs.random.random() < 0.5 else None))
         read_capture(inputs.like(captures()))
 
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from protocols.tlog import read_tlog
 from service.recording.tlog_recorder import TlogRecorder
 from service.settings import TlogLimits
 from tests.support.programs import TIMEOUT_S
+from tests.support.tlog import read_tlog
 
 HOUR_NS = 3600 * 10**9
 

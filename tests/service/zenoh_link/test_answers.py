@@ -79,7 +79,7 @@ def test_all_payloads_match_the_published_schemas(start: Starter, encoding: str)
         ask_surely(opened, f"{COMMANDS}/mission/upload", refused)
         bench.board.set("armed 1")
         reader.wait("event", lambda event: event["event"] == "vehicle.armed")
-        for suffix in ("state", "mission/current", "mission/list", "history"):
+        for suffix in ("state", "mission/current", "mission/list"):
             check(f"v{VERSION}/{suffix}", ask_surely(opened, suffix))
         bench.board.set("unplug")
         reader.wait("state", lambda state: state["link"]["flight_controller"] is None)

@@ -2,7 +2,7 @@
 """Events and reports survive outages; late subscribers and recorders get them; storages answer for absent vehicles."""
 
 import signal
-from datetime import UTC, datetime, timedelta
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +10,10 @@ import pytest
 import zenoh
 from zenoh import ext
 
-from service.zenoh_link.logged_past import read_logged_past
-from service.zenoh_link.time_range import TimeRange
 from tests.support.benches import Starter
 from tests.support.plan import plain_plan
 from tests.support.programs import until
-from tests.support.zenoh_bench import I_KNOW, Reader, ask, ask_surely, body, endpoint, key, session, zenoh_bench
+from tests.support.zenoh_bench import I_KNOW, Reader, ask_surely, body, endpoint, key, session, zenoh_bench
 from tests.support.zenoh_router import running_router
 
 DAY = timedelta(days=1)
@@ -66,56 +64,6 @@ def test_a_late_subscriber_gets_earlier_events(start: Starter) -> None:
         assert len(received["mission/report"][0]["stored"]) == 7
         assert received["mission/current"][-1]["count"] == 7
         del subscribers
-
-
-def test_past_events_can_be_queried(start: Starter) -> None:
-    where = endpoint()
-    bench = zenoh_bench(start, f'listen = ["{where}"]')
-    bench.daemon.push(plain_plan(7))
-    with session(connect=where) as opened:
-        began = datetime.now(UTC) - timedelta(minutes=10)
-        past = ask_surely(opened, f"history?_time=[{began:%Y-%m-%dT%H:%M:%SZ}..{began + DAY:%Y-%m-%dT%H:%M:%SZ}]")
-        assert [each["record_count"] for each in past["missions"]] == [7]
-        assert [each["seq"] for each in past["events"]] == list(range(len(past["events"])))
-        assert {"fc.found", "mission.push_ended"} <= {each["event"] for each in past["events"]}
-        assert (
-            ask_surely(opened, f"history?_time=[{began - DAY:%Y-%m-%dT%H:%MZ}..{began:%Y-%m-%dT%H:%MZ}]")["events"]
-            == []
-        )
-        assert (before := ask_surely(opened, "history?_time=[..now(-10m)]"))["events"] == before["missions"] == []
-        assert "not a time range" in ask_surely(opened, "history?_time=lately")["error"]
-        assert "positions" in ask_surely(opened, "history?positions=0")["error"]
-
-
-def test_events_from_before_a_restart_are_read_from_telemetry_logs(start: Starter) -> None:
-    where = endpoint()
-    bench = zenoh_bench(start, f'listen = ["{where}"]')
-    bench.daemon.push(plain_plan(7))
-    logs = bench.daemon.state_dir / "logs"
-    with session(connect=where) as opened:
-        wanted = "history?_time=[now(-10m)..];positions=50"
-        bench.board.set("armed 1")
-        until(lambda: ask_surely(opened, wanted)["positions"], "a position on the disk")
-        bench.board.set("armed 0")
-        until(lambda: "vehicle.disarmed" in str(read_logged_past(logs, TimeRange(), 0)), "the landing on the disk")
-        bench.daemon.kill_and_restart()
-        bench.daemon.wait()
-        past = until(lambda: next(iter(_answers_of_a_new_run(opened, wanted)), None), "the new run's answer")
-    logged = [each["event"] for each in past["events"] if each["seq"] is None]
-    assert [name for name in logged if name.startswith("vehicle.")] == ["vehicle.armed", "vehicle.disarmed"]
-    assert [each["time_s"] for each in past["events"]] == sorted(each["time_s"] for each in past["events"])
-    assert {"lat_deg", "height_m"} <= set(past["positions"][0])
-    assert past["logs_from_s"] <= past["events"][0]["time_s"]
-    assert [each["record_count"] for each in past["missions"]] == [7]
-
-
-def _answers_of_a_new_run(opened: zenoh.Session, wanted: str) -> list[Any]:
-    answers = ask(opened, wanted)
-    return [
-        past
-        for past in answers
-        if any(each["event"] == "fc.found" and each["seq"] is not None for each in past["events"])
-    ]
 
 
 def test_a_recorder_of_everything_is_not_a_ground_station(start: Starter) -> None:

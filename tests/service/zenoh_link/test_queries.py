@@ -67,7 +67,7 @@ async def test_a_flood_of_queries_that_guests_may_send_refuses_no_command() -> N
         return {"result": "done"}
 
     def declare(opened: zenoh.Session) -> None:
-        for each, answerer in ((keys.HISTORY, never), (keys.STATE, never), (keys.UPLOAD, at_once)):
+        for each, answerer in ((keys.MISSION_LIST, never), (keys.STATE, never), (keys.UPLOAD, at_once)):
             queries.declare(opened, each, key(each.suffix.removeprefix("v1/")), answerer)
 
     def guest_and_pilot() -> list[Any]:
@@ -77,7 +77,7 @@ async def test_a_flood_of_queries_that_guests_may_send_refuses_no_command() -> N
             refused.append(body(reply.err) if reply.err else None)
 
         with session(connect=where) as guest, session(connect=where) as pilot:
-            for suffix in ("history", "state"):
+            for suffix in ("mission/list", "state"):
                 before = len(refused)
                 for _ in range(FLOOD):
                     guest.get(key(suffix), zenoh.handlers.Callback(count), timeout=TIMEOUT_S)
