@@ -27,8 +27,8 @@ def state_lock(directory: Path) -> Iterator[None]:
     file and a third one a new file.
     """
     try:
-        directory.mkdir(parents=True, exist_ok=True)
-        descriptor = os.open(directory / _NAME, os.O_RDWR | os.O_CREAT, 0o644)
+        directory.mkdir(mode=0o700, parents=True, exist_ok=True)
+        descriptor = os.open(directory / _NAME, os.O_RDWR | os.O_CREAT, 0o600)
     except OSError as error:
         raise StateUnusableError(
             f"cannot use the state directory {directory}: {reason(error)}; use another with --state-dir"

@@ -12,8 +12,7 @@ import shutil
 from pathlib import Path
 
 import click
-import segno
-from segno import helpers
+from segno.helpers import make_wifi_data
 
 from service.cli.setup.answers import PAGE_PORT
 from service.cli.setup.command import check_answers, secret_line
@@ -22,6 +21,7 @@ from service.settings.passphrase import STRONGER, new_passphrase, weakness
 from service.web.token import new_token
 from storage.os_error import reason
 from terminal.options import PATH
+from terminal.secret_text import show_secret
 from terminal.sentences import complain, fail
 
 FOLDER = "naze-bridge"
@@ -56,7 +56,9 @@ _FIRST_BOOT = """\
 # Written by `naze-bridge card`. Its log is {log}.
 set -eu
 here=$(dirname "$(realpath "$0")")
+umask 077
 exec >>{log} 2>&1
+umask 022
 dpkg --install "$here"/naze-bridge.deb
 state=/var/lib/private/naze-bridge
 mkdir -p -m 700 /var/lib/private
@@ -117,13 +119,14 @@ def card(
         fail(error)
     except OSError as error:
         fail(f"{error.filename or boot} cannot be changed: {reason(error)}")
-    click.echo(f"The card is ready. Put it into the Pi and wait 5 minutes, then join {hotspot!r}:")
-    helpers.make_wifi(ssid=hotspot, password=password, security="WPA").terminal(compact=True)
+    click.echo(f"The card is ready. Put it into the Pi and wait 5 minutes, then join {hotspot!r}.")
+    kept_in = boot / FOLDER
+    show_secret("Its password", password, f"{kept_in}/password", make_wifi_data(hotspot, password, "WPA"))
     url = f"http://{ADDRESS}:{PAGE_PORT}/"
-    click.echo(f"Status page, with its token: {url}#token={token}")
-    segno.make(f"{url}#token={token}", error="l").terminal(compact=True)
+    click.echo(f"Status page: {url}")
+    show_secret("Its token, for changes", token, f"{kept_in}/web-token", f"{url}#token={token}")
     if key:
-        click.echo(f"The key, for ground stations that may make changes: {key}")
+        show_secret("The key, for ground stations that may make changes", key, f"{kept_in}/key", key)
 
 
 def prepare(boot: Path, package: Path, options: list[str], secrets: dict[str, str]) -> None:

@@ -15,6 +15,7 @@ from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from protocols.uart_capture import UartAction, read_capture
 from tests.support.benches import Starter
+from tests.support.plan import plain_plan
 from tests.support.programs import Daemon, run_naze_bridge, until
 from tests.support.tlog import TlogRecord, read_tlog
 
@@ -262,3 +263,21 @@ def test_invalid_recordings_and_replays_are_refused(
     assert complaint.replace("{dir}", str(tmp_path)) in done.stderr.replace("\n", " ")
     assert "Traceback" not in done.stderr
     assert (tmp_path / "notes.txt").read_text() == "mine\n"
+
+
+def test_other_users_cannot_read_what_a_daemon_run_by_hand_stores(
+    start: Starter, connect: Connect, tmp_path: Path
+) -> None:
+    before = os.umask(0o022)
+    try:
+        daemon = start.daemon("sim:", state_dir=tmp_path / "private", options=("--record-uart", str(tmp_path / "uart")))
+        daemon.wait()
+        daemon.push(plain_plan(3))
+    finally:
+        os.umask(before)
+    connect(daemon)
+    until(lambda: logs_of(daemon), "a log")
+    stored = [tmp_path / "uart", daemon.state_dir, *daemon.state_dir.rglob("*")]
+    assert {path.name for path in stored} >= {"private", "missions.db", "logs"}
+    # The control socket has its own check: the service's group may use it.
+    assert [path for path in stored if path.stat().st_mode & 0o077 and not path.is_socket()] == []

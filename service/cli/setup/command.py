@@ -11,7 +11,15 @@ from pathlib import Path
 import click
 
 from service.cli.doctor.command import diagnose
-from service.cli.setup.answers import GCS_PORT, PAGE_PORT, SetupChoices, current_key, earlier_choices, shadowed
+from service.cli.setup.answers import (
+    GCS_PORT,
+    KEY_FILE,
+    PAGE_PORT,
+    SetupChoices,
+    current_key,
+    earlier_choices,
+    shadowed,
+)
 from service.cli.setup.change import Machine, Run, SetupError, Step, WriteFile, is_root
 from service.cli.setup.hotspot import ADDRESS, JOIN_S, hotspot_name
 from service.cli.setup.state_folder import page_token
@@ -21,9 +29,12 @@ from service.daemon.client import STATUS, ControlError, ask_daemon
 from service.machine.host import Host
 from service.machine.raspberry_pi import pi_model
 from service.settings.addresses import AddressError, parse_fc
+from service.settings.load import SERVICE_STATE
 from service.settings.passphrase import STRONGER, new_passphrase, weakness
+from service.web.token import DEFAULT_NAME
 from storage.os_error import reason
 from terminal.options import PATH
+from terminal.secret_text import print_code, show_secret
 from terminal.sentences import complain, fail, say
 
 _LEAST_PASSWORD, _MOST_PASSWORD, _MOST_SSID = 8, 63, 32
@@ -120,9 +131,8 @@ def setup(
         _carry_out([step for step in steps if not step.cuts_network], log)
     _print_addresses(host, answers)
     if new_key:
-        click.echo(f"\nThe key, for ground stations that may make changes: {answers.key}")
-        click.echo("In Mission Planner: Setup, Advanced, MAVLink Signing, Add")
-        _print_code(str(answers.key))
+        click.echo("\nIn Mission Planner enter the key under Setup, Advanced, MAVLink Signing, Add.")
+        show_secret("The key, for ground stations that may make changes", str(answers.key), KEY_FILE, str(answers.key))
     is_well = True
     if any(step.needs_reboot for step in steps):
         click.echo("\nReboot once for the UART: sudo reboot. After that: naze-bridge doctor")
@@ -238,16 +248,10 @@ def _print_addresses(host: Host, answers: SetupChoices) -> None:
         return
     url = f"http://{(addresses or local or ['localhost'])[0]}:{PAGE_PORT}/"
     click.echo(f"Status page: {url}")
-    token = page_token(host)
-    if token:
-        click.echo(f"Its token, for changes: {token}")
-    _print_code(f"{url}#token={token}" if token else url)
-
-
-def _print_code(text: str) -> None:
-    import segno  # imported here: no other command needs it
-
-    segno.make(text, error="l").terminal(compact=True)
+    if token := page_token(host):
+        show_secret("Its token, for changes", token, f"{SERVICE_STATE}/{DEFAULT_NAME}", f"{url}#token={token}")
+    else:
+        print_code(url)
 
 
 def check_answers(ssid: str | None, password: str | None, country: str | None, name: str | None) -> None:

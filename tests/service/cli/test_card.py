@@ -13,6 +13,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from service.cli.main import main
+from terminal import secret_text
 
 _SYSTEMD_RUN = "systemd.run=/boot/firstrun.sh systemd.run_success_action=reboot systemd.unit=kernel-command-line.target"
 _FIRSTRUN = "#!/bin/bash\n\nset +e\n\necho kite >/etc/hostname\nrm -f /boot/firstrun.sh\nexit 0\n"
@@ -106,15 +107,21 @@ def test_it_may_be_prepared_again(card: Card, system: object) -> None:
     assert not (card.boot / "naze-bridge" / "key").exists()
 
 
-def test_the_folder_has_the_package_the_answers_and_valid_scripts(card: Card) -> None:
+def test_the_folder_has_the_package_the_answers_and_valid_scripts(card: Card, monkeypatch: pytest.MonkeyPatch) -> None:
     card.trixie()
+    monkeypatch.setattr(secret_text, "is_terminal", lambda: True)
     done = card.prepare("--new-key", "--name", "kite")
     folder = card.boot / "naze-bridge"
     assert (folder / "naze-bridge.deb").read_bytes() == _PACKAGE
     assert (folder / "password").read_text() == "long-enough\n"
     key, token = ((folder / name).read_text().strip() for name in ("key", "web-token"))
     assert f": {key}" in done.output
-    assert f"http://10.42.0.1:8080/#token={token}" in done.output
+    assert f": {token}" in done.output
+    assert ": long-enough" in done.output
+    monkeypatch.setattr(secret_text, "is_terminal", lambda: False)
+    captured = card.prepare("--new-key").output
+    secrets = [(folder / name).read_text().strip() for name in ("key", "web-token", "password")]
+    assert [secret for secret in secrets if secret in captured] == []
     (setup,) = (line for line in (folder / "first-boot.sh").read_text().splitlines() if " setup --yes" in line)
     words = shlex.split(setup)
     assert words[words.index("--hotspot") + 1] == "pilot's kite"

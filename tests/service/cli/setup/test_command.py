@@ -13,10 +13,16 @@ from click.testing import Result
 from service.cli.setup import command
 from service.cli.setup.answers import KEY_FILE, SETTINGS_FILE
 from service.settings.passphrase import weakness
+from terminal import secret_text
 from tests.support.setup_pi import Pi
 
 _SHOWN = re.compile(r"^The key, .*: (\S+)$", re.MULTILINE)
 _WANTED_BY = "etc/systemd/system/multi-user.target.wants"
+
+
+@pytest.fixture(autouse=True)
+def at_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(secret_text, "is_terminal", lambda: True)
 
 
 def shown_key(done: Result) -> str:
@@ -59,6 +65,20 @@ def test_a_new_key_replaces_the_present_one_and_the_service_takes_it(pi: Pi) -> 
     second = shown_key(pi.setup("--yes", "--new-key"))
     assert pi.key_file.read_text() == f"{second}\n" != f"{first}\n"
     assert pi.ran[-1] == "systemctl restart naze-bridge.service"
+
+
+def test_captured_output_has_no_secrets(pi: Pi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(secret_text, "is_terminal", lambda: False)
+    state, password = pi.root / "var/lib/naze-bridge", tmp_path / "password"
+    state.mkdir(parents=True)
+    (state / "web-token").write_text("2345-6789-abcd\n")
+    password.write_text("long-enough\n")
+    done = pi.setup("--yes", "--new-key", "--hotspot", "kite", "--password-file", str(password))
+    assert done.exit_code == 0, done.output
+    secrets = pi.key_file.read_text().strip(), "2345-6789-abcd", "long-enough"
+    assert [secret for secret in secrets if secret in done.output] == []
+    assert f"The key, for ground stations that may make changes: in {KEY_FILE}" in done.output
+    assert "Its token, for changes: in /var/lib/naze-bridge/web-token" in done.output
 
 
 def test_a_dry_run_shows_and_makes_no_key(pi: Pi) -> None:
