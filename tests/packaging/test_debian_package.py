@@ -288,7 +288,7 @@ def test_in_a_bare_root_a_card_sets_itself_up_at_its_first_start(
     assert "naze-bridge, version" in root.run("naze-bridge --version")
     assert "0.0.0.0:8080" in root.run("cat /etc/naze-bridge/setup.toml")
     hotspot = root.run("cat /etc/NetworkManager/system-connections/naze-bridge-hotspot.nmconnection")
-    assert "ssid=kite\n" in hotspot
+    assert "ssid=107;105;116;101;\n" in hotspot
     assert "autoconnect=true" in hotspot
     assert root.run("stat -c '%U %a' /var/lib/private/naze-bridge/web-token") == "naze-bridge 600\n"
     assert "console=serial0" not in root.run("cat /boot/firmware/cmdline.txt")

@@ -37,7 +37,9 @@ from terminal.options import PATH
 from terminal.secret_text import print_code, show_secret
 from terminal.sentences import complain, fail, say
 
-_LEAST_PASSWORD, _MOST_PASSWORD, _MOST_SSID = 8, 63, 32
+_MOST_SSID = 32
+#: A passphrase by IEEE 802.11.
+_PASSWORD = re.compile("[ -~]{8,63}")
 #: The search spends 9 s on a port: three are tried by then.
 _SEARCH_S = 30
 _NEEDS_ROOT = "setup needs root: run `sudo naze-bridge setup`, or see the changes with --dry-run"
@@ -256,10 +258,11 @@ def _print_addresses(host: Host, answers: SetupChoices) -> None:
 
 def check_answers(ssid: str | None, password: str | None, country: str | None, name: str | None) -> None:
     """Refuse answers that cannot be used, each with one sentence (click.UsageError)."""
-    if ssid is not None and not (0 < len(ssid.encode()) <= _MOST_SSID and ssid.isprintable()):
-        raise click.UsageError(f"{ssid!r} is not a network name: 1 to {_MOST_SSID} characters")
-    if password is not None and not (_LEAST_PASSWORD <= len(password) <= _MOST_PASSWORD and password.isascii()):
-        raise click.UsageError(f"a Wi-Fi password has {_LEAST_PASSWORD} to {_MOST_PASSWORD} plain characters")
+    if ssid is not None and not (ssid.isprintable() and 0 < len(ssid.encode()) <= _MOST_SSID):
+        wanted = f"1 to {_MOST_SSID} printable characters, of which those outside of ASCII count as 2 to 4"
+        raise click.UsageError(f"{ssid!r} is not a network name: {wanted}")
+    if password is not None and not _PASSWORD.fullmatch(password):
+        raise click.UsageError("a Wi-Fi password has 8 to 63 characters: letters, digits, blanks, signs of ASCII")
     if country is not None and not re.fullmatch("[A-Za-z]{2}", country):
         raise click.UsageError(f"{country!r} is not a country code: two letters, such as DE")
     if name is not None and not _HOST_NAME.fullmatch(name):
@@ -267,13 +270,13 @@ def check_answers(ssid: str | None, password: str | None, country: str | None, n
 
 
 def secret_line(path: Path) -> str:
-    """The only line of a file; click.UsageError if it has another number."""
+    """The only line of a file; click.UsageError if it holds anything else."""
     try:
-        lines = path.read_text().splitlines()
+        lines = path.read_bytes().decode().removesuffix("\n").removesuffix("\r").split("\n")
     except OSError as error:
         raise click.UsageError(f"{path} cannot be read: {reason(error)}") from error
     except UnicodeDecodeError:
         raise click.UsageError(f"{path} is not a text file") from None  # the error would quote the secret
-    if len(lines) != 1 or not lines[0].strip():
-        raise click.UsageError(f"{path} must hold one line")
-    return lines[0].strip()
+    if len(lines) != 1 or not lines[0].isprintable() or lines[0].strip() != lines[0] or not lines[0]:
+        raise click.UsageError(f"{path} must hold one line of text, without blanks before and after it")
+    return lines[0]

@@ -46,8 +46,8 @@ def hotspot_steps(host: Host, hotspot: tuple[str, str] | None) -> Iterator[Step]
         "# Written by `naze-bridge setup`.\n"
         f"[connection]\nid={CONNECTION}\nuuid={identity}\ntype=wifi\n"
         f"interface-name={HOTSPOT_CARD}\n{_ON}\nautoconnect-priority=100\n\n"
-        f"[wifi]\nmode=ap\nband=bg\nssid={_keyfile(ssid)}\n\n[wifi-security]\nkey-mgmt=wpa-psk\n"
-        f"psk={_keyfile(password)}\n\n"
+        f"[wifi]\nmode=ap\nband=bg\nssid={_byte_list(ssid)}\n\n[wifi-security]\nkey-mgmt=wpa-psk\n"
+        f"psk={_escaped(password)}\n\n"
         f"[ipv4]\nmethod=shared\naddress1={ADDRESS}/24\n\n[ipv6]\nmethod=disabled\n"
     )
     purpose = f"open the Wi-Fi hotspot {ssid!r}"
@@ -101,13 +101,19 @@ def _is_shared_elsewhere(host: Host) -> bool:
 def hotspot_name(host: Host) -> str | None:
     """The name of the hotspot's network; None without one."""
     found = re.search(r"^ssid=(.*)$", host.read(HOTSPOT_FILE), re.MULTILINE)
-    return found and found[1].replace("\\s", " ").replace("\\\\", "\\")
+    if found is None or not re.fullmatch("([0-9]{1,3};)+", found[1]):
+        return found and found[1].replace("\\s", " ").replace("\\\\", "\\")  # written up to 0.2.0
+    return bytes(int(number) & 0xFF for number in found[1].split(";")[:-1]).decode(errors="replace")
 
 
-def _keyfile(text: str) -> str:
-    """A value in the syntax of NetworkManager's key files (GKeyFile)."""
-    escaped = text.replace("\\", "\\\\")
-    return escaped.replace(" ", "\\s", 1) if escaped.startswith(" ") else escaped
+def _byte_list(ssid: str) -> str:
+    """A network name for NetworkManager's key file. As text, 70;71; would be read as FG."""
+    return "".join(f"{byte};" for byte in ssid.encode())
+
+
+def _escaped(password: str) -> str:
+    """A password for NetworkManager's key file, where leading blanks are lost and a backslash begins an escape."""
+    return password.replace("\\", "\\\\").replace(" ", "\\s")
 
 
 def open_hotspot(host: Host, machine: Machine, sleep: Callable[[float], None] = time.sleep) -> str:

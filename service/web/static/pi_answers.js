@@ -36,7 +36,7 @@ export function answersPanel(pi, refresh) {
 
 // Only what differs from the answers so far.
 function given(form, { fc, name, country }) {
-  const value = (field) => form.elements[field].value.trim();
+  const value = (field) => (field === "hotspot" || field === "password" ? form.elements[field].value : form.elements[field].value.trim());
   const differing = { fc: fc ?? "auto", name: name, country: country ?? "", hotspot: "", password: "" };
   const answers = Object.fromEntries(Object.entries(differing).filter(([field, before]) => value(field) && value(field) !== before).map(([field]) => [field, value(field)]));
   return form.elements.new_key.checked ? { ...answers, new_key: true } : answers;

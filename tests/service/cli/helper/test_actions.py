@@ -7,7 +7,7 @@ import pytest
 
 from service.cli.helper.action import HelperRefusal
 from service.cli.setup.answers import KEY_FILE, SETTINGS_FILE
-from service.cli.setup.hotspot import HOTSPOT_FILE
+from service.cli.setup.hotspot import hotspot_name
 from tests.service.cli.doctor.test_fixes import console, store_trouble
 from tests.support.fixable_pi import FixablePi
 
@@ -94,7 +94,7 @@ def test_the_hotspot_is_switched(pi: FixablePi) -> None:
     with pytest.raises(HelperRefusal, match="No hotspot is set up"):
         pi.ask("hotspot", on=True)
     pi.ask("answer", **_HOTSPOT)
-    assert "ssid=kite" in pi.read(HOTSPOT_FILE)
+    assert hotspot_name(pi) == "kite"
     assert pi.ask("hotspot", on=False)["cuts_network"]
     assert pi.ran[-1].endswith("-m service.cli.setup.hotspot close")
     pi.ask("hotspot", on=True)

@@ -6,12 +6,14 @@ import re
 import tomllib
 from pathlib import Path
 
+import click
 import pytest
 import segno
 from click.testing import Result
 
 from service.cli.setup import command
 from service.cli.setup.answers import KEY_FILE, SETTINGS_FILE
+from service.cli.setup.command import check_answers
 from service.settings.passphrase import weakness
 from terminal import secret_text
 from tests.support.setup_pi import Pi
@@ -106,6 +108,38 @@ def test_an_empty_key_and_two_keys_are_refused(pi: Pi, tmp_path: Path) -> None:
     file.write_text("x\n")
     assert "either" in pi.setup("--yes", "--key-file", str(file), "--new-key").output
     assert not pi.key_file.exists()
+
+
+@pytest.mark.parametrize(
+    "password",
+    [
+        "12345678\n[ipv4]\nmethod=auto",
+        "1234567",
+        "12345678\r",
+        "1234\0005678",
+        "1234\x1b5678",
+        "ü2345678",
+        "1" * 64,
+        "",
+    ],
+)
+def test_a_password_that_is_none_is_refused(password: str) -> None:
+    with pytest.raises(click.UsageError, match="8 to 63 characters"):
+        check_answers("kite", password, "DE", None)
+
+
+@pytest.mark.parametrize("name", ["", "n" * 33, "ü" * 17, "a\nb", "a\0b", "a\x1bb", "\ud800", "a\u202eb"])
+def test_a_network_name_that_is_none_is_refused(name: str) -> None:
+    with pytest.raises(click.UsageError, match="not a network name"):
+        check_answers(name, "long-enough", "DE", None)
+
+
+@pytest.mark.parametrize(
+    "text", [b"two\nlines\n", b" long-enough\n", b"long-enough \n", b"long\x1benough", b"\xff", b""]
+)
+def test_a_file_that_holds_no_single_line_is_refused(pi: Pi, tmp_path: Path, text: bytes) -> None:
+    (tmp_path / "password").write_bytes(text)
+    assert pi.setup("--yes", "--hotspot", "kite", "--password-file", str(tmp_path / "password")).exit_code == 2
 
 
 def test_everything_is_printed_before_the_wifi_changes(pi: Pi, tmp_path: Path) -> None:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The change from a Wi-Fi network to the hotspot, with a NetworkManager made of files."""
 
+import re
+import subprocess
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -22,6 +24,26 @@ from service.machine.host import Host
 from tests.support.faulty_machine import FaultyMachine
 
 _LEASES = "/var/lib/NetworkManager/dnsmasq-wlan0.leases"
+#: Names that NetworkManager would read as a list of bytes, without blanks or as escapes; and all signs of a password.
+_NETWORKS = [
+    (" naze\\field", "long-enough"),
+    ("70;71;72;", "  eight "),
+    ("kite  ", "\\s\\n\\x41;"),
+    ("#Drachen=ü;\\", "".join(map(chr, range(0x20, 0x5F)))),
+    ("1", "".join(map(chr, range(0x40, 0x7F)))),
+]
+_SECTIONS = ["[connection]", "[wifi]", "[wifi-security]", "[ipv4]", "[ipv6]"]
+#: Prints what NetworkManager's library reads in a key file.
+_READER = """
+import sys, gi
+gi.require_version("NM", "1.0")
+from gi.repository import GLib, NM
+text, file = sys.stdin.read(), GLib.KeyFile()
+file.load_from_data(text, len(text.encode()), GLib.KeyFileFlags.NONE)
+found = NM.keyfile_read(file, "/", NM.KeyfileHandlerFlags.NONE, lambda *_: sys.exit("not accepted"))
+wifi, security = found.get_setting_wireless(), found.get_setting_wireless_security()
+print(repr((wifi.get_ssid().get_data(), security.get_psk(), found.get_setting_ip4_config().get_method())), end="")
+"""
 _ARP = "IP address HW type Flags HW address Mask Device\n"
 
 
@@ -51,7 +73,7 @@ def pi(tmp_path: Path) -> FaultyMachine:
     host = FaultyMachine(tmp_path)
     host.write("/run/systemd/system/.keep")
     host.write(_LEASES, "1 aa:bb 10.42.0.7 old-phone *\n")
-    (step,) = hotspot_steps(host, (" naze\\field", "long-enough"))
+    (step,) = hotspot_steps(host, _NETWORKS[0])
     Machine(host).carry_out(step.changes[0])
     return host
 
@@ -112,7 +134,23 @@ def test_without_a_previous_network_it_waits_for_nobody(pi: FaultyMachine) -> No
     assert opens_at_boot(pi)
 
 
-def test_its_name_is_read_back(pi: FaultyMachine) -> None:
+@pytest.mark.parametrize(("name", "password"), _NETWORKS)
+def test_network_manager_reads_the_name_and_the_password_as_given(tmp_path: Path, name: str, password: str) -> None:
+    host = Host(tmp_path)
+    (step,) = hotspot_steps(host, (name, password))
+    Machine(host).carry_out(step.changes[0])
+    text = host.read(HOTSPOT_FILE)
+    assert hotspot_name(host) == name
+    assert f"\nssid={''.join(f'{byte};' for byte in name.encode())}\n" in text
+    assert re.findall(r"^\[.*\]$", text, re.MULTILINE) == _SECTIONS
+    read = subprocess.run(["/usr/bin/python3", "-c", _READER], input=text, capture_output=True, text=True, check=False)
+    if read.returncode:
+        pytest.skip("NetworkManager's own reader is not installed: apt-get install gir1.2-nm-1.0 python3-gi")
+    assert read.stdout == repr((name.encode(), password, "shared"))
+
+
+def test_the_name_of_an_older_releases_hotspot(pi: FaultyMachine) -> None:
+    pi.write(HOTSPOT_FILE, "[wifi]\nssid=\\snaze\\\\field\n")
     assert hotspot_name(pi) == " naze\\field"
 
 
