@@ -20,10 +20,12 @@ from typing import Any
 from payloads.mission_data import Json
 from payloads.names import check_name
 from storage.os_error import reason
-from storage.small_files import replace_file
+from storage.small_files import read_bounded, replace_file
 
 #: zenoh's own is 1,000. Each session costs the router some 100 kB.
 _MAX_SESSIONS = 12_000
+#: The router's configuration has a kB for each vehicle.
+_MAX_BYTES = 64 << 20
 _ACCEPT_PENDING = 1_000
 #: Beyond this, samples to a slow receiver are dropped rather than collected.
 _BUFFER_BYTES = 32 << 10
@@ -219,7 +221,7 @@ class FleetFolder:
         """A file's text; empty if there is none yet."""
         path = self.path / name
         try:
-            return path.read_text()
+            return read_bounded(path, _MAX_BYTES).decode()
         except FileNotFoundError:
             return ""
         except (OSError, UnicodeDecodeError) as error:

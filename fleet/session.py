@@ -134,7 +134,6 @@ def _config(connect: Sequence[str], config_file: Path | None) -> zenoh.Config:
 
 def _from_file(path: Path) -> zenoh.Config:
     try:
-        path.open("rb").close()  # zenoh's own message for a missing file is long
         return read_zenoh_file(path)
     except OSError as error:
         raise FleetError(f"{path} cannot be read: {reason(error)}") from error

@@ -17,6 +17,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from storage.os_error import reason
+from storage.small_files import open_regular
 from storage.store_error import FAILURES, StoreError, explained, primary_code
 
 #: The columns of `missions` that its crc32 covers.
@@ -176,7 +177,7 @@ def _log_was_lost(path: Path) -> bool:
     """
     log = path.with_name(path.name + _LOG)
     try:
-        with log.open("rb") as file:
+        with open_regular(log) as file:
             header = file.read(_LOG_HEADER.size)
         if not any(header):
             return False

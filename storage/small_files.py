@@ -6,27 +6,30 @@ import stat
 from pathlib import Path
 from typing import BinaryIO
 
-
-def read_bounded(path: Path, most: int) -> bytes:
-    """The contents; OSError if the file cannot be read, or is larger than `most` bytes (as /dev/zero is)."""
-    with path.open("rb") as file:
-        return _bounded(file, most)
+_NONBLOCK: int = getattr(os, "O_NONBLOCK", 0)  # Windows, where `naze-bridge card` runs too, has none
 
 
-def read_untrusted(path: Path, most: int) -> bytes:
-    """Like read_bounded, for root in a folder that another user controls: OSError also for a link, pipe or device."""
-    with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NOFOLLOW | os.O_NONBLOCK)) as file:
-        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-            raise OSError("it is not a regular file")
-        return _bounded(file, most)
+def read_bounded(path: Path, most: int, *, follows_links: bool = True) -> bytes:
+    """The contents; OSError if the file cannot be read, is larger than `most` bytes, or is a pipe or a device.
 
-
-def _bounded(file: BinaryIO, most: int) -> bytes:
-    data = file.read(most + 1)
+    Those might never end, or never begin. follows_links: False for root in a folder that another user controls.
+    """
+    with open_regular(path, follows_links=follows_links) as file:
+        data = file.read(most + 1)
     if len(data) > most:
         size = f"{most >> 20} MB" if most >> 20 else f"{most >> 10} kB"
         raise OSError(f"it is larger than {size}")
     return data
+
+
+def open_regular(path: Path, *, follows_links: bool = True) -> BinaryIO:
+    """Open a file to read; OSError also if it is a pipe or a device. Never waits for the other end of a pipe."""
+    flags = _NONBLOCK if follows_links else _NONBLOCK | os.O_NOFOLLOW
+    file = open(path, "rb", opener=lambda name, others: os.open(name, others | flags))  # noqa: SIM115  # the caller's
+    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        file.close()
+        raise OSError("it is not a regular file")
+    return file
 
 
 def replace_file(path: Path, data: bytes, mode: int = 0o600) -> None:

@@ -62,6 +62,19 @@ INSIDE = BRIDGE | SERVICE
 LEAST_MIRRORED = 0.9
 #: The calls of Bridge that are grouped.
 GROUPS = {"missions", "settings"}
+INSTALLED = (*PACKAGES.keys() - {"simulator"},)
+#: They open files of the program itself or of the kernel, or a closed standard stream.
+OWN_FILES = {
+    "payloads/compact.py",
+    "service/cli/program.py",
+    "service/links/serial_ports.py",
+    "service/machine/captive_portal.py",
+    "service/machine/package.py",
+    "service/web/pi_control.py",
+    "service/web/static_files.py",
+    "storage/database.py",
+    "storage/small_files.py",
+}
 #: Only service/ and simulator/ may use a clock, a port or an event loop.
 IMPURE = {"asyncio", "selectors", "serial", "socket", "subprocess", "threading", "time"}
 
@@ -75,6 +88,33 @@ def imports(folder: Path) -> Iterator[tuple[str, str]]:
                 yield from ((str(file), f"{node.module}.{alias.name}") for alias in node.names)
             elif isinstance(node, ast.Import):
                 yield from ((str(file), alias.name) for alias in node.names)
+
+
+def calls(*packages: str) -> Iterator[tuple[str, str, ast.Call]]:
+    """Each call in these packages: the file, the name of the called function or method, and the call."""
+    for package in packages:
+        for file in (REPOSITORY / package).rglob("*.py"):
+            for node in ast.walk(ast.parse(file.read_text())):
+                if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute | ast.Name):
+                    name = node.func.attr if isinstance(node.func, ast.Attribute) else node.func.id
+                    yield str(file.relative_to(REPOSITORY)), name, node
+
+
+def test_files_are_read_by_the_bounded_reader() -> None:
+    """`storage.small_files`: another reader could wait for a pipe, or read a device until the memory is full."""
+    readers = {
+        file
+        for file, name, call in calls(*INSTALLED)
+        if name in ("read_text", "read_bytes") or (name == "open" and _opens_to_read(call))
+    }
+    assert readers - OWN_FILES == set()
+
+
+def _opens_to_read(call: ast.Call) -> bool:
+    """True for open(path), open(path, "r...") and path.open("r...")."""
+    is_builtin = isinstance(call.func, ast.Name)
+    modes = [each.value for each in call.args[is_builtin:] if isinstance(each, ast.Constant)]
+    return str(modes[0]).startswith("r") if modes else is_builtin and len(call.args) == 1
 
 
 @pytest.mark.parametrize("package", PACKAGES)

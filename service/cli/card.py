@@ -20,12 +20,14 @@ from service.cli.setup.hotspot import ADDRESS
 from service.settings.passphrase import STRONGER, new_passphrase, weakness
 from service.web.token import new_token
 from storage.os_error import reason
+from storage.small_files import open_regular, read_bounded
 from terminal.options import PATH
 from terminal.secret_text import show_secret
 from terminal.sentences import complain, fail
 
 FOLDER = "naze-bridge"
 #: deb(5): an ar archive whose first member is debian-binary.
+_MAX_BYTES = 1 << 20
 _DEB = b"!<arch>\ndebian-binary"
 _LOG = "/var/log/naze-bridge-card.log"
 _UNIT = "/etc/systemd/system/naze-bridge-card.service"
@@ -158,8 +160,12 @@ def prepare(boot: Path, package: Path, options: list[str], secrets: dict[str, st
 
 
 def _is_package(path: Path) -> bool:
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         return file.read(len(_DEB)) == _DEB
+
+
+def _text(path: Path) -> str:
+    return read_bounded(path, _MAX_BYTES).decode().replace("\r\n", "\n")
 
 
 def _write(path: Path, text: str) -> None:
@@ -170,16 +176,16 @@ def _hooked(boot: Path) -> tuple[Path, str]:
     """The file for the first start, and its text with our line."""
     user_data, firstrun = boot / "user-data", boot / "firstrun.sh"
     if user_data.exists():
-        text = user_data.read_text("utf-8")
+        text = _text(user_data)
         if not text.startswith("#cloud-config"):
             raise CardError(f"{user_data} is not cloud-init's: write the card again")
         return user_data, text if _IN_USER_DATA in text else _with_command(user_data, text)
-    if not firstrun.exists() or "systemd.run=" not in (boot / "cmdline.txt").read_text("utf-8"):
+    if not firstrun.exists() or "systemd.run=" not in _text(boot / "cmdline.txt"):
         raise CardError(
             f"{boot} has neither user-data nor firstrun.sh: write the card with Raspberry Pi Imager, and give it a "
             "user name and a password there (Edit settings)"
         )
-    text = firstrun.read_text("utf-8")
+    text = _text(firstrun)
     first, _, rest = text.partition("\n")
     return firstrun, text if _IN_FIRSTRUN in text else f"{first}\n{_IN_FIRSTRUN}\n{rest}"
 

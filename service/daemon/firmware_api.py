@@ -27,7 +27,7 @@ from service.links.fc_device import PortError
 from service.links.serial_dialogue import carry_out, use_parity
 from service.settings import SettingsError, default_state_dir
 from storage.os_error import reason
-from storage.small_files import replace_file
+from storage.small_files import read_bounded, replace_file
 
 FIRMWARE_FOLDER = "firmware"
 #: USB, without a battery.
@@ -43,6 +43,7 @@ _PROOF_S = 45.0
 _LOOK_S = 0.1
 #: A dump has three decimals.
 _ROUNDED = 0.001
+_MAX_DUMP = 1 << 20
 #: States of the line (Link.state) without an answer.
 _SEARCHES = ("no port", "searching", "identifying")
 _AGAIN = (
@@ -175,7 +176,7 @@ class FirmwareApi:
     async def _restore_settings(self, path: Path) -> str:
         """Restore the settings printed before, if the new firmware has begun with its defaults."""
         try:
-            before = settings_in(await asyncio.to_thread(path.read_text))
+            before = settings_in((await asyncio.to_thread(read_bounded, path, _MAX_DUMP)).decode(errors="replace"))
             plan = await self._settings.plan(before, "")
             changed = {
                 each["name"]: each["becomes"]

@@ -11,6 +11,7 @@ from pathlib import Path
 from payloads.mission_data import Json
 from service.machine.threads import BackgroundThread
 from service.recording.tlog_folder import is_log_name
+from storage.small_files import open_regular
 
 #: Bytes; 8 kB/s are enough within the time that the page waits.
 PIECE = 64 << 10
@@ -48,6 +49,6 @@ class TelemetryLogs:
     def _read(self, name: str, start: int) -> bytes:
         if self._folder is None or not is_log_name(name):
             raise FileNotFoundError(name)
-        with (self._folder / name).open("rb") as file:
+        with open_regular(self._folder / name) as file:
             file.seek(start)
             return file.read(PIECE)

@@ -10,7 +10,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from storage.small_files import read_bounded
+
 _SIOCGIFADDR = 0x8915
+_MAX_BYTES = 1 << 20
 #: Not /dev/tty and /dev/tty1, the terminals of programs themselves.
 _SERIAL = re.compile(r"/dev/tty[A-Za-z].*")
 #: The programs of a login console.
@@ -57,7 +60,7 @@ class Host:
     def read(self, path: str) -> str:
         """A file's text; empty if it cannot be read."""
         try:
-            return self.path(path).read_text(errors="replace")
+            return read_bounded(self.path(path), _MAX_BYTES).decode(errors="replace")
         except OSError:
             return ""
 

@@ -21,6 +21,8 @@ DROP_INS = "conf.d"
 SETUP_FILE = "setup.toml"
 #: Settings made on the status page: before setup's, so that a page cannot override an answer given on the Pi.
 PAGE_FILE = "page.toml"
+#: A link to it hides a file of the package, as with systemd.
+_MASKED = Path("/dev/null")
 _MAX_BYTES = 1 << 20
 #: Reported per file, in case another program's file was named by mistake.
 _MOST_UNKNOWN = 20
@@ -69,11 +71,9 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
 
 def _read_file(path: Path, problems: list[Problem]) -> dict[str, Given]:
+    if path.resolve() == _MASKED:
+        return {}
     try:
-        if path.is_fifo():
-            # It may never have a writer, and at a reload it would be empty.
-            problems.append(Problem(str(path), "this is a pipe: name a file, so that it can be read again at a reload"))
-            return {}
         text = read_bounded(path, _MAX_BYTES).decode("utf-8-sig")
         tables = tomllib.loads(text)
     except OSError as error:

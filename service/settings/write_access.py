@@ -18,6 +18,7 @@ from protocols.mavlink.signing import key_from_passphrase
 from service.settings.addresses import AddressError, GcsAddress, parse_gcs, parse_table
 from service.settings.passphrase import weakness
 from storage.os_error import reason
+from storage.small_files import open_regular
 
 Network = IPv4Network | IPv6Network
 
@@ -79,12 +80,8 @@ def signing_access(path: Path) -> WriteAccess:
 def read_passphrase(path: Path) -> str:
     """The only line of a file that other users cannot read."""
     try:
-        # Not blocking: a FIFO without a writer would hang the daemon.
-        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
-            status = os.fstat(file.fileno())
-            if not stat.S_ISREG(status.st_mode):
-                raise AddressError(f"key_file {path} is not a file")
-            if status.st_mode & stat.S_IRWXO:
+        with open_regular(path) as file:
+            if os.fstat(file.fileno()).st_mode & stat.S_IRWXO:
                 raise AddressError(f"key_file {path} is readable by other users: run chmod 600 {path}")
             passphrase = file.read(_MAX_PASSPHRASE + 1).decode()
     except OSError as error:

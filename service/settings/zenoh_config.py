@@ -10,6 +10,7 @@ from payloads.endpoints import all_endpoints, in_short
 from payloads.names import ZenohSettingsError
 from payloads.zenoh_file import read_zenoh_file
 from service.settings.zenoh import I_KNOW, ZenohProfile, ZenohSettings
+from storage.os_error import reason
 
 #: Commands up to 10 MB get a reply; larger ones are not assembled in a Pi's memory.
 _MAX_MESSAGE_BYTES = 16 << 20
@@ -64,10 +65,9 @@ def _read(settings: ZenohSettings) -> zenoh.Config:
     assert settings.config_file is not None
     try:
         return read_zenoh_file(settings.config_file)
-    except zenoh.ZError as error:
-        raise ZenohSettingsError(
-            f"zenoh.config_file {settings.config_file} cannot be used: {in_short(error)}"
-        ) from error
+    except (zenoh.ZError, OSError) as error:
+        why = reason(error) if isinstance(error, OSError) else in_short(error)
+        raise ZenohSettingsError(f"zenoh.config_file {settings.config_file} cannot be used: {why}") from error
 
 
 def _require_authentication(settings: ZenohSettings, config: zenoh.Config) -> None:

@@ -122,5 +122,5 @@ def test_a_pipe_in_place_of_the_file_delays_nothing(daemon: ConfiguredDaemon, st
     Path(start.directory / "config.toml").unlink()
     os.mkfifo(start.directory / "config.toml")
     daemon.reload("config.rejected")
-    assert "this is a pipe" in daemon.log
+    assert "not a regular file" in daemon.log
     assert daemon.stations() == []

@@ -10,7 +10,7 @@ from pathlib import Path
 from service.machine.host import Host
 from service.settings.config_files import read_files
 from service.settings.load import SERVICE_CONFIG
-from storage.small_files import read_untrusted
+from storage.small_files import read_bounded
 
 SETTINGS_FILE = "/etc/naze-bridge/setup.toml"
 #: Where releases up to 0.2.0 kept the answers; there they overrode config.toml.
@@ -54,7 +54,7 @@ def earlier_choices(host: Host) -> SetupChoices | None:
 def current_key(host: Host) -> str:
     """The passphrase in the service's key file, which the service could have replaced; empty if there is none."""
     try:
-        return read_untrusted(host.path(KEY_FILE), _MAX_KEY_FILE).decode().strip()
+        return read_bounded(host.path(KEY_FILE), _MAX_KEY_FILE, follows_links=False).decode().strip()
     except (OSError, ValueError):
         return ""
 

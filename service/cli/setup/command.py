@@ -33,6 +33,7 @@ from service.settings.load import SERVICE_STATE
 from service.settings.passphrase import STRONGER, new_passphrase, weakness
 from service.web.token import DEFAULT_NAME
 from storage.os_error import reason
+from storage.small_files import read_bounded
 from terminal.options import PATH
 from terminal.secret_text import print_code, show_secret
 from terminal.sentences import complain, fail, say
@@ -272,7 +273,9 @@ def check_answers(ssid: str | None, password: str | None, country: str | None, n
 def secret_line(path: Path) -> str:
     """The only line of a file; click.UsageError if it holds anything else."""
     try:
-        lines = path.read_bytes().decode().removesuffix("\n").removesuffix("\r").split("\n")
+        lines = read_bounded(path, 1 << 10).decode().removesuffix("
+").removesuffix("").split("
+")
     except OSError as error:
         raise click.UsageError(f"{path} cannot be read: {reason(error)}") from error
     except UnicodeDecodeError:

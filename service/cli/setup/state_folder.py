@@ -14,7 +14,7 @@ from service.machine.host import Host
 from service.settings.load import SERVICE_STATE
 from service.web.token import DEFAULT_NAME
 from storage.os_error import reason
-from storage.small_files import read_untrusted
+from storage.small_files import read_bounded
 from terminal.sentences import complain
 
 _MAX_PORTS_FILE, _MAX_TOKEN_FILE = 1 << 16, 4096
@@ -38,7 +38,7 @@ def other_devices(host: Host) -> list[UsbDevice]:
     """The USB devices on which the bridge heard something other than a flight controller."""
     path = host.path(f"{SERVICE_STATE}/{PORTS_FILE}")
     try:
-        others = json.loads(read_untrusted(path, _MAX_PORTS_FILE))["others"]
+        others = json.loads(read_bounded(path, _MAX_PORTS_FILE, follows_links=False))["others"]
         if not isinstance(others, dict):
             raise ValueError("it has no list of devices")
     except FileNotFoundError:
@@ -56,8 +56,9 @@ def other_devices(host: Host) -> list[UsbDevice]:
 
 def page_token(host: Host) -> str:
     """The status page's token; empty if there is none that can be shown."""
+    path = host.path(f"{SERVICE_STATE}/{DEFAULT_NAME}")
     try:
-        token = read_untrusted(host.path(f"{SERVICE_STATE}/{DEFAULT_NAME}"), _MAX_TOKEN_FILE).decode().strip()
+        token = read_bounded(path, _MAX_TOKEN_FILE, follows_links=False).decode().strip()
     except (OSError, ValueError):
         return ""
     return token if _TOKEN.fullmatch(token) else ""

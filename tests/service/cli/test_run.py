@@ -62,7 +62,7 @@ def test_errors_are_reported_with_the_file(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("path", "words"), [("/dev/zero", "larger than 1 MB"), ("/none", "No such file"), ("/" + 256 * "x", "too long")]
+    ("path", "words"), [("/dev/zero", "not a regular file"), ("/none", "No such file"), ("/" + 256 * "x", "too long")]
 )
 def test_an_unreadable_file_is_one_sentence(tmp_path: Path, path: str, words: str) -> None:
     ended = run_naze_bridge("run", "--fc", "sim:", "--config", path, "--state-dir", tmp_path)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A small JSON file: damage is reported and ignored."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -27,6 +28,13 @@ def test_a_damaged_file_is_reported_and_ignored(tmp_path: Path, content: str) ->
     with capture_logs() as logged:
         memory = PortMemory(tmp_path)
     assert (memory.flight_controller, memory.others) == ("", {})
+    assert [entry["event"] for entry in logged] == ["state.lost"]
+
+
+def test_a_pipe_in_place_of_the_file_does_not_delay_the_start(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "state.json")
+    with capture_logs() as logged:
+        assert StateFile(tmp_path, "state.json", "").load(list) is None
     assert [entry["event"] for entry in logged] == ["state.lost"]
 
 

@@ -136,7 +136,7 @@ def test_pipes_folders_and_broken_links_are_errors(folder: Path) -> None:
     (folder / "conf.d" / "c.toml").symlink_to("/dev/null")
     (folder / "conf.d" / "d.toml").symlink_to("nowhere")
     assert problems(folder, "") == [
-        "conf.d/a.toml: this is a pipe: name a file, so that it can be read again at a reload",
+        "conf.d/a.toml: this cannot be read: it is not a regular file",
         "conf.d/b.toml: this cannot be read: Is a directory",
         "conf.d/d.toml: this cannot be read: No such file or directory",
     ]

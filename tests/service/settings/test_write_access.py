@@ -145,5 +145,5 @@ def test_a_binary_key_file_is_refused(key_file: Path) -> None:
 def test_a_fifo_does_not_block(tmp_path: Path) -> None:
     fifo = tmp_path / "fifo"
     os.mkfifo(fifo, 0o600)
-    with pytest.raises(AddressError, match="is not a file"):
+    with pytest.raises(AddressError, match="not a regular file"):
         read_passphrase(fifo)

@@ -14,6 +14,12 @@ SETTINGS_THAT_END_IT = {
     "a missing configuration": ('config_file = "nothing.json5"', None, "No such file"),
     "an invalid configuration": ('config_file = "zenoh.json5"', "{mode: ", "zenoh.config_file"),
     "an unknown field": ('config_file = "zenoh.json5"', "{moode: 'peer'}", "unknown field `moode`"),
+    "a device as configuration": ('config_file = "/dev/zero"', None, "not a regular file"),
+    "a device as certificate": (
+        'config_file = "zenoh.json5"',
+        json.dumps({"transport": {"link": {"tls": {"root_ca_certificate": "/dev/zero"}}}}),
+        "not a regular file",
+    ),
     "no endpoint": ('connect = ["tcp/"]', None, "zenoh.connect"),
     "commands, no login": ('listen = ["tcp/127.0.0.1:1"]\ncommands = true', None, "sessions accepted at tcp/"),
     "mavlink_in, no login": ('connect = ["tcp/127.0.0.1:1"]\nmavlink_in = true', None, "zenoh.mavlink_in is on"),
