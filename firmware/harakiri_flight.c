@@ -17,7 +17,6 @@ typedef char settings_fill_gaps[offsetof(config_t, gps_ins_vel) == offsetof(conf
                                     : -1];
 
 enum { FLIGHT = 179, REPLY_SIZE = 24, SETTLED_CM_S = 50 };
-enum { SET_RAW_RC = 200, SET_RAW_GPS = 201, SET_BOX = 203 };
 
 extern uint16_t batteryWarningVoltage;
 
@@ -217,16 +216,6 @@ void FlightNose(void)
 {
     if (out.nose)
         magHold = wrap_180((float)out.heading_cd * 0.01f);
-}
-
-bool FlightFlies(void)
-{
-    return out.mode != NF_PASS;
-}
-
-bool FlightRefuses(uint8_t command)
-{
-    return f.ARMED && cfg.mission_fly && (command == SET_RAW_RC || command == SET_RAW_GPS || command == SET_BOX);
 }
 
 static int16_t short_cm(int32_t value)

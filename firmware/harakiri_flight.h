@@ -43,12 +43,6 @@ int32_t FlightAutostartHeight(int32_t otherwise_cm);
 /* In the compass part of the loop: the heading to hold. */
 void FlightNose(void);
 
-/* True for an MSP command that must be refused while it could start, stop or move a flight. */
-bool FlightRefuses(uint8_t command);
-
-/* True while a flight is in command. */
-bool FlightFlies(void);
-
 /* Answer the request FLIGHT of docs/msp-mission.md. Returns the reply's length, or -1 if it is another command. */
 int FlightRequest(uint8_t command, uint8_t *buffer, uint8_t size);
 

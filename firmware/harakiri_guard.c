@@ -17,7 +17,8 @@ enum {
     MAG_CALIBRATION = 206,
     SET_MISC = 207,
     RESET_CONF = 208,
-    EEPROM_WRITE = 250
+    EEPROM_WRITE = 250,
+    DEBUG = 254
 };
 
 bool MotorsMayRun(void)
@@ -27,6 +28,8 @@ bool MotorsMayRun(void)
 
 bool GuardAccepts(uint8_t command, uint8_t size)
 {
+    if (command >= SET_RAW_RC && command != DEBUG && MotorsMayRun())
+        return false;
     switch (command) {
     case WP: /* else it would answer for the number left in the buffer */
         return size == 1;
@@ -46,7 +49,7 @@ bool GuardAccepts(uint8_t command, uint8_t size)
     case MAG_CALIBRATION:
     case RESET_CONF:
     case EEPROM_WRITE:
-        return size == 0 && !MotorsMayRun() && ConfigSpendWrite();
+        return size == 0 && ConfigSpendWrite();
     default:
         return true;
     }

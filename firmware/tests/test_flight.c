@@ -13,7 +13,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { STEP_MS = 20, MAX_RECORDS = 9, LAG_STEPS = 10, RADIUS_CM = 200, CRUISE_CM_S = 350, LIMIT_S = 900 };
+enum { MAX_RECORDS = 9, LAG_STEPS = 10, RADIUS_CM = 200, LIMIT_S = 900 };
+#define STEP_MS 20 /* macros, because clang 19 warns of enumerators in floating-point expressions */
+#define CRUISE_CM_S 350
+
 enum { WAYPOINT, LOITER_UNLIM, LOITER_TURNS, LOITER_TIME, RETURN_TO_LAUNCH, LAND, TAKEOFF, SETROI };
 
 #define DEGREE 1e7

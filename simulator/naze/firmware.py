@@ -110,7 +110,7 @@ class Firmware:
         self._mavlink = MavlinkSplitter()
         self._sender = MavlinkSender()
         # Harakiri's own list and MAVLink upload, even alongside the extension.
-        self._parameters = Parameters(self._board, self._settings, spend_write, self._send_message)
+        self._parameters = Parameters(self._board, self._settings, self._can_set_parameter, self._send_message)
         self._own_missions = OwnMissionStore(
             flash, self._board, self._missions, self._send_message, self._parameters.reset
         )
@@ -320,6 +320,12 @@ class Firmware:
             self._answer(*request)
             return True
         return False
+
+    def _can_set_parameter(self) -> bool:
+        """While armed, or with the write budget spent, the patch ignores a PARAM_SET."""
+        if not self._missions:
+            return True
+        return not self.armed and (self._board.config_write_due is not None or self._missions.spend_write())
 
     def _answer(self, command: int, payload: bytes) -> None:
         if (answer := self._extension_answer(command, payload)) is not None:

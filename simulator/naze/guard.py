@@ -17,8 +17,10 @@ _GROUNDED = (MspCommand.ACC_CALIBRATION, MspCommand.MAG_CALIBRATION, MspCommand.
 
 def accepts(command: int, size: int, *, box_size: int, armed: bool) -> bool:
     """GuardAccepts. box_size: of SET_BOX, bytes."""
+    if armed and command >= MspCommand.SET_RAW_RC and command != MspCommand.DEBUG:
+        return False
     if command in _GROUNDED:
-        return size == 0 and not armed
+        return size == 0
     if command == MspCommand.SET_MISC:
         return size != 0
     return size == (box_size if command == MspCommand.SET_BOX else _SIZES.get(command, size))

@@ -2,7 +2,8 @@
 """Harakiri's own parameters over MAVLink: the CLI's settings (baseflight_mavlink_send_paramlist, _set_param).
 
 PARAM_REQUEST_LIST alone is answered, one value in a slot of the stream. PARAM_SET changes every setting whose name the
-given one begins with, and schedules a write of the configuration. There is no PARAM_REQUEST_READ.
+given one begins with, and schedules a write of the configuration; the patch ignores it while armed. There is no
+PARAM_REQUEST_READ.
 """
 
 from collections.abc import Callable
@@ -25,12 +26,12 @@ class Parameters:
         self,
         board: Board,
         settings: SettingsCommands,
-        spend_write: Callable[[], bool],
+        can_set: Callable[[], bool],
         send: Callable[[Packed], None],
     ) -> None:
         self._board = board
         self._settings = settings
-        self._spend_write = spend_write
+        self._can_set = can_set
         self._send = send
         self._next = 0
         self.is_listing = False
@@ -44,9 +45,7 @@ class Parameters:
             case m.MAVLINK_MSG_ID_PARAM_REQUEST_LIST:
                 self.is_listing = True
             case m.MAVLINK_MSG_ID_PARAM_SET if message := decode(frame.msgid, frame.payload):
-                if (self._board.config_write_due is not None or self._spend_write()) and self._set(
-                    message.param_id, message.param_value
-                ):
+                if self._can_set() and self._set(message.param_id, message.param_value):
                     self._board.config_write_due = now + _WRITE_DELAY_S
 
     def send_next(self) -> None:

@@ -1,14 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """harakiri_guard.c on the image: requests that are refused before Harakiri evaluates them."""
 
+from itertools import product
+
 import pytest
 
-from protocols.msp.frame import Direction, request
+from protocols.msp.frame import Direction, MspFrame, request
 from simulator.board.msp_sensors import MspCommand
-from tests.support.real_bench import IDENT, Figure, RealBench
+from tests.support.mavlink_parameters import armed_a_set_is_ignored
+from tests.support.real_bench import Figure, RealBench
 
-#: Calibrations, RESET_CONF and EEPROM_WRITE: nothing but a frame of six bytes each.
-_GROUNDED = (205, 206, 208, 250)
+#: Harakiri's reads that take any payload, and the extension's requests, which check the armed flag themselves.
+_READS = {*range(100, 118), 254}
+_EXTENSION = (179, *range(190, 199))
+_LENGTHS = (0, 1, 2, 7, 16, 30, 64, 243)
 #: The setters and MSP_WP, and the size that each needs (of SET_BOX with four switches).
 _SIZES = {118: 1, 200: 16, 201: 14, 202: 30, 203: 30, 204: 7, 205: 0, 206: 0, 207: 2, 208: 0, 250: 0}
 _WRONG_SIZES = (0, 1, 2, 7, 8, 16, 29, 31, 58, 60, 64, 243)
@@ -16,10 +21,14 @@ _WRONG_SIZES = (0, 1, 2, 7, 8, 16, 29, 31, 58, 60, 64, 243)
 _EFFECT_S = 1.0
 
 
+def is_error(reply: MspFrame) -> bool:
+    return reply.direction is Direction.ERROR
+
+
 def is_refused(bench: RealBench, command: int, payload: bytes = b"") -> bool:
     reply = bench.ask(request(command, payload))
     assert reply is not None, f"no reply to {command} with {len(payload)} bytes"
-    return reply.direction is Direction.ERROR
+    return is_error(reply)
 
 
 def configuration(bench: RealBench) -> bytes:
@@ -36,17 +45,25 @@ def guarded(bench: RealBench) -> RealBench:
     return bench
 
 
-def test_armed_no_frame_calibrates_resets_or_writes(guarded: RealBench, figure: Figure) -> None:
+def test_armed_only_reads_and_the_extension_pass_at_the_port(guarded: RealBench, figure: Figure) -> None:
+    """Every command with eight payload lengths, sent to the UART, with the switches of every box on."""
     bench = guarded
     bench.arm()
+    faults = bench.naze.faults
+    faults.aux1 = faults.aux2 = faults.aux3 = faults.aux4 = 2000
     flash, settings, resets = bytes(bench.flash), configuration(bench), bench.naze.counters.resets
-    for command in _GROUNDED:
-        assert is_refused(bench, command)
-        bench.run(_EFFECT_S)
+    extension = {command for command in _EXTENSION if (reply := bench.ask(request(command))) and not is_error(reply)}
+    taken = 0
+    for command, size in product(range(256), _LENGTHS):
+        refused = is_refused(bench, command, (b"\x10" + b"\xff" * size)[:size])
+        taken += not refused
+        assert refused == (command not in extension and (command != 118 or size != 1) and command not in _READS), (
+            f"{command} with {size} bytes"
+        )
+    bench.run(_EFFECT_S)
     assert bench.naze.armed
     assert (bytes(bench.flash), configuration(bench), bench.naze.counters.resets) == (flash, settings, resets)
-    assert bench.ask(IDENT) is not None
-    figure("armed: calibrations, RESET_CONF, EEPROM_WRITE", "refused, still armed, nothing written")
+    figure("armed: commands x lengths at the port", f"{256 * len(_LENGTHS)}, {taken} answered, nothing changed")
 
 
 def test_a_setter_of_another_size_changes_nothing(guarded: RealBench, figure: Figure) -> None:
@@ -75,3 +92,9 @@ def test_setters_of_the_right_size_still_work(guarded: RealBench) -> None:
     assert not is_refused(bench, 250)
     bench.power_cycle()
     assert bench.payload(request(MspCommand.PID)) == bytes(pids)
+
+
+def test_armed_a_mavlink_parameter_set_is_ignored(guarded: RealBench) -> None:
+    guarded.configure(tele_prot=2)
+    guarded.arm()
+    armed_a_set_is_ignored(guarded)

@@ -50,3 +50,8 @@ def a_set_also_changes_the_setting_whose_name_it_begins_with(bench: WireBench) -
     after = dict(listed(bench).values())
     assert (after["rc_db"], after["rc_dbyw"]) == (10, 10)
     assert {name for name, value in after.items() if before[name] != value} == {"rc_db", "rc_dbyw"}
+
+
+def armed_a_set_is_ignored(bench: WireBench) -> None:
+    """The board is armed and speaks MAVLink."""
+    assert set_one(bench, "p_roll", 44) == []

@@ -8,7 +8,19 @@ from simulator.board.msp_sensors import MspCommand
 from simulator.board.options import Faults
 from tests.support.naze_bench import Bench
 
-_GROUNDED = (MspCommand.ACC_CALIBRATION, MspCommand.MAG_CALIBRATION, MspCommand.RESET_CONF, MspCommand.EEPROM_WRITE)
+#: With the payload's length that they are accepted with on the ground.
+_SETTERS = (
+    (MspCommand.SET_RAW_RC, 16),
+    (MspCommand.SET_RAW_GPS, 14),
+    (MspCommand.SET_PID, 30),
+    (MspCommand.SET_BOX, 30),
+    (MspCommand.SET_RC_TUNING, 7),
+    (MspCommand.SET_MISC, 2),
+    (MspCommand.ACC_CALIBRATION, 0),
+    (MspCommand.MAG_CALIBRATION, 0),
+    (MspCommand.RESET_CONF, 0),
+    (MspCommand.EEPROM_WRITE, 0),
+)
 #: The longest payload that Harakiri's own buffer holds, to leave bytes for a setter that gets none.
 _FILL = request(MspCommand.ATTITUDE, b"\x01" * 64)
 
@@ -19,12 +31,13 @@ def is_refused(bench: Bench, command: int, payload: bytes = b"") -> bool:
     return reply.direction is Direction.ERROR
 
 
-@pytest.mark.parametrize("command", _GROUNDED)
+@pytest.mark.parametrize(("command", "size"), _SETTERS)
 @pytest.mark.parametrize("extension", [True, False])
-def test_armed_calibrations_resets_and_writes_are_refused_by_the_patch(command: MspCommand, extension: bool) -> None:
+def test_armed_the_patch_refuses_every_setter(command: MspCommand, size: int, extension: bool) -> None:
     bench = Bench(faults=Faults(armed=True, extension=extension))
     bench.run(0.1)
-    assert is_refused(bench, command) is extension
+    assert not is_refused(bench, MspCommand.DEBUG)
+    assert is_refused(bench, command, bytes(size)) is extension
 
 
 @pytest.mark.parametrize("extension", [True, False])

@@ -4,7 +4,7 @@
 from pymavlink.dialects.v20 import ardupilotmega as m
 
 from protocols.msp.frame import request
-from simulator.board.options import Faults
+from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from simulator.naze.setting_table import SETTINGS
 from tests.support import mavlink_parameters as page
 from tests.support.mavlink_ground import MavlinkGround
@@ -56,3 +56,9 @@ def test_another_alignment_crashes_it() -> None:
     bench = Bench()
     page.set_one(bench, "align_gyro_x", 2)
     assert bench.run(3) == b""
+
+
+def test_armed_the_patch_ignores_a_set() -> None:
+    bench = Bench(SimOptions(tele_prot=TelemetryProtocol.MAVLINK), Faults(armed=True))
+    bench.run(1)
+    page.armed_a_set_is_ignored(bench)
