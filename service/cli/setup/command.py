@@ -273,9 +273,7 @@ def check_answers(ssid: str | None, password: str | None, country: str | None, n
 def secret_line(path: Path) -> str:
     """The only line of a file; click.UsageError if it holds anything else."""
     try:
-        lines = read_bounded(path, 1 << 10).decode().removesuffix("
-").removesuffix("").split("
-")
+        lines = read_bounded(path, 1 << 10).decode().removesuffix("\n").removesuffix("\r").split("\n")
     except OSError as error:
         raise click.UsageError(f"{path} cannot be read: {reason(error)}") from error
     except UnicodeDecodeError:
