@@ -28,7 +28,7 @@ from tests.support.programs import free_port
 
 _PUSHES = 9
 _ADDRESSES = ("127.0.0.1", "127.0.0.2", "127.0.0.3")
-_PATHS = ("/api/missions/1", "/api/missions/1/difference/2", "/api/state", "/api/missions", "/metrics", "/page.js")
+_PATHS = ("/api/missions/1", "/api/state", "/api/missions", "/metrics", "/page.js")
 _PROMISED_MB = 75.0
 _PROMISED_PERCENT = 3.0
 

@@ -5,8 +5,9 @@ Later ones win.
 """
 
 import difflib
+import re
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,10 +28,8 @@ _MAX_BYTES = 1 << 20
 #: Reported per file, in case another program's file was named by mistake.
 _MOST_UNKNOWN = 20
 _NAMES = frozenset(key.name for key in KEYS)
-#: One of these ends a value that began in an earlier line; other lines are skipped.
-_ENDS = ("]", '"""', "'''")
-#: The number of attempts at one value; if it does not end, the rest of the file has no line numbers.
-_MOST_LOOKS = 200
+#: A line with a table's header, or a key and the beginning of its value.
+_NAMING = re.compile(r"\s*(?:\[\s*(?P<table>[\w.-]+)\s*\]|(?P<key>[\w.-]+)\s*=)")
 
 Keys = tuple[str, ...]
 
@@ -91,7 +90,8 @@ def _read_file(path: Path, problems: list[Problem]) -> dict[str, Given]:
     for keys, value in _flat(tables):
         # A quoted dot belongs to the name, and no setting has one.
         name = ".".join(f'"{key}"' if "." in key else key for key in keys)
-        where = f"{path}:{lines[keys]}" if keys in lines else str(path)
+        line = lines.get(keys, lines.get(keys[:1]))
+        where = str(path) if line is None else f"{path}:{line}"
         if name in _NAMES or (name in TABLES and isinstance(value, dict)):
             found[name] = Given(True if name in TABLES else value, where, path.parent)
         elif name in TABLES:
@@ -115,49 +115,21 @@ def _flat(tables: Mapping[str, Any]) -> Iterable[tuple[tuple[str, ...], Any]]:
 
 
 def key_lines(text: str) -> Mapping[Keys, int]:
-    """The line, from 1, that first names each table and each key in a valid file.
+    """The line, from 1, that first names each table and each key of a table, for messages.
 
     The parser of the standard library does not provide them.
     """
     found: dict[Keys, int] = {}
     table: Keys = ()
-    for number, statement, held in _statements(text):
-        names = list(_names(held))
-        if statement.lstrip().startswith("["):
-            table = names.pop()
-            found.setdefault(table, number)
-            # [zenoh.transport] also names zenoh.
-            found.setdefault(table[:1], number)
-        for name in names:
-            found.setdefault(table + name, number)
-    return found
-
-
-def _statements(text: str) -> Iterator[tuple[int, str, Mapping[str, Any]]]:
-    """Yield the shortest runs of lines that are valid TOML: a table's header, or a key with its value."""
-    statement, began, looks = "", 1, 0
     for number, line in enumerate(text.split("\n"), 1):
-        if not statement:
-            began, looks = number, 0
-        may_end = not statement or any(end in line for end in _ENDS)
-        statement += line + "\n"
-        if not may_end:
+        if (match := _NAMING.match(line)) is None:
             continue
-        try:
-            held = tomllib.loads(statement)
-        except ValueError:
-            looks += 1
-            if looks == _MOST_LOOKS:
-                return
-            continue
-        yield began, statement, held
-        statement = ""
-
-
-def _names(held: Mapping[str, Any]) -> Iterator[Keys]:
-    """Yield the keys of a statement, one table level deep."""
-    for key, value in held.items():
-        yield (key,)
-        inner = value[-1] if isinstance(value, list) and value else value
-        if isinstance(inner, dict):
-            yield from ((key, name) for name in inner)
+        names = tuple((match["table"] or match["key"]).split("."))
+        if match["table"]:
+            table = names
+        else:
+            names = table + names
+        # [zenoh.transport] also names zenoh.
+        found.setdefault(names[:1], number)
+        found.setdefault(names, number)
+    return found

@@ -17,9 +17,8 @@ from starlette.routing import Route
 
 from bridge.missions.mission_service import HeldMission
 from bridge.model.mission_log import Outcome
-from payloads.comparison import difference, shown, stored_mission
-from payloads.mission_data import Json, mission_items, to_json
-from protocols.mission_item import MissionItem
+from payloads.comparison import shown, stored_mission
+from payloads.mission_data import to_json
 from service.daemon.api import DaemonApi
 from service.daemon.daemon import Daemon
 from service.daemon.telemetry_logs import TelemetryLogs
@@ -29,7 +28,7 @@ from service.recording.tlog_recorder import TLOG_FOLDER
 from service.settings.web import WebSettings
 from service.web.access import check_token, refusing, route
 from service.web.connect_help import connect_help, page_urls, qr_code
-from service.web.histories import INTERVAL_S, FlownTrack, LinkHistory
+from service.web.flown_track import FlownTrack
 from service.web.metrics import CONTENT_TYPE, Metrics
 from service.web.pi_control import PiControl
 from service.web.replies import ResponseCache, begun, json_reply, path_number, text_reply, whole
@@ -56,19 +55,16 @@ class Api:
         self._settings = SettingsHistory(self._api.settings, self._writer, self._cache)
         self._pi = PiControl(daemon, self._writer)
         self._map = {"tiles": str(settings.map_tiles), "credit": settings.map_credit}
-        self._history = LinkHistory(daemon)
         self._track = FlownTrack(daemon)
         self._sampling: asyncio.TimerHandle | None = None
         state_dir = daemon.settings.state_dir
         self._logs = TelemetryLogs(None if state_dir is None else state_dir / TLOG_FOLDER)
         self._host = Host()
 
-    def start(self, second: int = 0) -> None:
-        """Take the first samples; more follow every second until `close`."""
-        self._sampling = asyncio.get_running_loop().call_later(1, self.start, second + 1)
+    def start(self) -> None:
+        """Take the first sample; more follow every second until `close`."""
+        self._sampling = asyncio.get_running_loop().call_later(1, self.start)
         self._track.sample()
-        if second % INTERVAL_S == 0:
-            self._history.sample()
 
     async def close(self) -> None:
         if self._sampling is not None:
@@ -81,13 +77,11 @@ class Api:
         return [
             route("GET", "/api/state", self._state),
             route("GET", "/api/held", self._held),
-            route("GET", "/api/link", self._link),
             route("GET", "/api/track", self._flown_track),
             route("GET", "/api/connect", self._connect),
             route("GET", "/connect.svg", self._connect_code),
             route("GET", "/api/missions", self._missions),
             route("GET", "/api/missions/{number}", self._mission),
-            route("GET", "/api/missions/{number}/difference/{other}", self._difference),
             route("POST", "/api/missions/{number}/restore", self._restore, check_token),
             route("GET", "/api/logs", self._list_logs, check_token),
             route("GET", "/api/logs/{name}", self._read_log, check_token),
@@ -137,9 +131,6 @@ class Api:
             self._held_text = held, _held_text(held)
         return text_reply(self._held_text[1])
 
-    async def _link(self, _request: Request) -> Response:
-        return json_reply(self._history.to_json())
-
     async def _flown_track(self, request: Request) -> Response:
         """The track of this flight or the last one, from place `first` on."""
         return json_reply(self._track.to_json(whole(request.query_params.get("first", "0"))))
@@ -169,19 +160,6 @@ class Api:
 
         return text_reply(await self._cache.get(str(number), make))
 
-    async def _difference(self, request: Request) -> Response:
-        number, other = path_number(request, "number"), path_number(request, "other")
-
-        async def make() -> tuple[str, bool]:
-            first, second = await self._api.show_mission(number), await self._api.show_mission(other)
-
-            def compare() -> str:
-                return to_json({"rows": [row.to_json() for row in difference(_sent(first), _sent(second))]})
-
-            return await asyncio.to_thread(compare), True
-
-        return text_reply(await self._cache.get(f"{number} {other}", make))
-
     async def _restore(self, request: Request) -> Response:
         number = path_number(request, "number")
         return begun(self._writer.begin(f"mission {number}", partial(self._api.restore, number)))
@@ -199,10 +177,6 @@ class Api:
 
     async def _render_metrics(self, _request: Request) -> Response:
         return Response(self._metrics.render(), media_type=CONTENT_TYPE)
-
-
-def _sent(mission: Json) -> list[MissionItem]:
-    return mission_items(mission["received"]["items"])
 
 
 def _refusing_logs() -> AbstractContextManager[None]:

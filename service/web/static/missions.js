@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The stored missions: the latest upload, and a list; each mission opens below its own row.
-import "./compare.js";
 import { byId, make, setClass, setText } from "./dom.js";
 import { ask, post } from "./daemon.js";
 import { missionDetail, outcomeClass, when } from "./mission_detail.js";

@@ -5,7 +5,6 @@ import { ask } from "./daemon.js";
 import { byId, setText } from "./dom.js";
 import "./firmware.js";
 import { FlownTrack } from "./flown_track.js";
-import { showLinkPlot } from "./link_plot.js";
 import "./logs.js";
 import { followTiles } from "./map_tiles.js";
 import { MapView } from "./map_view.js";
@@ -45,7 +44,6 @@ async function look() {
     await showHeld(state);
     await showNewest(state);
     await showBackups(state);
-    await showLinkPlot();
     await showConnect();
     showTrouble(state.store_trouble);
   } catch (error) {

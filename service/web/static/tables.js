@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Mission lists as tables: one list, as sent and as stored, or two lists compared.
+// Mission lists as tables: one list, or as sent and as stored.
 import { make } from "./dom.js";
 
 const PARAMS = ["p1", "p2", "p3", "p4"], NAMES = { alt_m: "Alt", frame: "frame", lat_e7: "Lat", lon_e7: "Long" };
 const KINDS = {
   changed: "changed", dropped: "dropped: not stored", rejected: "the list was rejected because of this item",
-  added: "added", removed: "removed",
+  added: "added",
 };
 
 export function listTable(items) {
@@ -21,7 +21,7 @@ export function markFlown(container, seq) {
   }
 }
 
-// rows: of /api/missions/N or of a difference; titles: of the left and the right column. Equal rows are shown on request.
+// rows: of /api/missions/N; titles: of the left and the right column. Equal rows are shown on request.
 export function pairTable(rows, titles) {
   const whole = table(["No.", ...titles], rows.map((row) => pairRow(row, titles)));
   whole.className = "pairs";

@@ -112,8 +112,6 @@ def test_a_host_name_from_the_settings_is_accepted(start: Starter) -> None:
         "/api/missions/%00",
         "/api/missions/" + "9" * 300,
         "/api/missions/%D9%A2",  # a digit, but not ASCII
-        "/api/missions/1/difference/99",
-        "/api/missions/1/difference/x",
     ],
 )
 def test_a_missing_page_is_404_with_a_sentence(shared_web: WebBench, path: str) -> None:

@@ -111,20 +111,6 @@ def test_the_last_upload_is_shown_as_sent_and_as_stored(page: Browser) -> None:
     assert len(set(colours)) == 3
 
 
-def test_two_missions_are_compared(page: Browser) -> None:
-    page.find("#first").send_keys("1")
-    page.find("#second").send_keys("2")
-    page.press("#compare-form button")
-    page.wait_text("#compared h3", "Mission 1 and mission 2, as sent")
-    assert page.all("#compared tr.changed")
-    assert page.all("#compared tr.added")
-    page.find("#second").clear()
-    page.find("#second").send_keys("77")
-    page.press("#compare-form button")
-    page.wait_text("#compared .bad", "there is no mission 77")
-    page.errors()  # the browser notes the 404
-
-
 @pytest.fixture
 def own_bench(tmp_path: Path) -> Iterator[WebBench]:
     with web_bench(tmp_path) as bench:

@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Histories that the page draws: the track of this flight or the last one, and the serial line's last minutes."""
-
-from collections import deque
-from dataclasses import asdict, dataclass
+"""The track of this flight or the last one, which the page draws."""
 
 from payloads.mission_data import Json
 from service.daemon.daemon import Daemon
@@ -11,8 +8,6 @@ from service.daemon.daemon import Daemon
 _STEP = 1e-5
 #: Then every second place is left out: 1000 of them draw any flight.
 _MOST = 2000
-INTERVAL_S = 2.0
-_SAMPLES = 150  # five minutes
 
 
 class FlownTrack:
@@ -48,33 +43,3 @@ class FlownTrack:
     def to_json(self, first: int) -> Json:
         """The places from number `first` on."""
         return {"version": self._version, "places": self._places[first:]}
-
-
-@dataclass(frozen=True, slots=True)
-class Sample:
-    """One interval. round_trip_ms: None without MSP. lost, damaged: unanswered requests and bad checksums in it."""
-
-    round_trip_ms: float | None
-    lost: int
-    damaged: int
-
-
-class LinkHistory:
-    """`sample` takes one every INTERVAL_S."""
-
-    def __init__(self, daemon: Daemon) -> None:
-        self._daemon = daemon
-        self._samples: deque[Sample] = deque(maxlen=_SAMPLES)
-        self._before = (0, 0)
-
-    def sample(self) -> None:
-        link = self._daemon.report().link
-        lost, damaged = link.requests_lost or 0, link.bad_checksums or 0
-        lost_before, damaged_before = self._before
-        self._before = lost, damaged
-        # Both counters restart with another flight controller.
-        since = max(lost - lost_before, 0), max(damaged - damaged_before, 0)
-        self._samples.append(Sample(link.round_trip_ms, *since))
-
-    def to_json(self) -> Json:
-        return {"interval_s": INTERVAL_S, "samples": [asdict(sample) for sample in self._samples]}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mission in flight on the page: the item that is flown, and the track; and the history of the serial line."""
+"""A mission in flight on the page: the item that is flown, and the track."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -60,9 +60,3 @@ def test_places_that_the_page_has_are_not_sent_again(flying: WebBench) -> None:
     assert answer["version"] == track["version"]
     assert len(answer["places"]) >= track["length"] - 2
     assert flying.ask("/api/track?first=x").status == 404
-
-
-def test_the_history_of_the_serial_line_is_served(shared_web: WebBench) -> None:
-    history = shared_web.ask("/api/link").data
-    assert history["interval_s"] == 2
-    assert set(history["samples"][0]) == {"round_trip_ms", "lost", "damaged"}
