@@ -78,8 +78,7 @@ class Counters:
     """Counted since the start; those of the flight controller since it was found, None without MSP."""
 
     ground_stations: int
-    #: Frames of ground stations, by link and message id; damaged ones; refused ones, by link and reason.
-    frames_received: Mapping[tuple[str, int], int]
+    #: Frames of ground stations: damaged ones, and refused ones, by link and reason.
     bad_frames: int
     refused: Mapping[tuple[str, str], int]
     #: Requests of programs on a share, by reason.
@@ -322,7 +321,6 @@ class Bridge:
         state = self._session.state
         return Counters(
             ground_stations=len(self._ground.peers()),
-            frames_received=self._ground.frames_received,
             bad_frames=self._ground.bad_frames,
             refused=self._incoming.refused,
             refused_by_share=self._sharing.refused,

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """All ground stations, and the queue of datagrams to them. Sans-IO."""
 
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf
 
@@ -75,8 +75,6 @@ class Ground:
         self.notices: list[str] = []
         #: Frames from ground stations whose checksum was wrong.
         self.bad_frames = 0
-        #: Whole frames from ground stations, by link and message id.
-        self.frames_received: Counter[tuple[str, int]] = Counter()
         self._everyone: list[GroundStation] | None = None  # recomputed after each change
 
     # The connected stations.

@@ -73,7 +73,6 @@ class Incoming:
                     continue
             if not (sender.is_heard or self._ground.admits(sender, now)):
                 return False
-            self._ground.frames_received[peer.link, msgid] += 1
             self._ground.heard(sender, frame, ids, now)
             if refused is not None:
                 self._answer_refused(refused, sender, frame)

@@ -4,18 +4,17 @@
 Imported only if it is used: the client library takes several megabytes.
 """
 
-import time
 from collections.abc import Iterator, Mapping
 from itertools import accumulate
 
-from prometheus_client import CollectorRegistry, Counter, Histogram, ProcessCollector, generate_latest
+from prometheus_client import CollectorRegistry, Counter, ProcessCollector, generate_latest
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
 from prometheus_client.registry import Collector
 
 from bridge.fc.session import TRANSITIONS
 from bridge.line.msp_link import BOUNDS_S, RoundTrips
 from bridge.missions.mission_service import DeliveryResult
-from bridge.model.events import BridgeEvent, PushEnded, PushStarted, UploadEnded, UploadRefused, UploadStarted
+from bridge.model.events import BridgeEvent
 from bridge.model.mission_log import ArrivedMission
 from payloads.names import host_name
 from reports.vehicle_groups import VehicleReport
@@ -25,13 +24,9 @@ from service.machine.package import version
 #: The content type of /metrics.
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 _PREFIX = "naze_bridge_"
-#: An upload takes a second on a good link; a failing one times out after some more.
-_UPLOAD_S = (0.25, 0.5, 1, 2, 4, 8, 16, 32, 64)
 #: The followers' values that only grow.
 _COUNTED = {"zenoh_dropped"}
 _FIXES = {"none": 0, "2D": 2, "3D": 3}
-#: The transfers that are timed at once. An upload that its ground station replaces by another one never ends.
-_MOST_TIMED = 100
 
 
 class Metrics(Follower):
@@ -46,15 +41,6 @@ class Metrics(Follower):
         self._labelled.register(_OfVehicle(self._registry, host_name() if settings is None else settings.vehicle))
         self._events = self._counter("events", "Events of the log (docs/events.md).", "event", "level")
         self._missions = self._counter("missions", "Missions received, by their final ack.", "ack")
-        self._findings = self._counter("findings", "Values that were changed or items dropped, by field.", "field")
-        self._durations = Histogram(
-            f"{_PREFIX}mission_transfer_seconds",
-            "From the first item of an upload, or the beginning of a push, to the final ack.",
-            ("result",),
-            buckets=_UPLOAD_S,
-            registry=self._registry,
-        )
-        self._begun: dict[str, float] = {}
         daemon.add_follower(self)
 
     def render(self) -> bytes:
@@ -62,18 +48,9 @@ class Metrics(Follower):
 
     def happened(self, event: BridgeEvent) -> None:
         self._events.labels(event.name_in_log, event.level).inc()
-        if isinstance(event, UploadStarted | PushStarted):
-            self._begun[event.incident] = time.monotonic()
-            if len(self._begun) > _MOST_TIMED:
-                del self._begun[next(iter(self._begun))]
-        elif isinstance(event, UploadEnded | UploadRefused | PushEnded) and event.incident in self._begun:
-            elapsed_s = time.monotonic() - self._begun.pop(event.incident)
-            self._durations.labels(event.ack).observe(elapsed_s)
 
-    def mission_ended(self, mission: ArrivedMission, delivery: DeliveryResult) -> None:
+    def mission_ended(self, _mission: ArrivedMission, delivery: DeliveryResult) -> None:
         self._missions.labels(delivery.ack.name).inc()
-        for finding in mission.verdict.findings:
-            self._findings.labels(finding.field).inc()
 
     def _counter(self, name: str, meaning: str, *labels: str) -> Counter:
         return Counter(_PREFIX + name, meaning, labels, registry=self._registry)
@@ -130,12 +107,6 @@ class _State(Collector):
             yield pieces
         counters = self._daemon.bridge.counters()
         yield _gauge("ground_stations", "Ground stations currently heard.", {}, counters.ground_stations)
-        frames = _counters(
-            "ground_received_frames", "Frames of ground stations, by MAVLink message id.", "link", "msgid"
-        )
-        for (link, msgid), count in counters.frames_received.items():
-            frames.add_metric([link, str(msgid)], count)
-        yield frames
         damaged = counters.bad_frames
         yield _counted("ground_damaged_frames", "Frames of ground stations with a wrong checksum.", damaged)
         refused = _counters("refused_frames", "Frames of ground stations without write access.", "link", "why")
