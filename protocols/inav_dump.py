@@ -2,7 +2,8 @@
 """The settings of an INAV in a file: its command line's `dump` or `diff all`, or a .param file of ours.
 
 A dump is a list of commands: `set NAME = VALUE`, `safehome NUMBER ENABLED LAT LON` (degrees * 1e7) and others, which
-are skipped. A setting of several profiles has the value of the first.
+are skipped. As INAV's command line does, this reads any case and any blanks: `SET nav_rth_altitude=2000`. A setting of
+several profiles has the value of the first.
 """
 
 import re
@@ -10,11 +11,14 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from protocols.file_error import FileError, shown
+from protocols.file_text import file_text
 from protocols.msp.inav_places import Safehome
 from protocols.param_file import read_param_file
 
-_SET = re.compile(r"set (\w+) = (\S*)", re.ASCII)
-_SAFEHOME = re.compile(r"safehome (\d{1,9}) ([01]) (-?\d{1,10}) (-?\d{1,10})", re.ASCII)
+_SET = re.compile(r"set\s+(\w+)\s*=(.*)", re.ASCII | re.IGNORECASE)
+_SAFEHOME = re.compile(r"safehome\s+(\d{1,9})\s+([01])\s+(-?\d{1,10})\s+(-?\d{1,10})", re.ASCII | re.IGNORECASE)
+_COMMAND = re.compile(r"(set|safehome)\b", re.ASCII | re.IGNORECASE)
+_FORMS = {"set": "set NAME = VALUE", "safehome": "safehome NUMBER ENABLED LAT LON, in degrees * 1e7"}
 _MAX_SIZE = 1 << 20
 
 
@@ -31,18 +35,18 @@ class SavedSettings(NamedTuple):
 
 def read_inav_settings(data: bytes, name: str) -> SavedSettings:
     """Read a dump or a .param file; FileError names the file `name` and the line."""
-    text = data[:_MAX_SIZE].decode("utf-8", "replace")
     values: dict[str, float | str] = {}
     safehomes: list[Safehome] = []
-    for number, line in enumerate(text.splitlines(), start=1):
-        if found := _SET.fullmatch(line.strip()):
-            values.setdefault(found[1], found[2])
-        elif found := _SAFEHOME.fullmatch(line.strip()):
+    for number, line in enumerate(file_text(data[:_MAX_SIZE]).splitlines(), start=1):
+        command = line.strip()
+        if found := _SET.fullmatch(command):
+            values.setdefault(found[1].lower(), found[2].strip())
+        elif found := _SAFEHOME.fullmatch(command):
             place, enabled, lat_e7, lon_e7 = map(int, found.groups())
             safehomes.append(Safehome(place, bool(enabled), lat_e7, lon_e7))
-        elif line.startswith("safehome "):
-            remedy = "write safehome NUMBER ENABLED LAT LON, in degrees * 1e7"
-            raise InavDumpError(name, f"line {number}", f"{shown(line)} is not a safehome", remedy)
+        elif kind := _COMMAND.match(command):
+            remedy = f"write {_FORMS[kind[1].lower()]}"
+            raise InavDumpError(name, f"line {number}", f"{shown(command)} cannot be read", remedy)
     if not values:
         values.update(read_param_file(data, name).values)
     return SavedSettings(values, tuple(safehomes))

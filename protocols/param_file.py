@@ -13,6 +13,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from protocols.file_error import FileError, shown
+from protocols.file_text import file_text
 from protocols.float32 import is_single
 from protocols.plain_text import plain_text
 
@@ -43,11 +44,7 @@ class ParamFile:
 
 def read_param_file(data: bytes, name: str) -> ParamFile:
     """Read a file of settings; ParamFileError names the file `name` and the line."""
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        number = data.count(b"\n", 0, error.start) + 1
-        raise ParamFileError(name, f"line {number}", "this is not UTF-8 text", "give a .param file") from None
+    text = file_text(data)
     values: dict[str, float | str] = {}
     seen_at: dict[str, int] = {}
     board = ""

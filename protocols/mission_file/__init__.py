@@ -1,35 +1,72 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mission files as ground stations write them."""
+"""Mission files as ground stations and other programs write them, recognised by their content."""
 
 from collections.abc import Sequence
+from pathlib import PurePath
 
+from protocols.file_text import file_text
 from protocols.mission_file.error import MissionFileError, Note, no_note
+from protocols.mission_file.nav_mission import has_wp_lines, read_nav_xml, read_wp_lines
+from protocols.mission_file.path_file import is_path_table, read_csv, read_gpx, read_kml, read_kmz
 from protocols.mission_file.qgc_plan import read_qgc_plan, write_qgc_plan
 from protocols.mission_file.qgc_wpl import read_qgc_wpl, write_qgc_wpl
+from protocols.mission_file.strangers import refuse_binary, refuse_text
+from protocols.mission_file.xml_text import parse_xml
 from protocols.mission_item import MissionItem
+from protocols.plain_text import plain_text
 
 __all__ = ["MissionFileError", "read_mission_file", "write_mission_file", "write_qgc_wpl"]
 
+#: Endings of other formats, as which a mission that is read from a board would not open.
+_FOREIGN = frozenset((".kml", ".kmz", ".gpx", ".csv", ".mission", ".xml", ".json", ".param", ".tlog", ".bin"))
+
 
 def write_mission_file(items: Sequence[MissionItem], name: str) -> str:
-    """The items as a file's text: a QGroundControl plan if `name` ends with .plan, else QGC WPL 110."""
+    """The items as a file's text: a QGroundControl plan if `name` ends with .plan, else QGC WPL 110.
+
+    MissionFileError if the ending of `name` means another format.
+    """
+    ending = PurePath(name).suffix.lower()
+    if ending in _FOREIGN:
+        what = f"a mission read from the board cannot be written as {ending}"
+        raise MissionFileError(name, "", what, "name the file .waypoints or .plan")
     return write_qgc_plan(items) if _is_plan(name) else write_qgc_wpl(items)
 
 
-def read_mission_file(data: bytes, name: str, note: Note = no_note) -> list[MissionItem]:
-    """Read a QGC WPL 110, a QGroundControl plan or Mission Planner's JSON, recognised by content; home is item 0.
+def read_mission_file(data: bytes, name: str, note: Note = no_note, alt_m: float | None = None) -> list[MissionItem]:
+    """Read the mission of a file in any format that we know, home as item 0.
 
-    `note` is called for each thing that was fixed. MissionFileError is one sentence: the problem, its place in the file
-    `name`, and the remedy.
+    `note` is called for each thing that was fixed or left out. alt_m: the height above home of all points of a path
+    (KML, GPX or CSV). MissionFileError is one sentence: the problem, the place in the file `name`, and the remedy.
     """
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        remedy = "give a QGC WPL 110 (.waypoints) or a QGroundControl plan (.plan), saved as UTF-8"
-        raise MissionFileError(name, f"line {line}", "this is not UTF-8 text", remedy) from None
-    read = read_qgc_plan if text.lstrip().startswith("{") or _is_plan(name) else read_qgc_wpl
-    return read(text, name, note)
+    if data.startswith(b"PK\x03\x04"):
+        return read_kmz(data, name, note, alt_m)
+    text = file_text(data)
+    if text.lstrip().startswith("{") or _is_plan(name):
+        return read_qgc_plan(text, name, note)
+    if text.lstrip().startswith("<"):
+        return _read_xml(text, name, note, alt_m)
+    if has_wp_lines(text):
+        return read_wp_lines(text, name, note)
+    if is_path_table(text):
+        return read_csv(text, name, note, alt_m)
+    if "\0" in text:
+        refuse_binary(data, name)
+    refuse_text(text, name)
+    return read_qgc_wpl(text, name, note)
+
+
+def _read_xml(text: str, name: str, note: Note, alt_m: float | None) -> list[MissionItem]:
+    root = parse_xml(text, name)
+    match root.tag:
+        case "mission":
+            return read_nav_xml(root, name, note)
+        case "kml":
+            return read_kml(root, name, note, alt_m)
+        case "gpx":
+            return read_gpx(root, name, note, alt_m)
+    remedy = "give a mission of INAV Configurator or mwp, a KML or a GPX"
+    raise MissionFileError(name, "", f"this XML holds <{plain_text(root.tag)[:24]}>", remedy)
 
 
 def _is_plan(name: str) -> bool:

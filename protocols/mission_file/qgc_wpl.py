@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """QGC WPL 110, the text format of Mission Planner and most others (https://mavlink.io/en/file_formats/).
 
+Version 120, as QGroundControl wrote it for PX4 from 2011 on, has the same fields but no home. Version 100 is older than
+MAVLink 1: other numbers of commands, another order of fields (pymavlink's mavwp.py).
+
 A header line, then one item a line: seq, current, frame, command, param1..4, latitude, longitude, altitude and
 autocontinue. Usually separated by tabs; any white space is accepted. Empty lines and lines that start with # are
 ignored. As in Mission Planner's own reader these are fixed, with a note: commas, items not numbered 0, 1, 2..., no
@@ -11,20 +14,34 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NoReturn
 
 from protocols.file_error import shown
 from protocols.mission_file.error import MissionFileError, Note, file_degrees_to_e7, no_note, refuse_other_plans
 from protocols.mission_item import Command, Frame, MissionItem
 
-_HEADER = ["QGC", "WPL", "110"]
+_HEADER, _VERSIONS = ["QGC", "WPL"], ("100", "110", "120")
+#: Version 100: the place of each of version 110's fields, and the commands by its numbers.
+_ORDER_100 = (0, 7, 1, 2, 5, 6, 3, 4, 9, 8, 10, 12)
+_COMMANDS_100 = {
+    "2": Command.NAV_TAKEOFF,
+    "3": Command.NAV_RETURN_TO_LAUNCH,
+    "4": Command.NAV_LAND,
+    "24": Command.NAV_TAKEOFF,
+    "25": Command.NAV_WAYPOINT,
+    "26": Command.NAV_LAND,
+    "27": Command.NAV_LOITER_UNLIM,
+}
 _INTEGER_FIELDS = {"seq": 65535, "current": 255, "frame": 255, "command": 65535}
 _NUMBER_FIELDS = ("param1", "param2", "param3", "param4", "latitude", "longitude", "altitude", "autocontinue")
 _FIELD_COUNT = len(_INTEGER_FIELDS) + len(_NUMBER_FIELDS)
 # float() and int() also accept underscores and digits of any script, which no ground station writes.
 _INTEGER = re.compile(r"\d{1,9}", re.ASCII)
 _NUMBER = re.compile(r"[-+]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:e[-+]?\d+)?|nan|inf|infinity)", re.ASCII | re.IGNORECASE)
+_DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+", re.ASCII)
 _SAVE_AGAIN = "save the file again from the ground station"
+_NO_ITEM_0 = "there is no item 0: home is missing"
+_NO_HOME = "QGC WPL 120 has no home: the craft's position is used, or --home"
+_WITH_POINTS = "set the decimal symbol of Windows' region to a point and save it again, or replace the commas by points"
 
 
 def read_qgc_wpl(text: str, name: str, note: Note = no_note) -> list[MissionItem]:
@@ -33,50 +50,58 @@ def read_qgc_wpl(text: str, name: str, note: Note = no_note) -> list[MissionItem
     A file without items is an error: it is more likely truncated than meant to erase a mission.
     """
     items: list[MissionItem] = []
-    header_seen = False
+    version = ""
     lines = text.split("\n")
     for number, line in enumerate(lines, start=1):
         fields = _fields(line)
         if not fields or line.startswith("#"):
             continue
         where = f"line {number}"
-        if header_seen:
+        if version:
+            if version == "100":
+                fields = _fields_110(fields, name, where)
             if len(fields) == _FIELD_COUNT - 1 and number < len(lines):
                 # Missing in an unterminated last line, it would mean a truncated line.
                 note(f"{where}: autocontinue is missing")
                 fields.append("1")
             items.append(_item(fields, name, where))
-        elif fields == _HEADER:
-            header_seen = True
+        elif fields[:2] == _HEADER and fields[2:] in ([each] for each in _VERSIONS):
+            version = fields[2]
         else:
-            _refuse_header(fields, line, name, where)
+            what = f"the header is {shown(line)}, not 'QGC WPL 110'"
+            raise MissionFileError(name, where, what, "save it as a QGC WPL 110 file (.waypoints)")
     if not items:
-        what = "the file has no items" if header_seen else "the file is empty"
+        what = "the file has no items" if version else "the file is empty"
         raise MissionFileError(name, "", what, _SAVE_AGAIN)
     refuse_other_plans([item.command for item in items[1:]], name)
-    return _numbered(items, note)
+    return _numbered(items, note, has_home=version != "120")
+
+
+def _fields_110(fields: list[str], name: str, where: str) -> list[str]:
+    """The fields of version 100 in the order of version 110."""
+    if len(fields) != len(_ORDER_100) + 1:
+        what = f"{len(fields)} fields where an item of version 100 has {len(_ORDER_100) + 1}"
+        raise MissionFileError(name, where, what, _SAVE_AGAIN)
+    ordered = [fields[place] for place in _ORDER_100]
+    command = _COMMANDS_100.get(ordered[3])
+    if command is None:
+        raise MissionFileError(name, where, f"command {shown(ordered[3])} of version 100 is unknown", _SAVE_AGAIN)
+    ordered[3] = str(int(command))
+    return ordered
 
 
 def _fields(line: str) -> list[str]:
-    """The fields of a line; a few commas are decimal commas, which no ground station writes."""
-    if line.count(",") >= _FIELD_COUNT - 2:
+    """The fields of a line; commas separate them unless tabs do."""
+    if "\t" not in line and line.count(",") >= _FIELD_COUNT - 2:
         return [field.strip() for field in line.split(",")]
     return line.split()
 
 
-def _refuse_header(fields: list[str], line: str, name: str, where: str) -> NoReturn:
-    is_rally = fields[0] == "RALLY"
-    if is_rally or (len(fields) == 2 and all(map(_NUMBER.fullmatch, fields))):
-        what = "this file holds rally points" if is_rally else "this file holds a fence"
-        raise MissionFileError(name, where, what, "give the mission's own file")
-    what = f"the header is {shown(line)}, not 'QGC WPL 110'"
-    raise MissionFileError(name, where, what, "save it as a QGC WPL 110 file (.waypoints)")
-
-
-def _numbered(items: list[MissionItem], note: Note) -> list[MissionItem]:
+def _numbered(items: list[MissionItem], note: Note, *, has_home: bool) -> list[MissionItem]:
     """Number the items by their order, as Mission Planner does."""
-    if items[0].seq != 0:
-        note("there is no item 0: home is missing")
+    if not has_home or items[0].seq != 0:
+        note(_NO_ITEM_0 if has_home else _NO_HOME)
+        items = items if has_home else [replace(item, seq=item.seq + 1) for item in items]
         items = [replace(items[0], seq=0, command=0, lat_e7=None, lon_e7=None, alt_m=0.0), *items]
     elif items[0].command == 0:
         note("home has command 0, treated as a WAYPOINT")
@@ -97,6 +122,8 @@ def _item(fields: list[str], name: str, where: str) -> MissionItem:
     if len(fields) != _FIELD_COUNT:
         what = f"{len(fields)} fields where an item has {_FIELD_COUNT}, the line is truncated or damaged"
         raise MissionFileError(name, where, what, _SAVE_AGAIN)
+    if comma := next((token for token in fields if _DECIMAL_COMMA.fullmatch(token)), None):
+        raise MissionFileError(name, where, f"{shown(comma)} has a decimal comma", _WITH_POINTS)
     integers = []
     for (field, highest), token in zip(_INTEGER_FIELDS.items(), fields, strict=False):
         if not _INTEGER.fullmatch(token) or int(token) > highest:

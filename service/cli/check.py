@@ -19,7 +19,7 @@ from payloads.mission_data import verdict_data
 from protocols.file_error import FileError
 from protocols.inav_dump import InavDumpError, SavedSettings, read_inav_settings
 from protocols.mission_file import MissionFileError
-from protocols.mission_item import MissionItem, MissionResult, degrees_to_e7, is_on_earth
+from protocols.mission_item import MissionItem, MissionResult
 from protocols.mission_record import identify
 from reports.finding import DROPPED, without_defaults
 from reports.verdict import Result, Verdict
@@ -27,7 +27,7 @@ from service.settings import SettingsError, takeoff_limit_m
 from terminal.files import read_file, shown_path
 from terminal.mission_source import load_mission
 from terminal.mission_table import mission_table
-from terminal.options import PATH
+from terminal.options import PATH, position
 from terminal.printing import print_json, print_table
 from terminal.sentences import complain, say
 
@@ -48,19 +48,6 @@ class ExitCode(IntEnum):
 
 #: From the best to the worst.
 _RANKS = (ExitCode.ACCEPTED, ExitCode.CLEARED, ExitCode.REJECTED, ExitCode.UNREADABLE)
-
-
-def _place(_ctx: click.Context, _param: click.Parameter, text: str | None) -> tuple[int, int] | None:
-    """Read LAT,LON in degrees as (lat_e7, lon_e7)."""
-    if text is None:
-        return None
-    try:
-        lat, lon = (degrees_to_e7(float(each)) for each in text.split(","))
-    except ValueError:
-        lat = lon = None
-    if lat is None or lon is None or not is_on_earth(lat, lon):
-        raise click.BadParameter(f"{text!r} is not a position: write it like 45.3838,8.4733")
-    return lat, lon
 
 
 @click.command()
@@ -101,7 +88,10 @@ def _place(_ctx: click.Context, _param: click.Parameter, text: str | None) -> tu
     help="Harakiri's maximum take-off altitude.",
 )
 @click.option(
-    "--home", metavar="LAT,LON", callback=_place, help="The craft's position, for files whose home has no coordinates."
+    "--home",
+    metavar="LAT,LON",
+    callback=position,
+    help="The craft's position, for files whose home has no coordinates.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per line for each file.")
 @click.pass_context
@@ -119,7 +109,8 @@ def check(
 ) -> None:
     """Show how the flight controller would store mission files.
 
-    Files: QGC WPL 110 (.waypoints), QGroundControl .plan, Mission Planner .mission.
+    Files: QGC WPL (.waypoints), QGroundControl's .plan, Mission Planner's, INAV Configurator's and mwp's .mission, a
+    dump with wp lines, KML, KMZ, GPX, and CSV lists as Litchi writes them.
 
     Nothing is sent anywhere. Exit code 1: a file would be rejected, 3: one would erase the mission.
     """

@@ -20,6 +20,7 @@ _COMMANDS = {
     "status": LazyCommand("service.cli.status:status", "Show the state of the bridge and the vehicle."),
     "doctor": LazyCommand("service.cli.doctor.command:doctor", "Diagnose setup problems."),
     "check": LazyCommand("service.cli.check:check", "Show how mission files would be stored, offline."),
+    "convert": LazyCommand("service.cli.convert:convert", "Write a mission file in another format."),
     "fly": LazyCommand("service.cli.fly:fly", "Fly a mission file in a simulated sky, with your own firmware."),
     "push": LazyCommand("service.cli.mission_commands:push", "Write a mission file and verify it."),
     "pull": LazyCommand("service.cli.mission_commands:pull", "Read the mission from the flight controller."),

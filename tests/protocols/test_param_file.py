@@ -62,7 +62,7 @@ def test_a_value_that_is_no_number_is_left_out() -> None:
         (b"A,1e999\n", "line 1", "not a number"),
         (b"A,1_0\n", "line 1", "not a number"),
         (b"A,1\nB,2\nA,3\n", "line 3", "1 in line 1 and 3 here"),
-        (b"A,1\n\xff,2\n", "line 2", "UTF-8"),
+        (b"A,1\n\xff,2\n", "line 2", "not a setting's name"),
         ("ä,1\n".encode(), "line 1", "not a setting's name"),
         (b"A\x1b[31m,1\n", "line 1", "not a setting's name"),
         (b"QGC WPL 110\n0\t1\n", "line 1", "mission"),

@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Missions of MultiWii and INAV: the XML of INAV Configurator, mwp, EZ-GUI and WinGUI, and `wp` lines of INAV's CLI.
+
+Both list the records that the flight controller stores; XML has degrees and metres, the command line degrees * 1e7
+and centimetres. mwp keeps the planned home next to them (attributes home-x and home-y).
+
+    <missionitem no="1" action="WAYPOINT" lat="51.4771" lon="0.0012" alt="15" parameter1="0" flag="165"/>
+    wp 0 1 514771000 12000 1500 0 0 0 165
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from xml.etree.ElementTree import Element
+
+from protocols.file_error import shown
+from protocols.mission_file.error import MissionFileError, Note, file_degrees_to_e7
+from protocols.mission_item import MissionItem
+from protocols.msp.nav import LAST, NavAction, NavRecord
+from protocols.msp.nav_items import home_item, items_from_records
+
+_SAVE_AGAIN = "save it again from INAV Configurator or mwp"
+_NO_HOME = "the file has no home: the craft's position is used, or --home"
+_NUMBER = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:e[-+]?\d+)?", re.ASCII | re.IGNORECASE)
+_WP_LINE = re.compile(r"\s*wp(?:\s+-?\d{1,10}){5,9}\s*", re.ASCII | re.IGNORECASE)
+_INT16, _INT32 = 2**15 - 1, 2**31 - 1
+#: A `wp` line's fields after the number; INAV before 2.0 had no p2 and p3.
+_WP_FIELDS = {
+    8: ("action", "lat", "lon", "alt", "p1", "p2", "p3", "flag"),
+    6: ("action", "lat", "lon", "alt", "p1", "flag"),
+}
+
+
+def has_wp_lines(text: str) -> bool:
+    """True if the text holds `wp` lines of INAV's command line."""
+    return any(_WP_LINE.fullmatch(line) for line in text.splitlines())
+
+
+def read_nav_xml(root: Element, name: str, note: Note) -> list[MissionItem]:
+    """Read the mission's items, home first; MissionFileError names the missionitem."""
+    records = [_from_xml(item, name, f"missionitem {place}") for place, item in enumerate(root.iter("missionitem"), 1)]
+    home = None
+    for planned in root.iter("mwp"):
+        lat, lon = (_degrees(planned.get(key, "0"), key, name, "mwp") for key in ("home-y", "home-x"))
+        home = (lat, lon) if lat and lon else home
+    return _items(records, home, name, note)
+
+
+def read_wp_lines(text: str, name: str, note: Note) -> list[MissionItem]:
+    """Read the `wp` lines of a `dump` or `diff all`, home first; other lines are skipped."""
+    records = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        if not _WP_LINE.fullmatch(line):
+            continue
+        fields = _WP_FIELDS.get(len(line.split()) - 2)
+        if fields is None:
+            remedy = "write wp NUMBER ACTION LAT LON ALT P1 P2 P3 FLAG, as `dump` does"
+            raise MissionFileError(name, f"line {number}", f"{shown(line)} is not a waypoint", remedy)
+        values = dict(zip(fields, map(int, line.split()[2:]), strict=True))
+        if values["action"]:  # 0 fills the unused slots of a dump
+            where = f"line {number}"
+            numbers = {key: _within(value, key, name, where) for key, value in values.items()}
+            records.append(_record(numbers))
+    return _items(records, None, name, note)
+
+
+def write_nav_xml(records: Sequence[NavRecord], home: tuple[int, int] | None) -> str:
+    """The records as INAV Configurator's and mwp's XML; `home`: degrees * 1e7."""
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', "<mission>", '\t<version value="2.3-pre8"/>']
+    if home is not None:
+        lines.append(f'\t<mwp home-x="{home[1] / 1e7:.7f}" home-y="{home[0] / 1e7:.7f}"/>')
+    for number, record in enumerate(records, start=1):
+        place = f'lat="{record.lat_e7 / 1e7:.7f}" lon="{record.lon_e7 / 1e7:.7f}" alt="{record.alt_cm / 100:g}"'
+        params = f'parameter1="{record.p1}" parameter2="{record.p2}" parameter3="{record.p3}"'
+        action = NavAction(record.action).name
+        lines.append(f'\t<missionitem no="{number}" action="{action}" {place} {params} flag="{record.flag}"/>')
+    return "".join(f"{line}\n" for line in (*lines, "</mission>"))
+
+
+def _items(records: Sequence[NavRecord], home: tuple[int, int] | None, name: str, note: Note) -> list[MissionItem]:
+    if not records:
+        raise MissionFileError(name, "", "the mission has no waypoints", _SAVE_AGAIN)
+    missions = 1 + sum(record.flag == LAST for record in records[:-1])
+    if missions > 1:
+        raise MissionFileError(name, "", f"the file holds {missions} missions", "save one of them as a file of its own")
+    if home is None:
+        note(_NO_HOME)
+    unflagged = [replace(record, flag=0) if record.flag == LAST else record for record in records]
+    return list(items_from_records(unflagged, home_item(home)))
+
+
+def _from_xml(item: Element, name: str, where: str) -> NavRecord:
+    action = item.get("action", "").upper()
+    if action not in NavAction.__members__:
+        known = ", ".join(NavAction.__members__)
+        raise MissionFileError(name, where, f"its action is {shown(action)}", f"use one of {known}")
+    values = {"action": int(NavAction[action])}
+    for key in ("lat", "lon"):
+        values[key] = _degrees(item.get(key, "0"), key, name, where) or 0
+    values["alt"] = _within(round(_float(item.get("alt", "0"), "alt", name, where) * 100), "alt", name, where)
+    for field, key in {"p1": "parameter1", "p2": "parameter2", "p3": "parameter3", "flag": "flag"}.items():
+        values[field] = _within(int(_float(item.get(key, "0"), key, name, where)), field, name, where)
+    return _record(values)
+
+
+def _record(values: dict[str, int]) -> NavRecord:
+    return NavRecord(
+        values["action"],
+        values["lat"],
+        values["lon"],
+        values["alt"],
+        values["p1"],
+        values.get("p2", 0),
+        values.get("p3", 0),
+        values["flag"],
+    )
+
+
+def _within(value: int, field: str, name: str, where: str) -> int:
+    highest = _INT32 if field in ("lat", "lon", "alt") else _INT16
+    if abs(value) > highest:
+        raise MissionFileError(name, where, f"{field} is {shown(value)}, out of range", _SAVE_AGAIN)
+    return value
+
+
+def _degrees(text: str, key: str, name: str, where: str) -> int | None:
+    return file_degrees_to_e7(_float(text, key, name, where), key, name, where)
+
+
+def _float(text: str, key: str, name: str, where: str) -> float:
+    number = text.strip()
+    if not _NUMBER.fullmatch(number) or abs(float(number)) > _INT32:
+        raise MissionFileError(name, where, f"{key} is {shown(text)}, not a number", _SAVE_AGAIN)
+    return float(number)

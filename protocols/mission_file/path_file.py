@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Paths from other programs: KML and KMZ (Google Earth), GPX routes and tracks, CSV lists as Litchi writes them.
+
+The points become waypoints. Such a file has no home, and often no heights: then the reader asks for one, because a
+guessed height would be flown.
+"""
+
+import csv
+import io
+import math
+import re
+import zipfile
+import zlib
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+from xml.etree.ElementTree import Element
+
+from protocols.file_error import shown
+from protocols.file_text import file_text
+from protocols.mission_file.error import MissionFileError, Note, file_degrees_to_e7
+from protocols.mission_file.xml_text import parse_xml
+from protocols.mission_item import Command, Frame, MissionItem
+
+_MAX_KML = 2 * 2**20
+_FEET = 0.3048
+#: The frame of a height, by KML's altitudeMode; heights of paths on the ground have no meaning.
+_KML_MODES = {"relativetoground": Frame.GLOBAL_TERRAIN_ALT, "absolute": Frame.GLOBAL}
+_CSV_LAT, _CSV_LON = ("latitude", "lat"), ("longitude", "lon", "lng", "long")
+_CSV_ALT = {"altitude(m)": 1.0, "altitude": 1.0, "alt": 1.0, "height": 1.0, "altitude(ft)": _FEET}
+_ABOVE_GROUND = "1"
+_NUMBER = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)", re.ASCII)
+
+
+class _Point(NamedTuple):
+    """A point of a path. alt_m: None if the file does not say."""
+
+    where: str
+    lat: str
+    lon: str
+    alt_m: float | None
+    frame: Frame = Frame.GLOBAL_RELATIVE_ALT
+
+
+def read_kml(root: Element, name: str, note: Note, alt_m: float | None) -> list[MissionItem]:
+    """The only line of the file, or else its single points, in order."""
+    lines = [element for element in root.iter() if element.tag == "linestring"]
+    points = [element for element in root.iter() if element.tag == "point"]
+    if len(lines) > 1:
+        raise MissionFileError(name, "", f"the file holds {len(lines)} paths", "save the one to be flown by itself")
+    found = [point for shape in lines or points for point in _kml_points(shape, name)]
+    return _items(found, name, note, alt_m)
+
+
+def read_kmz(data: bytes, name: str, note: Note, alt_m: float | None) -> list[MissionItem]:
+    """A zipped KML."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            inside = next(each for each in archive.namelist() if each.lower().endswith(".kml"))
+            with archive.open(inside) as file:
+                kml = file.read(_MAX_KML + 1)
+    except StopIteration:
+        raise MissionFileError(name, "", "this zip archive holds no KML", "unpack it and give the mission") from None
+    except (OSError, zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, NotImplementedError):
+        raise MissionFileError(name, "", "this KMZ is damaged", "save it again") from None
+    return read_kml(parse_xml(file_text(kml), name), name, note, alt_m)
+
+
+def read_gpx(root: Element, name: str, note: Note, alt_m: float | None) -> list[MissionItem]:
+    """The only route, or else the only track, or else the waypoints. Heights are above sea level."""
+    for kind, tag, point_tag in (("routes", "rte", "rtept"), ("tracks", "trk", "trkpt"), ("", "gpx", "wpt")):
+        parts = [each for each in root.iter(tag) if each.find(f".//{point_tag}") is not None]
+        if len(parts) > 1:
+            raise MissionFileError(
+                name, "", f"the file holds {len(parts)} {kind}", "save the one to be flown by itself"
+            )
+        if parts:
+            return _items(list(_gpx_points(parts[0], point_tag, name)), name, note, alt_m)
+    return _items([], name, note, alt_m)
+
+
+def is_path_table(text: str) -> bool:
+    """True if the first line names columns of latitude and longitude."""
+    return _columns(text) is not None
+
+
+def read_csv(text: str, name: str, note: Note, alt_m: float | None) -> list[MissionItem]:
+    """A table with columns for latitude, longitude and altitude (m, or ft if the title says so).
+
+    Litchi's altitudemode 1 means above the ground. Headings, gimbals and actions are left out.
+    """
+    columns = _columns(text)
+    assert columns is not None
+    separator, titles, lat, lon = columns
+    alt = next((title for title in _CSV_ALT if title in titles), None)
+    others = len(titles) - 2 - (alt is not None)
+    points = []
+    for number, row in enumerate(csv.reader(text.splitlines(), delimiter=separator), start=1):
+        if number == 1 or not any(row):
+            continue
+        where = f"line {number}"
+        if len(row) < len(titles):
+            raise MissionFileError(name, where, f"{len(row)} of {len(titles)} columns", "save the table again")
+        cells = {title: cell.strip() for title, cell in zip(titles, row, strict=False)}
+        if separator == ";":
+            cells = {title: cell.replace(",", ".") for title, cell in cells.items()}
+        height = None if alt is None else _number(cells[alt], alt, name, where) * _CSV_ALT[alt]
+        is_above_ground = cells.get("altitudemode") == _ABOVE_GROUND
+        frame = Frame.GLOBAL_TERRAIN_ALT if is_above_ground else Frame.GLOBAL_RELATIVE_ALT
+        points.append(_Point(where, cells[lat], cells[lon], height, frame))
+    if others:
+        note(f"only latitude, longitude and altitude are read: {others} other columns are left out")
+    return _items(points, name, note, alt_m)
+
+
+def _columns(text: str) -> tuple[str, list[str], str, str] | None:
+    """The separator, all titles, and those of latitude and longitude."""
+    first = text.lstrip().partition("\n")[0]
+    separator = max(",;\t", key=first.count)
+    titles = [title.strip().strip('"').lower().replace(" ", "") for title in first.split(separator)]
+    lat = next((title for title in _CSV_LAT if title in titles), None)
+    lon = next((title for title in _CSV_LON if title in titles), None)
+    return None if lat is None or lon is None else (separator, titles, lat, lon)
+
+
+def _kml_points(shape: Element, name: str) -> Iterator[_Point]:
+    mode = (shape.findtext("altitudemode") or "").strip().lower()
+    frame = _KML_MODES.get(mode)
+    for place, triple in enumerate((shape.findtext("coordinates") or "").split(), start=1):
+        where = f"point {place}"
+        fields = triple.split(",")
+        if len(fields) not in (2, 3):
+            raise MissionFileError(name, where, f"{shown(triple)} is not LON,LAT,ALT", "save the file again")
+        has_height = frame is not None and len(fields) == 3
+        alt_m = _number(fields[2], "the altitude", name, where) if has_height else None
+        yield _Point(where, fields[1], fields[0], alt_m, Frame.GLOBAL if frame is None else frame)
+
+
+def _gpx_points(part: Element, tag: str, name: str) -> Iterator[_Point]:
+    for place, point in enumerate(part.iter(tag), start=1):
+        where = f"point {place}"
+        height = point.findtext("ele")
+        alt_m = None if height is None else _number(height, "the elevation", name, where)
+        yield _Point(where, point.get("lat", ""), point.get("lon", ""), alt_m, Frame.GLOBAL)
+
+
+def _items(points: Sequence[_Point], name: str, note: Note, alt_m: float | None) -> list[MissionItem]:
+    if not points:
+        raise MissionFileError(name, "", "the file holds no path", "draw a path, not an area, and save it again")
+    if alt_m is None and (bare := next((point for point in points if point.alt_m is None), None)) is not None:
+        remedy = f"set it for all points: `naze-bridge convert {name} MISSION.waypoints --alt METRES`"
+        raise MissionFileError(name, bare.where, "the path has no altitude", remedy)
+    note("the file has no home: the craft's position is used, or --home")
+    items = [_item(0, Frame.GLOBAL, None, None, 0.0)]
+    for point in points:
+        lat_e7, lon_e7 = (
+            file_degrees_to_e7(_number(text, what, name, point.where), what, name, point.where)
+            for text, what in ((point.lat, "the latitude"), (point.lon, "the longitude"))
+        )
+        if alt_m is not None:
+            items.append(_item(len(items), Frame.GLOBAL_RELATIVE_ALT, lat_e7, lon_e7, alt_m))
+        else:
+            items.append(_item(len(items), point.frame, lat_e7, lon_e7, point.alt_m or 0.0))
+    return items
+
+
+def _item(seq: int, frame: Frame, lat_e7: int | None, lon_e7: int | None, alt_m: float) -> MissionItem:
+    return MissionItem(seq, int(Command.NAV_WAYPOINT), int(frame), 0.0, 0.0, 0.0, 0.0, lat_e7, lon_e7, alt_m)
+
+
+def _number(text: str, what: str, name: str, where: str) -> float:
+    number = text.strip()
+    if not _NUMBER.fullmatch(number) or not math.isfinite(float(number)):
+        raise MissionFileError(name, where, f"{what} is {shown(text)}, not a number", "save the file again")
+    return float(number)

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`naze-bridge convert`: a mission file in another format, offline."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import click
+
+from bridge.controllers.nav.check import NavRules
+from bridge.controllers.nav.rules import inav_profile
+from bridge.missions.list_check import check_list
+from protocols.mission_file import MissionFileError, write_mission_file
+from protocols.mission_file.nav_mission import write_nav_xml
+from protocols.mission_item import MissionItem
+from protocols.msp.nav import NavRecord
+from reports.verdict import Result
+from terminal.files import shown_path, write_file
+from terminal.mission_source import load_mission
+from terminal.mission_table import mission_table
+from terminal.options import PATH, position
+from terminal.printing import print_table
+from terminal.sentences import UNREADABLE, fail, say
+
+_TEXT, _NAV = (".waypoints", ".txt", ".plan"), (".mission", ".xml")
+
+
+@click.command()
+@click.argument("source", type=PATH)
+@click.argument("target", type=PATH)
+@click.option(
+    "--alt",
+    "alt_m",
+    type=click.FloatRange(-32767, 32767),
+    help="The altitude above home of all points of a path (KML, GPX or CSV), m.",
+)
+@click.option("--home", metavar="LAT,LON", callback=position, help="Home, for files without it.")
+def convert(source: Path, target: Path, alt_m: float | None, home: tuple[int, int] | None) -> None:
+    """Write the mission in SOURCE to TARGET, in the format that the ending of TARGET names.
+
+    SOURCE is any file that `naze-bridge check` reads. TARGET ends with .waypoints or .txt (QGC WPL 110), .plan
+    (QGroundControl), .mission or .xml (INAV Configurator and mwp: INAV's rules apply, and every change is shown).
+    """
+    ending = target.suffix.lower()
+    if ending not in (*_TEXT, *_NAV):
+        raise click.UsageError(f"{shown_path(target)}: name it .waypoints, .plan or .mission")
+    try:
+        items = load_mission(source, alt_m)
+        if alt_m is not None and any(item.alt_m != alt_m for item in items[1:]):
+            raise click.UsageError(f"--alt is for a KML, GPX or CSV: {shown_path(source)} has altitudes of its own")
+        items[0] = _placed(items[0], home)
+        text = _nav_text(items) if ending in _NAV else write_mission_file(items, target.name)
+        write_file(target, text, MissionFileError)
+    except MissionFileError as error:
+        fail(error, UNREADABLE)
+    say(f"{len(items)} items, home included, written to {shown_path(target)}")
+
+
+def _placed(item: MissionItem, home: tuple[int, int] | None) -> MissionItem:
+    """Home with coordinates: its own, else those given, else 0, which ground stations read as unknown."""
+    if item.lat_e7 and item.lon_e7:
+        return item
+    lat_e7, lon_e7 = home or (0, 0)
+    return replace(item, lat_e7=lat_e7, lon_e7=lon_e7)
+
+
+def _nav_text(items: Sequence[MissionItem]) -> str:
+    """The records that an INAV would store. Ends the program with status 1 if it would refuse the list."""
+    verdict = check_list(items, NavRules(inav_profile()), None)
+    records = [record for record in verdict.records if isinstance(record, NavRecord)]
+    if verdict.findings:
+        print_table(mission_table(items, verdict.items, verdict.findings, verdict.sent_seqs))
+    if verdict.result is not Result.ACCEPTED:
+        fail(verdict.findings[-1].text())
+    home = items[0]
+    return write_nav_xml(records, (home.lat_e7, home.lon_e7) if home.lat_e7 and home.lon_e7 else None)

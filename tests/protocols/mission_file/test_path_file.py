@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Paths of other programs: KML, KMZ, GPX, CSV."""
+
+import io
+import zipfile
+
+import pytest
+
+from protocols.mission_file import MissionFileError, read_mission_file
+from protocols.mission_item import Frame
+
+POINTS = "0.0012,51.4771,30 0.0015,51.4772,40"
+LITCHI = "latitude,longitude,altitude(m),heading(deg),altitudemode\n51.4771,0.0012,30,0,{0}\n51.4772,0.0015,40,0,{0}\n"
+
+
+def kml(coordinates: str, mode: str = "relativeToGround", before: str = "") -> str:
+    line = f"<LineString><altitudeMode>{mode}</altitudeMode><coordinates>\n{coordinates}\n</coordinates></LineString>"
+    return (
+        f'<kml xmlns="http://www.opengis.net/kml/2.2"><Document>{before}<Placemark>{line}</Placemark></Document></kml>'
+    )
+
+
+def gpx(inside: str) -> str:
+    return f'<?xml version="1.0"?><gpx version="1.1" xmlns="http://www.topografix.com/GPX/1/1">{inside}</gpx>'
+
+
+def track(tag: str, point: str, ele: str = "<ele>30</ele>") -> str:
+    second = ele.replace("30", "40")
+    points = (
+        f'<{point} lat="51.4771" lon="0.0012">{ele}</{point}><{point} lat="51.4772" lon="0.0015">{second}</{point}>'
+    )
+    return f"<{tag}><trkseg>{points}</trkseg></{tag}>" if tag == "trk" else f"<{tag}>{points}</{tag}>"
+
+
+def read(data: str | bytes, alt_m: float | None = None) -> list[tuple[int, int | None, int | None, float]]:
+    """Frame, place and height of each waypoint; home is checked here."""
+    home, *points = read_mission_file(data if isinstance(data, bytes) else data.encode(), "field", alt_m=alt_m)
+    assert (home.seq, home.command, home.lat_e7, home.lon_e7) == (0, 16, None, None)
+    assert [point.seq for point in points] == [*range(1, len(points) + 1)]
+    return [(point.frame, point.lat_e7, point.lon_e7, point.alt_m) for point in points]
+
+
+def flown(frame: Frame, *heights: float) -> list[tuple[int, int, int, float]]:
+    return [(frame, 514771000, 12000, heights[0]), (frame, 514772000, 15000, heights[1])]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (kml(POINTS), flown(Frame.GLOBAL_TERRAIN_ALT, 30, 40)),
+        (kml(POINTS, "absolute"), flown(Frame.GLOBAL, 30, 40)),
+        (gpx(track("rte", "rtept")), flown(Frame.GLOBAL, 30, 40)),
+        (gpx(track("trk", "trkpt")), flown(Frame.GLOBAL, 30, 40)),
+        (gpx(track("rte", "rtept") + track("trk", "trkpt")), flown(Frame.GLOBAL, 30, 40)),
+        (LITCHI.format(0), flown(Frame.GLOBAL_RELATIVE_ALT, 30, 40)),
+        (LITCHI.format(1), flown(Frame.GLOBAL_TERRAIN_ALT, 30, 40)),
+        (
+            "Lat;Lon;Altitude (ft)\n51,4771;0,0012;100\n51,4772;0,0015;100\n",
+            flown(Frame.GLOBAL_RELATIVE_ALT, 30.48, 30.48),
+        ),
+    ],
+)
+def test_reads_the_points_with_their_heights(text: str, expected: list[tuple[int, int, int, float]]) -> None:
+    assert read(text) == expected
+    assert read(text, alt_m=25) == flown(Frame.GLOBAL_RELATIVE_ALT, 25, 25)
+
+
+def test_reads_a_zipped_kml() -> None:
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("doc.kml", kml(POINTS, "absolute"))
+    assert read(packed.getvalue()) == flown(Frame.GLOBAL, 30, 40)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        kml("0.0012,51.4771 0.0015,51.4772"),
+        kml(POINTS, "clampToGround"),
+        kml(POINTS).replace("<altitudeMode>relativeToGround</altitudeMode>", ""),
+        gpx(track("trk", "trkpt", ele="")),
+        "lat,lon\n51.4771,0.0012\n51.4772,0.0015\n",
+    ],
+)
+def test_a_path_without_heights_asks_for_one(text: str) -> None:
+    with pytest.raises(MissionFileError, match=r"no altitude; set it .*`naze-bridge convert field .* --alt METRES`"):
+        read(text)
+    assert read(text, alt_m=30) == flown(Frame.GLOBAL_RELATIVE_ALT, 30, 30)
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (kml(POINTS, before="<LineString><coordinates>0,0,1 1,1,1</coordinates></LineString>"), "holds 2 paths"),
+        (gpx(track("trk", "trkpt") * 2), "holds 2 tracks"),
+        (kml("0.0012;51.4771;30"), "point 1: '0.0012;51.4771;30' is not LON,LAT,ALT"),
+        (kml("0.0012,north,30"), "the latitude is 'north'"),
+        ("<kml><Polygon><coordinates>1,2,3</coordinates></Polygon></kml>", "draw a path, not an area"),
+        (gpx(""), "the file holds no path"),
+        ("latitude,longitude,altitude(m)\n51.4771,0.0012\n", "line 2: 2 of 3 columns"),
+        (b"PK\x03\x04" + bytes(60), "this KMZ is damaged"),
+    ],
+)
+def test_refuses_with_the_place_and_a_remedy(data: str | bytes, words: str) -> None:
+    with pytest.raises(MissionFileError) as caught:
+        read(data)
+    assert words in str(caught.value)
