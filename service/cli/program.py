@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The start and the end of the program `naze-bridge`, as the shell sees them."""
 
+import io
 import os
 import signal
 import sys
@@ -24,10 +25,16 @@ def start() -> None:
 
 
 def _open_standard_streams() -> None:
-    """Replace closed ones (`>&-`) by /dev/null: a serial port must not become descriptor 1 or 2."""
+    """Replace closed ones (`>&-`) by /dev/null: a serial port must not become descriptor 1 or 2.
+
+    A letter that the terminal's encoding lacks, as in a file's name, is printed as a question mark.
+    """
     for number, (name, mode) in enumerate((("stdin", "r"), ("stdout", "w"), ("stderr", "w"))):
         try:
             os.fstat(number)
         except OSError:
             os.open(os.devnull, os.O_RDWR)  # the lowest free number: this one
             setattr(sys, name, open(number, mode, closefd=False))  # noqa: SIM115
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
