@@ -12,6 +12,7 @@ from click.shell_completion import get_completion_class
 
 from generators.man_page import man_page
 from service.cli.main import main
+from service.machine.helper_socket import UNITS
 
 _HERE = Path(__file__).resolve().parent
 _LIB = Path("usr/lib/naze-bridge")
@@ -22,7 +23,8 @@ _PAGES = (
 )
 _NOT_THE_PATCH = ("__pycache__", "build", "tests", "sim", "Makefile")
 _UNITS = (
-    *("naze-bridge.service", "naze-bridge-helper.socket", "naze-bridge-helper@.service"),
+    "naze-bridge.service",
+    *(f"naze-bridge-helper-{unit}{kind}" for unit in UNITS for kind in (".socket", "@.service")),
     *("naze-bridge-captive.socket", "naze-bridge-captive.service"),
 )
 _SCHEMAS = "payloads/schemas"

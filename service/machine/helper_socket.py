@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The root helper's socket, from the daemon's side: one connection for one action (service.cli.helper)."""
+"""The root helper's sockets, from the daemon's side: one connection for one action (service.cli.helper)."""
 
 import asyncio
 import json
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -13,6 +13,12 @@ from payloads.mission_data import Json, to_json
 #: A doctor on a Pi Zero takes 10 s; apt compares all packages before it accepts one.
 _REPLY_TIMEOUT_S = 120.0
 _MAX_REPLY = 1 << 20
+#: The actions by the unit that carries them out: each has its own socket and privileges (systemd/).
+UNITS: Mapping[str, Sequence[str]] = {
+    "look": ("overview", "doctor"),
+    "change": ("fix", "answer", "settings", "undo"),
+    "update": ("install", "downgrade"),
+}
 #: The largest update, bytes.
 MAX_PACKAGE = 128 << 20
 
@@ -21,17 +27,18 @@ class HelperError(Exception):
     """The helper refused, failed, or is not there; one sentence."""
 
 
-def helper_socket() -> Path | None:
-    """The socket of the service's helper; None for a daemon that does not run as a service."""
-    runtime = os.environ.get("RUNTIME_DIRECTORY", "").split(":")[0]
-    return Path(f"{runtime}-helper.sock") if runtime else None
+def unit_of(action: object) -> str | None:
+    """The unit for an action; None if there is no such action."""
+    return next((unit for unit, actions in UNITS.items() if action in actions), None)
 
 
 async def ask_helper(request: Json, body: Iterable[bytes] = ()) -> Json:
     """Send a request, followed by its body; returns the reply. HelperError if the helper did not carry it out."""
-    path = helper_socket()
-    if path is None:
+    runtime = os.environ.get("RUNTIME_DIRECTORY", "").split(":")[0]
+    if not runtime:
         raise HelperError("This works only for the service: sudo systemctl start naze-bridge")
+    name = f"naze-bridge-helper-{unit_of(request['action'])}"
+    path = Path(runtime).with_name(f"{name}.sock")
     try:
         async with asyncio.timeout(_REPLY_TIMEOUT_S):
             reader, writer = await asyncio.open_unix_connection(path, limit=_MAX_REPLY)
@@ -47,8 +54,8 @@ async def ask_helper(request: Json, body: Iterable[bytes] = ()) -> Json:
                 writer.close()
     except OSError as error:
         if isinstance(error, TimeoutError):
-            raise HelperError("The helper did not answer in time: see journalctl -u 'naze-bridge-helper@*'") from error
-        remedy = "is the package complete? sudo systemctl status naze-bridge-helper.socket"
+            raise HelperError(f"The helper did not answer in time: see journalctl -u '{name}@*'") from error
+        remedy = f"is it switched off? sudo systemctl status {name}.socket"
         raise HelperError(f"The helper for changes to this Pi cannot be reached: {remedy}") from error
     except ValueError as error:
         raise HelperError("The helper's answer is too long.") from error
@@ -61,5 +68,5 @@ def _read(line: bytes) -> Json:
         if "error" not in reply:
             return reply
     except (ValueError, TypeError) as error:
-        raise HelperError("The helper ended without an answer: see journalctl -u 'naze-bridge-helper@*'") from error
+        raise HelperError("The helper ended without an answer: see journalctl -u 'naze-bridge-helper-*@*'") from error
     raise HelperError(str(reply["error"]))

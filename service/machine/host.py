@@ -4,6 +4,7 @@
 import os
 import re
 import socket
+import stat
 import struct
 from collections.abc import Iterator
 from contextlib import suppress
@@ -14,6 +15,7 @@ from storage.small_files import read_bounded
 
 _SIOCGIFADDR = 0x8915
 _MAX_BYTES = 1 << 20
+_MOST_LINKS = 8
 #: Not /dev/tty and /dev/tty1, the terminals of programs themselves.
 _SERIAL = re.compile(r"/dev/tty[A-Za-z].*")
 #: The programs of a login console.
@@ -51,11 +53,27 @@ class Host:
         return self.root / str(path).lstrip("/")
 
     def resolve(self, path: str | Path) -> Path:
-        """The target of a symbolic link, as a path on the machine."""
-        named = self.path(path)
-        if not named.is_symlink():
-            return Path(path)
-        return Path(os.path.normpath(Path(path).parent / os.readlink(named)))
+        """The target of symbolic links, as a path on the machine."""
+        target = Path(path)
+        for _ in range(_MOST_LINKS):
+            if not self.path(target).is_symlink():
+                break
+            target = Path(os.path.normpath(target.parent / os.readlink(self.path(target))))
+        return target
+
+    def is_tty(self, device: str | Path) -> bool:
+        """True for the character device of a serial port or terminal, by the kernel's list of their drivers."""
+        try:
+            status = self.path(device).lstat()
+        except (OSError, ValueError):
+            return False
+        major, minor = os.major(status.st_rdev), os.minor(status.st_rdev)
+        # Name, device, major number and minor numbers: "serial /dev/ttyS 4 64-95 serial".
+        drivers = re.findall(r"^\S+ +\S+ +(\d+) +(\d+)(?:-(\d+))?\b", self.read("/proc/tty/drivers"), re.MULTILINE)
+        is_listed = any(
+            int(kind) == major and int(first) <= minor <= int(last or first) for kind, first, last in drivers
+        )
+        return stat.S_ISCHR(status.st_mode) and is_listed
 
     def read(self, path: str) -> str:
         """A file's text; empty if it cannot be read."""

@@ -43,10 +43,16 @@ class Given:
     folder: Path = Path()
 
 
-def read_files(config: Path, problems: list[Problem]) -> dict[str, Given]:
-    """Read a configuration file and those in its folder: values by key name, and True for each table present."""
+def read_files(config: Path, problems: list[Problem], page: str | None = None) -> dict[str, Given]:
+    """Read a configuration file and those in its folder: values by key name, and True for each table present.
+
+    `page`: a draft of the status page's file, which is not read then.
+    """
+    page_file, setup_file = config.with_name(PAGE_FILE), config.with_name(SETUP_FILE)
     found: dict[str, Given] = {}
-    generated = [file for name in (PAGE_FILE, SETUP_FILE) if (file := config.parent / name).exists()]
+    if page is not None or page_file.exists():
+        found |= _read_file(page_file, problems, page)
+    generated = [setup_file] if setup_file.exists() else []
     for path in (*generated, config, *_drop_ins(config.parent / DROP_INS, problems)):
         found |= _read_file(path, problems)
     return found
@@ -69,11 +75,12 @@ def nearest(name: str, known: Iterable[str]) -> str:
     return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(sorted(known))}"
 
 
-def _read_file(path: Path, problems: list[Problem]) -> dict[str, Given]:
+def _read_file(path: Path, problems: list[Problem], text: str | None = None) -> dict[str, Given]:
     if path.resolve() == _MASKED:
         return {}
     try:
-        text = read_bounded(path, _MAX_BYTES).decode("utf-8-sig")
+        if text is None:
+            text = read_bounded(path, _MAX_BYTES).decode("utf-8-sig")
         tables = tomllib.loads(text)
     except OSError as error:
         problems.append(Problem(str(path), f"this cannot be read: {reason(error)}"))

@@ -54,11 +54,12 @@ class Reader(NamedTuple):
     """Converts a given value to the one used. `read` gets the value, and the folder of its file.
 
     It raises Unfit, or another ValueError with a whole sentence. `from_text` converts text from the environment or a
-    flag to the form of the file.
+    flag to the form of the file. `choices`: all values, as in the file, if they can be listed.
     """
 
     read: Callable[[object, Path], object]
     from_text: Callable[[str], object] = str
+    choices: Sequence[object] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +127,7 @@ def whole(least: int, most: int) -> Reader:
     def from_text(digits: str) -> object:
         return int(digits) if digits.isascii() and digits.isdecimal() and len(digits) < len(str(most)) + 2 else digits
 
-    return Reader(read, from_text)
+    return Reader(read, from_text, range(least, most + 1))
 
 
 def yes_no() -> Reader:
@@ -135,7 +136,7 @@ def yes_no() -> Reader:
             raise _wrong(value, "true or false")
         return value
 
-    return Reader(read, lambda word: {"true": True, "false": False}.get(word.lower(), word))
+    return Reader(read, lambda word: {"true": True, "false": False}.get(word.lower(), word), (True, False))
 
 
 def choice(kind: type[Enum]) -> Reader:
@@ -147,7 +148,7 @@ def choice(kind: type[Enum]) -> Reader:
         except ValueError:
             raise _wrong(value, " or ".join(f'"{each.value}"' for each in kind)) from None
 
-    return Reader(read)
+    return Reader(read, choices=[each.value for each in kind])
 
 
 def several(wanted: str, parse: Callable[[object, Path], object], *, may_be_empty: bool = True) -> Reader:

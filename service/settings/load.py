@@ -36,10 +36,15 @@ def default_state_dir() -> Path:
     return Path(base) / "naze-bridge"
 
 
-def load_settings(config: Path | None, gcs: Sequence[str] = (), **flags: object) -> Settings:
-    """Load the settings for `run`; SettingsError lists all problems. `flags`: settings by name, None: not given."""
+def load_settings(
+    config: Path | None, gcs: Sequence[str] = (), page: str | None = None, /, **flags: object
+) -> Settings:
+    """Load the settings for `run`; SettingsError lists all problems. `flags`: settings by name, None: not given.
+
+    `page`: a draft of the status page's file, which is not read then.
+    """
     problems: list[Problem] = []
-    given, values = _read(config, flags, problems)
+    given, values = _read(config, flags, problems, page)
     links: Sequence[tuple[GcsAddress, WriteAccess]] = values.get("gcs", ())
     addresses = _named_links(gcs, problems) or [address for address, _ in links] or [parse_gcs(DEFAULT_GCS)]
     problems += _tlog_problems(values, given)
@@ -88,10 +93,10 @@ def takeoff_limit_m() -> int:
 
 
 def _read(
-    config: Path | None, flags: Mapping[str, object], problems: list[Problem]
+    config: Path | None, flags: Mapping[str, object], problems: list[Problem], page: str | None = None
 ) -> tuple[dict[str, Given], dict[str, Any]]:
     """The settings given in files, environment and flags, and their values."""
-    given = {} if config is None else read_files(config, problems)
+    given = {} if config is None else read_files(config, problems, page)
     given |= _read_environment(os.environ, problems)
     named = {name: str(value) for name, value in flags.items() if value is not None}
     given |= {name: Given(value, f"--{name.replace('_', '-')}") for name, value in named.items()}

@@ -8,10 +8,12 @@ the page writes something to the flight controller or new firmware is flashed.
 import asyncio
 import ipaddress
 import json
+import os
 import secrets
 from collections.abc import Iterator
 from http import HTTPStatus
-from pathlib import Path
+from tempfile import TemporaryFile
+from typing import IO
 
 import structlog
 from starlette.exceptions import HTTPException
@@ -21,7 +23,7 @@ from starlette.routing import Route
 
 from payloads.mission_data import Json
 from service.daemon.daemon import Daemon
-from service.machine.helper_socket import MAX_PACKAGE, HelperError, ask_helper
+from service.machine.helper_socket import MAX_PACKAGE, HelperError, ask_helper, unit_of
 from service.machine.log_setup import recent_lines
 from service.web.access import MAX_FILE, check_token, refusing, route
 from service.web.replies import begun, json_reply, received_body, whole
@@ -29,9 +31,7 @@ from service.web.sent_files import MissionWriter
 from storage.os_error import reason
 
 _MAX_REQUEST = 64 << 10
-_PACKAGE_FILE = "update.deb"
 _PIECE = 1 << 16
-_CHANGE_NOTHING = ("overview", "doctor")
 _ELSEWHERE = "The Pi can be changed only from its own network: its hotspot, or the network that it has joined."
 _NOT_NEXT = "This piece does not follow the one before, or the package is too long: begin again."
 _ARMED = "The craft is armed: disarm it first."
@@ -66,6 +66,7 @@ class PiControl:
         self._writer = writer
         self._task: asyncio.Task[None] | None = None
         self._job: Json = {"id": None, "done": True}
+        self._package: IO[bytes] | None = None
 
     def routes(self) -> list[Route]:
         checks = check_local, check_token
@@ -80,6 +81,7 @@ class PiControl:
         if self._task is not None:
             self._task.cancel()
             await asyncio.gather(self._task, return_exceptions=True)
+        self._drop_package()
 
     async def _show(self, _request: Request) -> Response:
         """The request begun last, and its reply."""
@@ -89,10 +91,12 @@ class PiControl:
         """The body is a request to the helper."""
         try:
             asked = json.loads(await received_body(request))
-            action = str(asked["action"])
-        except (ValueError, TypeError, KeyError, RecursionError) as error:
-            raise HTTPException(HTTPStatus.UNPROCESSABLE_ENTITY, "Send a request with an action as JSON.") from error
-        if action not in _CHANGE_NOTHING:
+            action, unit = asked["action"], unit_of(asked["action"])
+        except (ValueError, TypeError, KeyError, RecursionError):
+            unit = None
+        if unit is None:
+            raise HTTPException(HTTPStatus.UNPROCESSABLE_ENTITY, "Send a request with an action as JSON.")
+        if unit != "look":
             self._check_changeable()
             self._writer.check_idle()
         if self._task is not None and not self._task.done():
@@ -121,12 +125,12 @@ class PiControl:
             job["done"] = True
 
     async def _install(self) -> Json:
-        path = self._package()
-        size = path.stat().st_size
-        try:
-            return await ask_helper({"action": "install", "size": size}, _pieces(path))
-        finally:
-            path.unlink()
+        package, self._package = self._package, None
+        if package is None:
+            raise HelperError("Send the package first.")
+        with package:
+            size = package.seek(0, os.SEEK_END)
+            return await ask_helper({"action": "install", "size": size}, _pieces(package))
 
     async def _keep(self, request: Request) -> Response:
         """The body is a piece of a package, from byte `start` on: kept for the request "install"."""
@@ -136,18 +140,29 @@ class PiControl:
             refusing(OSError, HTTPStatus.SERVICE_UNAVAILABLE, lambda why: f"It cannot be stored: {why}."),
             refusing(FileNotFoundError, HTTPStatus.CONFLICT, lambda _: _NOT_NEXT),
         ):
-            return json_reply({"size": await asyncio.to_thread(_append, self._package(), start, piece)})
+            return json_reply({"size": await asyncio.to_thread(self._append, start, piece)})
 
     async def _read_log(self, request: Request) -> Response:
         """The daemon's log lines after the first `after`."""
         count, lines = recent_lines(whole(request.query_params.get("after", "0")))
         return json_reply({"count": count, "lines": [line._asdict() for line in lines]})
 
-    def _package(self) -> Path:
-        state_dir = self._daemon.settings.state_dir
-        if state_dir is None:
-            raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, "There is no state directory for the package.")
-        return state_dir / _PACKAGE_FILE
+    def _append(self, start: int, piece: bytes) -> int:
+        """Append a piece that follows the ones before; FileNotFoundError if it does not. Returns the size so far."""
+        if start == 0:
+            self._drop_package()
+            # Without a name: the kernel removes it with the daemon.
+            self._package = TemporaryFile(dir=self._daemon.settings.state_dir)  # noqa: SIM115  # closed by _drop_package
+        file = self._package
+        if file is None or start != file.seek(0, os.SEEK_END) or start + len(piece) > MAX_PACKAGE:
+            raise FileNotFoundError
+        file.write(piece)
+        return start + len(piece)
+
+    def _drop_package(self) -> None:
+        if self._package is not None:
+            self._package.close()
+            self._package = None
 
     def _check_changeable(self) -> None:
         check_disarmed(self._daemon)
@@ -156,18 +171,7 @@ class PiControl:
             raise HTTPException(HTTPStatus.CONFLICT, _FLASHING)
 
 
-def _append(path: Path, start: int, piece: bytes) -> int:
-    """Append a piece that follows the ones before; FileNotFoundError if it does not. Returns the size so far."""
-    if start == 0:
-        path.write_bytes(b"")
-    if start != path.stat().st_size or start + len(piece) > MAX_PACKAGE:
-        raise FileNotFoundError
-    with path.open("ab") as file:
-        file.write(piece)
-    return start + len(piece)
-
-
-def _pieces(path: Path) -> Iterator[bytes]:
-    with path.open("rb") as file:
-        while piece := file.read(_PIECE):
-            yield piece
+def _pieces(file: IO[bytes]) -> Iterator[bytes]:
+    file.seek(0)
+    while piece := file.read(_PIECE):
+        yield piece

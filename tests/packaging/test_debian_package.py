@@ -19,6 +19,7 @@ import pytest
 
 from deb.build import PYTHONS, build, fetch
 from service.cli.card import prepare
+from service.machine.helper_socket import UNITS
 from tests.support.bare_root import BareRoot
 
 _REPOSITORY = Path(__file__).resolve().parents[2]
@@ -57,7 +58,10 @@ _FORMER_ANSWERS = (
     '# Written by `naze-bridge setup`, which can be run again.\nfc = "auto"\n'
     'gcs = [{address = "udpin:0.0.0.0:14550", key_file = "/etc/naze-bridge/gcs.key"}]'
 )
-_UNITS = (".service", "-helper.socket", "-helper@.service", "-captive.socket", "-captive.service")
+_UNITS = (
+    *(".service", "-captive.socket", "-captive.service"),
+    *(f"-helper-{unit}{kind}" for unit in UNITS for kind in (".socket", "@.service")),
+)
 _STOP = "kill $(cat /run/pid); while grep -q . /proc/$(cat /run/pid)/cmdline; do sleep 0.1; done"
 
 

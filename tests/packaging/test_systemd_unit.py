@@ -7,13 +7,20 @@ from pathlib import Path
 
 import pytest
 
-_UNIT = Path(__file__).resolve().parents[2] / "systemd" / "naze-bridge.service"
-_HELPER = _UNIT.with_name("naze-bridge-helper@.service")
-_HELPERS_SOCKET = _UNIT.with_name("naze-bridge-helper.socket")
+from service.machine.helper_socket import UNITS
+
+_SYSTEMD = Path(__file__).resolve().parents[2] / "systemd"
+_UNIT = _SYSTEMD / "naze-bridge.service"
 #: Maximum exposure found by `systemd-analyze security`, in tenths.
 _BAR = 15
 #: A root helper cannot be as closed as the daemon.
-_HELPERS_BAR = 40
+_HELPERS_BAR = 30
+#: Of each unit of the helper.
+_CAPABILITIES = {
+    "look": "CAP_DAC_READ_SEARCH CAP_SYS_PTRACE",
+    "change": "CAP_CHOWN CAP_DAC_READ_SEARCH CAP_NET_ADMIN",
+    "update": "",
+}
 #: The settings needed for it, which are also checked without systemd-analyze.
 _SHUT = """DynamicUser=yes
 CapabilityBoundingSet=
@@ -86,21 +93,25 @@ def test_readiness_and_watchdog_are_configured() -> None:
     assert {"Type=notify", "WatchdogSec=10", "Restart=always", "StartLimitIntervalSec=0"} <= set(settings())
 
 
-def test_the_helpers_exposure_is_bounded() -> None:
+@pytest.mark.parametrize(("unit", "capabilities"), _CAPABILITIES.items())
+def test_the_helpers_exposure_is_bounded(unit: str, capabilities: str) -> None:
+    file = _SYSTEMD / f"naze-bridge-helper-{unit}@.service"
     if shutil.which("systemd-analyze"):
         command = ("systemd-analyze", "security", "--offline=true", f"--threshold={_HELPERS_BAR}", "--no-pager")
-        judged = subprocess.run([*command, _HELPER], capture_output=True, text=True, check=False)
+        judged = subprocess.run([*command, file], capture_output=True, text=True, check=False)
         assert judged.returncode == 0, judged.stdout + judged.stderr
-    lines = _HELPER.read_text().splitlines()
+    lines = file.read_text().splitlines()
     assert {"NoNewPrivileges=yes", "ProtectSystem=strict", "StandardOutput=journal"} <= {*lines}
-    (capabilities,) = [line for line in lines if line.startswith("CapabilityBoundingSet=")]
-    assert "CAP_SYS_ADMIN" not in capabilities
-    assert "CAP_SYS_MODULE" not in capabilities
+    assert f"CapabilityBoundingSet={capabilities}" in lines
+    assert f"ExecStart=/usr/lib/naze-bridge/bin/python3 -I -m service.cli.helper.serve {unit}" in lines
 
 
-def test_only_the_daemon_may_ask_the_helper() -> None:
-    lines = {*_HELPERS_SOCKET.read_text().splitlines()}
+@pytest.mark.parametrize("unit", UNITS)
+def test_only_the_daemon_may_ask_the_helper(unit: str) -> None:
+    lines = {*(_SYSTEMD / f"naze-bridge-helper-{unit}.socket").read_text().splitlines()}
     assert {"SocketUser=naze-bridge", "SocketMode=0600", "Accept=yes"} <= lines
+    assert f"ListenStream=/run/naze-bridge-helper-{unit}.sock" in lines
     # Started with the service, never by itself.
     assert "[Install]" not in lines
-    assert "Wants=naze-bridge-helper.socket" in settings()
+    for order in ("Wants=", "After="):
+        assert any(line.startswith(order) and f"naze-bridge-helper-{unit}.socket" in line for line in settings())

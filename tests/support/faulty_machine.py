@@ -35,6 +35,10 @@ class FaultyMachine(Host):
         file.write_text(text)
         return file
 
+    def is_tty(self, device: str | Path) -> bool:
+        """Only root could make character devices."""
+        return str(device).startswith("/dev/tty") and self.path(device).is_file()
+
     def owned_by(self, path: str, group: str) -> None:
         """Give a file to a group. Only root can; other users keep their own group."""
         if os.geteuid() == 0:

@@ -2,7 +2,6 @@
 """A machine with faults whose programs have their effect on its files, for the helper's actions."""
 
 import shutil
-import subprocess
 from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
@@ -59,12 +58,8 @@ class FixablePi(FaultyMachine):
         self.ran.append(" ".join(command))
         words = [word for word in command if not word.startswith("--")]
         match words:
-            case ["chgrp" | "chmod", *_]:
-                subprocess.run([*words[:-1], self.path(words[-1])], check=True)
-            case ["kill", *pids]:
-                for pid in pids:
-                    shutil.rmtree(self.path(f"/proc/{pid}"))
-                self.sockets()
+            case ["udevadm", "trigger"]:
+                self.path("/dev/ttyAMA0").chmod(0o660)
             case ["systemctl", "disable", unit]:
                 self._stop(unit)
             case ["rfkill", "unblock", "wlan"]:
@@ -74,11 +69,12 @@ class FixablePi(FaultyMachine):
                 self.path(f"{SERVICE_STATE}/{DATABASE_NAME}").unlink(missing_ok=True)
                 if self.status is not None:
                     self.status = self.status | {"store_trouble": None}
-            case ["systemd-run", "systemctl", "reboot"]:
-                self.write("/proc/cmdline", self.read("/boot/firmware/cmdline.txt"))
-                self.write("/dev/ttyAMA0").chmod(0o660)
-                self.owned_by("/dev/ttyAMA0", "dialout")
         return ""
+
+    def reboot(self) -> None:
+        self.write("/proc/cmdline", self.read("/boot/firmware/cmdline.txt"))
+        self.write("/dev/ttyAMA0").chmod(0o660)
+        self.owned_by("/dev/ttyAMA0", "dialout")
 
     def _stop(self, unit: str) -> None:
         name = "agetty" if "getty" in unit else unit.removesuffix(".service")

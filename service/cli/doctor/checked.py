@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The result of a check."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
 
 from payloads.mission_data import Json
-from service.cli.doctor.fixes import Fix
 
 
 class Grade(Enum):
@@ -18,13 +17,13 @@ class Grade(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """One line: the subject, the finding, and a remedy if it is not OK. `fix`: the same as changes."""
+    """One line: the subject, the finding, and a remedy if it is not OK. `fix`: its name in fixes.py, if any."""
 
     check: str
     grade: Grade
     found: str
     remedy: str = ""
-    fix: Fix | None = field(default=None, compare=False)
+    fix: str = ""
 
     def to_json(self) -> Json:
         return {"check": self.check, "grade": self.grade.value, "found": self.found, "remedy": self.remedy}
@@ -34,9 +33,9 @@ def ok(check: str, found: str) -> Checked:
     return Checked(check, Grade.OK, found)
 
 
-def note(check: str, found: str, remedy: str, fix: Fix | None = None) -> Checked:
+def note(check: str, found: str, remedy: str, fix: str = "") -> Checked:
     return Checked(check, Grade.NOTE, found, remedy, fix)
 
 
-def problem(check: str, found: str, remedy: str, fix: Fix | None = None) -> Checked:
+def problem(check: str, found: str, remedy: str, fix: str = "") -> Checked:
     return Checked(check, Grade.PROBLEM, found, remedy, fix)

@@ -2,7 +2,8 @@
 """The checks, in the order to fix their problems."""
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
@@ -27,8 +28,17 @@ from service.cli.doctor.zenoh import check_zenoh
 from service.daemon.client import ControlError
 from service.machine.host import Host
 from service.settings import Settings
-from service.settings.addresses import AutoFc, FcAddress, parse_fc
+from service.settings.addresses import AddressError, AutoFc, FcAddress, parse_fc
 
+#: The facts of a daemon's status that the checks use.
+_STATUS: Mapping[str, type] = {
+    **dict.fromkeys(("flight_controller", "state", "where", "store_trouble"), str),
+    **dict.fromkeys(("speed_baud", "found_s", "bad_checksums", "fc_bytes_received"), float),
+    "armed": bool,
+    "refused": list,
+    "port": dict,
+}
+_FAR_TOO_LARGE = 1 << 53
 _ON_PORT = (check_permission, check_console, check_holder)
 
 
@@ -38,8 +48,9 @@ def examine(
     """Yield the result of each check. The last one listens to the port only if the others found no problem with it."""
     running = _status(ask_running)
     fc = settings.fc
-    if isinstance(fc, AutoFc) and running is not None and "port" not in running:
-        fc = parse_fc(running["where"])  # the daemon was started with --fc
+    if isinstance(fc, AutoFc) and running is not None and running["port"] is None and running["where"] is not None:
+        with suppress(AddressError):
+            fc = parse_fc(running["where"])  # the daemon was started with --fc
     ports: Sequence[FcAddress] = check_candidates(host) if isinstance(fc, AutoFc) else [fc]
     source = settings.sources.get("fc", "")
     checks: Sequence[Callable[[Host, FcAddress], Checked | None]] = (partial(check_port, source=source), *_ON_PORT)
@@ -56,7 +67,7 @@ def examine(
     yield from check_flight_controller(fc, running, ask_port if is_free else None, source)
     yield from check_wifi(host, settings.gcs)
     yield from check_ports(host, settings.gcs)
-    yield from check_keys(settings.access)
+    yield from check_keys(settings.gcs, settings.access)
     yield check_zenoh(settings.zenoh)
     yield check_clock(host, datetime.fromtimestamp(time.time(), UTC))
     state_dir = settings.state_dir or Path()
@@ -65,7 +76,16 @@ def examine(
 
 
 def _status(ask_running: Callable[[], Json]) -> Json | None:
+    """The daemon's status, without values of another type: root asks, and the daemon may have been taken over."""
     try:
-        return ask_running()
+        status = ask_running()
     except ControlError:
         return None
+    return {name: status.get(name) if _fits(status.get(name), kind) else None for name, kind in _STATUS.items()}
+
+
+def _fits(value: object, kind: type) -> bool:
+    if kind is list:
+        return isinstance(value, list) and all(isinstance(each, str) for each in value)
+    is_number = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < _FAR_TOO_LARGE
+    return is_number if kind is float else isinstance(value, kind)

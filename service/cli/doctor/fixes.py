@@ -1,70 +1,62 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The remedies that the status page's "Fix it" carries out, as changes of setup, whose undo also reverts them."""
+"""The remedies that the status page carries out, as changes of setup, whose undo also reverts them.
 
-from collections.abc import Callable
+A remedy is only a name: its changes follow from this machine, never from a finding or a request.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from pathlib import Path
 
 from service.cli.setup.answers import SetupChoices, earlier_choices
-from service.cli.setup.change import Change, Run, Step
-from service.cli.setup.steps import console_steps, settings_steps, uart_steps
+from service.cli.setup.change import Run, Step
+from service.cli.setup.hotspot import hotspot_name, switch_step
+from service.cli.setup.steps import console_steps, header_consoles, settings_steps, uart_steps
 from service.machine.host import Host
 from service.machine.raspberry_pi import wifi_country
-from service.settings.config_files import PAGE_FILE, SETUP_FILE
 
-#: Returns None where this machine lacks something that the remedy needs.
-Fix = Callable[[Host], Step | None]
-
-RESTART = Step("restart the bridge", [Run(("systemctl", "restart", "naze-bridge.service"))])
-REBOOT = Step("restart the Pi", [Run(("systemctl", "reboot"))])
-
-
-def restart_service(_host: Host) -> Step:
-    return RESTART
-
-
-def reboot(_host: Host) -> Step:
-    return REBOOT
+CLOSE_HOTSPOT = "close the hotspot"
+ENABLE_UART = "enable the UART on the header"
+FIND_FC = "look for the flight controller on all ports"
+FREE_UART = "free the UART from the login console"
+OPEN_HOTSPOT = "open the hotspot"
+OPEN_PORTS = "give the serial ports to the group dialout"
+RESTART_BRIDGE = "restart the bridge"
+STOP_MODEM_MANAGER = "switch ModemManager off"
+UNBLOCK_WIFI = "switch the Wi-Fi on"
 
 
-def set_fc(port: str, source: str) -> Fix | None:
-    """Answer setup's question for the flight controller. `source`: where `fc` is set now; None if that is by hand."""
-    if source and SETUP_FILE not in source and PAGE_FILE not in source:
-        return None
-
-    def fix(host: Host) -> Step:
-        answers = replace(earlier_choices(host) or SetupChoices(), fc=port)
-        changes: list[Change] = [change for step in settings_steps(host, answers) for change in step.changes]
-        return Step(f"look for the flight controller on {port}", changes)
-
-    return fix
+def fix_step(fix: str, host: Host) -> Step | None:
+    """The changes of a remedy; None if it is unknown, or not possible or needed on this machine."""
+    found = next(iter(_FIXES[fix](host)), None) if fix in _FIXES else None
+    return None if found is None else replace(found, purpose=fix)
 
 
-def enable_uart(host: Host) -> Step | None:
-    return next(uart_steps(host, SetupChoices()), None)
+def _run(*command: str, undo: tuple[str, ...] = ()) -> list[Step]:
+    return [Step("", [Run(command, undo)])]
 
 
-def free_port(terminals: set[str]) -> Fix:
-    """Remove the login console from the named terminals ("ttyS0")."""
-    return lambda host: next(console_steps(host, sorted(terminals)), None)
+def _find_fc(host: Host) -> Iterable[Step]:
+    return settings_steps(host, replace(earlier_choices(host) or SetupChoices(), fc=None))
 
 
-def stop_programs(*pids: int) -> Fix:
-    words = [str(pid) for pid in pids]
-    purpose = f"stop the {'program' if len(words) == 1 else 'programs'} with pid {', '.join(words)}"
-    return lambda _host: Step(purpose, [Run(("kill", *words))])
+def _switch_hotspot(host: Host, *, is_on: bool) -> Iterable[Step]:
+    return [] if hotspot_name(host) is None else [switch_step(is_on=is_on)]
 
 
-def open_to_group(device: Path, group: str) -> Fix:
-    commands = ("chgrp", group, str(device)), ("chmod", "g+rw", str(device))
-    return lambda _host: Step(f"open {device} to the group {group}", [Run(command) for command in commands])
-
-
-def stop_modem_manager(_host: Host) -> Step:
+def _stop_modem_manager(_host: Host) -> Iterable[Step]:
     words = "--now", "ModemManager.service"
-    return Step("switch ModemManager off", [Run(("systemctl", "disable", *words), ("systemctl", "enable", *words))])
+    return _run("systemctl", "disable", *words, undo=("systemctl", "enable", *words))
 
 
-def unblock_wifi(host: Host) -> Step | None:
-    step = Step("switch the Wi-Fi on", [Run(("rfkill", "unblock", "wlan"))])
-    return step if wifi_country(host) else None  # without a country the radio is blocked again
+_FIXES: Mapping[str, Callable[[Host], Iterable[Step]]] = {
+    CLOSE_HOTSPOT: lambda host: _switch_hotspot(host, is_on=False),
+    ENABLE_UART: lambda host: uart_steps(host, SetupChoices()),
+    FIND_FC: _find_fc,
+    FREE_UART: lambda host: console_steps(host, header_consoles(host)),
+    OPEN_HOTSPOT: lambda host: _switch_hotspot(host, is_on=True),
+    OPEN_PORTS: lambda _host: _run("udevadm", "trigger", "--settle", "--subsystem-match=tty"),
+    RESTART_BRIDGE: lambda _host: _run("systemctl", "restart", "naze-bridge.service"),
+    STOP_MODEM_MANAGER: _stop_modem_manager,
+    # Without a country the radio would be blocked again.
+    UNBLOCK_WIFI: lambda host: _run("rfkill", "unblock", "wlan") if wifi_country(host) else [],
+}

@@ -10,8 +10,8 @@ from bridge.fc.states.cli import Cli
 from payloads.mission_data import Json
 from protocols.mavlink.signing import Check
 from service.cli.doctor.checked import Checked, note, ok, problem
-from service.cli.doctor.fixes import restart_service, set_fc, stop_programs
-from service.cli.doctor.port import fc_remedy
+from service.cli.doctor.fixes import RESTART_BRIDGE
+from service.cli.doctor.port import fc_fix, fc_remedy
 from service.daemon.client import ControlError
 from service.machine.host import Host, Process
 from service.machine.package import page
@@ -68,7 +68,7 @@ def _silent(fc: FcAddress, status: Json, source: str) -> Checked:
     found = f"no reply on {fc}, but {heard} bytes were received that are no frames"
     if isinstance(fc, SerialFc) and fc.baud is not None:
         remedy = f"{fc.baud} baud is probably wrong; let the bridge find the speed: {fc_remedy(fc.path, source)}"
-        return problem("flight controller", found, remedy, set_fc(fc.path, source))
+        return problem("flight controller", found, remedy, fc_fix(source))
     remedy = "is MSP on at this UART, and nothing else (GPS, receiver)? Is TX on RX only, with GND at both ends?"
     return problem("flight controller", found, remedy)
 
@@ -83,7 +83,7 @@ def check_running(status: Json) -> Iterator[Checked]:
     if status.get("store_trouble"):
         remedy = "see disk and missions below; then: sudo systemctl restart naze-bridge"
         found = f"the daemon cannot store missions: {status['store_trouble']}"
-        yield problem("store", found, remedy, restart_service)
+        yield problem("store", found, remedy, RESTART_BRIDGE)
 
 
 def _line(status: Json) -> Iterator[Checked]:
@@ -95,7 +95,7 @@ def _line(status: Json) -> Iterator[Checked]:
 
 
 def _refused(status: Json) -> Iterator[Checked]:
-    for text in status.get("refused", ()):
+    for text in status.get("refused") or ():
         found = _REFUSED.fullmatch(text)
         if found is None:
             continue
@@ -122,4 +122,4 @@ def check_daemons(host: Host) -> Checked | None:
     pids = [str(each.pid) for each in rivals]
     remedy = f"stop all but one: sudo kill {' '.join(pids[1:])}"
     found = f"{len(pids)} daemons have {port} open (pids {', '.join(pids)})"
-    return problem("daemon", found, remedy, stop_programs(*(each.pid for each in rivals[1:])))
+    return problem("daemon", found, remedy)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from protocols.plain_text import plain_text
 from service.cli.doctor.checked import Checked, note, ok, problem
-from service.cli.doctor.fixes import restart_service
+from service.cli.doctor.fixes import RESTART_BRIDGE
 from service.daemon.store_worker import DATABASE_NAME
 from service.machine.host import Host
 from service.machine.package import version
@@ -21,8 +21,6 @@ from storage.database import kept_aside, read_database
 from storage.store_error import StoreError
 
 _SYNCED = "/run/systemd/timesync/synchronized"
-#: Until the next start.
-SET_BY_HAND = "/run/naze-bridge-helper/clock"
 _TIME_PROGRAMS = ("chronyd", "ntpd", "gpsd")
 #: A Pi without a clock starts in 1970, or at its last shutdown; no release is older than this.
 EPOCH = datetime(2026, 1, 1, tzinfo=UTC)
@@ -56,8 +54,6 @@ def check_clock(host: Host, now: datetime) -> Checked:
         )
     if host.path(_SYNCED).exists():
         return ok("clock", f"{time_text}, set by the network")
-    if host.path(SET_BY_HAND).exists():
-        return ok("clock", f"{time_text}, set from the status page")
     keeper = next((process.name for process in host.processes() if process.name in _TIME_PROGRAMS), None)
     if keeper is not None:
         return ok("clock", f"{time_text}, kept by {keeper}")
@@ -78,11 +74,10 @@ def check_disk(state_dir: Path, free_of: Callable[[Path], int] = lambda path: sh
         free = free_of(folder)
     except PermissionError:
         return note("disk", f"no permission to read {state_dir}", "run doctor with sudo")
-    if not os.access(folder, os.W_OK):
-        read_only = os.statvfs(folder).f_flag & os.ST_RDONLY
-        if read_only:
-            remedy = "the card may be worn out: look at `sudo dmesg`, then sudo mount -o remount,rw /"
-            return problem("disk", f"{folder} is on a disk that is read-only", remedy)
+    if os.statvfs(folder).f_flag & os.ST_RDONLY:
+        remedy = "the card may be worn out: look at `sudo dmesg`, then sudo mount -o remount,rw /"
+        return problem("disk", f"{folder} is on a disk that is read-only", remedy)
+    if os.geteuid() and not os.access(folder, os.W_OK):
         return note("disk", f"no permission to write to {folder}", "run doctor with sudo")
     space = f"{free >> 20} MB free for {state_dir}"
     if free < _LEAST_FREE:
@@ -122,7 +117,7 @@ def _look_into(path: Path) -> Checked:
     if finding == "ok":
         return ok("missions", f"{count} stored in {path}, intact")
     remedy = "restart the bridge: it sets the file aside and begins a new one (sudo systemctl restart naze-bridge)"
-    return problem("missions", f"{path} is damaged: {finding}", remedy, restart_service)
+    return problem("missions", f"{path} is damaged: {finding}", remedy, RESTART_BRIDGE)
 
 
 def _ask_firmware() -> str:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 
 from service.cli.doctor.checked import Checked, note, ok, problem
-from service.cli.doctor.fixes import reboot, stop_programs, unblock_wifi
+from service.cli.doctor.fixes import UNBLOCK_WIFI
 from service.machine.host import Host
 from service.machine.package import page
 from service.settings.addresses import GcsAddress
@@ -15,6 +15,7 @@ from service.settings.write_access import WriteAccess
 
 #: The state of listening sockets in /proc/net/tcp.
 _LISTENS = "0A"
+_LOOPBACK = ("127.", "::1", "localhost")
 
 
 def check_wifi(host: Host, gcs: Sequence[GcsAddress]) -> list[Checked]:
@@ -27,7 +28,7 @@ def check_wifi(host: Host, gcs: Sequence[GcsAddress]) -> list[Checked]:
     ]
     if blocked:
         remedy = "set the country (sudo raspi-config nonint do_wifi_country DE), then: sudo rfkill unblock wlan"
-        return [problem("Wi-Fi", "is switched off (rfkill)", remedy, unblock_wifi)]
+        return [problem("Wi-Fi", "is switched off (rfkill)", remedy, UNBLOCK_WIFI)]
     cards = [name for name in host.names("/sys/class/net") if host.path(f"/sys/class/net/{name}/wireless").exists()]
     if not cards:
         return [note("Wi-Fi", "there is no Wi-Fi card", "connect ground stations by cable, or plug a card in")]
@@ -67,8 +68,7 @@ def _check_port(host: Host, link: GcsAddress) -> Checked:
         return problem("port for ground stations", f"{what} is used by another program", hidden)
     remedy = f"stop it: sudo kill {holder.pid}; or give gcs another port" if holder else "restart the Pi"
     found = f"{what} is used by {holder or 'a program that is gone'}"
-    fix = stop_programs(holder.pid) if holder else reboot
-    return problem("port for ground stations", found, remedy, fix)
+    return problem("port for ground stations", found, remedy)
 
 
 def _inode(host: Host, transport: str, port: int) -> str | None:
@@ -81,10 +81,14 @@ def _inode(host: Host, transport: str, port: int) -> str | None:
     return None
 
 
-def check_keys(access_by_link: Mapping[str, WriteAccess]) -> Iterator[Checked]:
-    """Check that the links' keys, if they have any, cannot be guessed."""
-    for link, access in access_by_link.items():
-        if access.weak_key is not None:
+def check_keys(gcs: Sequence[GcsAddress], access_by_link: Mapping[str, WriteAccess]) -> Iterator[Checked]:
+    """Check that the links have keys that cannot be guessed, or a list of writers."""
+    for link in gcs:
+        access = access_by_link.get(str(link), WriteAccess())
+        if access.is_open and link.kind != "udpout" and not link.host.startswith(_LOOPBACK):
+            found = f"{link}: anyone on this network can change missions and settings"
+            yield note("key", found, "sudo naze-bridge setup --new-key makes a key that changes need, and shows it")
+        elif access.weak_key is not None:
             yield note("key", f"{link}: {access.weak_key}", STRONGER)
         elif access.key is not None:
             yield ok("key", f"required for changes on {link}")

@@ -7,16 +7,8 @@ import stat
 from pathlib import Path
 
 from service.cli.doctor.checked import Checked, note, ok, problem
-from service.cli.doctor.fixes import (
-    Fix,
-    enable_uart,
-    free_port,
-    open_to_group,
-    reboot,
-    set_fc,
-    stop_modem_manager,
-    stop_programs,
-)
+from service.cli.doctor.fixes import ENABLE_UART, FIND_FC, FREE_UART, OPEN_PORTS, STOP_MODEM_MANAGER
+from service.cli.setup.steps import header_consoles
 from service.links.serial_ports import serial_ports
 from service.machine.host import LOGIN_PROGRAMS, Host, Process
 from service.machine.package import page
@@ -37,6 +29,11 @@ def fc_remedy(port: str, source: str) -> str:
     return f'write fc = "{port}" in {source} (the line decides), then: sudo systemctl restart naze-bridge'
 
 
+def fc_fix(source: str) -> str:
+    """The page's remedy for a wrong `fc`, unless it was set by hand in `source`."""
+    return FIND_FC if SETUP_FILE in source else ""
+
+
 def check_port(host: Host, fc: FcAddress, source: str = "") -> Checked:
     """Check that the port exists. `source`: where `fc` is set, as in `Settings.sources`."""
     if not isinstance(fc, SerialFc):
@@ -46,21 +43,20 @@ def check_port(host: Host, fc: FcAddress, source: str = "") -> Checked:
     if model is not None and fc.path == "/dev/serial0" and str(device) == "/dev/ttyAMA10":
         found = f"/dev/serial0 is the debug socket on a {model.name}: the header's pins are {model.header_uart}"
         remedy = fc_remedy(model.header_uart, source)
-        return problem("port", found, remedy, set_fc(model.header_uart, source))
-    if host.path(device).exists():
+        return problem("port", found, remedy, fc_fix(source))
+    if host.is_tty(device):
         return ok("port", fc.path if str(device) == fc.path else f"{fc.path} is {device}")
-    fix: Fix | None
     there = [f"/dev/{name}" for pattern in _PORTS for name in host.names("/dev", pattern)]
     if not fc.path.startswith(("/dev/serial0", "/dev/ttyAMA", "/dev/ttyS")):
-        remedy, fix = "plug the flight controller in", None
+        remedy, fix = "plug the flight controller in", ""
     elif model is None:
-        remedy, fix = "enable this UART in the board's own boot settings", None
+        remedy, fix = "enable this UART in the board's own boot settings", ""
     else:
-        remedy, fix = "enable the UART on the header: sudo naze-bridge setup", enable_uart
+        remedy, fix = "enable the UART on the header: sudo naze-bridge setup", ENABLE_UART
     if there:
         remedy += f"; or use {' or '.join(there)}: {fc_remedy(there[0], source)}"
-        fix = fix or set_fc(there[0], source)
-    return problem("port", f"{fc.path} is missing", remedy, fix)
+        fix = fix or fc_fix(source)
+    return problem("port", f"{fc.path} is missing, or no serial port", remedy, fix)
 
 
 def check_candidates(host: Host) -> list[SerialFc]:
@@ -88,10 +84,10 @@ def check_permission(host: Host, fc: FcAddress) -> Checked | None:
     if found.st_mode & stat.S_IRGRP and found.st_mode & stat.S_IWGRP and group == _GROUP:
         return ok("permission", f"{device} is open to the group {_GROUP}")
     mode = stat.filemode(found.st_mode)
-    permanent = f"permanently, with a udev rule: {page('docs/install.md')}"
-    remedy = f"sudo chgrp {_GROUP} {device} && sudo chmod g+rw {device}; {permanent}"
+    own = f"if it stays so, another udev rule decides: {page('docs/install.md')}"
+    remedy = f"sudo udevadm trigger --settle --subsystem-match=tty; {own}"
     found_text = f"{device} belongs to the group {group} with {mode}, and not to {_GROUP}"
-    return problem("permission", found_text, remedy, open_to_group(device, _GROUP))
+    return problem("permission", found_text, remedy, OPEN_PORTS)
 
 
 def check_console(host: Host, fc: FcAddress) -> Checked | None:
@@ -103,7 +99,6 @@ def check_console(host: Host, fc: FcAddress) -> Checked | None:
     # The firmware's name for the header's UART.
     names |= {"serial0"} if host.resolve("/dev/serial0") == device else set()
     found, remedies = [], []
-    fix: Fix = free_port(names)
     getty = f"serial-getty@{device.name}"
     is_running = host.has_login(device.name)
     if is_running or host.names("/etc/systemd/system/getty.target.wants", f"{getty}.service"):
@@ -118,7 +113,7 @@ def check_console(host: Host, fc: FcAddress) -> Checked | None:
         found.append(f"the kernel was started with {named[0]}")
         by_hand = "remove that word from the boot loader's command line, and reboot"
         remedies.append(by_hand if file is None else "sudo naze-bridge setup && sudo reboot")
-        fix = fix if remedies[:-1] else reboot
+    fix = FREE_UART if names & {*header_consoles(host)} else ""
     if not found:
         return ok("console", f"no login console on {device}")
     return problem("console", f"a login console has {device}: {'; '.join(found)}", "; then ".join(remedies), fix)
@@ -135,8 +130,7 @@ def check_holder(host: Host, fc: FcAddress) -> Checked | None:
         return None  # reported by the console's check
     if holder.is_naze_bridge:
         return ok("other programs", f"the daemon has {device} open, pid {holder.pid}")
-    remedy = f"stop it: sudo kill {holder.pid}"
-    return problem("other programs", f"{holder} has {device} open", remedy, stop_programs(holder.pid))
+    return problem("other programs", f"{holder} has {device} open", f"stop it: sudo kill {holder.pid}")
 
 
 def holder_of_port(host: Host, fc: FcAddress) -> Process | None:
@@ -158,12 +152,12 @@ def check_modem_manager(host: Host, fc: FcAddress) -> Checked:
         f"install the package's udev rule ({page('docs/install.md')}), or: sudo systemctl disable --now ModemManager"
     )
     found = f"runs, and sends modem commands to {device} when it is plugged in"
-    return note("ModemManager", found, remedy, stop_modem_manager)
+    return note("ModemManager", found, remedy, STOP_MODEM_MANAGER)
 
 
 def _device(host: Host, fc: FcAddress) -> Path | None:
-    """The device behind symbolic links; None if it is missing, which the first check reports."""
+    """The device behind symbolic links; None if it is no serial port, which the first check reports."""
     if not isinstance(fc, SerialFc):
         return None
     device = host.resolve(fc.path)
-    return device if host.path(device).exists() else None
+    return device if host.is_tty(device) else None

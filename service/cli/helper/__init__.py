@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The root helper: carries out the status page's changes to this Pi, because the daemon has no privileges.
 
-systemd starts it for each connection to its socket, which only the service's user may open. A connection carries one
-request, a line of JSON such as {"action": "fix", "fix": "restart the bridge"}, and one reply. `actions.py` has all
-actions; there is no other, and none runs a shell or a program that the request names.
+systemd starts it for each connection to one of its sockets, which only the service's user may open: one for each set of
+privileges (service/machine/helper_socket.py). A connection carries one request, a line of JSON such as
+{"action": "fix", "fix": "restart the bridge"}, and one reply. `actions.py` has all actions; there is no other, and none
+runs a shell, or takes a command, a path or a process id.
 """

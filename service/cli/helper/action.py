@@ -24,12 +24,11 @@ class HelperRefusal(Exception):
 
 
 class DeferredRestarts(Machine):
-    """Restarts the bridge or the Pi only after the reply."""
+    """Restarts the bridge only after the reply."""
 
     def run(self, command: Sequence[str], timeout_s: float = 60) -> str:
         ends_bridge = command[0] == "systemctl" and command[1] in _ENDING and command[-1] in _UNIT
-        ends_pi = tuple(command) == ("systemctl", "reboot")
-        return super().run(later(command, DELAY_S) if ends_bridge or ends_pi else command, timeout_s)
+        return super().run(later(command, DELAY_S) if ends_bridge else command, timeout_s)
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +68,7 @@ def parse_action(line: bytes, actions: Mapping[str, Action]) -> partial[Json]:
     """Read a request; HelperRefusal if it is none, or has an argument that is missing, unknown or of another type."""
     try:
         request: Json = json.loads(line)
+        json.dumps(request, ensure_ascii=False).encode()  # lone surrogates are no text
         action = actions[request.pop("action")]
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         raise HelperRefusal(f"This is not an action; known are {', '.join(actions)}") from None

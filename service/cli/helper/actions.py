@@ -3,31 +3,30 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from datetime import UTC, datetime
 from functools import partial
 
 from payloads.mission_data import Json
 from service.cli.doctor.command import examined
-from service.cli.doctor.fixes import REBOOT, RESTART
-from service.cli.doctor.machine import EPOCH, SET_BY_HAND
+from service.cli.doctor.fixes import fix_step
 from service.cli.helper.action import Action, HelperRefusal, ThisPi
 from service.cli.helper.packages import PREVIOUS, receive, start_update, update_outcome, version_of
-from service.cli.helper.page_settings import change_settings, known_settings, settings_in_force
+from service.cli.helper.page_settings import change_settings, page_settings
 from service.cli.setup.answers import SetupChoices, current_key, earlier_choices, shadowed
-from service.cli.setup.change import Change, Machine, Run, Step, WriteFile
+from service.cli.setup.change import Machine
 from service.cli.setup.command import check_answers
-from service.cli.setup.hotspot import hotspot_is_open, hotspot_name, switch_step
+from service.cli.setup.hotspot import hotspot_is_open, hotspot_name
 from service.cli.setup.steps import missing_steps
 from service.cli.setup.undo import forget_last, undo_steps
 from service.daemon.client import STATUS, ask_daemon
+from service.links.serial_ports import serial_ports
 from service.machine.helper_socket import MAX_PACKAGE
+from service.machine.host import Host
 from service.machine.package import version
 from service.machine.raspberry_pi import pi_model, wifi_country
-from service.settings.addresses import AddressError, parse_fc
 from service.settings.load import SERVICE_CONFIG, SERVICE_STATE
 from service.settings.passphrase import new_passphrase
 
-_LATEST = datetime(2100, 1, 1, tzinfo=UTC)
+_AUTO = "auto"
 
 
 def overview(pi: ThisPi) -> Json:
@@ -38,6 +37,7 @@ def overview(pi: ThisPi) -> Json:
     return {
         "is_set_up": earlier is not None,
         "fc": (earlier or SetupChoices()).fc,
+        "ports": _ports(host),
         "has_key": bool(current_key(host)),
         "hotspot": hotspot_name(host),
         "hotspot_is_open": hotspot_is_open(host),
@@ -48,21 +48,24 @@ def overview(pi: ThisPi) -> Json:
         "version": version(),
         "previous": version_of(host.path(PREVIOUS), Machine(host)),
         "update": update_outcome(host),
-        "settings": settings_in_force(host),
-        "keys": known_settings(),
+        "settings": page_settings(host),
     }
 
 
 def doctor(pi: ThisPi) -> Json:
     """Doctor's checks. Changes nothing. `fix` names a remedy for the action of that name."""
-    return {"checks": [found for found, _ in _examine(pi)]}
+    host = pi.host
+    ask = partial(ask_daemon, None, STATUS)
+    # The port is the daemon's, which asks.
+    results = examined(host.path(SERVICE_CONFIG), None, host.path(SERVICE_STATE), ask, host, ask_port=ask)
+    return {"checks": [each.to_json() | {"fix": each.fix if fix_step(each.fix, host) else None} for each in results]}
 
 
 def apply_fix(pi: ThisPi, *, fix: str) -> Json:
-    """One of doctor's remedies, by its purpose; doctor must find the problem again."""
-    step = next((step for _, step in _examine(pi) if step is not None and step.purpose == fix), None)
+    """One of the remedies in service/cli/doctor/fixes.py, by its name."""
+    step = fix_step(fix, pi.host)
     if step is None:
-        raise HelperRefusal("Doctor no longer finds this problem: check again.")
+        raise HelperRefusal("This remedy has nothing to change here: check again.")
     return pi.make([step])
 
 
@@ -81,14 +84,12 @@ def answer(
     if bool(hotspot) != bool(password):
         raise HelperRefusal("A hotspot needs a name and a password.")
     check_answers(hotspot or None, password or None, country or None, name or None)
+    if fc and fc not in _ports(pi.host):
+        raise HelperRefusal("There is no such port for a flight controller on this Pi: open this again.")
     earlier = earlier_choices(pi.host) or SetupChoices()
-    try:
-        wanted = earlier.fc if not fc else None if fc == "auto" else str(parse_fc(fc))
-    except AddressError as error:
-        raise HelperRefusal(str(error)) from error
     answers = replace(
         earlier,
-        fc=wanted,
+        fc=earlier.fc if not fc else None if fc == _AUTO else fc,
         hotspot=(hotspot, password) if hotspot else None,
         country=country.upper() or None,
         name=name or None,
@@ -100,13 +101,6 @@ def answer(
     return made | {"warnings": warnings, "key": None if is_trial else answers.key}
 
 
-def switch_hotspot(pi: ThisPi, *, on: bool) -> Json:
-    """Open or close the hotspot of the last setup."""
-    if hotspot_name(pi.host) is None:
-        raise HelperRefusal("No hotspot is set up: give it a name and a password first.")
-    return pi.make([switch_step(is_on=on)])
-
-
 def undo(pi: ThisPi, *, is_trial: bool = False) -> Json:
     """Revert the last setup, fix, or change of settings. `is_trial`: only show the changes."""
     steps, kept = undo_steps(pi.host)
@@ -114,19 +108,6 @@ def undo(pi: ThisPi, *, is_trial: bool = False) -> Json:
         return pi.shown(steps) | {"kept": kept}
     forget_last(pi.host, Machine(pi.host))
     return pi.make_for_good(steps) | {"kept": kept}
-
-
-def restart(pi: ThisPi, *, machine: bool = False) -> Json:
-    """Restart the bridge, or the Pi."""
-    return pi.make([REBOOT if machine else RESTART])
-
-
-def set_clock(pi: ThisPi, *, unix_s: int) -> Json:
-    """Set the clock to the phone's: seconds since 1970, UTC."""
-    if not EPOCH.timestamp() <= unix_s < _LATEST.timestamp():
-        raise HelperRefusal("This time cannot be right: look at the clock of this phone.")
-    changes: list[Change] = [Run(("date", "--utc", "--set", f"@{unix_s}")), WriteFile(SET_BY_HAND, "")]
-    return pi.make_for_good([Step("set the clock", changes)])
 
 
 def install(pi: ThisPi, *, size: int) -> Json:
@@ -144,16 +125,8 @@ def downgrade(pi: ThisPi) -> Json:
     return {"version": known}
 
 
-def _examine(pi: ThisPi) -> list[tuple[Json, Step | None]]:
-    host = pi.host
-    ask = partial(ask_daemon, None, STATUS)
-    # The port is the daemon's, which asks.
-    results = examined(host.path(SERVICE_CONFIG), None, host.path(SERVICE_STATE), ask, host, ask_port=ask)
-    found = []
-    for checked in results:
-        step = None if checked.fix is None else checked.fix(host)
-        found.append((checked.to_json() | {"fix": None if step is None else step.purpose}, step))
-    return found
+def _ports(host: Host) -> list[str]:
+    return [_AUTO, *(port.path for port in serial_ports(host) if host.is_tty(port.path))]
 
 
 #: Everything that the helper does.
@@ -163,10 +136,7 @@ ACTIONS: Mapping[str, Action] = {
     "fix": apply_fix,
     "answer": answer,
     "settings": change_settings,
-    "hotspot": switch_hotspot,
     "undo": undo,
-    "restart": restart,
-    "clock": set_clock,
     "install": install,
     "downgrade": downgrade,
 }

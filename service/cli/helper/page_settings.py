@@ -1,99 +1,85 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The bridge's settings on the page: those in force, and the file of those made there (page.toml)."""
+"""The bridge's settings on the page: those in force, and the file of those made there (page.toml).
 
-import tomllib
+Only settings with a choice of values: none of them names a file or an address, or lets anyone do more.
+"""
+
+import json
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
-from payloads.mission_data import Json, to_json
+from payloads.mission_data import Json
 from service.cli.helper.action import HelperRefusal, ThisPi
-from service.cli.setup.change import Machine, Run, Step, WriteFile
+from service.cli.setup.change import Run, Step, WriteFile
 from service.cli.setup.steps import restart_changes
 from service.machine.host import Host
 from service.settings import load_settings
 from service.settings.config_files import PAGE_FILE, read_files
+from service.settings.key import Key
 from service.settings.load import SERVICE_CONFIG, SERVICE_STATE
 from service.settings.table import KEYS
 
 _FILE = str(SERVICE_CONFIG.with_name(PAGE_FILE))
 _HEAD = "# Written by the status page. setup.toml, config.toml and conf.d, in this folder, override this.\n"
 _RELOAD = ("systemctl", "reload", "naze-bridge.service")
-_MAX_TEXT = 4096
+_NAMES = ("sysid", "takeoff_max_m", "record_tlog", "tlog_file_mb", "tlog_total_mb", "tlog_days", "log_level")
+_KEYS: Mapping[str, Key] = {key.name: key for key in KEYS if key.name in _NAMES}
 
 
-def settings_in_force(host: Host) -> Json:
-    """The given settings by name: each as in the configuration file, and the file and line that decide."""
-    given = read_files(host.path(SERVICE_CONFIG), [])
+def page_settings(host: Host) -> list[Json]:
+    """Each setting with its choices, the value in force (None: the default), and the other file that decides it."""
+    return [_page_setting(key, *_given(host).get(key.name, (None, _FILE))) for key in _KEYS.values()]
+
+
+def _page_setting(key: Key, value: object, where: str) -> Json:
+    choices = key.reader.choices
     return {
-        key.name: {"text": toml_text(given[key.name].value), "where": _on_machine(host, given[key.name].where)}
-        for key in KEYS
-        if key.name in given
+        "name": key.name,
+        "meaning": key.meaning,
+        "default": json.loads(key.default),
+        "choices": {"least": choices[0], "most": choices[-1]} if isinstance(choices, range) else list(choices),
+        "value": value if value is None or _is_choice(key, value) else str(value),
+        "elsewhere": None if where.startswith(_FILE) else where,
     }
-
-
-def known_settings() -> list[Json]:
-    shown = ("name", "meaning", "default", "example", "is_live")
-    return [{name: getattr(key, name) for name in shown} for key in KEYS]
 
 
 def change_settings(pi: ThisPi, *, values: dict) -> Json:  # type: ignore[type-arg]  # its contents are checked here
     """Write the settings, if all files together can then be used; the bridge takes them over.
 
-    `values`: by name, each text as in the file; None: the default.
+    `values`: by name, each one of the setting's choices; None: the default.
     """
-    host = pi.host
-    in_force, keys = settings_in_force(host), {key.name: key for key in KEYS}
+    host, given = pi.host, _given(pi.host)
     before = host.read(_FILE)
-    lines = {name: found["text"] for name, found in in_force.items() if found["where"].startswith(_FILE)}
-    for name, text in values.items():
-        where = in_force.get(name, {"where": _FILE})["where"]
-        if name not in keys:
-            raise HelperRefusal(f"{name!r} is not a setting.")
-        if not where.startswith(_FILE):
-            raise HelperRefusal(f"{name} is set in {where}, which overrides the page: change it there.")
-        if text is None:
-            lines.pop(name, None)
-        else:
-            lines[name] = _one_value(name, text)
-    file = WriteFile(_FILE, _HEAD + "".join(f"{name} = {text}\n" for name, text in sorted(lines.items())))
-    if file.text == before or (not lines and not before):
+    chosen = {name: value for name, (value, where) in given.items() if where.startswith(_FILE)}
+    for name, value in values.items():
+        if name not in _KEYS:
+            raise HelperRefusal("The page cannot change this setting.")
+        if name in given and name not in chosen:
+            raise HelperRefusal(f"{name} is set in {given[name][1]}, which overrides the page: change it there.")
+        chosen[name] = value
+    kept = {name: value for name, value in chosen.items() if value is not None}
+    if odd := [name for name, value in kept.items() if not _is_choice(_KEYS[name], value)]:
+        raise HelperRefusal(f"{odd[0]} cannot have this value. {_KEYS[odd[0]].meaning}")
+    text = _HEAD + "".join(f"{name} = {json.dumps(value)}\n" for name, value in sorted(kept.items()))
+    if text == before or (not kept and not before):
         return pi.shown([])
-    _try(host, file, before)
-    is_live = all(keys[name].is_live for name in values)
+    load_settings(host.path(SERVICE_CONFIG), (), text, state_dir=host.path(SERVICE_STATE))
+    is_live = all(_KEYS[name].is_live for name in values)
     take_over = [Run(_RELOAD, undo=_RELOAD)] if is_live else restart_changes(host)
-    return pi.make([Step("save the settings", [file, *take_over])])
+    return pi.make([Step("save the settings", [WriteFile(_FILE, text), *take_over])])
 
 
-def toml_text(value: object) -> str:
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{name} = {toml_text(each)}" for name, each in value.items()) + "}"
-    if isinstance(value, list):
-        return "[" + ", ".join(map(toml_text, value)) + "]"
-    if isinstance(value, str):
-        return to_json(value)  # also valid TOML
-    return str(value).lower() if isinstance(value, bool) else str(value)
+def _given(host: Host) -> Mapping[str, tuple[Any, str]]:
+    """The given settings by name: the value, and the file and line that decide."""
+    found = read_files(host.path(SERVICE_CONFIG), [])
+    return {
+        name: (found[name].value, "/" + str(Path(found[name].where).relative_to(host.root)))
+        for name in _KEYS
+        if name in found
+    }
 
 
-def _one_value(name: str, text: object) -> str:
-    try:
-        if isinstance(text, str) and len(text) <= _MAX_TEXT and "\n" not in text:
-            return toml_text(tomllib.loads(f"value = {text}")["value"])
-    except (ValueError, RecursionError):
-        pass
-    raise HelperRefusal(f"{name}: this is no value: text needs quotes, a list brackets.")
-
-
-def _try(host: Host, file: WriteFile, before: str) -> None:
-    """Load the settings with the new file; SettingsError if they cannot be used, and the file is as before."""
-    path, machine = host.path(_FILE), Machine(host)
-    machine.carry_out(file)
-    try:
-        load_settings(host.path(SERVICE_CONFIG), state_dir=host.path(SERVICE_STATE))
-    finally:
-        if before:
-            machine.carry_out(WriteFile(_FILE, before))
-        else:
-            path.unlink()
-
-
-def _on_machine(host: Host, where: str) -> str:
-    return "/" + str(Path(where).relative_to(host.root))
+def _is_choice(key: Key, value: object) -> bool:
+    choices = key.reader.choices
+    return type(value) is type(choices[0]) and value in choices

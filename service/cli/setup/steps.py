@@ -36,7 +36,7 @@ def missing_steps(host: Host, answers: SetupChoices) -> list[Step]:
 
 
 def _console(host: Host, answers: SetupChoices) -> Iterator[Step]:
-    return console_steps(host, _header_consoles(host))
+    return console_steps(host, header_consoles(host))
 
 
 def console_steps(host: Host, consoles: Sequence[str]) -> Iterator[Step]:
@@ -58,7 +58,7 @@ def console_steps(host: Host, consoles: Sequence[str]) -> Iterator[Step]:
         yield Step("free the UART from the login console", changes, needs_reboot=in_cmdline)
 
 
-def _header_consoles(host: Host) -> list[str]:
+def header_consoles(host: Host) -> list[str]:
     """The console names that mean the UART on the header.
 
     On a Pi 5 serial0 is the debug socket, except with enable_uart=1 from the bootloader of 2025-02-12 on.

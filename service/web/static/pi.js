@@ -34,13 +34,12 @@ function summary(pi) {
 function last({ hotspot, hotspot_is_open: isOpen, can_undo: canUndo }) {
   const said = make("p", { class: "result", role: "status" });
   const plan = make("div");
-  const act = (text, request, note) => action(text, said, async () => aftermath(await askPi(request)) + note);
+  const act = (text, fix, note) => action(text, said, async () => aftermath(await askPi({ action: "fix", fix })) + note);
   const undo = action("Undo the last change …", said, () => showUndo(plan, said));
   undo.disabled = !canUndo;
   const note = isOpen ? " This phone must join the Pi's other network." : " Join the hotspot within 3 minutes, or the Pi returns to this network.";
-  const hotspots = hotspot === null ? [] : [act(isOpen ? "Close the hotspot" : "Open the hotspot", { action: "hotspot", on: !isOpen }, note)];
-  return make("div", {}, make("div", { class: "row" }, undo, ...hotspots, act("Restart the bridge", { action: "restart" }, " The page returns in a few seconds."),
-    act("Restart the Pi", { action: "restart", machine: true }, " The page returns in about a minute."), said), plan);
+  const hotspots = hotspot === null ? [] : [act(isOpen ? "Close the hotspot" : "Open the hotspot", isOpen ? "close the hotspot" : "open the hotspot", note)];
+  return make("div", {}, make("div", { class: "row" }, undo, ...hotspots, act("Restart the bridge", "restart the bridge", " The page returns in a few seconds."), said), plan);
 }
 
 async function showUndo(plan, said) {

@@ -8,7 +8,7 @@ export function answersPanel(pi, refresh) {
   const result = make("p", { class: "result", role: "status" }), plan = make("div");
   const show = make("button", {}, "Show the changes");
   const key = make("label", { class: "check" }, make("input", { type: "checkbox", name: "new_key" }), pi.has_key ? " Make a new key" : " Require a key for changes: make one");
-  const form = makeForm({}, () => pressed(show, result, () => tryOut(given(form, pi))), make("div", { class: "row" }, field("Flight controller", "fc", pi.fc ?? "auto"), field("Name of this Pi", "name", pi.name, { maxlength: 63 })),
+  const form = makeForm({}, () => pressed(show, result, () => tryOut(given(form, pi))), make("div", { class: "row" }, make("label", {}, "Flight controller ", make("select", { name: "fc" }, ...ports(pi))), field("Name of this Pi", "name", pi.name, { maxlength: 63 })),
   make("div", { class: "row" }, field("Hotspot: name", "hotspot", "", { placeholder: pi.hotspot ?? "none", maxlength: 32 }),
     field("Password, 8 or more", "password", "", { type: "password", minlength: 8, maxlength: 63, autocomplete: "new-password" }), field("Country", "country", pi.country ?? "", { size: 3, maxlength: 2, placeholder: "DE" })),
   key, make("div", { class: "row" }, show, result));
@@ -32,6 +32,11 @@ export function answersPanel(pi, refresh) {
     return "";
   }
   return make("details", pi.is_set_up ? {} : { open: "" }, make("summary", {}, pi.is_set_up ? "Setup" : "First questions"), form, plan);
+}
+
+function ports({ ports: found, fc }) {
+  const now = fc ?? "auto";
+  return [...new Set([now, ...found])].map((port) => make("option", { selected: port === now ? "" : null }, port));
 }
 
 // Only what differs from the answers so far.

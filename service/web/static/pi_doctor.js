@@ -29,15 +29,13 @@ async function examine(list, result) {
 function finding({ check, grade, found, remedy, fix }, list, result) {
   const parts = [make("b", { class: KINDS[grade] }, grade), ` ${check}: ${found}`];
   if (remedy) parts.push(make("span", { class: "why" }, remedy));
-  const request = fix ? { action: "fix", fix } : check === "clock" && grade !== "ok" ? { action: "clock" } : null;
-  if (request) parts.push(fixButton(request, fix ?? "set the clock to this phone's", list, result));
+  if (fix) parts.push(fixButton(fix, list, result));
   return make("li", {}, ...parts);
 }
 
-function fixButton(request, purpose, list, result) {
-  return action(`Fix it: ${purpose}`, result, async () => {
-    const now = request.action === "clock" ? { unix_s: Math.round(Date.now() / 1000) } : {};
-    const text = aftermath(await askPi({ ...request, ...now }));
+function fixButton(fix, list, result) {
+  return action(`Fix it: ${fix}`, result, async () => {
+    const text = aftermath(await askPi({ action: "fix", fix }));
     await examine(list, result);
     return text;
   });

@@ -42,7 +42,7 @@ export function action(text, result, work) {
 export function aftermath({ steps, needs_reboot: needsReboot, cuts_network: cutsNetwork }) {
   if (!steps.length) return "Nothing had to be changed.";
   const done = `Done: ${steps.map(({ purpose }) => purpose).join("; ")}.`;
-  const reboot = needsReboot ? " Restart the Pi for this to take effect." : "";
+  const reboot = needsReboot ? " Switch the Pi off and on for this to take effect." : "";
   return done + reboot + (cutsNetwork ? " The Wi-Fi changes in a few seconds." : "");
 }
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from payloads.mission_data import Json
-from service.machine.helper_socket import HelperError, ask_helper
+from service.machine.helper_socket import HelperError, ask_helper, unit_of
 
 
 async def ask(folder: Path, reply: bytes, request: Json, body: tuple[bytes, ...] = ()) -> tuple[Json | str, bytes]:
@@ -21,7 +21,7 @@ async def ask(folder: Path, reply: bytes, request: Json, body: tuple[bytes, ...]
         writer.write(reply)
         writer.close()
 
-    async with await asyncio.start_unix_server(serve, folder / "run-helper.sock"):
+    async with await asyncio.start_unix_server(serve, folder / f"naze-bridge-helper-{unit_of(request['action'])}.sock"):
         try:
             return await ask_helper(request, body), bytes(received)
         except HelperError as error:
@@ -55,7 +55,7 @@ def test_a_refusal(tmp_path: Path, reply: bytes, why: str) -> None:
 
 
 def test_without_a_helper(monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(HelperError, match=r"cannot be reached: .*naze-bridge-helper.socket"):
+    with pytest.raises(HelperError, match=r"cannot be reached: .*naze-bridge-helper-look.socket"):
         asyncio.run(ask_helper({"action": "overview"}))
     monkeypatch.delenv("RUNTIME_DIRECTORY")
     with pytest.raises(HelperError, match="works only for the service"):

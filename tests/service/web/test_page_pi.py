@@ -87,20 +87,22 @@ def test_first_questions_remedies_settings_log_and_undo(browsers: Browsers, benc
         assert fits_a_phone(page)
         assert violations(page) == []
         press(page, "Fix it: free the UART from the login console")
-        page.wait_text("#pi", "Restart the Pi for this to take effect")
+        page.wait_text("#pi", "Switch the Pi off and on for this to take effect")
         page.wait_text("#pi .findings", "ok console")
         assert "console=serial0" not in pi.read("/boot/firmware/cmdline.txt")
 
         unfold(page, "Settings of the bridge")
         fill(page, "sysid", "900")
         press(page, "Save the settings")
-        page.wait_text("#pi", "sysid is 900")
+        assert page.run("return document.querySelector('#pi [name=sysid]').validity.rangeOverflow")
         fill(page, "sysid", "9")
         assert violations(page) == []
         press(page, "Save the settings")
         until(lambda: "sysid = 9" in pi.read("/etc/naze-bridge/page.toml"), "the saved setting")
         until(lambda: page.run("return !document.querySelector('#pi details[open]')"), "the refreshed panels")
-        assert not page.find("#pi [name='fc'][autocomplete='off']").get_property("disabled")
+        assert page.run("return [...document.querySelector('#pi [name=fc]').options].map((each) => each.value)") == [
+            *("auto", "/dev/ttyAMA0")
+        ]
 
         unfold(page, "Log")
         page.wait_text("#pi .log", "web.pi_request")

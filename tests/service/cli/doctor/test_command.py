@@ -19,7 +19,7 @@ def test_the_flight_controller_is_found(start: Starter) -> None:
     assert ended.returncode == 1
     assert f"ok       configuration: {config} can be used" in ended.stdout
     assert "problem  permission: " in ended.stdout
-    assert "         -> sudo chgrp dialout " in ended.stdout
+    assert "         -> sudo udevadm trigger " in ended.stdout
 
 
 def test_a_running_daemon_is_asked_and_not_disturbed(start: Starter) -> None:

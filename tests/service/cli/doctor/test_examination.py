@@ -31,7 +31,7 @@ def test_a_healthy_pi_has_no_problem(pi: FaultyMachine, tmp_path: Path) -> None:
     settings = Settings(PORT, GCS, tmp_path / "state")
     found = list(examine(pi, settings, no_answer, lambda: STATUS))
     # Only root can give a file to the group dialout.
-    assert {each.check for each in found if each.grade is not Grade.OK} <= {"permission", "flight controller"}
+    assert {each.check for each in found if each.grade is not Grade.OK} <= {"permission", "flight controller", "key"}
     text = " ".join(each.found for each in found)
     assert "/dev/serial0 is /dev/ttyAMA0" in text
     assert "wlan0 is 192.168.4.1; ground stations connect to port 14550" in text

@@ -38,6 +38,7 @@ def test_an_unusable_state_directory_is_a_problem(tmp_path: Path, monkeypatch: p
     (tmp_path / "file").touch()
     assert_problem(check_disk(tmp_path / "file" / "state"), f"{tmp_path}/file is a file", "name another state_dir")
     monkeypatch.setattr(os, "access", lambda _path, _mode: False)
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
     assert_note(check_disk(tmp_path), "no permission to write to")
     monkeypatch.setattr(os, "statvfs", lambda _path: SimpleNamespace(f_flag=os.ST_RDONLY))
     assert_problem(check_disk(tmp_path, lambda _: 1 << 30), "on a disk that is read-only", "remount,rw")

@@ -3,8 +3,9 @@
 
 import os
 
-from service.cli.doctor.network import check_ports, check_wifi
+from service.cli.doctor.network import check_keys, check_ports, check_wifi
 from service.settings.addresses import parse_gcs
+from service.settings.write_access import WriteAccess
 from tests.support.doctor import GCS, assert_note, assert_ok, assert_problem
 from tests.support.faulty_machine import FaultyMachine
 
@@ -46,3 +47,9 @@ def test_an_outgoing_connection_does_not_occupy_its_port(pi: FaultyMachine) -> N
     assert_ok(check_ports(pi, [parse_gcs("tcpin:0.0.0.0:14550")]), "TCP port 14550 is free")
     pi.sockets(tcp=TCP_14550.replace(" 01 ", " 0A "))
     assert_problem(check_ports(pi, [parse_gcs("tcpin:0.0.0.0:14550")]), "TCP port 14550 is used", "")
+
+
+def test_a_link_open_to_everyone_is_reported() -> None:
+    assert_note(check_keys(GCS, {}), "udpin:0.0.0.0:14550: anyone on this network can change missions")
+    assert list(check_keys(GCS, {str(GCS[0]): WriteAccess(writers=())})) == []
+    assert list(check_keys([parse_gcs("tcpin:127.0.0.1:1"), parse_gcs("udpout:gcs.local:2")], {})) == []

@@ -67,7 +67,7 @@ def test_without_a_named_port_the_daemons_own_is_checked(pi: FaultyMachine, tmp_
 
 def test_a_port_without_group_access_is_a_problem(pi: FaultyMachine) -> None:
     pi.path("/dev/ttyAMA0").chmod(0o600)
-    assert_problem(check_permission(pi, PORT), "-rw-------", "sudo chmod g+rw /dev/ttyAMA0")
+    assert_problem(check_permission(pi, PORT), "-rw-------", "sudo udevadm trigger --settle --subsystem-match=tty")
 
 
 def test_a_running_login_console_is_reported_once(pi: FaultyMachine) -> None:

@@ -11,7 +11,7 @@ import pytest
 from service.cli.doctor.checked import Checked, Grade
 from service.cli.doctor.flight_controller import check_flight_controller
 from service.cli.doctor.network import check_keys
-from service.cli.doctor.port import check_console, check_permission, check_port
+from service.cli.doctor.port import check_console, check_port
 from service.settings import Settings, load_settings
 from service.settings.addresses import SerialFc
 from tests.support.doctor import STATUS
@@ -52,16 +52,6 @@ def test_a_console_in_cmdline_txt(pi: FaultyMachine) -> None:
     run_in(pi.root, found.remedy)
     assert pi.read("/boot/firmware/cmdline.txt") == "console=tty1 rootwait\n"
     fixed = check_console(pi, PORT)
-    assert fixed is not None
-    assert fixed.grade is Grade.OK
-
-
-def test_a_port_without_group_access(pi: FaultyMachine) -> None:
-    pi.path("/dev/ttyAMA0").chmod(0o600)
-    found = check_permission(pi, PORT)
-    assert found is not None
-    run_in(pi.root, found.remedy)
-    fixed = check_permission(pi, PORT)
     assert fixed is not None
     assert fixed.grade is Grade.OK
 
@@ -108,7 +98,8 @@ def test_a_weak_key(pi: FaultyMachine, setup_pi: Pi, tmp_path: Path) -> None:
     def checked() -> Checked:
         answers = setup_pi.root / "etc/naze-bridge/setup.toml"
         answers.write_text(answers.read_text().replace('"/etc', f'"{setup_pi.root}/etc'))
-        (found,) = check_keys(settings_of(setup_pi).access)
+        settings = settings_of(setup_pi)
+        (found,) = check_keys(settings.gcs, settings.access)
         return found
 
     found = checked()

@@ -19,6 +19,8 @@ from service.cli.helper.actions import ACTIONS
         b'{"action": ["fix"]}',
         b'{"action": "shell", "command": "id"}',
         b"[" * 50_000,
+        b'{"action": "fix", "fix": "\\ud800"}',
+        b'{"action": "overview", "\\udfff": 1}',
     ],
 )
 def test_what_is_not_an_action_is_refused(line: bytes) -> None:
@@ -43,7 +45,7 @@ def test_a_number_is_not_a_truth_value() -> None:
     ("line", "name", "arguments"),
     [
         (b'{"action": "overview"}', "overview", {}),
-        (b'{"action": "fix", "fix": "restart the Pi"}\n', "fix", {"fix": "restart the Pi"}),
+        (b'{"action": "fix", "fix": "restart the bridge"}\n', "fix", {"fix": "restart the bridge"}),
         (b'{"action": "answer", "fc": "sim"}', "answer", {"fc": "sim"}),
     ],
 )

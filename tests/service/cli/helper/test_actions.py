@@ -1,32 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The helper's actions on a machine made of files."""
 
-from pathlib import Path
-
 import pytest
 
 from service.cli.helper.action import HelperRefusal
 from service.cli.setup.answers import KEY_FILE, SETTINGS_FILE
 from service.cli.setup.hotspot import hotspot_name
+from service.machine.host import Host
 from tests.service.cli.doctor.test_fixes import console, store_trouble
 from tests.support.fixable_pi import FixablePi
 
 _HOTSPOT = {"hotspot": "kite", "password": "long-enough", "country": "de"}
-
-
-def test_the_clock_is_set_from_the_phone(pi: FixablePi) -> None:
-    pi.path("/run/systemd/timesync/synchronized").unlink()
-    assert [found["grade"] for found in pi.checked("clock")] == ["note"]
-    pi.ask("clock", unix_s=1_800_000_000)
-    assert "date --utc --set @1800000000" in pi.ran
-    assert [found["grade"] for found in pi.checked("clock")] == ["ok"]
-
-
-@pytest.mark.parametrize("wrong", [0, -1, 10**12])
-def test_a_clock_that_cannot_be_right_is_refused(pi: FixablePi, wrong: int) -> None:
-    with pytest.raises(HelperRefusal, match="clock of this phone"):
-        pi.ask("clock", unix_s=wrong)
-    assert pi.ran == []
 
 
 def test_the_first_questions(pi: FixablePi) -> None:
@@ -50,7 +34,7 @@ def test_the_first_questions(pi: FixablePi) -> None:
 
 
 def test_the_bridge_restarts_only_after_the_reply(pi: FixablePi) -> None:
-    pi.ask("answer", fc="sim")
+    pi.ask("answer", fc="/dev/ttyAMA0")
     (restart,) = [command for command in pi.ran if "restart naze-bridge.service" in command]
     assert restart.startswith("systemd-run")
     assert "--on-active=2" in restart
@@ -59,7 +43,9 @@ def test_the_bridge_restarts_only_after_the_reply(pi: FixablePi) -> None:
 @pytest.mark.parametrize(
     ("wrong", "why"),
     [
-        ({"fc": "/dev/x,fast"}, "baud"),
+        ({"fc": "/dev/ttyAMA7"}, "no such port"),
+        ({"fc": "/etc/shadow"}, "no such port"),
+        ({"fc": "tcp:elsewhere:1"}, "no such port"),
         ({"hotspot": "kite"}, "a name and a password"),
     ],
 )
@@ -70,7 +56,7 @@ def test_answers_that_cannot_be_used_change_nothing(pi: FixablePi, wrong: dict[s
 
 
 def test_an_undo_reverts_the_last_change(pi: FixablePi) -> None:
-    pi.ask("answer", fc="sim")
+    pi.ask("answer", fc="/dev/ttyAMA0")
     before = pi.read(SETTINGS_FILE)
     pi.ask("answer", fc="auto", new_key=True)
     assert "remove /etc/naze-bridge/gcs.key" in pi.ask("undo", is_trial=True)["steps"][0]["changes"]
@@ -91,14 +77,20 @@ def test_a_fix_can_be_undone_unless_there_is_nothing_to_revert(pi: FixablePi) ->
 
 
 def test_the_hotspot_is_switched(pi: FixablePi) -> None:
-    with pytest.raises(HelperRefusal, match="No hotspot is set up"):
-        pi.ask("hotspot", on=True)
+    with pytest.raises(HelperRefusal, match="nothing to change here"):
+        pi.ask("fix", fix="open the hotspot")
     pi.ask("answer", **_HOTSPOT)
     assert hotspot_name(pi) == "kite"
-    assert pi.ask("hotspot", on=False)["cuts_network"]
+    assert pi.ask("fix", fix="close the hotspot")["cuts_network"]
     assert pi.ran[-1].endswith("-m service.cli.setup.hotspot close")
-    pi.ask("hotspot", on=True)
+    pi.ask("fix", fix="open the hotspot")
     assert pi.ran[-1].endswith("-m service.cli.setup.hotspot")
+
+
+def test_only_serial_ports_of_this_pi_are_offered(pi: FixablePi, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert pi.ask("overview")["ports"] == ["auto", "/dev/ttyAMA0"]
+    monkeypatch.setattr(FixablePi, "is_tty", Host.is_tty)  # the port is only a file
+    assert pi.ask("overview")["ports"] == ["auto"]
 
 
 def test_no_way_back_without_an_update(pi: FixablePi) -> None:
@@ -111,9 +103,8 @@ def test_a_package_of_an_impossible_size(pi: FixablePi) -> None:
         pi.ask("install", size=1 << 40)
 
 
-def test_what_is_asked_only_chooses(pi: FixablePi, tmp_path: Path) -> None:
-    """No request can bring a command or a file of its own."""
-    for fix in ("kill 1", "rm -rf /", "", "stop the program with pid 1"):
+def test_a_request_brings_no_command_path_or_process(pi: FixablePi) -> None:
+    for fix in ("kill 1", "rm -rf /", "", "stop the program with pid 1", "restart the Pi", "restart the bridge\n"):
         with pytest.raises(HelperRefusal):
             pi.ask("fix", fix=fix)
     assert pi.ran == []

@@ -20,12 +20,15 @@ def lock(tmp_path: Path) -> Path:
     return tmp_path / "lock"
 
 
-def served(pi: FixablePi, lock: Path, request: bytes, user: int | None = None) -> dict[str, Any]:
+_RESTART = b'{"action": "fix", "fix": "restart the bridge"}'
+
+
+def served(pi: FixablePi, lock: Path, request: bytes, user: int | None = None, unit: str = "change") -> dict[str, Any]:
     ours, theirs = socket.socketpair()
     with ours, theirs, theirs.makefile("rb") as body:
         ours.sendall(request + b"\n")
         ours.shutdown(socket.SHUT_WR)
-        answer(theirs, ThisPi(pi, body), {os.geteuid() if user is None else user}, lock)
+        answer(theirs, ThisPi(pi, body), {os.geteuid() if user is None else user}, lock, unit)
         line = ours.recv(1 << 20)
     assert line.endswith(b"\n")
     reply: dict[str, Any] = json.loads(line)
@@ -33,11 +36,11 @@ def served(pi: FixablePi, lock: Path, request: bytes, user: int | None = None) -
 
 
 def test_a_request_is_answered(pi: FixablePi, lock: Path) -> None:
-    assert served(pi, lock, b'{"action": "overview"}')["name"] == "kite"
+    assert served(pi, lock, b'{"action": "overview"}', unit="look")["name"] == "kite"
 
 
 def test_another_user_is_refused(pi: FixablePi, lock: Path) -> None:
-    reply = served(pi, lock, b'{"action": "restart"}', user=os.geteuid() + 1)
+    reply = served(pi, lock, _RESTART, user=os.geteuid() + 1)
     assert reply == {"error": "Only the user naze-bridge may ask for this."}
     assert pi.ran == []
 
@@ -46,9 +49,13 @@ def test_another_user_is_refused(pi: FixablePi, lock: Path) -> None:
     ("request_line", "why"),
     [
         (b"GET / HTTP/1.1", "not an action"),
-        (b'{"action": "downgrade"}', "No earlier version"),
+        (b'{"action": "downgrade"}', "not an action; known are fix, answer, settings, undo"),
+        (b'{"action": "answer", "name": "\\ud800"}', "not an action"),
+        (b'{"action": "answer", "hotspot": "a\\nb", "password": "long-enough"}', "not a network name"),
+        (b'{"action": "answer", "hotspot": "a", "password": "12345678\\u0000"}', "a Wi-Fi password"),
+        (b'{"action": "answer", "name": "a\\n"}', "not a host name"),
         (b'{"action": "answer", "country": "Germany"}', "'Germany' is not a country code"),
-        (b'{"action": "settings", "values": {"sysid": "0"}}', "sysid is 0"),
+        (b'{"action": "settings", "values": {"sysid": 0}}', "sysid cannot have this value"),
     ],
 )
 def test_every_refusal_is_a_sentence(pi: FixablePi, lock: Path, request_line: bytes, why: str) -> None:
@@ -58,11 +65,11 @@ def test_every_refusal_is_a_sentence(pi: FixablePi, lock: Path, request_line: by
 def test_one_change_at_a_time(pi: FixablePi, lock: Path) -> None:
     with lock.open("w") as held:
         fcntl.flock(held, fcntl.LOCK_EX)
-        assert "Another change" in served(pi, lock, b'{"action": "restart"}')["error"]
+        assert "Another change" in served(pi, lock, _RESTART)["error"]
     assert pi.ran == []
-    assert "error" not in served(pi, lock, b'{"action": "restart"}')
+    assert "error" not in served(pi, lock, _RESTART)
 
 
 def test_a_refusal_arrives_although_the_body_was_not_read(pi: FixablePi, lock: Path) -> None:
     request = b'{"action": "install", "size": 0}\n' + bytes(100_000)
-    assert "at most 128 MB" in served(pi, lock, request)["error"]
+    assert "at most 128 MB" in served(pi, lock, request, unit="update")["error"]
