@@ -9,15 +9,14 @@ from typing import Any
 import cbor2
 import zenoh
 
-from payloads.mission_data import Json
+from payloads.mission_data import Json, printable
 from payloads.payload import decoded
-from protocols.plain_text import plain_text
 
 
 def decode(sample: zenoh.Sample | zenoh.ReplyError) -> Json | None:
     """The object in a payload, JSON or CBOR by its encoding."""
     try:
-        value = decoded(sample.payload.to_bytes(), str(sample.encoding))
+        value = printable(decoded(sample.payload.to_bytes(), str(sample.encoding)))
     except (ValueError, RecursionError, cbor2.CBORError):
         return None
     return value if isinstance(value, dict) else None
@@ -33,7 +32,7 @@ def part(data: Json, *path: str) -> Any:
 
 def text(data: Json, *path: str) -> str | None:
     value = part(data, *path)
-    return plain_text(value) if isinstance(value, str) else None
+    return value if isinstance(value, str) else None
 
 
 def number(data: Json, *path: str) -> float | None:

@@ -22,7 +22,7 @@ from fleet.session import FleetError
 from fleet.tables import (
     dry_run_table,
     in_few_words,
-    progress_bars,
+    push_bars,
     push_data,
     push_summary,
     push_table,
@@ -145,7 +145,7 @@ def push_file(
     """Push a file with `count` parts and print the outcome; True if a vehicle failed."""
     delivery, is_stopped = FleetPush(meant, bridges), False
     try:
-        with progress_bars(count) as show:
+        with push_bars(count) as show:
             push(session, prefix, delivery, bridges, file, show, staged=staged, key=what.key)
     except KeyboardInterrupt:
         is_stopped = True

@@ -9,7 +9,7 @@ import zenoh
 from fleet.payload import decode, part, text
 from fleet.session import NO_COMMANDS, ask_each
 from payloads.keys import SETTINGS_LIST, SETTINGS_PLAN
-from payloads.mission_data import Json, printable
+from payloads.mission_data import Json
 from payloads.settings_comparison import SettingValues, setting_values
 from protocols.param_file import is_equal
 
@@ -54,7 +54,7 @@ def read_settings(session: zenoh.Session, prefix: str, names: Collection[str]) -
         if result is None:
             continue
         try:
-            found[name].values = setting_values(printable(part(result, "values")))
+            found[name].values = setting_values(part(result, "values"))
             found[name].board = text(result, "board") or ""
         except ValueError as error:
             found[name].error = f"this version does not understand its reply: {error}"
@@ -67,7 +67,7 @@ def try_settings(session: zenoh.Session, prefix: str, names: Collection[str], fi
     for name, reply in ask_each(session, prefix, names, SETTINGS_PLAN.suffix, _TIMEOUT_S, file):
         if reply is not None:
             result, trials[name].error = _result(reply)
-            trials[name].plan = None if result is None else printable(result)
+            trials[name].plan = result
     return list(trials.values())
 
 

@@ -5,9 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from rich import box
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, TaskID, TextColumn
-from rich.progress import Progress as Bars
+from rich.progress import TaskID
 from rich.table import Table
 from rich.text import Text
 
@@ -16,6 +14,7 @@ from fleet.push import FleetPush, PushState
 from fleet.trial import Trial
 from fleet.vehicle import FleetVehicle
 from payloads.mission_data import Json
+from terminal.printing import console, progress_bars
 
 _UNKNOWN = "-"
 #: The number of vehicles named if many have the same problem.
@@ -102,11 +101,9 @@ def _number(value: float | None, form: str, unit: str = "") -> Text:
 
 
 @contextmanager
-def progress_bars(item_count: int) -> Iterator[Callable[[FleetPush], None]]:
+def push_bars(item_count: int) -> Iterator[Callable[[FleetPush], None]]:
     """Show the count of finished vehicles and a progress bar per transfer on standard error, if that is a terminal."""
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn())
-    console = Console(stderr=True)
-    with Bars(*columns, console=console, transient=True, disable=not console.is_terminal) as bars:
+    with progress_bars(console(to_error=True)) as bars:
         # First, because only the last lines are cut off if there are more than the terminal has.
         whole_fleet = bars.add_task("")
         tasks: dict[str, TaskID] = {}

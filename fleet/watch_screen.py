@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass
 from enum import IntEnum
 
 import zenoh
-from rich.console import Console, Group
+from rich.console import Group
 from rich.live import Live
 from rich.text import Text
 
@@ -23,7 +23,7 @@ from fleet.session import is_connected
 from fleet.tables import watch_table
 from fleet.vehicle import FleetVehicle
 from fleet.watch import Watch
-from terminal.printing import print_json
+from terminal.printing import console, print_json
 
 _REFRESH_S = 0.5
 #: The slowest profile sends the state every 30 s; one may be lost.
@@ -62,11 +62,11 @@ class ScreenRow:
 
 def show_screen(seen: Watch, session: zenoh.Session, conditions: Sequence[Condition]) -> None:
     """Draw the fleet until KeyboardInterrupt."""
-    console = Console(highlight=False)
+    on = console()
     top, was_connected = 0, True
-    with _scrolling(), Live(console=console, auto_refresh=False, vertical_overflow="crop") as live:
+    with _scrolling(), Live(console=on, auto_refresh=False, vertical_overflow="crop") as live:
         while True:
-            page = max(console.height - _OTHER_LINES, 1)
+            page = max(on.height - _OTHER_LINES, 1)
             rows = _rows(seen, conditions)
             top = max(0, min(top, len(rows) - page))
             seen.follow([row.vehicle.name for row in rows[top : top + page]])

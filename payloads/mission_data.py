@@ -69,7 +69,7 @@ def _layout(kind: Hashable) -> tuple[tuple[str, ...], Callable[[Any], tuple[Any,
 def printable(value: Any) -> Any:
     """Make the texts in plain data safe to print: a daemon or store that was taken over may hold anything."""
     if isinstance(value, dict):
-        return {key: printable(each) for key, each in value.items()}
+        return {printable(key): printable(each) for key, each in value.items()}
     if isinstance(value, list):
         return [printable(each) for each in value]
     return plain_text(value) if isinstance(value, str) else value

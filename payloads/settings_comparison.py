@@ -4,7 +4,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from protocols.param_file import MOST_SETTINGS, is_equal
+from protocols.param_file import MOST_SETTINGS, is_equal, is_setting_name
 
 #: By name; a text where the setting is one.
 SettingValues = Mapping[str, float | str]
@@ -29,12 +29,15 @@ def settings_difference(left: SettingValues, right: SettingValues) -> list[Setti
 
 
 def setting_values(data: object) -> SettingValues:
-    """Read a table of settings from plain data; ValueError gives the reason. Without those that are NaN (null)."""
+    """Read a table of settings from plain data; ValueError gives the reason.
+
+    Left out are settings that are NaN (null), and names that no setting can have.
+    """
     if not isinstance(data, dict):
         raise ValueError("settings must be an object")
     if len(data) > MOST_SETTINGS:
         raise ValueError(f"settings must be at most {MOST_SETTINGS}, no flight controller has more")
-    data = {str(name): value for name, value in data.items() if value is not None}
+    data = {name: value for name, value in data.items() if value is not None and is_setting_name(name)}
     for name, value in data.items():
         is_number = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= _MOST
         if not is_number and not isinstance(value, str):

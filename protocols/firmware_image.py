@@ -5,7 +5,10 @@ An image is the flash's contents from its first byte; an ELF file also has symbo
 """
 
 import struct
+from binascii import unhexlify
 from dataclasses import dataclass, field
+
+from protocols.plain_text import plain_text
 
 #: The address and size of an STM32F103CB's flash.
 FLASH_BASE = 0x0800_0000
@@ -91,10 +94,10 @@ def _parse_binary(data: bytes) -> tuple[bytes, dict[str, int]]:
 def _parse_hex(data: bytes) -> tuple[bytes, dict[str, int]]:
     """Intel's Hexadecimal Object File Format Specification, revision A (1988)."""
     program, base = bytearray(), 0
-    for line in data.decode("ascii").split():
-        if line[0] != ":":
+    for line in data.split():
+        if not line.startswith(b":"):
             raise ValueError
-        record = bytes.fromhex(line[1:])
+        record = unhexlify(line[1:])
         count, address, kind = struct.unpack_from(">BHB", record)
         payload = record[4:-1]
         if sum(record) & 0xFF or len(payload) != count:
@@ -142,5 +145,5 @@ def _symbols(data: bytes, at: int, count: int) -> dict[str, int]:
             names = headers[link][4]
             for name, value, _, _, _, _ in _SYMBOL.iter_unpack(data[offset : offset + size]):
                 start = names + name
-                found[data[start : data.index(b"\0", start)].decode(errors="replace")] = value
+                found[plain_text(data[start : data.index(b"\0", start)])] = value
     return found

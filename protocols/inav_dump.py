@@ -14,6 +14,7 @@ from protocols.file_error import FileError, shown
 from protocols.file_text import file_text
 from protocols.msp.inav_places import Safehome
 from protocols.param_file import read_param_file
+from protocols.plain_text import plain_text
 
 _SET = re.compile(r"set\s+(\w+)\s*=(.*)", re.ASCII | re.IGNORECASE)
 _SAFEHOME = re.compile(r"safehome\s+(\d{1,9})\s+([01])\s+(-?\d{1,10})\s+(-?\d{1,10})", re.ASCII | re.IGNORECASE)
@@ -40,7 +41,7 @@ def read_inav_settings(data: bytes, name: str) -> SavedSettings:
     for number, line in enumerate(file_text(data[:_MAX_SIZE]).splitlines(), start=1):
         command = line.strip()
         if found := _SET.fullmatch(command):
-            values.setdefault(found[1].lower(), found[2].strip())
+            values.setdefault(found[1].lower(), plain_text(found[2].strip()))
         elif found := _SAFEHOME.fullmatch(command):
             place, enabled, lat_e7, lon_e7 = map(int, found.groups())
             safehomes.append(Safehome(place, bool(enabled), lat_e7, lon_e7))

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from protocols.file_error import FileError, shown
 from protocols.file_text import file_text
 from protocols.float32 import is_single
-from protocols.plain_text import plain_text
+from protocols.plain_text import PlainText, plain_text
 
 _NAME = re.compile(r"[!$-+\--~]{1,64}")
 # float() also accepts underscores and digits of any script.
@@ -85,6 +85,17 @@ def write_param_file(values: Mapping[str, float | str], board: str = "", comment
     return "".join(f"{line}\n" for line in (*heading, *lines))
 
 
+def is_setting_name(name: str) -> bool:
+    """True if a file can hold a setting of this name; no firmware has another."""
+    return _NAME.fullmatch(name) is not None
+
+
+def setting_name(name: bytes) -> PlainText:
+    """A board's name of a setting; empty if it is impossible."""
+    text = plain_text(name)
+    return text if is_setting_name(text) and text.encode() == name else PlainText("")
+
+
 def shown_value(value: float | str) -> str:
     """The shortest text of the value; of a fraction, the shortest that is equal in single precision."""
     if isinstance(value, str):
@@ -115,7 +126,7 @@ def _setting(fields: list[str], line: str, name: str, where: str) -> tuple[str, 
         remedy = "write NAME,VALUE, with a decimal point"
         raise ParamFileError(name, where, f"{shown(line)} is not a name and a value", remedy)
     setting, number = fields
-    if not _NAME.fullmatch(setting):
+    if not is_setting_name(setting):
         raise ParamFileError(name, where, f"{shown(setting)} is not a setting's name", "write NAME,VALUE")
     if line.startswith(_TEXT):
         return setting, plain_text(number)

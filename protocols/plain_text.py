@@ -1,12 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Text from files, programs and the wire, made safe to show: on a terminal escape sequences would be carried out."""
+"""Text of others, made safe to show: a terminal would obey escape sequences in it."""
+
+from typing import NewType
+
+#: Foreign text on one line, without control and formatting characters. Made by `plain_text` alone.
+PlainText = NewType("PlainText", str)
 
 
-def plain_text(text: str) -> str:
+def plain_text(text: str | bytes) -> PlainText:
     """The text on one line, without control and formatting characters; letters of all languages stay.
 
     Left out are C0 and C1 controls, marks that reverse the direction of writing, and characters without a glyph. Any
-    white space becomes a space, and a byte of a file name that is not UTF-8 a question mark.
+    white space becomes a space, a byte of a file name that is not UTF-8 a question mark, any other such byte U+FFFD.
     """
-    known = text.encode(errors="replace").decode()  # lone surrogates become question marks
-    return "".join(each if each.isprintable() else " " if each.isspace() else "" for each in known)
+    known = text.decode(errors="replace") if isinstance(text, bytes) else text
+    if known.isprintable():
+        return PlainText(known)
+    known = known.encode(errors="replace").decode()  # lone surrogates become question marks
+    return PlainText("".join(each if each.isprintable() else " " if each.isspace() else "" for each in known))

@@ -14,8 +14,11 @@ One independent JSON object per line, so a capture can be appended to, cut with 
 
 import json
 import re
+from binascii import unhexlify
 from dataclasses import dataclass
 from enum import Enum
+
+from protocols.plain_text import plain_text
 
 _MARK = "naze-bridge-uart"
 _VERSION = 1
@@ -103,8 +106,8 @@ def read_capture(data: bytes) -> list[UartEvent]:
 def _event(line: re.Match[bytes], at: float) -> UartEvent | None:
     speed = None if line["baud"] == b"null" else int(line["baud"])
     if line["hex"] is not None:
-        return UartEvent(at, speed, _ACTIONS[line["bytes"]], bytes.fromhex(line["hex"].decode()))
+        return UartEvent(at, speed, _ACTIONS[line["bytes"]], unhexlify(line["hex"]))
     try:
-        return UartEvent(at, speed, _ACTIONS[line["other"]], text=json.loads(line["text"]))
+        return UartEvent(at, speed, _ACTIONS[line["other"]], text=plain_text(json.loads(line["text"])))
     except ValueError:
         return None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The output of commands: tables without trailing blanks, and strict JSON."""
+"""The output of commands: tables without trailing blanks, progress bars, and strict JSON."""
 
 import re
 from collections.abc import Iterator
@@ -10,12 +10,28 @@ import click
 from payloads.mission_data import to_json
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
+    from rich.console import Console, RenderableType
+    from rich.progress import Progress
     from rich.table import Table
 
 #: Columns, for measuring a table.
 _WIDEST = 1000
 _BLANK_END = re.compile(r"(?: |\x1b\[[\d;]*m)+$", re.MULTILINE)
+
+
+def console(*, to_error: bool = False) -> "Console":
+    """The terminal, which takes texts as they are: markup in the name of a setting or a vehicle has no effect."""
+    from rich.console import Console
+
+    return Console(stderr=to_error, highlight=False, markup=False, emoji=False)
+
+
+def progress_bars(on: "Console") -> "Progress":
+    """Progress bars with the number of finished parts, drawn only on a terminal and removed at the end."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn())
+    return Progress(*columns, console=on, transient=True, disable=not on.is_terminal)
 
 
 def print_table(table: "Table") -> None:
@@ -24,14 +40,14 @@ def print_table(table: "Table") -> None:
     On a terminal that is too narrow each row becomes a paragraph: a shortened number would be a wrong one, and wrapped
     lines could not be read as columns.
     """
-    from rich.console import Console, Group
+    from rich.console import Group
     from rich.measure import Measurement
 
-    console = Console(highlight=False)
-    needed = Measurement.get(console, console.options.update(width=_WIDEST), table).minimum
-    shown = table if needed <= console.width else Group(*_paragraphs(table), table.caption or "")
-    with console.capture() as capture:
-        console.print(shown)
+    on = console()
+    needed = Measurement.get(on, on.options.update(width=_WIDEST), table).minimum
+    shown = table if needed <= on.width else Group(*_paragraphs(table), table.caption or "")
+    with on.capture() as capture:
+        on.print(shown)
     click.echo(_BLANK_END.sub(lambda end: end[0].replace(" ", ""), capture.get()), nl=False)
 
 

@@ -63,6 +63,24 @@ LEAST_MIRRORED = 0.9
 #: The calls of Bridge that are grouped.
 GROUPS = {"missions", "settings"}
 INSTALLED = (*PACKAGES.keys() - {"simulator"},)
+#: Bytes that become text elsewhere, and why that is safe.
+DECODERS = {
+    "fleet/enrolment.py": "JSON of the administrator",
+    "protocols/mavlink/message_base.py": "as pymavlink reads it; names and texts are checked where they are used",
+    "protocols/msp/setting_table.py": "a name's bytes count in a checksum; impossible names are left out of the table",
+    "service/cli/card.py": "cloud-init's file is written again as it was",
+    "service/cli/setup/answers.py": "a secret",
+    "service/cli/setup/command.py": "a secret",
+    "service/cli/setup/hotspot.py": "our own file",
+    "service/cli/setup/state_folder.py": "a secret",
+    "service/machine/host.py": "files of the system, which are searched for words",
+    "service/settings/config_files.py": "TOML is UTF-8",
+    "service/settings/write_access.py": "a secret",
+    "storage/database.py": "the daemon wrote it; commands print it by `printable`",
+    "storage/mission_store.py": "makes text that SQLite can store",
+    "storage/salvage.py": "copied as it is",
+    "storage/state_lock.py": "a process id",
+}
 #: They open files of the program itself or of the kernel, or a closed standard stream.
 OWN_FILES = {
     "payloads/compact.py",
@@ -115,6 +133,30 @@ def _opens_to_read(call: ast.Call) -> bool:
     is_builtin = isinstance(call.func, ast.Name)
     modes = [each.value for each in call.args[is_builtin:] if isinstance(each, ast.Constant)]
     return str(modes[0]).startswith("r") if modes else is_builtin and len(call.args) == 1
+
+
+def test_foreign_bytes_become_text_at_one_door() -> None:
+    """`protocols.plain_text`, and `file_text` for whole files: text from elsewhere could hold what a terminal obeys."""
+    decoders = {file for file, name, call in calls(*INSTALLED) if name == "decode" and _decodes_bytes(call)}
+    assert decoders - {"protocols/file_text.py", "protocols/plain_text.py"} == DECODERS.keys()
+
+
+def _decodes_bytes(call: ast.Call) -> bool:
+    """True for data.decode(), also with an encoding, but not for other methods of that name and base64."""
+    assert isinstance(call.func, ast.Attribute | ast.Name)
+    of = call.func.value if isinstance(call.func, ast.Attribute) else None
+    is_base64 = isinstance(of, ast.Call) and isinstance(of.func, ast.Attribute) and of.func.attr == "b64encode"
+    return of is not None and not is_base64 and all(isinstance(each, ast.Constant) for each in call.args)
+
+
+def test_the_terminal_gets_text_and_never_markup() -> None:
+    """A name such as "[/x]" would end a command, and "[link=...]" would become a link."""
+    makers = {"Console", "TextColumn", "from_markup"}
+    made = {(file, name) for file, name, _ in calls(*INSTALLED) if name in makers}
+    assert made == {("terminal/printing.py", "Console"), ("terminal/printing.py", "TextColumn")}
+    text = (REPOSITORY / "terminal/printing.py").read_text()
+    assert "markup=False, emoji=False" in text
+    assert 'TextColumn("{task.description}", markup=False)' in text
 
 
 @pytest.mark.parametrize("package", PACKAGES)

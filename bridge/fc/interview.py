@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from bridge.line.conversation import Conversation, ask_surely
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame, request
-from protocols.msp.telemetry import Ident, decode_box_names, decode_ident, msp_text
+from protocols.msp.telemetry import Ident, decode_box_names, decode_ident
+from protocols.plain_text import plain_text
 
 _IDENT_SIZE = 7
 _VARIANT_SIZE, _VERSION_SIZE = 4, 3
@@ -42,7 +43,7 @@ class Interview:
     def variant(self) -> Conversation[str | None]:
         """FC_VARIANT, four letters; None on boards older than it."""
         reply = yield from self.ask(Msp.FC_VARIANT, _VARIANT_SIZE)
-        return msp_text(reply.payload) if reply.direction is Direction.REPLY else None
+        return plain_text(reply.payload) if reply.direction is Direction.REPLY else None
 
     def version(self) -> Conversation[tuple[int, int, int] | None]:
         """FC_VERSION: major, minor and patch level."""

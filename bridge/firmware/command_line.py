@@ -8,6 +8,7 @@ for a disarmed Harakiri.
 from contextlib import suppress
 
 from protocols.msp.command_line import PROMPT
+from protocols.plain_text import plain_text
 from protocols.stm32_boot_loader import Dialogue, Exchange
 
 _OPEN = b"\r\r\r"
@@ -30,8 +31,8 @@ def read_dump() -> Dialogue[str]:
     if not printed.endswith(PROMPT):
         yield Exchange(b"\rexit\r", _RESTART_S, _never)
         raise CommandLineError("its command line does not print the settings: it was restarted, try again")
-    lines = printed.removesuffix(PROMPT).decode("ascii", "replace").splitlines()
-    return "\n".join(line.rstrip() for line in lines[1:]).strip() + "\n"
+    lines = printed.removesuffix(PROMPT).splitlines()
+    return "\n".join(plain_text(line).rstrip() for line in lines[1:]).strip() + "\n"
 
 
 def settings_in(dump: str) -> dict[str, float]:

@@ -8,6 +8,7 @@ from enum import Enum
 from typing import Any
 
 from protocols.float32 import single
+from protocols.param_file import is_setting_name
 
 #: A text only where the setting is one.
 Value = float | str
@@ -71,11 +72,13 @@ class BoardSetting:
 class SettingTable:
     """All settings of a board, in its own order.
 
-    is_complete: False if some could not be read; their names are missing.
+    is_complete: False if some could not be read; their names are missing. left_out: how many have a name that no ground
+    station or file could take.
     """
 
     settings: Mapping[str, BoardSetting] = field(default_factory=dict)
     is_complete: bool = True
+    left_out: int = 0
 
     def __iter__(self) -> Iterator[BoardSetting]:
         return iter(self.settings.values())
@@ -106,7 +109,9 @@ class SettingTable:
 
 
 def table_of(*settings: BoardSetting, is_complete: bool = True) -> SettingTable:
-    return SettingTable({setting.name: setting for setting in settings}, is_complete)
+    possible = {setting.name: setting for setting in settings if is_setting_name(setting.name)}
+    left_out = sum(not is_setting_name(setting.name) for setting in settings)
+    return SettingTable(possible, is_complete, left_out)
 
 
 def shown(value: Value) -> str:

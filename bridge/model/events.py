@@ -219,11 +219,15 @@ class MissionChangedOnBoard(BridgeEvent):
 
 
 class SettingsRead(BridgeEvent):
-    """All settings of the flight controller were read, for the first time or with other values, named by `changed`."""
+    """All settings of the flight controller were read, for the first time or with other values, named by `changed`.
+
+    `left_out`: how many have names that no ground station or file could take.
+    """
 
     name_in_log = "settings.read"
     settings: int
     changed: str
+    left_out: int
 
 
 class SettingChanged(BridgeEvent):

@@ -241,7 +241,9 @@ class BoardSettings:
         former, self.table = self.table, table
         changed = table.differences(former or table)
         if former is None or changed:
-            self._emit(SettingsRead(settings=len(table), changed=", ".join(changed[:_MOST_NAMED])))
+            self._emit(
+                SettingsRead(settings=len(table), changed=", ".join(changed[:_MOST_NAMED]), left_out=table.left_out)
+            )
             self.on_table(table, now)
 
     def _as_last_read(self) -> SettingTable | SettingRefusal:

@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterator, Sequence
 from enum import IntEnum
 from zlib import crc32
 
+from protocols.plain_text import plain_text
+
 _HEADER = struct.Struct("<HBBBBBBI")
 _PAYLOAD_SIZE, _OPCODE_AT = 251, 3
 MOST_DATA = _PAYLOAD_SIZE - _HEADER.size
@@ -66,7 +68,7 @@ class FtpSession:
                 self._file = None
                 yield reply(_ACK)
             case FtpOp.OPEN_FILE_RO | FtpOp.CALC_FILE_CRC32:
-                found = self._find(data.split(b"\0")[0].decode("utf-8", "replace"))
+                found = self._find(plain_text(data.split(b"\0")[0]))
                 if found is None:
                     yield reply(_NAK, _FILE_NOT_FOUND)
                 elif opcode == FtpOp.CALC_FILE_CRC32:

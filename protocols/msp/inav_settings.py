@@ -5,6 +5,9 @@ import struct
 from enum import IntEnum
 from typing import NamedTuple
 
+from protocols.param_file import setting_name
+from protocols.plain_text import plain_text
+
 #: MSP command numbers.
 COMMON_SETTING, COMMON_SET_SETTING, COMMON_SETTING_INFO = 0x1003, 0x1004, 0x1007
 
@@ -32,7 +35,7 @@ _VALUES = [struct.Struct(f"<{letter}") for letter in "BbHhIf"]
 
 
 class InavSetting(NamedTuple):
-    """A reply to COMMON_SETTING_INFO.
+    """A reply to COMMON_SETTING_INFO. name: empty if no setting can have it.
 
     section: 0 is for all profiles. place: in INAV's table. choices: names of the values from minimum on.
     """
@@ -81,8 +84,8 @@ def pack_value(kind: InavType, value: float | str) -> bytes:
 
 def decode_setting_info(payload: bytes) -> InavSetting | None:
     """Read a reply to COMMON_SETTING_INFO; None if it is truncated, or has an unknown type."""
-    name, rest = _take_text(payload)
-    if not name or rest is None or len(rest) < _DETAILS.size:
+    coded, rest = _take_text(payload)
+    if not coded or rest is None or len(rest) < _DETAILS.size:
         return None
     group, kind, section, mode, minimum, maximum, index, _, _ = _DETAILS.unpack_from(rest)
     if kind > max(InavType):
@@ -96,7 +99,7 @@ def decode_setting_info(payload: bytes) -> InavSetting | None:
         choice, after = _take_text(rest)
         if after is None:
             return None
-        choices.append(choice)
+        choices.append(plain_text(choice))
         rest = after
     value = decode_value(InavType(kind), rest)
     if value is None:
@@ -104,13 +107,14 @@ def decode_setting_info(payload: bytes) -> InavSetting | None:
     if kind in (InavType.INT8, InavType.INT16, InavType.FLOAT):
         # Sent as an unsigned number; the largest values of these types may be negative.
         maximum = struct.unpack("<i", struct.pack("<I", maximum))[0]
+    name = setting_name(coded)
     return InavSetting(name, group, InavType(kind), section, minimum, maximum, index, tuple(choices), value)
 
 
 def decode_value(kind: InavType, data: bytes) -> float | str | None:
     """The value in a reply; None if it is truncated."""
     if kind is InavType.STRING:
-        return data.partition(b"\0")[0].decode("ascii", "replace")
+        return plain_text(data.partition(b"\0")[0])
     if len(data) < _VALUES[kind].size:
         return None
     value: float = _VALUES[kind].unpack_from(data)[0]
@@ -121,7 +125,7 @@ def _text(text: str) -> bytes:
     return text.encode("ascii", "replace") + b"\0"
 
 
-def _take_text(data: bytes) -> tuple[str, bytes | None]:
+def _take_text(data: bytes) -> tuple[bytes, bytes | None]:
     """A text and the bytes after it; None if its end is missing."""
     text, end, rest = data.partition(b"\0")
-    return text.decode("ascii", "replace"), rest if end else None
+    return text, rest if end else None

@@ -8,7 +8,7 @@ import struct
 from enum import IntFlag
 from typing import NamedTuple
 
-from protocols.plain_text import plain_text
+from protocols.plain_text import PlainText, plain_text
 
 _IDENT = struct.Struct("<BBBI")
 _STATUS = struct.Struct("<HHHIB")
@@ -176,14 +176,9 @@ def decode_home(payload: bytes) -> tuple[int, int] | None:
     return _PLACE.unpack_from(payload, 2 if has_action else 1)
 
 
-def decode_box_names(payload: bytes) -> tuple[str, ...]:
+def decode_box_names(payload: bytes) -> tuple[PlainText, ...]:
     """Read MSP_BOXNAMES: names in the order of the status bits."""
-    return tuple(msp_text(payload).rstrip(";").split(";")) if payload else ()
-
-
-def msp_text(payload: bytes) -> str:
-    """The text of a reply; firmware sends ASCII."""
-    return plain_text(payload.decode("ascii", "replace"))
+    return tuple(map(plain_text, payload.rstrip(b";").split(b";"))) if payload else ()
 
 
 def decode_box_activation(payload: bytes, boxes: int) -> tuple[int, ...] | None:

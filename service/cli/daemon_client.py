@@ -19,7 +19,7 @@ from service.settings.addresses import AddressError, parse_fc
 from service.settings.load import SERVICE_STATE
 from storage.store_error import StoreError
 from terminal.options import PATH
-from terminal.printing import print_json
+from terminal.printing import console, print_json, progress_bars
 from terminal.sentences import INTERRUPTED, complain, fail
 
 _GOES_ON = "the daemon continues, and the result follows; to exit now, press Ctrl-C again"
@@ -44,7 +44,9 @@ class BridgeClient:
                 return ask_daemon(self.state_dir, request, progress)
             from service.cli.direct_bridge import ask_directly  # the whole daemon: --help does without
 
-            return event_loop.run(ask_directly(parse_fc(self.fc), request, progress, state_dir=self.state_dir))
+            asking = ask_directly(parse_fc(self.fc), request, progress, state_dir=self.state_dir)
+            answer: Json = printable(event_loop.run(asking))
+            return answer
         except (KeyboardInterrupt, Interrupted) as error:
             complain(_interruption(request, str(error), is_own=self.fc is not None))
             raise SystemExit(INTERRUPTED) from None
@@ -58,12 +60,8 @@ class BridgeClient:
 
         `total`: the records to write; None: the bridge reports steps of "step", "done" and "total".
         """
-        from rich.console import Console
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-
-        columns = (TextColumn("[progress.description]{task.description}"), BarColumn(), MofNCompleteColumn())
-        console = Console(stderr=True)
-        with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        on = console(to_error=True)
+        with progress_bars(on) as bar:
             task = bar.add_task("Starting" if total is None else "Flight controller", total=total)
 
             def show(progress: Any) -> None:
@@ -73,9 +71,9 @@ class BridgeClient:
                     step, done, of = (progress[key] for key in ("step", "done", "total"))
                     bar.update(task, description=step.capitalize(), completed=done, total=of)
                 else:
-                    console.out(f"naze-bridge: {progress['step']}")
+                    on.out(f"naze-bridge: {progress['step']}")
 
-            goes_on = _first_interrupt(lambda: console.out(f"naze-bridge: {_GOES_ON}"))
+            goes_on = _first_interrupt(lambda: on.out(f"naze-bridge: {_GOES_ON}"))
             with goes_on if self.fc is None else nullcontext():
                 return self.ask(request, show)
 

@@ -12,7 +12,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import click
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from payloads.mission_data import Json, mission_findings, mission_items
 from protocols.mission_file import MissionFileError
@@ -23,7 +22,7 @@ from service.machine.host import Host
 from terminal.mission_source import load_mission
 from terminal.mission_table import mission_table
 from terminal.options import PATH
-from terminal.printing import print_table
+from terminal.printing import console, print_table, progress_bars
 from terminal.sentences import fail, say
 
 #: A link to examples/ in the repository, a file in the installed package.
@@ -61,8 +60,7 @@ def demo(file: Path, once: bool, port: int) -> None:
 def _show(items: list[MissionItem], file: Path, port: int, state_dir: Path) -> None:
     with connect("127.0.0.1", port, _CONNECT_TIMEOUT_S) as client:
         say(f"Writing {file.name}, {len(items)} items, over UDP port {port} ...")
-        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
-        with Progress(*columns) as bar:
+        with progress_bars(console()) as bar:
             task = bar.add_task("Upload", total=len(items))
             result = client.write(items, lambda done: bar.update(task, completed=done))
         say(f"The vehicle answers MAV_MISSION_{result.name}.\n")

@@ -18,6 +18,7 @@ from bridge.controllers.harakiri.profile import PATCHED, UNPATCHED
 from bridge.firmware.command_line import CommandLineError, read_dump, settings_in, start_boot_loader
 from bridge.firmware.reflash import FlashingError, find_chip, read_flash, rewrite_flash
 from payloads.mission_data import Json
+from protocols.file_text import file_text
 from protocols.firmware_image import FLASH_SIZE, PROGRAM_END, ImageError, check_backup, check_patched
 from protocols.stm32_boot_loader import BootLoaderError, start_program
 from service.daemon.client import ControlError
@@ -176,7 +177,7 @@ class FirmwareApi:
     async def _restore_settings(self, path: Path) -> str:
         """Restore the settings printed before, if the new firmware has begun with its defaults."""
         try:
-            before = settings_in((await asyncio.to_thread(read_bounded, path, _MAX_DUMP)).decode(errors="replace"))
+            before = settings_in(file_text(await asyncio.to_thread(read_bounded, path, _MAX_DUMP)))
             plan = await self._settings.plan(before, "")
             changed = {
                 each["name"]: each["becomes"]

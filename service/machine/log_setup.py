@@ -17,6 +17,8 @@ from typing import NamedTuple
 import structlog
 from structlog.typing import EventDict, Processor
 
+from payloads.mission_data import printable
+
 #: The levels in ascending order, with their syslog priorities.
 _PRIORITIES = {"debug": 7, "info": 6, "warning": 4, "error": 3}
 _WEIGHTS = {level: weight for weight, level in enumerate(_PRIORITIES)}
@@ -113,6 +115,11 @@ def _journal_line(logger: object, method: str, event: EventDict) -> str:
     return f"<{_PRIORITIES[method]}>{_render_json(logger, method, event)!s}"
 
 
+def _safe(_logger: object, _method: str, event: EventDict) -> EventDict:
+    """Without escape sequences: a terminal would obey those in the message of a library or of the system."""
+    return {key: value if key == "exception" else printable(value) for key, value in event.items()}
+
+
 _least_level = _LeastLevel()
 _recent = _Recent()
 
@@ -165,5 +172,5 @@ def _output() -> list[Processor]:
     if os.environ.get("JOURNAL_STREAM"):
         return [_journal_line]
     if sys.stderr is not None and sys.stderr.isatty():
-        return [structlog.processors.TimeStamper(fmt="%H:%M:%S", utc=False), structlog.dev.ConsoleRenderer()]
+        return [structlog.processors.TimeStamper(fmt="%H:%M:%S", utc=False), _safe, structlog.dev.ConsoleRenderer()]
     return [structlog.processors.TimeStamper(fmt="iso", utc=True), structlog.processors.JSONRenderer()]

@@ -78,6 +78,11 @@ def test_an_error_names_the_line_and_the_problem(text: bytes, place: str, what: 
     assert sentence.isprintable()
 
 
+@pytest.mark.parametrize("encoding", ["cp1252", "latin-1", "utf-8", "utf-8-sig", "utf-16"])
+def test_a_comment_may_be_in_any_encoding(encoding: str) -> None:
+    assert read_param_file("# f\u00fcr den S\u00fcdhang\nA,1\n".encode(encoding), "x").values == {"A": 1.0}
+
+
 def test_a_repeated_equal_line_is_no_error() -> None:
     assert read_param_file(b"A,1\nA,1.0\n", "x").values == {"A": 1.0}
 

@@ -24,8 +24,8 @@ def test_control_and_direction_marks_are_left_out(text: str, shown: str) -> None
     assert plain_text(text) == shown
 
 
-@given(st.text())
-def test_any_text_becomes_printable(text: str) -> None:
+@given(st.text() | st.binary())
+def test_any_text_becomes_printable(text: str | bytes) -> None:
     shown = plain_text(text)
     assert shown.isprintable()
     assert plain_text(shown) == shown

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from protocols.plain_text import plain_text
 from protocols.uart_capture import UartAction, UartEvent, capture_header, capture_line, read_capture
 
 HEADER = capture_header("2026-11-21T06:33:06Z")
@@ -24,7 +25,7 @@ def recordings(draw: st.DrawFn) -> list[UartEvent]:
     for _ in range(draw(st.integers(0, 20))):
         at += draw(st.integers(0, 10**7))
         found.append(UartEvent(at / 1e6, draw(SPEEDS), draw(ACTIONS), draw(st.binary(min_size=1, max_size=80))))
-    return [*found, UartEvent(at / 1e6, speed, UartAction.CLOSE, text=draw(st.text()))]
+    return [*found, UartEvent(at / 1e6, speed, UartAction.CLOSE, text=plain_text(draw(st.text())))]
 
 
 def written(events: list[UartEvent]) -> bytes:

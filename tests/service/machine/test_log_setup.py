@@ -56,6 +56,16 @@ def test_the_journal_gets_each_line_with_its_priority(monkeypatch: pytest.Monkey
     )
 
 
+def test_a_terminal_gets_no_escape_sequences_of_others() -> None:
+    ours, terminal = os.openpty()
+    script = BEGIN + 'log.info("fc.lost", why="a\\x1b[2Jb")'
+    subprocess.run([sys.executable, "-c", script], cwd=REPOSITORY, stderr=terminal, timeout=TIMEOUT_S, check=True)
+    shown = os.read(ours, 4096)
+    os.close(ours)
+    os.close(terminal)
+    assert b"a[2Jb" in shown
+
+
 def test_a_line_longer_than_the_pipe_neither_blocks_nor_damages_others() -> None:
     script = """
 log.info("fc.lost", why="x" * 1_000_000)
