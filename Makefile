@@ -19,7 +19,6 @@
 #   make deb-trial      install, use and purge it in a bare Debian with systemd (root; SUITE=trixie: Debian 13;
 #                       SUITE=bookworm-to-trixie: after an upgrade of the system)
 #   make lock           pin the newest packages that pyproject.toml allows (needs uv)
-#   make messages       regenerate protocols/mavlink/messages.py and message_table.py from pymavlink's definitions
 #   make cli-page       regenerate docs/cli.md
 #   make rules-page     regenerate the table of docs/mission-rules.md from the rules
 #   make rights-page    regenerate the tables of docs/rights.md from protocols/rights/
@@ -38,7 +37,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .NOTPARALLEL:
-.PHONY: rules-page rights-page demo test lint bench pictures real-board soak fuzz deb release deb-trial image-check lock messages config-sample cli-page inav-page zenoh-schemas clean
+.PHONY: rules-page rights-page demo test lint bench pictures real-board soak fuzz deb release deb-trial image-check lock config-sample cli-page inav-page zenoh-schemas clean
 
 # Installed if missing and if run as root, like the compilers of firmware/; systemd checks its own unit.
 BROWSER_PACKAGES := chromium chromium-driver
@@ -139,13 +138,6 @@ PIN = $(UV) pip compile --quiet --upgrade --universal --python-version 3.11 --ge
 lock:
 	$(PIN) --output-file requirements.lock
 	$(PIN) --constraint requirements.lock --group test --group lint --output-file requirements-dev.lock
-
-# Each through a temporary file: if its generator fails, the present one stays.
-messages: $(VENV)/.test-ready
-	$(BIN)/python -m generators.message_table > $(VENV)/message_table.py
-	mv $(VENV)/message_table.py protocols/mavlink/
-	$(BIN)/python -m generators.messages > $(VENV)/messages.py
-	mv $(VENV)/messages.py protocols/mavlink/
 
 cli-page: $(VENV)/.test-ready
 	$(BIN)/python -m generators.cli_page > docs/cli.md

@@ -28,7 +28,7 @@ from protocols.mavlink.frame import MavlinkSplitter
 _SETTLING_S = 3.0
 _WATCHED_S = 20.0
 _STARTS = 7
-_DIALECT = "import protocols.mavlink.messages"
+_DIALECT = "import protocols.mavlink.dialect"
 #: Hz by stream.
 _MISSION_PLANNER_HZ = {
     mavlink.MAV_DATA_STREAM_EXTENDED_STATUS: 2,

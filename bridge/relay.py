@@ -192,7 +192,7 @@ class _End:
             self.ground.forward([frame.raw], self.ground.everyone())
             return
         self.ground.multicast(packed, self.ground.everyone())
-        message = decode(frame.msgid, frame.payload) if frame.msgid in _HEARD else None
+        message = decode(frame) if frame.msgid in _HEARD else None
         if message is not None and frame.msgid == m.MAVLINK_MSG_ID_HEARTBEAT:
             armed = bool(message.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED)
             self.missions.vehicle.hear(FlightState(now, Source.MAVLINK, armed))
@@ -222,7 +222,7 @@ class _End:
         handler = self._handlers.get(frame.msgid) if self.missions.is_local else None
         if handler is None or frame.target not in self._targets:
             return False
-        message = decode(frame.msgid, frame.payload)
+        message = decode(frame)
         if message is None or getattr(message, "mission_type", 0) != m.MAV_MISSION_TYPE_MISSION:
             return False
         if getattr(message, "current", 0) in _GUIDED and not self.uploads.is_writing(station):

@@ -4,7 +4,8 @@
 The libraries are the wheels that requirements.lock pins, for the Pythons of Debian 12 and 13 and Ubuntu 24.04 side by
 side; pip fetches them for any architecture on any machine, and nothing is compiled. The target needs no network.
 
-cbor2 has no wheel for armhf: its last pure Python release is used there (armhf.lock).
+cbor2 has no wheel for armhf: its last pure Python release is used there (armhf.lock). pymavlink has none either: it has a
+C part. Only the modules that we use are packed: the rest, 90 MB, is other dialects and log tools.
 
 pip evaluates a requirement's `python_version < ...` for the Python that runs it, not for the target's. So far our
 requirements do not differ between 3.11 and 3.14.
@@ -15,6 +16,8 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
+import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -30,6 +33,10 @@ PYTHONS = ("3.11", "3.12", "3.13")
 #: Debian's name of an architecture -> the name in wheels.
 _MACHINES = {"amd64": "x86_64", "arm64": "aarch64", "armhf": "armv7l"}
 #: The C library that wheels may require; Debian 12 has 2.36.
+_PYMAVLINK = re.compile(
+    r"pymavlink/(__init__|mavutil|mavexpression|mavextra|rotmat|generator/(__init__|mavcrc|mavparse)"
+    r"|dialects/(__init__|v20/(__init__|all)))\.py|.*\.dist-info/(WHEEL|licenses/.+)"
+)
 _GLIBC = (*(f"manylinux_2_{minor}" for minor in range(36, 16, -1)), "manylinux2014")
 
 
@@ -80,23 +87,49 @@ def fetch(architecture: str, python: str, wheels: Path) -> None:
     Wheels for every Python and machine that are already there stay.
     """
     wheels.mkdir(parents=True, exist_ok=True)
+    if not any(wheels.glob("pymavlink-*")):
+        _fetch_pymavlink(wheels)
     for lock in _locks(architecture, wheels):
-        hashed = ("--require-hashes", "--no-deps", "--requirement", lock)
-        _run(*_PIP, "download", *hashed, *_target(python, _MACHINES[architecture]), "--dest", wheels)
+        _download(lock, wheels, *_target(python, _MACHINES[architecture]))
+
+
+def _download(lock: Path, folder: Path, *target: str) -> None:
+    _run(*_PIP, "download", "--require-hashes", "--no-deps", "--requirement", lock, *target, "--dest", folder)
+
+
+def _fetch_pymavlink(wheels: Path) -> None:
+    """Put a wheel with the used modules of pymavlink into the folder `wheels`; it suits every Python and machine."""
+    with tempfile.TemporaryDirectory() as name:
+        lock = Path(name) / "pymavlink.lock"
+        lock.write_text(next(text for text, package, _ in _pinned() if package == "pymavlink"))
+        _download(lock, Path(name), *_target(PYTHONS[0], "x86_64"))
+        (whole,) = Path(name).glob("*.whl")
+        package = "-".join(whole.name.split("-")[:2])
+        with zipfile.ZipFile(whole) as source, zipfile.ZipFile(wheels / f"{package}-py3-none-any.whl", "w") as used:
+            kept = [each for each in source.namelist() if _PYMAVLINK.fullmatch(each)]
+            for each in kept:
+                used.writestr(each, source.read(each))
+            about = f"{package}.dist-info"
+            metadata = source.read(f"{about}/METADATA").decode()
+            used.writestr(f"{about}/METADATA", metadata.replace("Requires-Dist: lxml\n", ""))
+            used.writestr(f"{about}/RECORD", "".join(f"{each},,\n" for each in (*kept, f"{about}/METADATA")))
 
 
 def _locks(architecture: str, wheels: Path) -> list[Path]:
     """The lists of pinned wheel files to fetch for an architecture to the folder `wheels`."""
-    lock = _PROJECT / "requirements.lock"
     fetched = {_pin(*wheel.name.split("-")[:2]) for wheel in wheels.glob("*-none-any.whl")}
-    # A requirement extends from its name to the next line that is not indented.
-    pinned = re.findall(r"^(([a-z].*?)==([^ \n]+).*\n(?:[ ].*\n)*)", lock.read_text(), re.MULTILINE)
-    needed = [text for text, name, version in pinned if _pin(name, version) not in fetched]
+    needed = [text for text, name, version in _pinned() if _pin(name, version) not in fetched]
     if architecture == "armhf":
         needed = [each for each in needed if not each.startswith("cbor2==")]
     usual = wheels.parent / "usual.lock"
     usual.write_text("".join(needed))
     return [*([usual] if needed else []), *([_HERE / "armhf.lock"] if architecture == "armhf" else [])]
+
+
+def _pinned() -> list[tuple[str, str, str]]:
+    """The text, name and version of each requirement in requirements.lock."""
+    # A requirement extends from its name to the next line that is not indented.
+    return re.findall(r"^(([a-z].*?)==([^ \n]+).*\n(?:[ ].*\n)*)", (_PROJECT / "requirements.lock").read_text(), re.M)
 
 
 def _pin(name: str, version: str) -> str:

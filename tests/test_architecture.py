@@ -66,7 +66,6 @@ INSTALLED = (*PACKAGES.keys() - {"simulator"},)
 #: Bytes that become text elsewhere, and why that is safe.
 DECODERS = {
     "fleet/enrolment.py": "JSON of the administrator",
-    "protocols/mavlink/message_base.py": "as pymavlink reads it; names and texts are checked where they are used",
     "protocols/msp/setting_table.py": "a name's bytes count in a checksum; impossible names are left out of the table",
     "service/cli/card.py": "cloud-init's file is written again as it was",
     "service/cli/setup/answers.py": "a secret",

@@ -126,7 +126,7 @@ class MavlinkTelemetry:
 
     def _read(self, kind: bytes, frame: bytes, now: float) -> None:
         whole = MavlinkFrame(frame)
-        message = decode(whole.msgid, whole.payload)
+        message = decode(whole)
         if message is not None:
             self._readers[self._known[kind]](message, now)
 

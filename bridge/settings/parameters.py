@@ -23,10 +23,9 @@ from bridge.settings.own_parameters import OwnParameters
 from bridge.settings.parameter_files import GENERAL_URI, ParameterFiles
 from bridge.settings.parameter_names import parameter_names
 from protocols.float32 import single
-from protocols.mavlink.codec import pack
+from protocols.mavlink.codec import pack, pack_component_metadata
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.ftp import FtpSession, file_crc32, is_opening
-from protocols.mavlink.missing_messages import component_metadata
 
 _REAL32 = 9
 #: 500 parameters a second for all lists together: a radio at 57600 baud carries as many.
@@ -138,7 +137,7 @@ class Parameters:
             return None
         self._files.show(self._values(), self._named)
         crc = file_crc32(self._files.general())
-        return component_metadata(uptime_ms, crc, GENERAL_URI)
+        return pack_component_metadata(uptime_ms, crc, GENERAL_URI)
 
     def follow(self) -> None:
         """Send the values that have changed to all stations, which keep a copy, once any has read them."""

@@ -24,9 +24,9 @@ from bridge.vehicle.calibration import CALIBRATE_ACCELEROMETER, CALIBRATE_COMPAS
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.set_waypoint import SetWaypoint
 from bridge.vehicle.vehicle_messages import auto_mode
+from protocols.mavlink.codec import COMPONENT_METADATA
 from protocols.mavlink.command import CommandResult
 from protocols.mavlink.dialect import messages
-from protocols.mavlink.missing_messages import COMPONENT_METADATA
 from protocols.mission_item import MissionResult
 
 _MAX_U16, _MAX_I32 = (1 << 16) - 1, (1 << 31) - 1

@@ -114,7 +114,7 @@ class Incoming:
                 answers = partial(self._ground.to_as, asked, sender)
         if not (is_vehicle and sender.allows(Cost.ANSWER)):
             return
-        message = decode(frame.msgid, frame.payload)
+        message = decode(frame)
         answer = None if message is None else _denial(message, station)
         if answer is not None:
             answers(answer)

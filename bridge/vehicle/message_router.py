@@ -128,7 +128,7 @@ class MessageRouter:
     def take(self, sender: GroundStation, station: Station, frame: MavlinkFrame, msgid: int, now: float) -> None:
         """Handle a frame for the bridge's vehicle, if it is understood and its sender has not sent too many."""
         handler = self.handlers.get(msgid)
-        if handler is None or (message := decode(msgid, frame.payload)) is None:
+        if handler is None or (message := decode(frame)) is None:
             return
         if not sender.allows(Cost.TRANSFER if msgid in _OF_A_TRANSFER else Cost.ANSWER):
             return

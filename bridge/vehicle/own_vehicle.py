@@ -30,7 +30,6 @@ from bridge.vehicle.telemetry_table import NO_STREAM, TELEMETRY, Row
 from bridge.vehicle.vehicle_messages import Moment
 from protocols.mavlink.codec import pack
 from protocols.mavlink.dialect import Message, messages
-from protocols.mavlink.missing_messages import AVAILABLE_MODES
 from protocols.msp.commands import Msp
 from protocols.msp.nav import NavStatus
 from reports.vehicle_groups import Progress
@@ -188,7 +187,7 @@ class OwnVehicle:
 
         `index`: of the flight mode in AVAILABLE_MODES, from 1; 0: all.
         """
-        if msgid == AVAILABLE_MODES:
+        if msgid == messages.MAVLINK_MSG_ID_AVAILABLE_MODES:
             modes = make.available_modes(self._session.vehicle)
             made = modes[index - 1 : index] if index else modes
             if not made:

@@ -8,7 +8,6 @@ from bridge.fc.msp_telemetry import POLL_FOR
 from bridge.model import vehicle as v
 from bridge.vehicle import vehicle_messages as make
 from protocols.mavlink.dialect import messages as m
-from protocols.mavlink.missing_messages import CURRENT_MODE
 from protocols.msp.commands import Msp
 
 NO_STREAM = -1
@@ -63,5 +62,5 @@ TELEMETRY = (
     Row(m.MAVLINK_MSG_ID_MISSION_CURRENT, None, 1.0, EXTENDED_STATUS, (make.mission_current,)),
     Row(m.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT, None, 1.0, EXTENDED_STATUS, (make.nav_controller_output,)),
     Row(m.MAVLINK_MSG_ID_SYSTEM_TIME, None, 1.0, EXTRA3, (make.system_time,)),
-    Row(CURRENT_MODE, None, 1.0, EXTENDED_STATUS, (make.current_mode,)),
+    Row(m.MAVLINK_MSG_ID_CURRENT_MODE, None, 1.0, EXTENDED_STATUS, (make.current_mode,)),
 )

@@ -16,8 +16,7 @@ from bridge.model.flight_memory import Home
 from bridge.model.flight_mode import FlightMode
 from bridge.model.ground_track import bearing_deg, distance_m, north_east_m
 from bridge.model.mission_progress import FlownMission, Way
-from protocols.mavlink import missing_messages
-from protocols.mavlink.codec import pack_payload
+from protocols.mavlink.codec import pack_attitude
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import Command
 from reports.vehicle_groups import Progress
@@ -77,8 +76,6 @@ _RAW_CHANNELS, _CHANNELS = 8, 18
 #: Cells in BATTERY_STATUS.
 _MOST_CELLS = 10
 _MAX_RSSI = 254
-#: ATTITUDE is sent most often, and pymavlink's object would cost as much as the frame itself.
-_ATTITUDE = messages.MAVLink_attitude_message.unpacker
 _UNKNOWN_RATES = (math.nan, math.nan, math.nan)
 #: An armed craft this far above or below home, or faster, is in the air.
 _FLYING_M, _FLYING_M_S = 1.0, 0.5
@@ -183,7 +180,7 @@ def current_mode(at: Moment) -> Message:
     mode = at.need(v.Mode).mode
     if not isinstance(mode, FlightMode):
         raise Unknown
-    return missing_messages.current_mode(_custom_mode(at.vehicle, mode), _standard_mode(at.vehicle, mode))
+    return messages.MAVLink_current_mode_message(_standard_mode(at.vehicle, mode), _custom_mode(at.vehicle, mode), 0)
 
 
 def available_modes(vehicle: v.Vehicle) -> list[Message]:
@@ -193,8 +190,13 @@ def available_modes(vehicle: v.Vehicle) -> list[Message]:
         modes.setdefault(_custom_mode(vehicle, mode), mode)
     names = {Airframe.FIXED_WING: _PLANE_NAMES, **dict.fromkeys(_ROVERS, _ROVER_NAMES)}.get(vehicle.airframe, {})
     return [
-        missing_messages.available_mode(
-            index, len(modes), custom_mode, _standard_mode(vehicle, mode), names.get(custom_mode, mode.name)
+        messages.MAVLink_available_modes_message(
+            len(modes),
+            index,
+            _standard_mode(vehicle, mode),
+            custom_mode,
+            messages.MAV_MODE_PROPERTY_NOT_USER_SELECTABLE,  # the pilot's switches set the mode
+            names.get(custom_mode, mode.name).encode(),
         )
         for index, (custom_mode, mode) in enumerate(modes.items(), 1)
     ]
@@ -254,8 +256,7 @@ def attitude(at: Moment) -> Message:
     heading_deg = (now.heading_deg + 180) % 360 - 180
     angles = map(math.radians, (now.roll_deg, now.pitch_deg, heading_deg))
     rates = _UNKNOWN_RATES if now.rates_deg_s is None else map(math.radians, now.rates_deg_s)
-    payload = _ATTITUDE.pack(at.boot_ms, *angles, *rates)
-    return pack_payload(messages.MAVLINK_MSG_ID_ATTITUDE, payload)
+    return pack_attitude(at.boot_ms, *angles, *rates)
 
 
 def gps_raw_int(at: Moment) -> Message:

@@ -19,5 +19,5 @@ class CommandResult(IntEnum):
 
 def command_name(command: int) -> str:
     """A MAV_CMD's name as Mission Planner lists it, or its number."""
-    name = messages.COMMAND_NAMES.get(command)
-    return str(command) if name is None else name.removeprefix("NAV_")
+    known = messages.enums["MAV_CMD"].get(command)
+    return str(command) if known is None else known.name.removeprefix("MAV_CMD_").removeprefix("NAV_")

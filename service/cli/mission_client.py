@@ -1,20 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A small MAVLink ground station that writes and reads missions over UDP, for the demonstration."""
+"""The demonstration's ground station: pymavlink's mavutil, so that the mission is written by code not ours."""
 
-import socket
+import os
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
+from typing import Any
 
-from protocols.mavlink.codec import FrameWriter, decode, item_from_int_message, item_message, pack
-from protocols.mavlink.dialect import Message, messages
-from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+from protocols.mavlink.codec import item_from_int_message
 from protocols.mission_item import MissionItem, MissionResult
 
 _HEARTBEAT_INTERVAL_S = 0.2
 _REPLY_TIMEOUT_S = 1.0
 _TRIES = 8
-_DATAGRAM_SIZE = 2048
+_REQUESTS = ("MISSION_REQUEST", "MISSION_REQUEST_INT")
 
 
 class ClientError(Exception):
@@ -22,88 +21,76 @@ class ClientError(Exception):
 
 
 class MissionClient:
-    """A connection to one vehicle. `texts` collects received STATUSTEXTs."""
+    """A connection to one vehicle (mavutil.mavfile). `texts` collects received STATUSTEXTs."""
 
-    def __init__(self, address: tuple[str, int]) -> None:
-        self._address = address
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._writer, self._splitter = FrameWriter(255, 190), MavlinkSplitter()
-        self._sysid, self._compid = 0, 0
+    def __init__(self, connection: Any) -> None:
+        self._connection = connection
         self.texts: list[str] = []
 
     def connect(self, timeout_s: float) -> bool:
         """Wait for the heartbeat of a vehicle with a flight controller; False if none arrives in time."""
-        heartbeat = messages.MAVLink_heartbeat_message(
-            messages.MAV_TYPE_GCS, messages.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3
-        )
-        for _ in range(max(round(timeout_s / _HEARTBEAT_INTERVAL_S), 1)):
-            self._send(heartbeat)
-            for frame, message in self._received(_HEARTBEAT_INTERVAL_S):
-                if message.get_type() == "HEARTBEAT" and message.system_status != messages.MAV_STATE_UNINIT:
-                    self._sysid, self._compid = frame.sysid, frame.compid
-                    return True
+        end = time.monotonic() + timeout_s
+        while time.monotonic() < end:
+            self._connection.mav.heartbeat_send(6, 8, 0, 0, 4)  # a ground station
+            heartbeat = self._connection.wait_heartbeat(timeout=_HEARTBEAT_INTERVAL_S)
+            if heartbeat is not None and heartbeat.system_status:
+                return True
         return False
-
-    def close(self) -> None:
-        self._socket.close()
 
     def write(self, items: Sequence[MissionItem], progress: Callable[[int], None]) -> MissionResult:
         """Upload a list; returns the type of the final MISSION_ACK."""
-        count = messages.MAVLink_mission_count_message(self._sysid, self._compid, len(items), 0)
-        answer = self._ask(count, "MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK")
-        while answer.get_type() != "MISSION_ACK":
+        answer = self._ask(lambda mav, *target: mav.mission_count_send(*target, len(items)), *_REQUESTS, "MISSION_ACK")
+        while answer.get_type() in _REQUESTS:
             progress(answer.seq)
-            item = item_message(items[answer.seq], self._sysid, self._compid, as_int=True)
-            answer = self._ask(item, "MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK")
+            item = items[answer.seq]
+            fields = item.seq, item.frame, item.command, 0, 1, item.p1, item.p2, item.p3, item.p4
+            place = item.lat_e7 or 0, item.lon_e7 or 0, item.alt_m
+            answer = self._ask(
+                lambda mav, *target, fields=fields, place=place: mav.mission_item_int_send(*target, *fields, *place),
+                *_REQUESTS,
+                "MISSION_ACK",
+            )
         progress(len(items))
         return MissionResult(answer.type)
 
     def read(self) -> list[MissionItem]:
-        request_list = messages.MAVLink_mission_request_list_message(self._sysid, self._compid, 0)
-        count = self._ask(request_list, "MISSION_COUNT").count
+        count = self._ask(lambda mav, *target: mav.mission_request_list_send(*target), "MISSION_COUNT").count
         items: list[MissionItem] = []
         while len(items) < count:
-            wanted = messages.MAVLink_mission_request_int_message(self._sysid, self._compid, len(items), 0)
-            message = self._ask(wanted, "MISSION_ITEM_INT")
+            message = self._ask(
+                lambda mav, *target: mav.mission_request_int_send(*target, len(items)), "MISSION_ITEM_INT"
+            )
             if message.seq == len(items):
                 items.append(item_from_int_message(message))
-        self._send(messages.MAVLink_mission_ack_message(self._sysid, self._compid, 0, 0))
+        self._connection.mav.mission_ack_send(*self._target, 0)
         return items
 
-    def _ask(self, message: Message, *answers: str) -> Message:
+    @property
+    def _target(self) -> tuple[int, int]:
+        return self._connection.target_system, self._connection.target_component
+
+    def _ask(self, send: Callable[..., None], *answers: str) -> Any:
         for _ in range(_TRIES):
-            self._send(message)
-            for _, answer in self._received(_REPLY_TIMEOUT_S):
-                if answer.get_type() in answers:
+            send(self._connection.mav, *self._target)
+            end = time.monotonic() + _REPLY_TIMEOUT_S
+            while (left_s := end - time.monotonic()) > 0:
+                answer = self._connection.recv_match(type=[*answers, "STATUSTEXT"], blocking=True, timeout=left_s)
+                if answer is not None and answer.get_type() in answers:
                     return answer
-                if answer.get_type() == "STATUSTEXT":
+                if answer is not None:
                     self.texts.append(answer.text)
-        raise ClientError(f"no answer to {message.get_type()}")
-
-    def _send(self, message: Message) -> None:
-        self._socket.sendto(self._writer.frame(pack(message), 2), self._address)
-
-    def _received(self, timeout_s: float) -> Iterator[tuple[MavlinkFrame, Message]]:
-        """The messages that arrive within a time."""
-        end = time.monotonic() + timeout_s
-        while (left_s := end - time.monotonic()) > 0:
-            self._socket.settimeout(left_s)
-            try:
-                frames = self._splitter.feed(self._socket.recv(_DATAGRAM_SIZE))
-            except TimeoutError:
-                return
-            for frame in frames:
-                if (message := decode(frame.msgid, frame.payload)) is not None:
-                    yield frame, message
+        raise ClientError(f"no {' or '.join(answers)} from the vehicle")
 
 
 @contextmanager
 def connect(host: str, port: int, timeout_s: float) -> Iterator[MissionClient]:
     """Connect to the vehicle on a UDP port; ClientError if no heartbeat arrives in time."""
-    client = MissionClient((host, port))
-    try:
+    os.environ["MAVLINK20"] = "1"  # mavutil reads the version from the environment when it is imported
+    from pymavlink import mavutil
+
+    address = f"udpout:{host}:{port}"
+    with closing(mavutil.mavlink_connection(address, source_system=255, source_component=190)) as connection:
+        client = MissionClient(connection)
         if not client.connect(timeout_s):
             raise ClientError(f"no vehicle with a flight controller on UDP port {port} within {timeout_s:.0f} s")
         yield client
-    finally:
-        client.close()

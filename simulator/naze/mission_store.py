@@ -94,7 +94,7 @@ class OwnMissionStore:
             self.load()
 
     def take(self, frame: MavlinkFrame, now: float) -> None:
-        message = decode(frame.msgid, frame.payload)
+        message = decode(frame)
         if message is None:
             return
         self._partner = (frame.sysid, frame.compid)

@@ -44,7 +44,7 @@ class Parameters:
         match frame.msgid:
             case m.MAVLINK_MSG_ID_PARAM_REQUEST_LIST:
                 self.is_listing = True
-            case m.MAVLINK_MSG_ID_PARAM_SET if message := decode(frame.msgid, frame.payload):
+            case m.MAVLINK_MSG_ID_PARAM_SET if message := decode(frame):
                 if self._can_set() and self._set(message.param_id, message.param_value):
                     self._board.config_write_due = now + _WRITE_DELAY_S
 

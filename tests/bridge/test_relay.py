@@ -69,7 +69,7 @@ class Bench:
     def _take(self) -> None:
         for _, data in self.relay.take_datagrams():
             for frame in MavlinkSplitter().feed(data):
-                message = decode(frame.msgid, frame.payload)
+                message = decode(frame)
                 assert message is not None
                 self.frames.append((frame.raw[4], message))
 

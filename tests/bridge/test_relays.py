@@ -54,7 +54,7 @@ class Bench:
         return [(frame.sysid, message) for frame in frames for message in self._messages(frame.raw)]
 
     def _messages(self, data: bytes) -> list[Message]:
-        found = [decode(frame.msgid, frame.payload) for frame in MavlinkSplitter().feed(data)]
+        found = [decode(frame) for frame in MavlinkSplitter().feed(data)]
         return [message for message in found if message is not None]
 
 

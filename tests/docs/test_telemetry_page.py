@@ -6,10 +6,9 @@ from math import inf
 from pathlib import Path
 
 import pytest
-from pymavlink.dialects.v20 import ardupilotmega as m
+from pymavlink.dialects.v20 import all as m
 
 from bridge.vehicle.telemetry_table import NO_STREAM, TELEMETRY, Row
-from protocols.mavlink.missing_messages import CURRENT_MODE
 
 PAGE = (Path(__file__).parents[2] / "docs" / "telemetry.md").read_text()
 SECTIONS = re.findall(r"^### ([^\n]*)\n(.*?)(?=^##|\Z)", PAGE, re.MULTILINE | re.DOTALL)
@@ -20,16 +19,12 @@ UNTOLD = {"alt_ellipsoid", "h_acc", "v_acc", "vel_acc", "hdg_acc", "yaw", "id", 
               "mission_mode", "time_usec", "port", "chancount", "name", "value"}  # fmt: skip
 
 
-#: pymavlink lacks CURRENT_MODE (protocols/mavlink/missing_messages.py).
-ROWS = [row for row in TELEMETRY if row.msgid != CURRENT_MODE]
-
-
 def name_of(row: Row) -> str:
     name: str = m.mavlink_map[row.msgid].msgname
     return name
 
 
-@pytest.mark.parametrize("row", ROWS, ids=name_of)
+@pytest.mark.parametrize("row", TELEMETRY, ids=name_of)
 def test_each_message_on_the_page_matches_the_code(row: Row) -> None:
     (line,) = re.findall(rf"^\| {name_of(row)} \| (.*) \|$", PAGE, re.MULTILINE)
     after, rate, stream = line.split(" | ")
@@ -39,7 +34,7 @@ def test_each_message_on_the_page_matches_the_code(row: Row) -> None:
     assert stream == ("none" if row.stream == NO_STREAM else STREAMS[row.stream])
 
 
-@pytest.mark.parametrize("row", [row for row in ROWS if row.msgid != m.MAVLINK_MSG_ID_RAW_IMU], ids=name_of)
+@pytest.mark.parametrize("row", [row for row in TELEMETRY if row.msgid != m.MAVLINK_MSG_ID_RAW_IMU], ids=name_of)
 def test_each_field_is_on_the_page(row: Row) -> None:
     sections = [
         text for heading, text in SECTIONS if name_of(row) in heading.split(", ") or heading == "Always the same"

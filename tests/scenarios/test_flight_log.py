@@ -5,10 +5,9 @@ from collections import Counter
 from collections.abc import Sequence
 
 import pytest
-from pymavlink.dialects.v20 import ardupilotmega as m
+from pymavlink.dialects.v20 import all as m
 
 from protocols.mavlink.frame import MavlinkSplitter
-from protocols.mavlink.missing_messages import CURRENT_MODE
 from simulator.board.options import SimOptions, TelemetryProtocol
 from tests.support.world import GroundStation, World
 
@@ -24,7 +23,7 @@ class Log:
         """Messages logged since the last call, counted by name."""
         found = MavlinkSplitter().feed(b"".join(self.frames))
         self.frames.clear()
-        return Counter(m.mavlink_map[frame.msgid].msgname for frame in found if frame.msgid != CURRENT_MODE)
+        return Counter(m.mavlink_map[frame.msgid].msgname for frame in found)
 
 
 def logged(protocol: TelemetryProtocol) -> tuple[World, Log]:

@@ -42,7 +42,7 @@ class MavlinkGround:
             while self._frames:
                 frame = self._frames.pop(0)
                 if frame.msgid in wanted:
-                    return decode(frame.msgid, frame.payload)
+                    return decode(frame)
             if self._bench.now >= end:
                 return None
             self._frames += self._splitter.feed(self._bench.run(0.02))

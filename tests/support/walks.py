@@ -35,12 +35,8 @@ _TIMEOUT_S = 30.0
 _POLL_S = 0.001
 _ROOT = f"{Path(__file__).parents[2]}/"
 _PRODUCT = ("bridge/", "protocols/", "reports/", "service/", "storage/")
-#: The event loop's own functions, and the messages' classes, which a reader of a walk skips.
-_SKIPPED = (
-    "service/machine/event_loop.py",
-    "protocols/mavlink/messages.py",
-    "protocols/mavlink/message_base.py",
-)
+#: The event loop's own functions, which a reader of a walk skips.
+_SKIPPED = ("service/machine/event_loop.py",)
 
 
 @dataclass(frozen=True, slots=True)

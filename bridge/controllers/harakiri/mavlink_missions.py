@@ -155,7 +155,7 @@ class HarakiriMavlinkMissions(HarakiriStore):
         for seq in range(count):
             message = m.MAVLink_mission_request_message(*_TARGET, seq)
             answer = yield from self._question(message, _ITEM, seq)
-            item = None if answer is None else decode(answer.msgid, answer.payload)
+            item = None if answer is None else decode(answer)
             record = None if item is None else _record(item)
             if record is None:
                 return None
@@ -173,7 +173,7 @@ class HarakiriMavlinkMissions(HarakiriStore):
         return None
 
     def _field(self, frame: MavlinkFrame, name: str) -> int:
-        message = decode(frame.msgid, frame.payload)
+        message = decode(frame)
         return _NO_SEQ if message is None else int(getattr(message, name))
 
 

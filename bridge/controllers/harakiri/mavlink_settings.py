@@ -64,7 +64,7 @@ class HarakiriMavlinkSettings(FcSettings):
                 frame: MavlinkFrame | None = yield Await(frozenset((_VALUE,)), _SILENCE_S)
                 if frame is None:
                     break
-                value = decode(frame.msgid, frame.payload)
+                value = decode(frame)
                 if value is None or not value.param_index < value.param_count <= _MOST:
                     continue
                 count = value.param_count

@@ -4,12 +4,11 @@
 import math
 
 import pytest
-from pymavlink.dialects.v20 import ardupilotmega as messages
+from pymavlink.dialects.v20 import all as messages
 
 from bridge.gcs.ground import EXPIRY_S
 from bridge.vehicle.telemetry_table import TELEMETRY, Row
 from protocols.mavlink.dialect import Message
-from protocols.mavlink.missing_messages import AVAILABLE_MODES
 from protocols.msp.commands import Msp
 from protocols.msp.frame import MspParser
 from tests.support.world import GroundStation, World, ready_world
@@ -220,14 +219,14 @@ def test_the_modes_are_listed_and_the_current_one_is_reported(world: World) -> N
     station, old = station_of(world, "gcs"), GroundStation(world, "old", version=1)
     send_heartbeat(old)
     world.run(1)
-    assert ask(station, 512, AVAILABLE_MODES) == ACCEPTED
+    assert ask(station, 512, m.MAVLINK_MSG_ID_AVAILABLE_MODES) == ACCEPTED
     listed = station.messages("AVAILABLE_MODES")
     assert [(mode.mode_index, mode.number_modes) for mode in listed] == [(number, 6) for number in range(1, 7)]
     names = {mode.custom_mode: mode.mode_name for mode in listed}
     assert names == {0: "STABILIZE", 1: "ACRO", 2: "ALT_HOLD", 3: "AUTO", 5: "LOITER", 6: "RTL"}
-    assert ask(station, 512, AVAILABLE_MODES, 3) == ACCEPTED
+    assert ask(station, 512, m.MAVLINK_MSG_ID_AVAILABLE_MODES, 3) == ACCEPTED
     assert [mode.mode_index for mode in station.messages("AVAILABLE_MODES")] == [3]
-    assert ask(station, 512, AVAILABLE_MODES, 7) == UNSUPPORTED
+    assert ask(station, 512, m.MAVLINK_MSG_ID_AVAILABLE_MODES, 7) == UNSUPPORTED
     world.faults.boxes = 1 << 0 | 1 << 2
     world.run(3)
     present = station.take("CURRENT_MODE")

@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""MAVLink 1 for receivers that support only it: fixed payload sizes, no extension fields."""
+"""MAVLink 1 for receivers that support only it (fixed payload sizes, no extension fields), and packing by struct."""
+
+import struct
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from pymavlink.dialects.v10 import ardupilotmega as mavlink_1
+from pymavlink.dialects.v20 import ardupilotmega as m
 
-from protocols.mavlink.codec import FrameWriter, decode, pack
+from protocols.mavlink.codec import FrameWriter, decode, pack, pack_attitude, pack_component_metadata
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MavlinkSplitter
 
@@ -36,7 +41,7 @@ SENT = [
 @pytest.mark.parametrize("message", SENT, ids=lambda message: str(message.get_type()))
 def test_our_frames_are_valid_mavlink_1(message: Message) -> None:
     frame = FrameWriter(1, 1).frame(pack(message), 1)
-    assert frame[1] == mavlink_1.mavlink_map[message.msgid].unpacker.size
+    assert frame[1] == mavlink_1.mavlink_map[message.get_msgId()].unpacker.size
     received = mavlink_1.MAVLink(None).decode(bytearray(frame))
     for name in received.get_fieldnames():
         assert getattr(received, name) == pytest.approx(getattr(message, name)), name
@@ -46,6 +51,22 @@ def test_our_frames_are_valid_mavlink_1(message: Message) -> None:
 @pytest.mark.parametrize("message", SENT, ids=lambda message: str(message.get_type()))
 def test_our_frames_are_read(message: Message, version: int) -> None:
     (frame,) = MavlinkSplitter().feed(FrameWriter(1, 1).frame(pack(message), version))
-    received = decode(frame.msgid, frame.payload)
+    received = decode(frame)
     assert received is not None
     assert received.get_type() == message.get_type()
+
+
+@pytest.mark.parametrize("version", [1, 2])
+@given(boot_ms=st.integers(0, 2**32 - 1), values=st.lists(st.floats(width=32), min_size=6, max_size=6))
+def test_attitude_is_packed_like_pymavlinks(version: int, boot_ms: int, values: list[float]) -> None:
+    frame = FrameWriter(1, 1).frame(pack_attitude(boot_ms, *values), version)
+    theirs = m.MAVLink_attitude_message(boot_ms, *values)
+    assert frame == theirs.pack(m.MAVLink(None, srcSystem=1, srcComponent=1), force_mavlink1=version == 1)
+
+
+def test_component_metadata_has_the_layout_of_common_xml() -> None:
+    """pymavlink lacks it: https://mavlink.io/en/messages/common.html#COMPONENT_METADATA."""
+    raw = FrameWriter(1, 1).frame(pack_component_metadata(12, 34, "mftp://general.json"), 1)
+    (frame,) = MavlinkSplitter().feed(raw)
+    assert (frame.version, frame.msgid) == (2, 397)
+    assert frame.payload == struct.pack("<II", 12, 34) + b"mftp://general.json"

@@ -80,7 +80,7 @@ def test_no_frame_is_lost_behind_garbage_unless_a_valid_one_covers_it(
 def test_found_frames_decode_or_are_refused(data: bytes) -> None:
     found, splitter = split(data, [])
     for frame in found + splitter.feed(b"", is_end=True):
-        decode(frame.msgid, frame.payload)
+        decode(frame)
 
 
 @given(st.binary(max_size=300))
@@ -95,7 +95,7 @@ def test_any_payload_with_a_valid_checksum_decodes_or_is_refused(payload: bytes)
         header = bytes((len(payload), 0, 0, 5, 255, 190)) + msgid.to_bytes(3, "little")
         crc = mcrf4xx(header + payload + CRC_EXTRA[msgid])
         (frame,) = MavlinkSplitter().feed(b"\xfd" + header + payload + crc.to_bytes(2, "little"))
-        decode(frame.msgid, frame.payload)
+        decode(frame)
 
 
 def test_a_signed_frame_includes_its_signature() -> None:
