@@ -9,36 +9,15 @@ from collections.abc import Callable
 
 import structlog
 
-from benchmarks import (
-    fleet,
-    forward,
-    idle,
-    inav,
-    mission_planner,
-    push,
-    resync,
-    search,
-    status_page,
-    telemetry,
-    upload,
-    zenoh_link,
-)
+from benchmarks import forward, idle, mission_planner, push
 from benchmarks.figure import Figure
 from benchmarks.report import keep_json, print_table
 
 _BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
-    "push": push.measure,
-    "inav": inav.measure,
-    "upload": upload.measure,
-    "mission-planner": mission_planner.measure,
     "idle": idle.measure,
-    "telemetry": telemetry.measure,
-    "search": search.measure,
+    "push": push.measure,
+    "mission-planner": mission_planner.measure,
     "forward": forward.measure,
-    "resync": resync.measure,
-    "zenoh": zenoh_link.measure,
-    "fleet": fleet.measure,
-    "status-page": status_page.measure,
 }
 
 

@@ -1,38 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The floors that need their own program: `python -m benchmarks.floors NAME`.
 
-echo                         sends every UDP datagram back; prints its port
-vehicle                      answers heartbeats, and accepts any mission without storing it; prints its port
-poll LINK                    polls a flight controller as the idle daemon does, and ignores the replies
-attitude LINK PORT MSP=HZ... polls a flight controller at these rates by MSP command, others as often as the daemon
-                             itself needs them, and sends each attitude to a UDP port of the loopback
+vehicle    answers heartbeats, and accepts any mission without storing it; prints its port
+poll LINK  polls a flight controller as the idle daemon does, and ignores the replies
 """
 
 import asyncio
 import os
 import socket
-import struct
 import sys
 from collections.abc import Callable, Mapping
-from math import inf, radians
+from math import inf
 
 import serial
-from fastcrc.crc16 import mcrf4xx
 
 from bridge.line.poll_schedule import POLLS, Poll
 from bridge.vehicle.telemetry_table import TELEMETRY
 from protocols.mavlink.codec import FrameWriter, pack
-from protocols.mavlink.dialect import CRC_EXTRA, Message
+from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
-from protocols.msp.commands import Msp
 
 _QUADROTOR = 2
-_MSP_REPLY, _MSP_OVERHEAD = b"$M>", 6
-_ANGLES = struct.Struct("<3h")
-_ATTITUDE = struct.Struct("<BBBBBBBHBI6f")
-_ATTITUDE_PAYLOAD = 28
-_ATTITUDE_CRC_EXTRA = CRC_EXTRA[m.MAVLINK_MSG_ID_ATTITUDE]
 
 
 def _serve(loop: asyncio.AbstractEventLoop, answers: Callable[[bytes], list[bytes]]) -> None:
@@ -86,33 +75,6 @@ def _poll(loop: asyncio.AbstractEventLoop, link: str) -> None:
     _ask_all(loop, port, intervals)
 
 
-def _send_attitudes(loop: asyncio.AbstractEventLoop, link: str, udp_port: int, rates_hz: Mapping[int, float]) -> None:
-    """The least that Python can do: one reader, no checks, precompiled formats."""
-    port = serial.Serial(link, 115200, timeout=0)
-    fileno = port.fileno()
-    ground = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    ground.connect(("127.0.0.1", udp_port))
-    ground.setblocking(False)
-    waiting = b""
-    seq = 0
-
-    def readable() -> None:
-        nonlocal waiting, seq
-        waiting += os.read(fileno, 4096)
-        while len(waiting) >= _MSP_OVERHEAD and len(waiting) >= (size := waiting[3] + _MSP_OVERHEAD):
-            reply, waiting = waiting[:size], waiting[size:]
-            if reply[4] == Msp.ATTITUDE and reply.startswith(_MSP_REPLY):
-                roll_ddeg, pitch_ddeg, heading_deg = _ANGLES.unpack_from(reply, 5)
-                angles = radians(roll_ddeg / 10), radians(-pitch_ddeg / 10), radians(heading_deg)
-                seq = (seq + 1) & 0xFF
-                boot_ms = int(loop.time() * 1000) & 0xFFFFFFFF
-                frame = _ATTITUDE.pack(0xFD, _ATTITUDE_PAYLOAD, 0, 0, seq, 1, 1, 30, 0, boot_ms, *angles, 0, 0, 0)
-                ground.send(frame + mcrf4xx(frame[1:] + _ATTITUDE_CRC_EXTRA).to_bytes(2, "little"))
-
-    loop.add_reader(fileno, readable)
-    _ask_all(loop, port, {command: 1 / rate_hz for command, rate_hz in rates_hz.items()})
-
-
 def _ask_all(loop: asyncio.AbstractEventLoop, port: serial.Serial, intervals_s: Mapping[int, float]) -> None:
     """Send each poll at its interval, or as often as the daemon itself needs it."""
 
@@ -129,15 +91,10 @@ def _ask_all(loop: asyncio.AbstractEventLoop, port: serial.Serial, intervals_s: 
 def main() -> None:
     loop = asyncio.new_event_loop()
     match sys.argv[1:]:
-        case ["echo"]:
-            _serve(loop, lambda data: [data])
         case ["vehicle"]:
             _serve(loop, _Vehicle().answers)
         case ["poll", link]:
             _poll(loop, link)
-        case ["attitude", link, port, *rates]:
-            wanted = (rate.split("=") for rate in rates)
-            _send_attitudes(loop, link, int(port), {int(command): float(hz) for command, hz in wanted})
     loop.run_forever()
 
 

@@ -2,8 +2,7 @@
 """Forwarding MAVLink from the flight controller to a ground station: CPU time per message, latency, losses.
 
 Each forwarder has its own pseudo-terminal and UDP port; flight controller and ground station are this process. The
-forwarders take turns, so that all see the same load of the machine. Two placements: all on one CPU, where the limits
-apply, and the forwarder on its own CPU, as in practice: there each wake-up costs more.
+forwarders take turns on one CPU, so that all see the same load of the machine.
 """
 
 import os
@@ -19,8 +18,6 @@ from benchmarks.figure import Figure, Floor
 from benchmarks.forwarders import (
     FLOOR,
     MAVLINK_ROUTER,
-    MAVP2P,
-    MAVPROXY,
     OURS,
     Forwarder,
     usable_forwarders,
@@ -37,10 +34,10 @@ _WATCHED_S = 2.0
 _LIMITS: dict[str, dict[str, float]] = {
     "150/s": {MAVLINK_ROUTER: 1.8},
     "500/s": {MAVLINK_ROUTER: 1.8},
-    "3000/s": {FLOOR: 2.0, MAVLINK_ROUTER: 1.2, MAVP2P: 1 / 3, MAVPROXY: 1 / 20},
+    "3000/s": {FLOOR: 2.0, MAVLINK_ROUTER: 1.2},
     "unpaced": {MAVLINK_ROUTER: 1.1},
 }
-_OTHERS = (FLOOR, MAVLINK_ROUTER, MAVP2P, MAVPROXY)
+_OTHERS = (FLOOR, MAVLINK_ROUTER)
 #: At the lower rates, reads are gathered for up to 30 ms.
 _MAX_P99_MS = {"150/s": 35.0, "500/s": 15.0, "3000/s": 3.0}
 
@@ -59,18 +56,9 @@ _Runs = dict[tuple[str, str], list[_Run]]
 
 
 def measure() -> list[Figure]:
-    """Measure all forwarders on this machine, on one CPU and, if there are two, on separate ones."""
-    peers = usable_forwarders()
-    here, *others = sorted(os.sched_getaffinity(0))
-    with on_cpu(here):
-        figures = _judged(_rounds(peers, here, _ROUNDS))
-        if others:
-            figures += _apart(_rounds(peers, others[0], 1))
-    return figures
-
-
-def _judged(runs: _Runs) -> list[Figure]:
-    """Our figures on one CPU, with those of each other forwarder."""
+    """Measure all forwarders on this machine."""
+    with on_cpu(min(os.sched_getaffinity(0))):
+        runs = _rounds(usable_forwarders())
     return [figure for rate in _RATES for figure in _at(rate, runs)]
 
 
@@ -88,13 +76,6 @@ def _at(rate: str, runs: _Runs) -> Iterator[Figure]:
         yield Figure(f"forward at {rate}, lost by {name}", _lost(its_runs), "")
 
 
-def _apart(runs: _Runs) -> list[Figure]:
-    return [
-        Figure(f"forward at {rate} on its own CPU, CPU a message, {name}", _cpu_us(its_runs), "us")
-        for (name, rate), its_runs in runs.items()
-    ]
-
-
 def _cpu_us(runs: Sequence[_Run]) -> float:
     return statistics.median(run.cpu_us for run in runs)
 
@@ -107,16 +88,15 @@ def _lost(runs: Sequence[_Run]) -> int:
     return sum(run.lost for run in runs)
 
 
-def _rounds(peers: Sequence[Forwarder], cpu: int, count: int) -> _Runs:
-    """Run all in turns, several rounds, each on that CPU."""
+def _rounds(peers: Sequence[Forwarder]) -> _Runs:
+    """Run all in turns, several rounds."""
     runs: _Runs = defaultdict(list)
-    for _ in range(count):
+    for _ in range(_ROUNDS):
         for peer in peers:
             with ExitStack() as stack:
                 folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
                 line = stack.enter_context(closing(Line()))
-                with on_cpu(cpu):
-                    pid = stack.enter_context(peer.start(folder, line))
+                pid = stack.enter_context(peer.start(folder, line))
                 line.warm_up()
                 for name, rate in _RATES.items():
                     runs[peer.name, name].append(_run(line, pid, rate))

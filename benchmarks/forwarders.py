@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Programs that forward MAVLink from a terminal to UDP: ours, the floor, and other projects'."""
+"""Programs that forward MAVLink from a terminal to UDP: ours, the floor, and mavlink-router."""
 
 import os
 import shutil
 import subprocess
-import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, closing, contextmanager
@@ -14,11 +13,9 @@ from pathlib import Path
 from benchmarks.line import Line
 from benchmarks.processes import ROOT, BenchmarkError, daemon, running
 
-OURS, FLOOR, MAVPROXY, MAVP2P = "naze-bridge", "C floor", "MAVProxy", "mavp2p"
-MAVLINK_ROUTER = "mavlink-router"
-_OTHERS = {FLOOR, MAVLINK_ROUTER, MAVP2P, MAVPROXY}
+OURS, FLOOR, MAVLINK_ROUTER = "naze-bridge", "C floor", "mavlink-router"
+_OTHERS = {FLOOR, MAVLINK_ROUTER}
 _SPEED = 57600
-_MAVPROXY = Path(sys.executable).parent / "mavproxy.py"
 #: Starts a forwarder in a folder, on a line; yields its process id.
 _Start = Callable[[Path, Line], AbstractContextManager[int]]
 
@@ -51,19 +48,12 @@ def usable_forwarders() -> list[Forwarder]:
 
 
 def _installed() -> list[Forwarder]:
-    """The floor needs cc, MAVProxy comes with `make test`'s dependencies.
-
-    mavlink-router and mavp2p are found as $MAVLINK_ROUTERD and $MAVP2P, or on the path.
-    """
+    """The floor needs cc; mavlink-router is found as $MAVLINK_ROUTERD, or on the path."""
     found = [Forwarder(OURS, _naze_bridge)]
-    if _MAVPROXY.exists():
-        found.append(Forwarder(MAVPROXY, _mavproxy))
     if shutil.which("cc"):
         found.insert(0, Forwarder(FLOOR, _floor))
     if router := os.environ.get("MAVLINK_ROUTERD") or shutil.which("mavlink-routerd"):
         found.append(Forwarder(MAVLINK_ROUTER, lambda folder, line: _mavlink_router(router, folder, line)))
-    if mavp2p := os.environ.get("MAVP2P") or shutil.which("mavp2p"):
-        found.append(Forwarder(MAVP2P, lambda folder, line: _mavp2p(mavp2p, folder, line)))
     return found
 
 
@@ -83,15 +73,6 @@ def _naze_bridge(folder: Path, line: Line) -> Iterator[int]:
 
 
 @contextmanager
-def _mavproxy(folder: Path, line: Line) -> Iterator[int]:
-    """The daemon with its default modules."""
-    program = [sys.executable, str(_MAVPROXY), "--daemon"]
-    link = [f"--master={line.tty}", f"--baudrate={_SPEED}", f"--out=127.0.0.1:{line.port}", "--mav20"]
-    with running([*program, *link, f"--state-basedir={folder}"], folder / "mavproxy.log") as process:
-        yield process.pid
-
-
-@contextmanager
 def _mavlink_router(program: str, folder: Path, line: Line) -> Iterator[int]:
     """The daemon without its TCP server, and regardless of the machine's configuration."""
     configuration = folder / "mavlink-router.conf"
@@ -99,11 +80,4 @@ def _mavlink_router(program: str, folder: Path, line: Line) -> Iterator[int]:
     options = ["--conf-file", str(configuration), "--conf-dir", str(folder / "none")]
     command = [program, *options, "--endpoint", f"127.0.0.1:{line.port}", f"{line.tty}:{_SPEED}"]
     with running(command, folder / "mavlink-router.log") as process:
-        yield process.pid
-
-
-@contextmanager
-def _mavp2p(program: str, folder: Path, line: Line) -> Iterator[int]:
-    command = [program, f"serial:{line.tty}:{_SPEED}", f"udpc:127.0.0.1:{line.port}"]
-    with running(command, folder / "mavp2p.log") as process:
         yield process.pid

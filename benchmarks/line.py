@@ -12,7 +12,7 @@ import socket
 import struct
 import time
 import tty
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
@@ -106,19 +106,6 @@ class Line:
         while self._receive(passage, first, _LAST_ONES_S):
             pass
         return passage
-
-    def send(self, pieces: Sequence[bytes], rate: float) -> list[bytes]:
-        """Send pieces at a rate per second; returns the received frames except heartbeats."""
-        frames: list[bytes] = []
-        due = time.monotonic_ns()
-        for piece in pieces:
-            self._write(piece)
-            due += int(1e9 / rate)
-            while (left := due - time.monotonic_ns()) > 0:
-                frames += self._frames(left / 1e9)
-        while came := self._frames(_LAST_ONES_S):
-            frames += came
-        return [frame for frame in frames if frame[7:10] != bytes(3)]
 
     def frame(self, msgid: int, payload: bytes) -> bytes:
         """The autopilot's next frame."""

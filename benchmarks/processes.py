@@ -3,18 +3,16 @@
 
 import json
 import os
-import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from tests.support.programs import NAZE_BRIDGE, free_port
+from tests.support.programs import NAZE_BRIDGE
 
 ROOT = Path(__file__).resolve().parent.parent
 #: The folder of saved figures (git-ignored).
@@ -25,8 +23,6 @@ ENVIRONMENT = {key: value for key, value in os.environ.items() if key != "PYTHON
 }
 _TIMEOUT_S = 30.0
 _POLL_S = 0.002
-#: UART1 of INAV's own simulator.
-_INAV_SITL_PORT = 5760
 
 
 class BenchmarkError(Exception):
@@ -63,58 +59,17 @@ class Board:
     """A simulated Naze on a pseudo-terminal that keeps the pace of a UART."""
 
     link: Path
-    control: Path
-
-    def tell(self, *lines: str) -> None:
-        """Switch a fault, a plug or the power (simulator.links.control)."""
-        with socket.socket(socket.AF_UNIX) as connection:
-            connection.connect(str(self.control))
-            with connection.makefile("rw") as stream:
-                for line in lines:
-                    stream.write(f"{line}\n")
-                    stream.flush()
-                    if (answer := stream.readline().strip()) != "ok":
-                        raise BenchmarkError(f"the simulated Naze answers {answer!r} to {line!r}")
 
 
 @contextmanager
 def simulated_naze(folder: Path, *options: str) -> Iterator[Board]:
     """Run `naze-bridge sim` with `options`."""
-    board = Board(folder / "naze", folder / "sim.sock")
-    command = [*NAZE_BRIDGE, "sim", "--link", str(board.link), "--control", str(board.control), *options]
+    board = Board(folder / "naze")
+    command = [*NAZE_BRIDGE, "sim", "--link", str(board.link), *options]
     log = folder / "sim.log"
     with running(command, log):
         wait_for(lambda: b"Simulated Naze at" in log.read_bytes(), "the simulated Naze is up")
         yield board
-
-
-@contextmanager
-def inav_on_a_socket(folder: Path) -> Iterator[tuple[str, int]]:
-    """Run `naze-bridge sim --kind inav --tcp`, or INAV's own simulator; yields its address."""
-    host, port = "127.0.0.1", free_port(socket.SOCK_STREAM)
-    log = folder / "sim.log"
-    if real := os.environ.get("INAV_SITL"):
-        with running([real, f"--path={folder / 'eeprom.bin'}"], log):
-            wait_for(lambda: _listens(host, _INAV_SITL_PORT), "INAV's simulator is up")
-            yield host, _INAV_SITL_PORT
-        return
-    with running([*NAZE_BRIDGE, "sim", "--kind", "inav", "--tcp", f"{host}:{port}"], log):
-        wait_for(lambda: b"Simulated " in log.read_bytes(), "the simulated INAV is up")
-        yield host, port
-
-
-def _listens(host: str, port: int) -> bool:
-    with socket.socket() as connection:
-        return connection.connect_ex((host, port)) == 0
-
-
-@contextmanager
-def inav_on_a_uart(folder: Path) -> Iterator[str]:
-    """Run benchmarks.paced_inav; yields the path of its terminal."""
-    log = folder / "paced.log"
-    with running([sys.executable, "-m", "benchmarks.paced_inav"], log):
-        wait_for(lambda: log.read_bytes().endswith(b"\n"), "the simulated INAV is up")
-        yield log.read_text().strip()
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,11 +90,6 @@ class DaemonProcess:
         """Wait until an event was logged `count` times; returns the last of them."""
         wait_for(lambda: len(self.events(name)) >= count, f"the daemon logs {name} (see {self._log})")
         return self.events(name)[count - 1]
-
-
-def logged_at(event: dict[str, Any]) -> float:
-    """The time of a logged event, in the scale of time.time()."""
-    return datetime.fromisoformat(event["timestamp"]).timestamp()
 
 
 @contextmanager
@@ -165,9 +115,3 @@ def cpu_s(pid: int) -> float:
     The clock id is computed like clock_getcpuclockid(3) on Linux.
     """
     return time.clock_gettime(~pid << 3 | 2)
-
-
-def resident_mb(pid: int) -> float:
-    """Memory of a process."""
-    pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
-    return pages * 4096 / 1e6

@@ -4,8 +4,8 @@
 The libraries are the wheels that requirements.lock pins, for the Pythons of Debian 12 and 13 and Ubuntu 24.04 side by
 side; pip fetches them for any architecture on any machine, and nothing is compiled. The target needs no network.
 
-cbor2 has no wheel for armhf: its last pure Python release is used there (armhf.lock). pymavlink has none either: it has a
-C part. Only the modules that we use are packed: the rest, 90 MB, is other dialects and log tools.
+cbor2 has no wheel for armhf: its last pure Python release is used there (armhf.lock). pymavlink has none either.
+Only the modules that we use are packed: the rest is a module in C and 90 MB of other dialects and log tools.
 
 pip evaluates a requirement's `python_version < ...` for the Python that runs it, not for the target's. So far our
 requirements do not differ between 3.11 and 3.14.

@@ -12,7 +12,6 @@ from pathlib import Path
 import click
 import pytest
 
-from benchmarks.__main__ import _BENCHMARKS as BENCHMARKS
 from service.cli.main import main
 from service.cli.setup.hotspot import CONNECTION
 from tests.support.benches import Starter
@@ -35,12 +34,6 @@ NOT_RUN = {
     "naze-bridge sim --image": "needs a firmware image: `make real-board` runs it",
     "naze-bridge sim --link /tmp/naze --core": "needs the compiled core: tests/e2e/test_compiled_core.py runs it",
     "make": "long, or changes the machine; its target is checked",
-    "python -m benchmarks": "long, and it measures; its module is checked",
-    "python -m benchmarks.light_fleet": "needs a router, and takes long; its module is checked",
-    "python -m benchmarks.light_watch": "takes long, and it measures; lint checks its types",
-    "python -m benchmarks.far_mission": "takes long, and it measures; lint checks its types",
-    "python -m benchmarks.fleet_mavlink": "takes long, and it measures; lint checks its types",
-    "python -m benchmarks.zenoh_volume": "takes ten minutes, and it measures; lint checks its types",
     "python examples/zenoh_router.py": "tests/support/zenoh_router.py runs it, for all tests of fleets",
     "python examples/zenoh-tls/make_certificates.py": "tests/support/secured_fleet.py runs it",
     "pip install trustme": "a test dependency",
@@ -185,7 +178,6 @@ def test_a_command_of_another_program_names_what_exists(command: Command) -> Non
         assert re.search(rf"^{target}\b[^:=]*:(?!=)", (folder / "Makefile").read_text(), re.MULTILINE)
     if words[0] == "-m" and program == "python":
         assert find_spec(words[1])
-        assert words[2:] == [] or words[2] in BENCHMARKS
     for word in words:
         if word.startswith("examples/"):
             assert (REPOSITORY / word).exists()

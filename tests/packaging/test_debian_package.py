@@ -164,6 +164,8 @@ def test_the_package_has_the_expected_files(package: Path) -> None:
         "/usr/share/bash-completion/completions/naze-bridge",
     ):
         assert expected in files
+    dialects = {name.partition("/dialects/")[2] for name in files if "/pymavlink/dialects/" in name}
+    assert dialects - {""} == {"__init__.py", "v20", "v20/__init__.py", "v20/all.py"}
     assert {(member.uid, member.gid) for member in files.values()} == {(0, 0)}
     assert not [name for name, member in files.items() if member.mode & 0o022 and not member.issym()]
     described = subprocess.run(["dpkg-deb", "--field", package], capture_output=True, text=True, check=True).stdout

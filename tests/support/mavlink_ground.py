@@ -59,7 +59,7 @@ class MavlinkGround:
         for _ in range(count + 1):
             reply = self.wait(m.MAVLINK_MSG_ID_MISSION_REQUEST, m.MAVLINK_MSG_ID_MISSION_ACK)
             assert reply is not None, "no reply"
-            if reply.msgid == m.MAVLINK_MSG_ID_MISSION_ACK:
+            if reply.get_msgId() == m.MAVLINK_MSG_ID_MISSION_ACK:
                 return int(reply.type)
             if reply.seq == stop_after:
                 return None

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The mode shown for each combination of boxes."""
 
-import struct
-
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
@@ -12,7 +10,6 @@ from bridge.model.vehicle import Vehicle
 from bridge.vehicle import vehicle_messages as make
 from tests.bridge.vehicle.test_vehicle_messages import BETAFLIGHT, HARAKIRI, INAV, at, status, with_replies
 
-_AVAILABLE_MODE = struct.Struct("<IIBBB35s")
 #: The numbers of INAV 9.1's own MAVLink for an aeroplane (telemetry/mavlink.c), in the order in which it looks for the
 #: modes (fc/runtime_config.c).
 INAVS_OWN = {
@@ -76,6 +73,7 @@ def test_an_aeroplane_and_a_rover_list_their_own_modes_under_ardupilots_names() 
         (Airframe.BOAT, {0: "MANUAL", 1: "ACRO", 5: "LOITER", 10: "AUTO", 11: "RTL"}),
     ):  # fmt: skip
         vehicle.airframe = kind
-        listed = [_AVAILABLE_MODE.unpack(mode.payload_v1) for mode in make.available_modes(vehicle)]
-        assert {custom: name.rstrip(b"\0").decode() for custom, *_, name in listed} == names
-        assert [fields[2:4] for fields in listed] == [(len(names), index) for index in range(1, len(names) + 1)]
+        listed = make.available_modes(vehicle)
+        assert {mode.custom_mode: mode.mode_name for mode in listed} == names
+        assert [mode.mode_index for mode in listed] == [*range(1, len(names) + 1)]
+        assert {mode.number_modes for mode in listed} == {len(names)}

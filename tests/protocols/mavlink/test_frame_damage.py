@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as mavlink_2
 
-from benchmarks.damage import Damage, damaged_stream
 from protocols.mavlink.dialect import MESSAGE_FORMATS, Message
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+from tests.support.damage import Damage, damaged_stream
 
 SIGNED = "MAVLink 2, signed"
 SENDERS = ("MAVLink 1", "MAVLink 2", SIGNED)
