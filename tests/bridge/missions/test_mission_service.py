@@ -11,7 +11,7 @@ from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.frame import MspParser
 from protocols.msp.mission import MissionCommand
 from simulator.board.options import SimOptions
-from tests.support.conversations import Upload, records_of, waypoints
+from tests.support.conversations import Upload, ack_message, records_of, waypoints
 from tests.support.world import GroundStation, World, flash_holding
 
 OLD, NEW = waypoints(20, seed=77), waypoints(30)
@@ -67,3 +67,18 @@ def test_a_mission_that_a_killed_daemon_left_pending_is_settled_at_the_start(
     world.wait_ready()
     world.run(1)
     assert world.store.outcomes() == [outcome]
+
+
+def test_other_stations_hear_of_a_list_only_if_it_is_a_new_one() -> None:
+    """A station that timed out may write the same list again."""
+    world = World(speeds=(115200,), flash=OLD_FLASH)
+    world.wait_ready()
+    station, other = GroundStation(world), GroundStation(world, "other", sysid=254)
+    other.send(ack_message(MissionResult.ACCEPTED))
+    heard: list[list[str]] = []
+    for items in (OLD, NEW, NEW, []):
+        other.take()
+        assert Upload(station, items).run() is MissionResult.ACCEPTED
+        world.run(1)
+        heard.append(other.texts())
+    assert heard == [[], ["New mission, 30 items, by udp gcs"], [], ["Mission erased, by udp gcs"]]

@@ -88,6 +88,33 @@ def test_a_record_that_is_not_stored_is_noticed_and_the_old_list_restored() -> N
     assert "refused a record" in world.store.missions[-1][1].detail  # type: ignore[union-attr]
 
 
+@pytest.mark.parametrize("first", ["a refused record", "an arming"])
+def test_after_a_failed_upload_the_next_failure_restores_the_old_list_too(first: str) -> None:
+    """A MultiWii's list is not read again after a failure, so the bridge must remember it."""
+    board = FakeMultiwii()
+    world, station = found(board)
+    old = plan(12)
+    assert Upload(station, old).run() is ACCEPTED
+    if first == "an arming":
+        upload = Upload(GroundStation(world, "far", radio=Radio(delay_s=0.02)), plan(10, 1))
+        world.run_until(lambda _: len(upload.requested) == 10, 5)
+        board.armed = True
+        assert upload.run() is DENIED
+        board.armed = False
+        world.run(3)
+    honest = board.store
+
+    def store(number: int, record: bytes) -> None:
+        if record not in packed(plan(12, 2))[5:]:
+            honest(number, record)
+
+    board.store = store  # type: ignore[method-assign]
+    for _ in range(2):
+        assert Upload(station, plan(12, 2)).run() is MissionResult.INVALID
+        assert board.flown == packed(old)
+        world.run(5)
+
+
 def test_half_a_list_on_an_empty_board_cannot_be_flown() -> None:
     inav = FakeInav(drop=lambda frame: "request" if frame.command == Nav.SET_WP and frame.payload[0] == 20 else "")
     world, station = found(inav)
