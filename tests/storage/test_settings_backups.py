@@ -3,6 +3,7 @@
 
 import math
 import sqlite3
+from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
@@ -16,8 +17,9 @@ TABLE = {"p_roll": 40.0, "i_roll": 30.0, "nan": math.nan}
 
 
 @pytest.fixture
-def backups() -> SettingsBackups:
-    return store_in_memory().backups
+def backups() -> Iterator[SettingsBackups]:
+    with store_in_memory() as store:
+        yield store.backups
 
 
 def test_a_backup_reads_back_with_its_line(backups: SettingsBackups) -> None:
