@@ -144,6 +144,7 @@ class Bridge:
             on_frames,
             {name: replace(access, passes_everything=passes_everything) for name, access in config.links.items()},
             LinkAccess(passes_everything=passes_everything),
+            config.is_near,
         )
         self._routes = Routes(ground)
         runner = self._runner = Runner()
@@ -232,7 +233,6 @@ class Bridge:
         # The front door: calls that one part answers. First the ground stations' side.
         self.gcs_received, self.take_datagrams = self._incoming.received, ground.take_datagrams
         self.add_default_peer, self.remove_default_peer = ground.add_default_peer, ground.remove_default_peer
-        self.displaced = ground.displaced
         #: Other programs, on a share.
         self.program_joined, self.program_left = self._sharing.join, self._sharing.leave
         #: Shows a text to each ground station that connects from now on.

@@ -51,7 +51,8 @@ class BridgeConfig:
     """The configuration of one bridge. `speeds`: of the port, baud; (None,) if it has no speed.
 
     `version`: of the bridge itself. `unix_time_s`: the time of day at a monotonic time, None if unknown.
-    `links`: access rules by link name; every station may write over other links. `flight`: of the craft that a previous
+    `links`: access rules by link name; every station may write over other links. `is_near`: True for an IP address on
+    this machine's own networks, without a router in between. `flight`: of the craft that a previous
     bridge left armed. `seals`: of the settings of the boards seen before.
     """
 
@@ -60,6 +61,7 @@ class BridgeConfig:
     compid: int = 1
     profiles: Sequence[Profile] = PROFILES
     links: Mapping[str, LinkAccess] = field(default_factory=dict)
+    is_near: Callable[[str], bool] = lambda _address: True
     version: str = ""
     unix_time_s: Callable[[float], float | None] = lambda _now: None
     flight: FlightMemory | None = None

@@ -76,12 +76,19 @@ class Relay:
     """One vehicle and its ground stations.
 
     `to_vehicle` gets the frames for it, `write` the lists, () to clear; the reply is `wrote`. Missions are received
-    here once the vehicle's mission is known (`holds`), which shows that it stores missions itself.
+    here once the vehicle's mission is known (`holds`), which shows that it stores missions itself. `is_near`: as of
+    Ground.
     """
 
-    def __init__(self, to_vehicle: Callable[[bytes], object], write: Callable[[Sequence[MissionItem]], object]) -> None:
+    def __init__(
+        self,
+        to_vehicle: Callable[[bytes], object],
+        write: Callable[[Sequence[MissionItem]], object],
+        is_near: Callable[[str], bool] = lambda _host: True,
+    ) -> None:
         self._to_vehicle = to_vehicle
         self._write = write
+        self._is_near = is_near
         self._splitter = MavlinkSplitter()
         self._peers: list[tuple[Peer, bool]] = []
         self._end: _End | None = None
@@ -130,7 +137,7 @@ class Relay:
         """Pass on frames of the vehicle."""
         for frame in self._splitter.feed(data):
             if self._end is None:
-                self._end = _End(frame.sender, self._to_vehicle, self._write)
+                self._end = _End(frame.sender, self._to_vehicle, self._write, self._is_near)
                 for peer, until_answered in self._peers:
                     self._end.ground.add_default_peer(peer, until_answered=until_answered)
                 self._end.holds(*self._held)
@@ -156,11 +163,12 @@ class _End:
         ids: tuple[int, int],
         to_vehicle: Callable[[bytes], object],
         write: Callable[[Sequence[MissionItem]], object],
+        is_near: Callable[[str], bool],
     ) -> None:
         self.ids = ids
         self._to_vehicle = to_vehicle
         self._targets = {(system, component) for system in (0, ids[0]) for component in (0, ids[1])}
-        self.ground = Ground(*ids, _ignore, lambda _station, _now: None, None, {}, LinkAccess())
+        self.ground = Ground(*ids, _ignore, lambda _station, _now: None, None, {}, LinkAccess(), is_near)
         self._runner = Runner()
         self.missions = _RemoteMissions(Vehicle(), self._runner, self.ground, write)
         self.uploads = MissionUploads(self.missions, self.ground, _ignore, count(1), lambda _peer, _now: None)
@@ -191,6 +199,8 @@ class _End:
         if packed is None:
             self.ground.forward([frame.raw], self.ground.everyone())
             return
+        if frame.msgid == m.MAVLINK_MSG_ID_HEARTBEAT:
+            self.ground.show_heartbeat(packed)
         self.ground.multicast(packed, self.ground.everyone())
         message = decode(frame) if frame.msgid in _HEARD else None
         if message is not None and frame.msgid == m.MAVLINK_MSG_ID_HEARTBEAT:
@@ -205,14 +215,14 @@ class _End:
         self.missions.is_local = self.missions.is_local or is_known
 
     def received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> None:
-        sender = self.ground.sender(peer, now, datagram=datagram)
+        sender = self.ground.sender(peer, len(data), now, datagram=datagram)
         if sender is None:
             return
         for frame in self.ground.split(sender, data, datagram=datagram):
             if not (sender.is_heard or self.ground.admits(sender, now)):
                 return
-            self.ground.heard(sender, frame, frame.sender, now)
-            if not self._is_answered(Station(peer, *frame.sender), frame, now):
+            is_connected = self.ground.heard(sender, frame, frame.sender, now)
+            if is_connected and not self._is_answered(Station(peer, *frame.sender), frame, now):
                 self._to_vehicle(frame.raw)
 
     def _item(self, convert: Callable[[Message], MissionItem], station: Station, message: Message, now: float) -> None:

@@ -18,10 +18,13 @@ class Rate:
 
 
 class Cost(IntEnum):  # hashed for each datagram: as an int, in C
-    """The limited kinds of work. Two limits: for a station or host with its own budget, and for all others together.
+    """The limited kinds of work. Two limits: for one address, and for all together that have no proven rights.
 
-    RECEIVED: a datagram or a read from a connection.
-    ARRIVAL: a new peer, which costs greetings and a log entry.
+    RECEIVED: a datagram or a read from a connection. The total is for addresses that are not known yet.
+    CONTACT: an address that is not known yet, which costs memory for some seconds. FAR_CONTACT: one behind a router, as
+    anybody may forge.
+    ARRIVAL: a station that is served from now on, which costs greetings and a log entry. In a second there are fewer
+    than places, so that they displace no station that sends heartbeats.
     ANSWER: a message sent on request. Mission Planner requests about sixty when it connects, most of them parameters.
     LIST: a list of all parameters, several hundred messages.
     TRANSFER: a message of a mission transfer; over a fast link there may be a thousand items a second.
@@ -31,6 +34,8 @@ class Cost(IntEnum):  # hashed for each datagram: as an int, in C
     PASSED: a frame for an autopilot that speaks MAVLink itself, over a slow line.
     COPIED: a copy of a station's frame for another station, alongside such an autopilot.
     STORED: a list in the store that did not reach the flight controller.
+    FLASH: a write to the flight controller's flash, whose pages endure 10,000 each: strangers would have to write for a
+    month. A Harakiri with the mission extension has its own limit (docs/msp-mission.md).
     RECORDED: a ground station's frame in the telemetry log, whose space is mostly for the flight itself.
     """
 
@@ -43,7 +48,9 @@ class Cost(IntEnum):  # hashed for each datagram: as an int, in C
         return cost
 
     RECEIVED = Rate(1500, 3000), Rate(15000, 15000)
-    ARRIVAL = Rate(5, 32), Rate(50, 200)
+    CONTACT = Rate(5, 32), Rate(50, 200)
+    FAR_CONTACT = Rate(1, 8), Rate(10, 20)
+    ARRIVAL = Rate(2, 16), Rate(10, 20)
     ANSWER = Rate(50, 600), Rate(500, 3000)
     LIST = Rate(1 / 2, 10), Rate(2, 40)
     TRANSFER = Rate(1000, 2000), Rate(1000, 8000)
@@ -53,14 +60,9 @@ class Cost(IntEnum):  # hashed for each datagram: as an int, in C
     PASSED = Rate(200, 600), Rate(200, 600)
     COPIED = Rate(150, 300), Rate(150, 300)
     STORED = Rate(1 / 10, 20), Rate(1 / 5, 40)
+    FLASH = Rate(1 / 600, 200), Rate(1 / 300, 400)
     RECORDED = Rate(50, 400), Rate(100, 800)
 
 
-#: Hosts with a budget of their own.
-SEATS = 16
-#: Writes to the flash (bridge.gcs.flash_budget) for each seat, and for all hosts without one: 17 times 2 at once, and
-#: 17 times 1 in two hours.
-FLASH_RESERVE = Rate(1 / 7200, 2)
-#: For all: with the reserves it makes 400 at once, and 12 an hour.
-FLASH_SHARED = Rate(3.5 / 3600, 366)
-FLASH_PROVEN = Rate(1 / 300, 400)
+#: The text for a ground station that may not write to the flash now.
+TOO_MANY_WRITES = "Flash wear limit: try again in 10 minutes"

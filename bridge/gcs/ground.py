@@ -5,11 +5,10 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf
 
-from bridge.gcs.budget import HostBudgets
+from bridge.gcs.budget import Budgets
 from bridge.gcs.cost import Cost
-from bridge.gcs.flash_budget import FlashBudget
 from bridge.gcs.ground_station import GroundStation, Speaker
-from bridge.gcs.places import MAX_LISTENERS, MAX_PEERS, Places
+from bridge.gcs.return_path import ReturnPath
 from bridge.gcs.rights import LinkAccess, Standing
 from bridge.gcs.station import RECORDER, Peer, Severity, Station
 from bridge.gcs.texts import cut_text, split_text
@@ -24,6 +23,10 @@ from protocols.mission_item import MissionResult
 EXPIRY_S = 60.0
 #: This time applies to a station whose ids have all moved to another address, as after Wi-Fi roaming.
 MOVED_S = 5.0
+#: This time applies to a station that has not shown that it receives anything.
+_UNPROVEN_S = 5.0
+#: Stations with a copy of the telemetry.
+MAX_STATIONS = 32
 #: A connected station, whether or not it transfers a mission, is never silent for this long.
 _STILL_S = 1.0
 #: The interval between searches for silent stations.
@@ -40,7 +43,8 @@ class Ground:
     """The ground stations. `on_newcomer` is called for one that is new or returns after a silence.
 
     `access`: the rules of each link; a link without rules is `open_access`. A station that may only read gets telemetry
-    and answers, but no texts for everyone, and is not recorded.
+    and answers, but no texts for everyone, and is not recorded. `is_near`: True for an address on the machine's own
+    networks, without a router in between.
     """
 
     def __init__(
@@ -52,6 +56,7 @@ class Ground:
         on_frames: FrameListener | None,
         access: Mapping[str, LinkAccess],
         open_access: LinkAccess,
+        is_near: Callable[[str], bool] = lambda _host: True,
     ) -> None:
         self._ids = sysid, compid
         self._emit = emit
@@ -60,13 +65,16 @@ class Ground:
         self.on_frames = on_frames or _drop
         self._access = access
         self._open_access = open_access
+        self._is_near = is_near
         self._heard: dict[Peer, GroundStation] = {}  # in order of arrival
         #: Configured stations, and connections, that have not sent a frame.
         self._unheard: dict[Peer, GroundStation] = {}
+        #: Stations that have not shown that they receive anything.
+        self._unproven: dict[Peer, GroundStation] = {}
+        #: The vehicle's ids and last heartbeat: all that such a station gets.
+        self._heartbeat: tuple[tuple[int, int], Packed] | None = None
         self._default_peers: dict[Peer, bool] = {}
-        self._places: dict[tuple[str, bool], Places] = {}
-        self.hosts = HostBudgets()
-        self.flash = FlashBudget()
+        self._budgets = Budgets()
         #: Frames to be sent.
         self._outgoing: defaultdict[GroundStation, list[bytes]] = defaultdict(list)
         self._text_id = 0
@@ -101,11 +109,11 @@ class Ground:
         return heard
 
     def station(self, peer: Peer) -> GroundStation | None:
-        return self._heard.get(peer) or self._unheard.get(peer)
+        return self._heard.get(peer) or self._unheard.get(peer) or self._unproven.get(peer)
 
     def speaker(self, station: Station) -> Speaker:
         """The sender with the station's ids; an empty one if its address has too many to remember."""
-        there = self._heard.get(station.peer)
+        there = self._heard.get(station.peer) or self.station(station.peer)
         return (there and there.speakers.get((station.sysid, station.compid))) or Speaker()
 
     def peers(self) -> list[Peer]:
@@ -126,11 +134,8 @@ class Ground:
 
     def gone(self, peer: Peer) -> None:
         """Forget a station; a configured one starts from scratch."""
-        self._unheard.pop(peer, None)
-        station = self._heard.pop(peer, None)
-        if station is not None and station.places is not None:
-            station.places.remove(station)
-            station.leaves()
+        for stations in (self._unheard, self._heard, self._unproven):
+            stations.pop(peer, None)
         self._everyone = None
         if peer in self._default_peers:
             self._unheard[peer] = self._made(peer)
@@ -145,7 +150,10 @@ class Ground:
             moved = all(latest[peer.link, ids] > each.heard_at for ids, each in station.speakers.items())
             if now >= station.heard_at + (MOVED_S if moved else EXPIRY_S):
                 self._leaves(station)
-        self.due = now + _EXPIRY_INTERVAL_S if self._heard else inf
+        for peer, station in [*self._unproven.items()]:
+            if now >= station.heard_at + _UNPROVEN_S:
+                del self._unproven[peer]
+        self.due = now + _EXPIRY_INTERVAL_S if self._heard or self._unproven else inf
 
     def _leaves(self, station: GroundStation) -> None:
         self.gone(station.peer)
@@ -153,31 +161,27 @@ class Ground:
 
     def _made(self, peer: Peer, *, is_connection: bool = False) -> GroundStation:
         access = self._access.get(peer.link, self._open_access)
-        return GroundStation(peer, access, *self._ids, self.hosts.host(peer.host) if is_connection else None)
-
-    def _places_of(self, station: GroundStation) -> Places:
-        key = station.peer.link, station.is_listener
-        places = self._places.get(key)
-        if places is None:
-            places = self._places[key] = Places(MAX_LISTENERS if station.is_listener else MAX_PEERS)
-        return places
+        return GroundStation(peer, access, *self._ids, self._budgets.of(peer.host) if is_connection else None)
 
     # Received from them.
 
-    def sender(self, peer: Peer, now: float, *, datagram: bool) -> GroundStation | None:
+    def sender(self, peer: Peer, size: int, now: float, *, datagram: bool) -> GroundStation | None:
         """The sender of a read or a datagram; None if it sends too many. A new one is remembered when it is admitted.
 
-        New addresses share one limit, because they may be made up; a connection cannot be.
+        The address of a datagram may be made up, unlike that of a connection.
         """
-        station = self._heard.get(peer) or self._unheard.get(peer)
+        station = self._heard.get(peer) or self.station(peer)
         if station is None:
             station = self._made(peer, is_connection=not datagram)
             if not datagram:
                 self._unheard[peer] = station
-        is_allowed = station.allows(Cost.RECEIVED, now) and (
-            station.host is not None or self.hosts.totals[Cost.RECEIVED].take(now)
-        )
-        return station if is_allowed else None
+            elif isinstance(peer.key, tuple):
+                station.return_path = ReturnPath(is_near=self._is_near(str(peer.host)))
+        if station.return_path is not None:
+            station.return_path.received(size)
+        if station.budget is None:
+            return station if self._budgets.totals[Cost.RECEIVED].take(now) else None
+        return station if station.budget.allows(Cost.RECEIVED, now, is_proven=True) else None
 
     def split(self, station: GroundStation, data: bytes, *, datagram: bool) -> list[MavlinkFrame]:
         """Parse bytes from a station into frames. A datagram holds whole frames only."""
@@ -189,74 +193,77 @@ class Ground:
 
     def admits(self, station: GroundStation, now: float) -> bool:
         """False if a station's first frame must be ignored, because it comes from one of too many new addresses."""
-        if station.standing is not Standing.PROVEN and not self._places_of(station).has_room_for(station.peer):
-            return False
-        station.host = self.hosts.host(station.peer.host)
-        return station.standing is Standing.PROVEN or station.host.allows(Cost.ARRIVAL, now)
+        station.budget = self._budgets.of(station.peer.host)
+        path = station.return_path
+        return station.has_key or station.allows(
+            Cost.CONTACT if path is None or path.is_near else Cost.FAR_CONTACT, now
+        )
 
-    def heard(self, station: GroundStation, frame: MavlinkFrame, sender: tuple[int, int], now: float) -> None:
-        """Note a frame from a station, which counts as connected from now on."""
-        peer = station.peer
-        is_unknown = not station.is_heard
-        if station.places is None:
-            self._takes_place(station, now)
-        else:
-            station.places.stations.move_to_end(peer)
-        if station.heard(frame, sender, now):
-            self._on_newcomer(station, now)
-        if is_unknown:
-            name = Station(peer, *sender)
-            self._emit(GcsFound(station=str(name)))
-            for notice in self.notices:
-                self.say(Severity.WARNING, notice, name)
+    def heard(self, station: GroundStation, frame: MavlinkFrame, sender: tuple[int, int], now: float) -> bool:
+        """Note a frame from a station. False if it must first show that it receives what is sent to it.
 
-    def _takes_place(self, station: GroundStation, now: float) -> None:
-        places = self._places_of(station)
-        if (displaced := places.displaced_by(station.peer)) is not None:
-            self._leaves(displaced)
-        places.add(station)
-        station.joins()
-        self._unheard.pop(station.peer, None)
+        On an own network it is answered meanwhile, but gets no telemetry.
+        """
+        path, peer = station.return_path, station.peer
+        is_new = station.heard(frame, sender, now)
+        if peer in self._heard:
+            if is_new:
+                self._on_newcomer(station, now)
+            return True
+        is_proven = path is None or station.has_key or path.is_proven_by(frame)
+        if is_proven and (station.has_key or station.allows(Cost.ARRIVAL, now)):
+            self._joins(station, Station(peer, *sender), now)
+            return True
+        if path is None:
+            return True
+        self._unproven[peer] = station
+        self.due = min(self.due, now + _EXPIRY_INTERVAL_S)
+        self._ask(station, path)
+        return path.is_near
+
+    def _joins(self, station: GroundStation, name: Station, now: float) -> None:
+        if len(self._heard) >= MAX_STATIONS:
+            self._leaves(min(self._heard.values(), key=lambda each: (each.standing is Standing.PROVEN, each.heard_at)))
+        for stations in (self._unheard, self._unproven):
+            stations.pop(station.peer, None)
+        station.return_path = None
         self._heard[station.peer] = station
         self._everyone = None
         self.due = min(self.due, now + _EXPIRY_INTERVAL_S)
+        self._on_newcomer(station, now)
+        self._emit(GcsFound(station=str(name)))
+        for notice in self.notices:
+            self.say(Severity.WARNING, notice, name)
+
+    def show_heartbeat(self, heartbeat: Packed, ids: tuple[int, int] | None = None) -> None:
+        """Keep the vehicle's last heartbeat for stations that have just been heard. `ids`: of an autopilot."""
+        self._heartbeat = ids or self._ids, heartbeat
+
+    def _ask(self, station: GroundStation, path: ReturnPath) -> None:
+        """Reply to a datagram with the vehicle's heartbeat and a question that only its address gets."""
+        if self._heartbeat is None or station in self._outgoing:
+            return
+        ids, heartbeat = self._heartbeat
+        writer = station.writer if ids == self._ids else FrameWriter(*ids, station.access.signer)
+        self._outgoing[station].append(writer.frame(heartbeat, 2))
+        if (question := path.question()) is not None:
+            self._outgoing[station].append(writer.frame(pack(question), 2))
+        elif path.is_near and not station.reads_v2_only:
+            self._outgoing[station].append(writer.frame(heartbeat, 1))
 
     def record(self, station: GroundStation, frame: MavlinkFrame) -> None:
         if self.on_frames is not _drop and not station.is_listener and station.allows(Cost.RECORDED):
             self.on_frames([frame.raw])
 
-    def displaced(self, peers: Mapping[Peer, float]) -> Peer:
-        """The connection of a full link to drop: the one silent for longest, those with their own budget last.
-
-        `peers`: when each was last heard.
-        """
-
-        def worth(peer: Peer) -> tuple[bool, bool, float]:
-            station = self._heard.get(peer)
-            return station is not None and station.has_own_budget, station is not None, peers[peer]
-
-        return min(peers, key=worth)
-
-    def has_own_budget(self, peer: Peer) -> bool:
-        """True for a connected station whose limits strangers cannot use up."""
-        return (station := self._heard.get(peer)) is not None and station.has_own_budget
-
     def allows(self, station: Station, cost: Cost) -> bool:
         """Count work that a ground station causes; False if that exceeds its limit."""
-        return (sender := self._heard.get(station.peer)) is not None and sender.allows(cost)
-
-    def allows_write(self, station: Station, now: float) -> bool:
-        """Count a write to the flight controller's flash; False if it must wait."""
-        return self.flash.allows(self._heard.get(station.peer), now)
+        sender = self._heard.get(station.peer) or self.station(station.peer)
+        return sender is not None and sender.allows(cost)
 
     def not_written(self, station: Station) -> None:
         """Take back a write: the flash held the same already, or the flight controller refused."""
-        self.flash.not_written(self._heard.get(station.peer))
-
-    def wrote_at(self, station: Station) -> float:
-        """The time of the last write by the station's host: the one that has waited longest writes first."""
-        sender = self._heard.get(station.peer)
-        return inf if sender is None or sender.host is None else sender.host.wrote_at
+        if (sender := self.station(station.peer)) is not None:
+            sender.give_back(Cost.FLASH)
 
     def record_flight(self, *, on: bool) -> None:
         """Log everything that a connected ground station would get, even if there is none."""
@@ -269,7 +276,7 @@ class Ground:
 
     def moved_to(self, station: Station, now: float) -> list[Station]:
         """The new addresses of a station that fell silent at its old one: usually none."""
-        old = self._heard.get(station.peer)
+        old = self.station(station.peer)
         if old is None or now < old.heard_at + _STILL_S:
             return []
         return [where for where in self.elsewhere(station) if self.has_moved(station, where, now)]
@@ -277,7 +284,8 @@ class Ground:
     def elsewhere(self, station: Station) -> list[Station]:
         """Other addresses where these ids were heard."""
         ids = station.sysid, station.compid
-        others = (peer for peer, there in self._heard.items() if ids in there.speakers and peer != station.peer)
+        everywhere = (*self._heard.items(), *self._unproven.items())
+        others = (peer for peer, there in everywhere if ids in there.speakers and peer != station.peer)
         return [Station(peer, *ids) for peer in others]
 
     def has_moved(self, station: Station, to: Station, now: float) -> bool:
@@ -286,12 +294,13 @@ class Ground:
         This excludes a second station with the same ids, heard earlier or alongside the first.
         """
         ids = station.sysid, station.compid
-        old, new = self._heard.get(station.peer), self._heard.get(to.peer)
+        old, new = self.station(station.peer), self.station(to.peer)
         if old is None or new is None or old is new or ids != (to.sysid, to.compid):
             return False
         return (
             now >= old.heard_at + _STILL_S
-            and new.places is old.places
+            and new.peer.link == old.peer.link
+            and new.is_listener == old.is_listener
             and ids in new.speakers
             and new.came_at >= old.heard_at
         )
@@ -302,6 +311,8 @@ class Ground:
         """The datagrams to send; each holds whole frames. Those of one station are in order."""
         datagrams: list[tuple[Peer, bytes]] = []
         for station, frames in self._outgoing.items():
+            if station.return_path is not None:
+                frames = [*filter(station.return_path.allows, frames)]
             together = b"".join(frames)
             if len(together) <= MAX_DATAGRAM_SIZE:
                 datagrams.append((station.peer, together))
@@ -312,7 +323,7 @@ class Ground:
 
     def to(self, station: Station, *together: Message) -> None:
         """Send messages in one datagram to one ground station, unless it has left."""
-        receiver = self._heard.get(station.peer) or self._unheard.get(station.peer)
+        receiver = self._heard.get(station.peer) or self.station(station.peer)
         if receiver is not None:
             self._send(receiver, receiver.writer, together)
 
@@ -362,6 +373,7 @@ class Ground:
         knows only MAVLink 1 would not see the vehicle otherwise. Signed links need no MAVLink 1.
         """
         packed = pack(heartbeat)
+        self.show_heartbeat(packed)
         logged: bytes | None = None
         for station in stations:
             frames = [station.writer.frame(packed, version) for version in ((2,) if station.reads_v2_only else (2, 1))]

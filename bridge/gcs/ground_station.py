@@ -3,11 +3,11 @@
 
 from collections import defaultdict
 from math import inf
-from typing import TYPE_CHECKING
 
-from bridge.gcs.budget import Budget, HostBudget
+from bridge.gcs.budget import Budget
 from bridge.gcs.cost import Cost
 from bridge.gcs.message_rates import MessageRates
+from bridge.gcs.return_path import ReturnPath
 from bridge.gcs.rights import FrameRefusal, LinkAccess, Standing
 from bridge.gcs.station import RECORDER, Peer
 from bridge.gcs.texts import RecentTexts
@@ -17,14 +17,8 @@ from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame, MavlinkSplitter
 from protocols.mavlink.signing import Check
 from protocols.rights.effect import Effect
 
-if TYPE_CHECKING:
-    from bridge.gcs.places import Places
-
 #: After such a silence a station may have been restarted: all send a heartbeat each second.
 _RETURNS_S = 3.0
-#: A station is steady once it has been heard this often, with pauses of at least `_BEAT_S`, like heartbeats at 1 Hz.
-_STEADY_BEATS = 3
-_BEAT_S = 0.7
 #: Ids remembered for one address: a router may carry a fleet, but forged ids must not fill the memory.
 _MAX_SPEAKERS = 64
 _SETUP = "set the key in naze-bridge's settings"
@@ -103,29 +97,26 @@ class GroundStation:
     It is one address, a UDP peer or a TCP connection, because rights, limits, MAVLink version and message rates belong
     to an address. Several MAVLink ids may speak from there, behind a radio or a router: `speakers` has them all, and
     the short-lived `Station` names one of them where a message must be addressed. All that is known about a station is
-    here, so dropping this object forgets it, except for its `host`, which is remembered longer.
+    here, so dropping this object forgets it, except for its `budget`, which is remembered longer.
     """
 
-    def __init__(self, peer: Peer, access: LinkAccess, sysid: int, compid: int, host: HostBudget | None = None) -> None:
+    def __init__(self, peer: Peer, access: LinkAccess, sysid: int, compid: int, budget: Budget | None = None) -> None:
         self.peer = peer
         self.access = access
         #: None until a datagram was accepted: forged addresses must cost no memory.
-        self.host = host
-        self._own_budget: Budget | None = None
+        self.budget = budget
+        #: None once it is known that the station receives what is sent to its address.
+        self.return_path: ReturnPath | None = None
         #: It has sent a valid signature.
         self.has_key = False
         self._settle_rights()
         self.splitter = MavlinkSplitter()
         self.writer = FrameWriter(sysid, compid, access.signer)
         self.is_heard = False
-        #: The places of its link, of which it holds one; None until it is heard.
-        self.places: Places | None = None
         #: The highest MAVLink version that it has sent, and the version of replies: everything signed is MAVLink 2.
         self.version = 0
         self.frame_version = 2
         self.came_at = self.heard_at = -inf
-        self._beats = 0
-        self._beat_at = -inf
         #: The senders there, by sysid and compid.
         self.speakers: dict[tuple[int, int], Speaker] = {}
         #: It has sent REQUEST_DATA_STREAM; a command.
@@ -150,7 +141,8 @@ class GroundStation:
         check = Check.VALID if signing is None else signing.check(frame)
         if signing is not None and check is Check.VALID:
             if not self.has_key:
-                self._has_shown_key()
+                self.has_key = True
+                self._settle_rights()
         elif self.has_key:
             # A duplicate made by the network, or another sender posing as this station.
             return FrameRefusal(str(check.value), effect in _ROUTINE, is_forged=True)
@@ -167,46 +159,22 @@ class GroundStation:
             return FrameRefusal(_ADDRESS, is_routine=True)
         return FrameRefusal(_NOT_OVER_OPEN_LINK, effect in _ROUTINE)
 
-    def _has_shown_key(self) -> None:
-        """Its first valid signature. It gives up its place as a listener, and takes another once it is heard."""
-        if self.places is not None:
-            self.places.remove(self)
-            self.leaves()
-        self.has_key = True
-        self._settle_rights()
-
     def _settle_rights(self) -> None:
         self.standing = self.access.standing(self.peer, has_key=self.has_key)
         self.rights = self.access.rights(self.standing)
         self.is_listener = self.standing is Standing.LISTENER
 
-    @property
-    def has_own_budget(self) -> bool:
-        """True if other hosts cannot use up the station's limits."""
-        return self._own_budget is not None or (self.is_heard and self.host is not None and self.host.seat is not None)
-
     def allows(self, cost: Cost, now: float | None = None) -> bool:
         """Count work caused by the last message of the station, or at `now`; False if it exceeds the limit."""
-        budget = self._own_budget or self.host
-        return budget is None or budget.allows(cost, self.heard_at if now is None else now)
+        is_proven = self.standing is Standing.PROVEN
+        return self.budget is None or self.budget.allows(
+            cost, self.heard_at if now is None else now, is_proven=is_proven
+        )
 
-    # Arrival and departure.
-
-    @property
-    def is_steady(self) -> bool:
-        return self._beats >= _STEADY_BEATS
-
-    def joins(self) -> None:
-        """The station has taken a place on its link, or gained other rights there."""
-        if self.standing is Standing.PROVEN:
-            self._own_budget = Budget()
-        elif self.host is not None:
-            self.host.join(may_sit=self.standing is Standing.OPEN)
-
-    def leaves(self) -> None:
-        """The station loses its place on its link, or is about to gain other rights."""
-        if self._own_budget is None and self.host is not None:
-            self.host.leave()
+    def give_back(self, cost: Cost) -> None:
+        """Take back work that was allowed, but not done."""
+        if self.budget is not None:
+            self.budget.give_back(cost, is_proven=self.standing is Standing.PROVEN)
 
     def heard(self, frame: MavlinkFrame, sender: tuple[int, int], now: float) -> bool:
         """Note a frame; True if the station is new, or returns after a silence, perhaps restarted."""
@@ -222,11 +190,6 @@ class GroundStation:
             speaker = self.speakers[sender] = Speaker()
         if speaker is not None:
             speaker.heard(frame, now)
-        if self._beats < _STEADY_BEATS and now >= self._beat_at + _BEAT_S:
-            self._beats, self._beat_at = self._beats + 1, now
-        host = self.host if self.standing is Standing.OPEN and self._beats >= _STEADY_BEATS else None
-        if host is not None and not (host.is_steady and host.seat is not None):
-            host.stays()
         return is_new
 
     # Sending.

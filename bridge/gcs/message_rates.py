@@ -6,15 +6,10 @@ Intervals are in seconds; infinity: never.
 
 from collections.abc import Mapping, Sequence
 from math import inf
-from typing import TYPE_CHECKING
+from typing import Protocol, TypeVar
 
-if TYPE_CHECKING:
-    from bridge.gcs.ground_station import GroundStation
-
-#: Messages a second to all stations with their own budget: at least 75 for each of the first 16. The defaults are 46.
+#: Messages a second to all stations together, in equal shares: the defaults are 46 for each.
 _MOST_PER_S = 1200
-#: The same to all other stations: telemetry for a crowd must leave a Pi Zero time for the pilot.
-_MOST_TO_OTHERS_PER_S = 400
 #: A station may get its share of this time in one burst.
 _BURST_S = 1.0
 #: A message due within this fraction of its interval is sent now, because the readings arrive at their own rate.
@@ -24,15 +19,14 @@ _EARLY = 0.25
 class MessageRates:
     """One station's requests and schedule, by message id.
 
-    Each message uses `cost_s` of its time; messages are sent while `used_until` is not more than a burst ahead.
+    Each message uses some of its share; messages are sent while `used_until` is not more than a burst ahead.
     """
 
-    __slots__ = "cost_s", "due", "requested", "used_until"
+    __slots__ = "due", "requested", "used_until"
 
     def __init__(self) -> None:
         self.requested: dict[int, float] = {}
         self.due: dict[int, float] = {}
-        self.cost_s = 1 / _MOST_PER_S
         self.used_until = -inf
 
     def request(self, msgid: int, interval_s: float | None) -> None:
@@ -51,15 +45,18 @@ class MessageRates:
         return not self.requested
 
 
-def share_out(stations: Sequence["GroundStation"]) -> None:
-    """Divide the messages a second between the stations: the share of those with a budget does not depend on others."""
-    own = sum(station.has_own_budget for station in stations)
-    for station in stations:
-        others = len(stations) - own
-        station.rates.cost_s = own / _MOST_PER_S if station.has_own_budget else others / _MOST_TO_OTHERS_PER_S
+class Receiver(Protocol):
+    """A ground station, as far as its rates matter."""
+
+    @property
+    def rates(self) -> MessageRates:
+        """Its requests and schedule."""
 
 
-def fastest_s(stations: Sequence["GroundStation"], defaults_s: Mapping[int, float]) -> Mapping[int, float]:
+_Receiver = TypeVar("_Receiver", bound=Receiver)
+
+
+def fastest_s(stations: Sequence[Receiver], defaults_s: Mapping[int, float]) -> Mapping[int, float]:
     """The shortest interval for each message."""
     special = [station.rates for station in stations if not station.rates.is_default]
     if stations and not special:
@@ -71,9 +68,9 @@ def fastest_s(stations: Sequence["GroundStation"], defaults_s: Mapping[int, floa
     }
 
 
-def take_due(stations: Sequence["GroundStation"], msgid: int, default_s: float, now: float) -> list["GroundStation"]:
+def take_due(stations: Sequence[_Receiver], msgid: int, default_s: float, now: float) -> list[_Receiver]:
     """The stations for which the message is due now; schedules the next one for each."""
-    taken = []
+    taken, cost_s = [], len(stations) / _MOST_PER_S
     for station in stations:
         rates = station.rates
         if rates.used_until > now + _BURST_S:
@@ -82,7 +79,7 @@ def take_due(stations: Sequence["GroundStation"], msgid: int, default_s: float, 
         due = rates.due.get(msgid, -inf)
         if interval_s == inf or now < due - interval_s * _EARLY:
             continue
-        rates.used_until = max(rates.used_until, now) + rates.cost_s
+        rates.used_until = max(rates.used_until, now) + cost_s
         # Counted from the due time to keep the rate, but missed messages are not caught up.
         rates.due[msgid] = (due if now < due + interval_s else now) + interval_s
         taken.append(station)

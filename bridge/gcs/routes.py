@@ -9,19 +9,17 @@ not heard yet go to the autopilot.
 from collections.abc import Sequence
 from itertools import takewhile
 
-from bridge.gcs.cost import SEATS, Cost
+from bridge.gcs.cost import Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import GroundStation
+from protocols.mavlink.codec import repack
 from protocols.mavlink.dialect import messages
-from protocols.mavlink.frame import MavlinkFrame
+from protocols.mavlink.frame import MavlinkFrame, is_autopilot_heartbeat
 
 #: Messages remembered that have no target: all of one dialect from a few components.
 _MAX_KINDS = 1024
-#: Stations without their own budget that get a datagram of telemetry, if more than 16 are connected.
-_OTHERS = 3
 #: Carries a signing key in the clear. The guard refuses it from ground stations.
 _NEVER_FORWARDED = messages.MAVLINK_MSG_ID_SETUP_SIGNING
-_HEARTBEAT = messages.MAVLINK_MSG_ID_HEARTBEAT
 
 
 class Routes:
@@ -34,15 +32,16 @@ class Routes:
     def forget(self) -> None:
         """Begin again with another autopilot."""
         self._aboard: set[tuple[int, int]] = set()
-        #: The station without its own budget that is the next to get telemetry.
-        self._turn = 0
-        #: The kinds (protocols.mavlink.frame) of messages without a target.
+        #: The kinds (protocols.mavlink.frame) of messages without a target, and of the autopilot's heartbeat.
         self._for_all: set[bytes] = set()
+        self._heartbeats: set[bytes] = set()
 
     def from_autopilot(self, frames: Sequence[bytes], kinds: Sequence[bytes]) -> None:
         """Send the autopilot's frames on; those that arrived together share datagrams unless one has a target."""
         if self._for_all.issuperset(kinds) or all(map(self._is_for_all, kinds, map(MavlinkFrame, frames))):
             self._send(frames)
+            if not self._heartbeats.isdisjoint(kinds):
+                self._show_heartbeat(frames)
             return
         for frame in map(MavlinkFrame, frames):
             self._send_alone(frame)
@@ -83,7 +82,14 @@ class Routes:
         self._aboard.add(frame.sender)
         if len(self._for_all) < _MAX_KINDS:
             self._for_all.add(kind)
+            if is_autopilot_heartbeat(frame):
+                self._heartbeats.add(kind)
         return True
+
+    def _show_heartbeat(self, frames: Sequence[bytes]) -> None:
+        for frame in filter(is_autopilot_heartbeat, map(MavlinkFrame, frames)):
+            if (heartbeat := repack(frame)) is not None:
+                self._ground.show_heartbeat(heartbeat, frame.sender)
 
     def _send_alone(self, frame: MavlinkFrame) -> None:
         self._aboard.add(frame.sender)
@@ -98,14 +104,4 @@ class Routes:
 
     def _send(self, frames: Sequence[bytes]) -> None:
         self._ground.on_frames(frames)
-        stations = self._ground.everyone()
-        if len(stations) > SEATS and _HEARTBEAT not in (MavlinkFrame(raw).msgid for raw in frames):
-            stations = self._with_some_others(stations)
-        self._ground.forward(frames, stations)
-
-    def _with_some_others(self, stations: Sequence[GroundStation]) -> list[GroundStation]:
-        """The stations with their own budget, and a few of the others in turn: a crowd does not multiply the load."""
-        own = [station for station in stations if station.has_own_budget]
-        others = [station for station in stations if not station.has_own_budget]
-        self._turn = (self._turn + _OTHERS) % max(len(others), 1)
-        return own + (others[self._turn :] + others[: self._turn])[:_OTHERS]
+        self._ground.forward(frames, self._ground.everyone())

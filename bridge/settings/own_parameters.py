@@ -10,7 +10,7 @@ must not exist: FENCE_TOTAL, RALLY_TOTAL and COMPASS_PRIO1_ID (Mission Planner),
 import math
 from collections.abc import Callable
 
-from bridge.gcs.flash_budget import TOO_MANY_WRITES
+from bridge.gcs.cost import TOO_MANY_WRITES, Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.station import Severity, Station
 from bridge.line.conversation import LinkLost
@@ -72,7 +72,7 @@ class OwnParameters:
             return
         elif self._missions.armed_refusal() is not None:
             refusal = f"{WP_RADIUS} stays {radius_cm:.0f}: {PushFailure.ARMED.value}"
-        elif not self._ground.allows_write(station, now):
+        elif not self._ground.allows(station, Cost.FLASH):
             refusal = TOO_MANY_WRITES
         else:
             self._write(fc_store, wanted_cm, station, now, send)

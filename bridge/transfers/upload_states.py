@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Uploads: their states from MISSION_COUNT to the final MISSION_ACK, the events, and whose turn it is."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum, auto
 from math import inf
 
-from bridge.gcs.station import Peer, Station
+from bridge.gcs.station import Station
 from bridge.missions.list_check import ListCheck
 from bridge.missions.mission_service import OCCUPIED
 from bridge.model.refusal import Refusal
@@ -289,13 +289,9 @@ class UploadQueue:
     def undelivered(self) -> list[Upload]:
         return [upload for upload in self.uploads if not isinstance(upload.state, Delivering)]
 
-    def least_worth(self, has_standing: Callable[[Peer], bool]) -> Upload:
-        """The upload to end if too many run: a stranger's, one without items, the oldest."""
-
-        def worth(upload: Upload) -> tuple[bool, bool, float]:
-            return has_standing(upload.station.peer), bool(upload.state.received), upload.state.deadline
-
-        return min(self.undelivered(), key=worth)
+    def least_worth(self) -> Upload:
+        """The upload to end if too many run: one without items, the oldest."""
+        return min(self.undelivered(), key=lambda upload: (bool(upload.state.received), upload.state.deadline))
 
     def remove(self, upload: Upload, now: float) -> None:
         self._last_end = now

@@ -11,11 +11,9 @@ from functools import partial
 from math import inf
 from typing import Any
 
-from bridge.gcs.cost import Cost
-from bridge.gcs.flash_budget import TOO_MANY_WRITES
+from bridge.gcs.cost import TOO_MANY_WRITES, Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import Speaker
-from bridge.gcs.places import MAX_PEERS
 from bridge.gcs.station import Peer, Severity, Station
 from bridge.line.conversation import Conversation
 from bridge.missions.fc_mission_store import StoreReport
@@ -54,8 +52,8 @@ from reports.finding import Finding
 from reports.verdict import CLEARED_LIST, Result, Verdict
 
 _TOO_MANY_UPLOADS = Refusal(MissionResult.DENIED, "Too many uploads: wait a few seconds")
-#: The maximum number of simultaneous uploads: one for each peer of a link.
-_MOST_UPLOADS = MAX_PEERS
+#: The maximum number of simultaneous uploads: one address may have several stations.
+_MOST_UPLOADS = 64
 #: A ground station that reads the mission has given up an upload that was silent for this long.
 _SILENT_S = 1.0
 _AGAIN = Replaced("the station started again")
@@ -192,11 +190,7 @@ class MissionUploads:
             elif now >= state.due:
                 self._request(upload, now, *state.repeats(now))
         self.answers.tick(now)
-        waiting = self._queue.within(Waiting, Complete)
-        if len(waiting) > 1:
-            # The host that has waited longest comes first.
-            waiting.sort(key=lambda upload: self._ground.wrote_at(upload.station))
-        for upload in waiting:
+        for upload in self._queue.within(Waiting, Complete):
             event = self._turn(upload, now)
             if event is not None:
                 self._handle(upload, event, now)
@@ -225,7 +219,7 @@ class MissionUploads:
         if armed is not None:
             self._handle(upload, Ended(armed), now)
         elif len(self._queue.uploads) > _MOST_UPLOADS:
-            ended = self._queue.least_worth(self._ground.has_own_budget)
+            ended = self._queue.least_worth()
             self._handle(ended, Ended(_cancelled("ended: too many at once")), now)
 
     def _turn(self, upload: Upload, now: float) -> Event | None:
@@ -234,7 +228,7 @@ class MissionUploads:
         if isinstance(state, Complete):
             refusal = self._missions.acquire(upload)
             is_write = state.whole.verdict.result is not Result.REJECTED
-            if refusal is None and is_write and not self._ground.allows_write(upload.station, now):
+            if refusal is None and is_write and not self._ground.allows(upload.station, Cost.FLASH):
                 refusal = Refusal(MissionResult.DENIED, TOO_MANY_WRITES)
         else:
             refusal = OCCUPIED if self._queue.must_wait(now) else self._missions.occupied()

@@ -14,7 +14,7 @@ from enum import Enum
 from math import inf
 
 from bridge.fc.session import FcSession
-from bridge.gcs.flash_budget import TOO_MANY_WRITES
+from bridge.gcs.cost import TOO_MANY_WRITES, Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.station import Severity, Station
 from bridge.line.conversation import Conversation, LinkLost, Pause, Receive, ask, ask_status, send
@@ -114,7 +114,7 @@ class Calibration:
             self._acknowledge(station, command, CommandResult.IN_PROGRESS)
         elif self._action is not None:
             self._asked(station, command, action, ActionResult.RUNNING, now)
-        elif not self._ground.allows_write(station, now):
+        elif not self._ground.allows(station, Cost.FLASH):
             self._ground.say(Severity.ERROR, TOO_MANY_WRITES, station)
             self._acknowledge(station, command, CommandResult.TEMPORARILY_REJECTED)
         elif (refused := self._start(station, command, action, now)) is not None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from bridge.fc.fc_settings import Cause, SettingRefusal
 from bridge.fc.profile import Spoken
 from bridge.fc.session import FcSession
-from bridge.gcs.flash_budget import TOO_MANY_WRITES
+from bridge.gcs.cost import TOO_MANY_WRITES, Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.station import Severity, Station
 from bridge.model.flight_mode import MISSION_BOXES
@@ -213,7 +213,7 @@ class CommandService:
             self._acknowledge(station, command, CommandResult.DENIED)
         elif settings.is_saved or not (settings.unsaved or settings.obstacle() is None):
             self._acknowledge(station, command, CommandResult.ACCEPTED)
-        elif not self._ground.allows_write(station, now):
+        elif not self._ground.allows(station, Cost.FLASH):
             self._ground.say(Severity.ERROR, TOO_MANY_WRITES, station)
             self._acknowledge(station, command, CommandResult.TEMPORARILY_REJECTED)
         else:

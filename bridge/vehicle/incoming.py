@@ -9,6 +9,7 @@ from itertools import product
 from bridge.gcs.cost import Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import GroundStation
+from bridge.gcs.return_path import NOT_SHOWN
 from bridge.gcs.rights import FrameRefusal
 from bridge.gcs.routes import Routes
 from bridge.gcs.station import Peer, Severity, Station
@@ -56,7 +57,7 @@ class Incoming:
 
     def received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> bool:
         """Handle bytes from a ground station; False if they are dropped. A datagram holds whole frames only."""
-        sender = self._ground.sender(peer, now, datagram=datagram)
+        sender = self._ground.sender(peer, len(data), now, datagram=datagram)
         if sender is None:
             return False
         for frame in self._ground.split(sender, data, datagram=datagram):
@@ -73,8 +74,9 @@ class Incoming:
                     continue
             if not (sender.is_heard or self._ground.admits(sender, now)):
                 return False
-            self._ground.heard(sender, frame, ids, now)
-            if refused is not None:
+            if not self._ground.heard(sender, frame, ids, now):
+                self._ignore_unproven(sender, frame)
+            elif refused is not None:
                 self._answer_refused(refused, sender, frame)
             elif self.routes is not None:
                 self._pass_on(self.routes, sender, frame, effect)
@@ -83,6 +85,12 @@ class Incoming:
                 if target in self._our_targets:
                     self._router.take(sender, Station(peer, *ids), frame, msgid, now)
         return True
+
+    def _ignore_unproven(self, sender: GroundStation, frame: MavlinkFrame) -> None:
+        """Report a station that has not shown that it receives anything, once it had several opportunities."""
+        if sender.return_path is not None and sender.return_path.has_failed:
+            self.refused[sender.peer.link, NOT_SHOWN] += 1
+            self._report(FrameRefusal(NOT_SHOWN, is_routine=False), sender, frame)
 
     def _pass_on(self, routes: Routes, sender: GroundStation, frame: MavlinkFrame, effect: Effect) -> None:
         """Send a frame on to its targets, within its sender's rights."""
@@ -103,7 +111,7 @@ class Incoming:
 
     def _answer_refused(self, refused: FrameRefusal, sender: GroundStation, frame: MavlinkFrame) -> None:
         """Answer a refused frame under the ids that it addressed, if these are the vehicle's."""
-        is_first = self._report(refused, sender, frame)
+        self._report(refused, sender, frame)
         station = Station(sender.peer, *frame.sender)
         answers = partial(self._ground.to, station)
         is_vehicle = frame.target in self._our_targets
@@ -121,18 +129,18 @@ class Incoming:
         elif message is not None and frame.msgid == m.MAVLINK_MSG_ID_PARAM_SET and self.routes is None:
             # The protocol's answer is the current value.
             self._parameters.send(station, message.param_id)
-        if is_first:
-            answers(m.MAVLink_statustext_message(Severity.WARNING, f"Refused: {refused.why}".encode()))
+        text = f"Refused: {refused.why}"
+        if not refused.is_routine and sender.texts.is_new(text, sender.heard_at) and sender.allows(Cost.TEXT):
+            answers(m.MAVLink_statustext_message(Severity.WARNING, text.encode()))
 
-    def _report(self, refused: FrameRefusal, station: GroundStation, frame: MavlinkFrame) -> bool:
-        """Log a connected station's refusal once for each reason; True if it is the first."""
+    def _report(self, refused: FrameRefusal, station: GroundStation, frame: MavlinkFrame) -> None:
+        """Log a connected station's refusal once for each reason."""
         if refused.is_routine or refused.why in station.reported:
-            return False
+            return
         station.reported.add(refused.why)
         name, known = Station(station.peer, *frame.sender), MESSAGE_FORMATS.get(frame.msgid)
         message = str(frame.msgid if known is None else known.name)
         self._emit(GcsRefused(station=str(name), message=message, why=refused.why))
-        return True
 
 
 def _denial(message: Message, station: Station) -> Message | None:

@@ -11,10 +11,9 @@ from math import floor, inf
 
 from bridge.fc.msp_telemetry import POLL_FOR
 from bridge.fc.session import FcSession
-from bridge.gcs.cost import SEATS
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import GroundStation
-from bridge.gcs.message_rates import fastest_s, share_out, take_due
+from bridge.gcs.message_rates import fastest_s, take_due
 from bridge.gcs.station import Peer, Severity, Station
 from bridge.missions.mission_service import MissionService
 from bridge.model.airframe import Airframe
@@ -120,7 +119,6 @@ class OwnVehicle:
         # Polls are also due at whole seconds: one wake-up serves both.
         self._second_ends = floor(now) + _TICK_S
         everyone = self._ground.everyone()
-        share_out(everyone)
         self._set_polls(everyone)
         self._polls_set_at = now
         self.arming_reasons.follow(now)
@@ -133,14 +131,13 @@ class OwnVehicle:
         self._inform_newcomers(everyone, now)
 
     def _greet(self, now: float) -> None:
-        """Greet a few newcomers of a crowd: the others get a heartbeat a second."""
-        newcomers = [station for station in self._ground.everyone() if now < station.greeted_until][:SEATS]
+        newcomers = [station for station in self._ground.everyone() if now < station.greeted_until]
         self._newcomers_due = now + _NEWCOMER_INTERVAL_S if newcomers else inf
         self._ground.beat(self._heartbeat(now), newcomers)
 
     def _inform_newcomers(self, everyone: Sequence[GroundStation], now: float) -> None:
-        """Tell home and the reasons not to arm: to a crowd, each second to some."""
-        newcomers = [station for station in everyone if not station.is_informed][:SEATS]
+        """Tell home and the reasons not to arm."""
+        newcomers = [station for station in everyone if not station.is_informed]
         for message in self._moment(now).made(_HOME) if newcomers else ():
             self._ground.multicast(pack(message), newcomers)
         for station in newcomers:

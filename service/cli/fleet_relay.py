@@ -2,7 +2,7 @@
 """`fleet mavlink` while it runs: the MAVLink of vehicles between zenoh and local ground stations, and its messages."""
 
 import asyncio
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from math import inf
 
 import click
@@ -111,10 +111,6 @@ class FleetRelay:
 
     def gcs_gone(self, peer: Peer) -> None:
         self._relays.gcs_gone(peer, self._loop.time())
-
-    def displaced(self, peers: Mapping[Peer, float]) -> Peer:
-        """The connection silent for longest."""
-        return min(peers, key=peers.__getitem__)
 
     def _remove(self, name: str) -> None:
         self._relays.remove(name)

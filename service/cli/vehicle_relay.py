@@ -15,6 +15,8 @@ from payloads.mission_data import Json, mission_findings, mission_items
 from protocols.mission_file import write_qgc_wpl
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.mission_record import ListIdentity
+from service.machine.host import Host
+from service.machine.own_networks import OwnNetworks
 from service.machine.threads import post
 
 #: The router reports a vehicle's subscription within this time.
@@ -44,7 +46,7 @@ class VehicleRelay:
         self._loop = asyncio.get_running_loop()
         self._session, self._prefix, self._name, self._bridges = session, prefix, name, bridges
         self._sent, self._on_input = sent, on_input
-        self.relay = Relay(lambda data: self._input.put(data), self._write)
+        self.relay = Relay(lambda data: self._input.put(data), self._write, OwnNetworks(Host()))
         self._input = session.declare_publisher(
             self._key(MAVLINK_IN.suffix),
             congestion_control=zenoh.CongestionControl.DROP,

@@ -33,6 +33,7 @@ from service.links.traffic import Traffic
 from service.machine import event_loop
 from service.machine.host import Host
 from service.machine.log_setup import warn_once
+from service.machine.own_networks import OwnNetworks
 from service.machine.package import version
 from service.recording.tlog_recorder import TLOG_FOLDER, TlogRecorder
 from service.settings import Settings
@@ -91,6 +92,7 @@ class Daemon:
                 _speeds(settings.fc),
                 settings,
                 links={**self._signing.links, **_ZENOH},
+                is_near=OwnNetworks(host),
                 version=version(),
                 unix_time_s=lambda now: time.time() - self._loop.time() + now,
                 flight=self._flight.load(self._loop.time()),

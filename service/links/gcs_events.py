@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Events from a link to ground stations."""
 
-from collections.abc import Mapping
 from typing import Protocol
 
 from bridge.gcs.station import Peer
@@ -15,9 +14,6 @@ class GcsEvents(Protocol):
 
     def gcs_gone(self, peer: Peer) -> None:
         """A connection was closed."""
-
-    def displaced(self, peers: Mapping[Peer, float]) -> Peer:
-        """The connection of a full link to close. `peers`: when each was last heard, oldest first."""
 
     def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
         """Send to `peer` before it is heard; with `until_answered` only until any peer of its link is."""

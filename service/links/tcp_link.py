@@ -4,6 +4,7 @@
 import asyncio
 import errno
 import socket
+from collections import Counter
 from collections.abc import Callable
 from functools import partial
 
@@ -68,7 +69,12 @@ class TcpLink:
                 self._resting = self._loop.call_later(_REST_S, self._listen)
             return
         if len(self._clients) >= _MAX_CLIENTS:
-            displaced = self._events.displaced({peer: client.heard_at for peer, client in self._clients.items()})
+            # Of the machine with the most connections one that has sent nothing, or the one silent for longest.
+            connections = Counter(peer.host for peer in self._clients)
+            displaced, _ = max(
+                self._clients.items(),
+                key=lambda each: (connections[each[0].host], not each[1].has_sent, -each[1].heard_at),
+            )
             warn_once(
                 self._warned, "gcs.too_many_clients", link=self.name, displaced=str(displaced), limit=_MAX_CLIENTS
             )
@@ -109,7 +115,7 @@ class _TcpClient:
         self._loop = loop
         self._received = received
         #: When it last sent bytes, on the loop's clock; at first the time of the connection.
-        self.heard_at = loop.time()
+        self.heard_at, self.has_sent = loop.time(), False
         self._gone = gone
         self._unsent = SendQueue(_MAX_UNSENT)
         self._hanging_up: asyncio.Handle | None = None
@@ -170,7 +176,7 @@ class _TcpClient:
         except OSError:
             data = b""
         if data:
-            self.heard_at = self._loop.time()
+            self.heard_at, self.has_sent = self._loop.time(), True
             self._received(data)
         else:
             self._hang_up()

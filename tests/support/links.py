@@ -3,7 +3,6 @@
 
 import asyncio
 import socket
-from collections.abc import Mapping
 from contextlib import ExitStack
 
 from bridge.gcs.station import Peer
@@ -25,9 +24,6 @@ class RecordedEvents:
 
     def gcs_gone(self, peer: Peer) -> None:
         self.gone.append(peer)
-
-    def displaced(self, peers: Mapping[Peer, float]) -> Peer:
-        return min(peers, key=peers.__getitem__)
 
     def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
         self.default_peers[peer] = until_answered

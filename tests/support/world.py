@@ -8,7 +8,7 @@ bytes to the flight controller, each with a right, deadlines in the future, a bo
 import heapq
 import itertools
 import random
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -28,7 +28,7 @@ from bridge.fc.states.cli import Cli
 from bridge.fc.states.mavlink import MavlinkLine
 from bridge.fc.states.msp import Polling
 from bridge.fc.states.searching import SPEEDS
-from bridge.gcs.ground import MAX_DATAGRAM_SIZE, FrameListener
+from bridge.gcs.ground import FrameListener
 from bridge.gcs.rights import LinkAccess
 from bridge.gcs.station import Peer
 from bridge.line.conversation import Conclude, FindPending, NoteReader, Recall, Save, StoreEffect
@@ -137,7 +137,8 @@ class World:
     """By default the board is powered and booted at time 0, when the port opens.
 
     `flash`: initial contents of its flash. `peer`: a device in place of the simulated Naze (fake_controllers).
-    `late_s`: maximum delay of the bridge's wake-ups, as on a busy machine. `links`: write access per link.
+    `late_s`: maximum delay of the bridge's wake-ups, as on a busy machine. `links`: write access per link. `is_near`:
+    True for an address on the bridge's own networks; stations with a name instead of an address need no proof.
     """
 
     def __init__(
@@ -153,6 +154,7 @@ class World:
         peer: Any = None,
         late_s: float = 0.0,
         links: Mapping[str, LinkAccess] | None = None,
+        is_near: Callable[[str], bool] = lambda _host: True,
         profiles: Sequence[Profile] = PROFILES,
         passes_everything: bool = False,
         on_frames: FrameListener | None = None,
@@ -178,6 +180,7 @@ class World:
             speeds,
             BridgeSettings(pass_through=PassThroughRule.EVERYTHING) if passes_everything else BridgeSettings(),
             links=links or {},
+            is_near=is_near,
             profiles=profiles,
             seals=seals or SealsOfThisRun(),
         )
@@ -438,7 +441,7 @@ class GroundStation:
     def __init__(
         self,
         world: World,
-        name: str = "gcs",
+        name: Hashable = "gcs",
         *,
         sysid: int = 255,
         compid: int = 190,
@@ -508,9 +511,9 @@ class GroundStation:
         return [message.text.rstrip() for message in self.messages("STATUSTEXT")]
 
     def _arrived(self, frame: bytes) -> None:
-        found = MavlinkSplitter().feed(frame)
+        found = MavlinkSplitter().feed(frame, is_end=True)
         assert b"".join(each.raw for each in found) == frame, f"not whole frames: {frame.hex()}"
-        assert len(found) == 1 or len(frame) <= MAX_DATAGRAM_SIZE
+        assert len(found) == 1 or len(frame) <= 280
         for each in found:
             self.frames.append(each.raw)
             self._undecoded.append((self.world.now, each.raw))

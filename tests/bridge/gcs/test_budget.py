@@ -4,12 +4,16 @@
 import gc
 from collections import Counter
 
+import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
-from bridge.gcs.budget import Budget, HostBudget, HostBudgets
-from bridge.gcs.cost import SEATS, Cost
+from bridge.gcs.budget import Budget, Budgets
+from bridge.gcs.cost import Cost
+from bridge.gcs.station import Station
+from protocols.mission_item import MissionResult
 from protocols.msp.frame import MspParser
-from tests.support.world import GroundStation, ready_world
+from tests.support.conversations import Upload, waypoints
+from tests.support.world import GroundStation, World, ready_world
 
 
 def test_texts_are_limited() -> None:
@@ -22,91 +26,87 @@ def test_texts_are_limited() -> None:
     assert 200 < len(station.texts()) <= 200 + 5 * 10 + 5
 
 
-def host(hosts: HostBudgets, number: int, *, may_sit: bool = False) -> HostBudget:
-    """A host with one connected station."""
-    host = hosts.host(f"10.0.0.{number}")
-    host.join(may_sit=may_sit)
-    return host
-
-
-def spent(budget: Budget, cost: Cost, now: float = 0.0) -> int:
+def spent(budget: Budget, cost: Cost, now: float = 0.0, *, is_proven: bool = False) -> int:
     """The number of messages that it allows until it has refused a hundred."""
     allowed = refused = 0
-    while refused < 100 and allowed < 10_000:
-        if budget.allows(cost, now):
+    while refused < 100 and allowed < 20_000:
+        if budget.allows(cost, now, is_proven=is_proven):
             allowed += 1
         else:
             refused += 1
     return allowed
 
 
-def test_hosts_without_a_seat_share_the_total_in_equal_parts() -> None:
-    hosts = HostBudgets()
-    crowd = [host(hosts, number) for number in range(20)]
-    for cost in Cost:
-        parts = [spent(one, cost) for one in crowd]
-        assert sum(parts) <= max(cost.total.burst, len(crowd))
-        assert min(parts) >= min(max(1, int(cost.total.burst / 20)), int(cost.each.burst)), cost
+@pytest.mark.parametrize("cost", Cost)
+def test_a_crowd_uses_up_the_total_but_not_the_budget_of_a_station_with_rights(cost: Cost) -> None:
+    budgets = Budgets()
+    crowd = [spent(budgets.of(f"10.0.0.{number}"), cost) for number in range(60)]
+    assert crowd[0] == min(cost.each.burst, cost.total.burst)
+    assert sum(crowd) == cost.total.burst
+    assert spent(budgets.of("pilot"), cost, is_proven=True) == cost.each.burst
 
 
-def test_a_crowd_uses_up_neither_a_seat_nor_the_budget_of_a_proven_station() -> None:
-    hosts = HostBudgets()
-    pilot = host(hosts, 1)
-    pilot.stays()
-    crowd = [host(hosts, number) for number in range(2, 60)]
-    for cost in Cost:
-        for stranger in crowd:
-            spent(stranger, cost)
-        assert spent(pilot, cost) == cost.each.burst
-        assert spent(Budget(), cost) == cost.each.burst
+def test_an_address_that_comes_back_has_the_budget_that_it_left() -> None:
+    budgets = Budgets()
+    assert spent(budgets.of("10.0.0.1"), Cost.BOARD) == 20
+    assert spent(budgets.of("10.0.0.1"), Cost.BOARD) == 0
 
 
-def test_a_host_that_comes_back_has_the_budget_that_it_left() -> None:
-    hosts = HostBudgets()
-    stranger = host(hosts, 1)
-    assert spent(stranger, Cost.BOARD) == Cost.BOARD.each.burst
-    stranger.leave()
-    assert spent(host(hosts, 1), Cost.BOARD) == 0
-
-
-def test_a_seat_is_free_again_when_its_host_has_left() -> None:
-    hosts = HostBudgets()
-    seated = [host(hosts, number, may_sit=True) for number in range(SEATS)]
-    late = host(hosts, 99, may_sit=True)
-    for one in (*seated, late):
-        one.stays()
-    assert [late.seat] == [None]
-    seated[3].leave()
-    late.stays()
-    assert late.seat is not None
-    assert sum(one.seat is not None for one in seated) == SEATS - 1
-    assert hosts.without_seat == 0
-
-
-def test_made_up_hosts_lose_their_seats_to_one_that_stays() -> None:
-    hosts = HostBudgets()
-    made_up = [host(hosts, number, may_sit=True) for number in range(30)]
-    pilot = host(hosts, 99, may_sit=True)
-    pilot.stays()
-    assert [one.seat is not None for one in made_up] == [True] * (SEATS - 1) + [False] * 15
-    assert pilot.seat is not None
-    assert hosts.without_seat == 15
-
-
-def test_thousands_of_hosts_are_not_remembered() -> None:
-    hosts = HostBudgets()
-    pilot = host(hosts, 1)
+def test_thousands_of_addresses_are_not_remembered() -> None:
+    budgets = Budgets()
     for number in range(5000):
-        hosts.host(("made up", number)).allows(Cost.ARRIVAL, 0.0)
-    assert hosts.host("10.0.0.1") is pilot
+        budgets.of(("made up", number)).allows(Cost.ANSWER, 0.0)
     gc.collect()
-    assert sum(isinstance(each, HostBudget) for each in gc.get_objects()) < 3000
+    assert sum(isinstance(each, Budget) for each in gc.get_objects()) < 2000
 
 
 def test_limits_do_not_depend_on_when_the_clock_starts() -> None:
-    stranger = host(HostBudgets(), 1)
+    stranger = Budgets().of("10.0.0.1")
     for now in (1e5, 1e5 + 1, 1e9, 1e9):
         assert stranger.allows(Cost.RECEIVED, now)
+
+
+@pytest.mark.parametrize("hosts", [1, 15, 240])
+def test_a_flash_page_survives_a_month_of_writes_by_strangers(hosts: int) -> None:
+    """A page endures 10,000 erases."""
+    budgets = Budgets()
+    writes = 0
+    for minute in range(0, 30 * 24 * 60, 5):
+        writes += sum(budgets.of(host).allows(Cost.FLASH, minute * 60.0) for host in range(hosts))
+    assert writes < 10_000
+
+
+def test_one_stranger_leaves_half_of_the_flash_writes_to_others() -> None:
+    budgets = Budgets()
+    assert spent(budgets.of("stranger"), Cost.FLASH) == 200
+    assert spent(budgets.of("pilot"), Cost.FLASH) == 200
+
+
+def writes_left(world: World, station: GroundStation) -> int:
+    at = Station(station.peer, station.sysid, station.compid)
+    return sum(world.inside.ground.allows(at, Cost.FLASH) for _ in range(500))
+
+
+def test_an_unchanged_list_is_not_counted_as_a_flash_write() -> None:
+    world = ready_world()
+    pilot = GroundStation(world)
+    for _ in range(40):
+        assert Upload(pilot, waypoints(3)).run(2) is MissionResult.ACCEPTED
+    assert writes_left(world, pilot) == 199
+
+
+def test_a_command_that_the_board_did_not_execute_is_not_counted_as_a_flash_write() -> None:
+    world = ready_world()
+    pilot = GroundStation(world)
+    world.faults.armed = True
+    for message in (
+        m.MAVLink_command_long_message(1, 1, m.MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 1, *[0] * 5),
+        m.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", 500, 9),
+    ):
+        # Before the bridge has noticed that it is armed.
+        pilot.send(message)
+        world.run(1)
+    assert writes_left(world, pilot) == 200
 
 
 def test_a_flood_of_counts_is_not_logged() -> None:

@@ -111,7 +111,7 @@ def test_a_requested_mission_current_has_the_askers_numbers() -> None:
 def test_the_numbers_survive_a_restart_of_the_bridge() -> None:
     world, board = bench()
     names = {("10.0.0.2", 50001): 255, ("10.0.0.3", 50002): 254}
-    sender, reader = (GroundStation(world, name, sysid=sysid) for name, sysid in names.items())  # type: ignore[arg-type]
+    sender, reader = (GroundStation(world, name, sysid=sysid) for name, sysid in names.items())
     for station in (sender, reader):
         assert Upload(station, WITH_TAKEOFF).run() is MissionResult.ACCEPTED
     Download(reader).run()
@@ -119,8 +119,8 @@ def test_the_numbers_survive_a_restart_of_the_bridge() -> None:
     restarted, _ = bench(board, world.store)
     # A TCP connection has another port now.
     names = {("10.0.0.2", 61000): 255, ("10.0.0.3", 50002): 254, ("10.0.0.4", 50001): 255}
-    again = [GroundStation(restarted, name, sysid=sysid) for name, sysid in names.items()]  # type: ignore[arg-type]
-    for station in again:
+    again = [GroundStation(restarted, name, sysid=sysid) for name, sysid in names.items()]
+    for station in [*again, *again]:
         station.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
     fly(restarted, board, 2)
     assert [current(station) for station in again] == [(3, 4), (2, 3), (2, 3)]

@@ -5,7 +5,6 @@ import asyncio
 import os
 import resource
 import socket
-from collections.abc import Mapping
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
@@ -32,9 +31,6 @@ class Listener:
 
     def gcs_gone(self, peer: Peer) -> None:
         """The connection is closed."""
-
-    def displaced(self, peers: Mapping[Peer, float]) -> Peer:
-        return min(peers, key=peers.__getitem__)
 
     def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
         self.peers.append(peer)
