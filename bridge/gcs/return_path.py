@@ -22,7 +22,7 @@ _NONCES = 1 << 47
 _ENOUGH_QUESTIONS = 4
 #: The reason why frames of such a station are ignored, and the text for its user.
 NOT_SHOWN = "behind a router, and answers no PING or TIMESYNC"
-_ADVICE = b"Behind a router: use a key, or connect by TCP"
+_ADVICE = "Behind a router: use a key, or connect by TCP"
 
 
 class ReturnPath:
@@ -74,5 +74,5 @@ class ReturnPath:
             case 2:
                 return m.MAVLink_timesync_message(0, self._nonce)
             case 0:
-                return m.MAVLink_statustext_message(Severity.WARNING, _ADVICE)
+                return m.MAVLink_statustext_message(Severity.WARNING, _ADVICE.encode())
         return None
