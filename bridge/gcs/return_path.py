@@ -52,7 +52,7 @@ class ReturnPath:
             return self._datagrams > 1
         if not self._nonce or frame.msgid not in (m.MAVLINK_MSG_ID_PING, m.MAVLINK_MSG_ID_TIMESYNC):
             return False
-        answer = decode(frame.msgid, frame.payload)
+        answer = decode(frame)
         if frame.msgid == m.MAVLINK_MSG_ID_PING:
             return answer is not None and answer.target_system != 0 and answer.time_usec == self._nonce
         return answer is not None and answer.tc1 != 0 and answer.ts1 == self._nonce
