@@ -2,8 +2,9 @@
 """Makes a release: `make release VERSION=0.3.0`, or `python -m deb.release 0.3.0` in the project's folder.
 
 It cuts the changelog, commits, tags the commit and builds the source archive, the wheel and the Debian packages in
-dist/VERSION, with their checksums and the release notes. With a signing key (`git config user.signingkey`) the tag and
-the checksums are signed. Nothing is pushed. If a step fails, fix its cause and run it again: finished steps are kept.
+dist/VERSION, with their checksums and the release notes. The tag, the packages and the checksums are signed with git's
+user.signingkey, which must be one of deb/signers. Nothing is pushed. If a step fails, fix its cause and run it again:
+finished steps are kept.
 """
 
 import hashlib
@@ -14,6 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from deb.build import build, build_python
+from deb.sign import ReleaseError, check_key, sign, sign_package
 
 _PROJECT = Path(__file__).resolve().parent.parent
 _CHANGELOG = _PROJECT / "CHANGELOG.md"
@@ -24,10 +26,6 @@ _ARCHITECTURES = ("amd64", "arm64", "armhf")
 SUMS, NOTES = "SHA256SUMS", "NOTES.md"
 
 
-class ReleaseError(Exception):
-    """A reason not to release; one sentence."""
-
-
 def release(version: str, architectures: tuple[str, ...] = _ARCHITECTURES) -> Path:
     """Make the release; returns the folder of its files."""
     newest = released_versions(_CHANGELOG.read_text())[0]
@@ -35,6 +33,7 @@ def release(version: str, architectures: tuple[str, ...] = _ARCHITECTURES) -> Pa
         raise ReleaseError(f"{version!r} is not a version: write three numbers, as in 0.3.0")
     if _git("status", "--porcelain"):
         raise ReleaseError("there are uncommitted changes: commit or stash them first")
+    check_key()
     if version != newest:
         if _numbers(version) <= _numbers(newest):
             raise ReleaseError(f"{version} is not newer than {newest}, the last release in CHANGELOG.md")
@@ -42,23 +41,23 @@ def release(version: str, architectures: tuple[str, ...] = _ARCHITECTURES) -> Pa
         _PYPROJECT.write_text(_FALLBACK.sub(f'fallback-version = "{version}"', _PYPROJECT.read_text()))
         _git("commit", "--quiet", "--all", "--message", f"Release {version}")
     notes = section(_CHANGELOG.read_text(), version)
-    is_signed = bool(_git("config", "--default", "", "--get", "user.signingkey"))
     if not _git("tag", "--list", version):
         if section(_CHANGELOG.read_text(), "Unreleased"):
             raise ReleaseError(f"CHANGELOG.md has changes after {version}: tag the commit that released it by hand")
         # Verbatim, because # begins a heading in the notes.
-        how = ("--sign",) if is_signed else ("--annotate",)
-        _git("tag", *how, "--cleanup=verbatim", "--message", f"naze-bridge {version}\n\n{notes}", version)
+        _git("tag", "--sign", "--cleanup=verbatim", "--message", f"naze-bridge {version}\n\n{notes}", version)
     if _git("rev-parse", f"{version}^{{commit}}") != _git("rev-parse", "HEAD"):
         raise ReleaseError(f"the tag {version} is on another commit: git checkout {version}, and run this again")
     folder = _PROJECT / "dist" / version
     folder.mkdir(parents=True, exist_ok=True)
     files = [*build_python(folder), *(build(each, folder=folder) for each in architectures)]
+    for package in files:
+        if package.suffix == ".deb":
+            sign_package(package)
     (folder / NOTES).write_text(notes)
     sums = folder / SUMS
     sums.write_text("".join(f"{hashlib.sha256(file.read_bytes()).hexdigest()}  {file.name}\n" for file in files))
-    if is_signed:
-        _sign(sums)
+    sign(sums, "file")
     return folder
 
 
@@ -87,17 +86,6 @@ def cut(changelog: str, version: str, date: str) -> str:
 
 def _numbers(version: str) -> tuple[int, ...]:
     return tuple(int(number) for number in version.split("."))
-
-
-def _sign(sums: Path) -> None:
-    if _git("config", "--default", "openpgp", "--get", "gpg.format") == "ssh":
-        key = str(Path(_git("config", "--get", "user.signingkey")).expanduser())
-        command = ["ssh-keygen", "-q", "-Y", "sign", "-n", "file", "-f", key, str(sums)]
-        sums.with_name(f"{SUMS}.sig").unlink(missing_ok=True)  # ssh-keygen would ask
-    else:
-        key = _git("config", "--get", "user.signingkey")
-        command = ["gpg", "--yes", "--armor", "--local-user", key, "--detach-sign", str(sums)]
-    subprocess.run(command, check=True)
 
 
 def _git(*words: str) -> str:

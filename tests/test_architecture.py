@@ -83,11 +83,11 @@ DECODERS = {
 #: They open files of the program itself or of the kernel, or a closed standard stream.
 OWN_FILES = {
     "payloads/compact.py",
+    "service/cli/helper/signature.py",
     "service/cli/program.py",
     "service/links/serial_ports.py",
     "service/machine/captive_portal.py",
     "service/machine/package.py",
-    "service/web/pi_control.py",
     "service/web/static_files.py",
     "storage/database.py",
     "storage/small_files.py",

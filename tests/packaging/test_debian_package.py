@@ -19,6 +19,7 @@ import pytest
 
 from deb.build import PYTHONS, build, fetch
 from service.cli.card import prepare
+from service.cli.helper.signature import SIGNERS
 from service.machine.helper_socket import UNITS
 from tests.support.bare_root import BareRoot
 
@@ -51,7 +52,7 @@ mkdir -p NetworkManager/dnsmasq-shared.d NetworkManager/system-connections avahi
 touch NetworkManager/system-connections/naze-bridge-hotspot.nmconnection avahi/services/naze-bridge.service
 touch NetworkManager/dnsmasq-shared.d/naze-bridge-captive.conf
 touch udev/rules.d/59-naze-bridge-others.rules naze-bridge/setup.toml naze-bridge/gcs.key naze-bridge/undo.json
-mkdir -p /var/lib/naze-bridge-helper /run/naze-bridge-helper
+mkdir -p /var/lib/naze-bridge-helper
 touch naze-bridge/page.toml /var/lib/naze-bridge-helper/previous.deb
 """
 _FORMER_ANSWERS = (
@@ -152,6 +153,7 @@ def test_the_package_has_the_expected_files(package: Path) -> None:
     for expected in (
         *(f"/usr/lib/naze-bridge/lib/python{python}/site-packages/{_SCHEMA}" for python in _PYTHONS),
         "/usr/bin/naze-bridge",
+        SIGNERS,
         *(f"/usr/lib/systemd/system/naze-bridge{name}" for name in _UNITS),
         "/usr/lib/udev/rules.d/60-naze-bridge.rules",
         "/usr/lib/sysusers.d/naze-bridge.conf",

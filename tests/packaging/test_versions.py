@@ -3,6 +3,7 @@
 
 import itertools
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -12,7 +13,11 @@ from pathlib import Path
 import pytest
 
 from deb.build import debian_version
-from deb.release import ReleaseError, cut, released_versions, section
+from deb.release import cut, released_versions, section
+from deb.sign import ReleaseError
+from service.cli.helper.signature import check_signature
+from tests.service.cli.helper.test_packages import packed
+from tests.support.release_key import ReleaseKey
 
 _REPOSITORY = Path(__file__).resolve().parents[2]
 _NEWEST = released_versions((_REPOSITORY / "CHANGELOG.md").read_text())[0]
@@ -44,6 +49,14 @@ class Clone:
         self.run("git", "clone", "--quiet", "--no-tags", str(_REPOSITORY), str(folder), inside=False)
         for key, value in (("user.name", "A"), ("user.email", "a@example.org"), ("commit.gpgsign", "false")):
             self.run("git", "config", key, value)
+
+    def has_key(self, key: ReleaseKey) -> None:
+        """Make it the maintainer's."""
+        self.run("git", "config", "gpg.format", "ssh")
+        self.run("git", "config", "user.signingkey", str(key.file))
+        shutil.copy(key.signers, self.folder / "deb")
+        self.run("git", "add", "deb/signers")
+        self.run("git", "commit", "--quiet", "--message", "key")
 
     def run(self, *command: str, inside: bool = True) -> str:
         environment = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
@@ -122,7 +135,9 @@ def test_a_cut_makes_a_section_of_the_unreleased_changes() -> None:
         cut(changed, "0.4.0", "2026-03-03")
 
 
-def test_a_release_is_tagged_built_and_summed(clone: Clone) -> None:
+def test_a_release_is_tagged_built_summed_and_signed(clone: Clone, tmp_path: Path) -> None:
+    key = ReleaseKey(tmp_path / "key")
+    clone.has_key(key)
     (clone.folder / "CHANGELOG.md").write_text(_CHANGELOG.replace("0.2.0", _NEWEST))
     clone.run("git", "commit", "--quiet", "--all", "--message", "changes")
     folder = Path(clone.release("97.0.0").splitlines()[-1])
@@ -131,9 +146,14 @@ def test_a_release_is_tagged_built_and_summed(clone: Clone) -> None:
     assert clone.run("git", "tag", "--list", "--format=%(contents:body)", "97.0.0").startswith("### Added")
     assert clone.run("git", "status", "--porcelain") == ""
     assert {path.name for path in folder.iterdir()} == {
-        *("naze_bridge-97.0.0-py3-none-any.whl", "naze_bridge-97.0.0.tar.gz", "SHA256SUMS", "NOTES.md"),
+        *("naze_bridge-97.0.0-py3-none-any.whl", "naze_bridge-97.0.0.tar.gz"),
+        *("SHA256SUMS", "SHA256SUMS.sig", "NOTES.md"),
     }
     subprocess.run(["sha256sum", "--check", "--quiet", "SHA256SUMS"], cwd=folder, check=True)
+    assert "BEGIN SSH SIGNATURE" in clone.run("git", "cat-file", "tag", "97.0.0")
+    named = ("-I", "naze-bridge", "-n", "file", "-s", "SHA256SUMS.sig")
+    check = ["ssh-keygen", "-Y", "verify", "-f", str(key.signers), *named]
+    subprocess.run(check, cwd=folder, input=(folder / "SHA256SUMS").read_bytes(), capture_output=True, check=True)
     assert (folder / "NOTES.md").read_text() == "### Added\n\n- A thing.\n\n### Fixed\n\n- A fault."
     # The source archive builds the same version without git.
     subprocess.run(["tar", "-xf", folder / "naze_bridge-97.0.0.tar.gz", "-C", clone.folder.parent], check=True)
@@ -144,20 +164,6 @@ def test_a_release_is_tagged_built_and_summed(clone: Clone) -> None:
     clone.release("97.0.0")
 
 
-@pytest.mark.skipif(shutil.which("ssh-keygen") is None, reason="ssh-keygen is not installed")
-def test_a_signing_key_signs_the_tag_and_the_checksums(clone: Clone, tmp_path: Path) -> None:
-    key = tmp_path / "key"
-    subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", key], check=True)
-    clone.run("git", "config", "gpg.format", "ssh")
-    clone.run("git", "config", "user.signingkey", str(key))
-    (clone.folder / "CHANGELOG.md").write_text(_CHANGELOG.replace("0.2.0", _NEWEST))
-    clone.run("git", "commit", "--quiet", "--all", "--message", "changes")
-    folder = Path(clone.release("97.0.0").splitlines()[-1])
-    assert "BEGIN SSH SIGNATURE" in clone.run("git", "cat-file", "tag", "97.0.0")
-    check = ["ssh-keygen", "-Y", "check-novalidate", "-n", "file", "-s", f"{folder}/SHA256SUMS.sig"]
-    subprocess.run(check, input=(folder / "SHA256SUMS").read_bytes(), capture_output=True, check=True)
-
-
 def refusal(clone: Clone, version: str) -> str:
     attempt = f"try: release.release({version!r}, ())\nexcept release.ReleaseError as error: print(error)"
     return clone.run(sys.executable, "-c", f"from deb import release\n{attempt}")
@@ -166,11 +172,38 @@ def refusal(clone: Clone, version: str) -> str:
 @pytest.mark.parametrize(
     ("version", "reason"), [("", "not a version"), ("1.0", "not a version"), ("0.1.0", "not newer")]
 )
-def test_a_wrong_version_is_refused(clone: Clone, version: str, reason: str) -> None:
+def test_a_wrong_version_is_refused(clone: Clone, tmp_path: Path, version: str, reason: str) -> None:
+    clone.has_key(ReleaseKey(tmp_path / "key"))
     assert reason in refusal(clone, version)
     assert clone.run("git", "tag") == ""
 
 
-def test_uncommitted_changes_are_refused(clone: Clone) -> None:
+def test_an_unsigned_release_is_refused(clone: Clone, tmp_path: Path) -> None:
+    assert "there is no SSH key to sign with" in refusal(clone, "97.0.0")
+    clone.has_key(ReleaseKey(tmp_path / "key"))
+    clone.run("git", "config", "user.signingkey", str(ReleaseKey(tmp_path / "other").file))
+    assert "is not one of deb/signers" in refusal(clone, "97.0.0")
+    assert clone.run("git", "tag") == ""
+
+
+def test_a_package_is_signed_with_the_maintainers_key(clone: Clone, tmp_path: Path) -> None:
+    key = ReleaseKey(tmp_path / "key")
+    clone.has_key(key)
+    package = packed(tmp_path)
+    clone.run(sys.executable, "-m", "deb.sign", str(package))
+    check_signature(package, key.signers)
+
+
+def test_uncommitted_changes_are_refused(clone: Clone, tmp_path: Path) -> None:
+    clone.has_key(ReleaseKey(tmp_path / "key"))
     (clone.folder / "README.md").write_text("other\n")
     assert "uncommitted changes" in refusal(clone, "97.0.0")
+
+
+def test_the_forge_runs_only_pinned_actions() -> None:
+    files = sorted((_REPOSITORY / ".github/workflows").glob("*.yml"))
+    used = [
+        line.split("uses:")[1].split()[0] for file in files for line in file.read_text().splitlines() if "uses:" in line
+    ]
+    assert used
+    assert [action for action in used if not re.fullmatch(r"[a-z/-]+@[0-9a-f]{40}", action)] == []

@@ -24,6 +24,7 @@ def helper_bench(directory: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[t
     pi = FixablePi(directory / "root", monkeypatch)
     runtime = directory / "state"  # the daemon's, where tests look for its control socket
     runtime.mkdir()
+    (directory / "lock").touch()
     with ExitStack() as stack:
         for unit in UNITS:
             listening = stack.enter_context(socket.socket(socket.AF_UNIX))

@@ -9,7 +9,7 @@ from payloads.mission_data import Json
 from service.cli.doctor.command import examined
 from service.cli.doctor.fixes import fix_step
 from service.cli.helper.action import Action, HelperRefusal, ThisPi
-from service.cli.helper.packages import PREVIOUS, receive, start_update, update_outcome, version_of
+from service.cli.helper.packages import PREVIOUS, can_update, receive, start_update, update_outcome, version_of
 from service.cli.helper.page_settings import change_settings, page_settings
 from service.cli.setup.answers import SetupChoices, current_key, earlier_choices, shadowed
 from service.cli.setup.change import Machine
@@ -46,6 +46,7 @@ def overview(pi: ThisPi) -> Json:
         "model": None if model is None else model.name,
         "can_undo": bool(undo_steps(host)[0]),
         "version": version(),
+        "can_update": can_update(host),
         "previous": version_of(host.path(PREVIOUS), Machine(host)),
         "update": update_outcome(host),
         "settings": page_settings(host),

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """An update from a file: received and checked by the helper, installed by a process that outlives the old program.
 
+Only a signed package is read further, and only a newer one installed: an older one may have known faults.
+
 That process first packs the installed files again, so that it can go back, and does so by itself if the
 bridge does not run with the new package: `python -m service.cli.helper.packages FILE`.
 """
@@ -12,6 +14,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from service.cli.helper.action import DELAY_S, HelperRefusal, ThisPi
+from service.cli.helper.signature import SIGNERS, check_signature
 from service.cli.setup.change import Machine, Run, SetupError, WriteFile, later
 from service.daemon.client import STATUS, ControlError, ask_daemon
 from service.machine.host import Host
@@ -19,6 +22,7 @@ from service.machine.host import Host
 #: Not in /run, which is memory.
 _FOLDER = "/var/lib/naze-bridge-helper"
 NEW, PREVIOUS, _OUTCOME = f"{_FOLDER}/new.deb", f"{_FOLDER}/previous.deb", f"{_FOLDER}/outcome"
+_RECEIVED = f"{_FOLDER}/received.deb"
 _NAME = "naze-bridge"
 _PIECE = 1 << 16
 _DPKG_INFO = "/var/lib/dpkg/info"
@@ -41,7 +45,9 @@ _APT = (
 
 def receive(pi: ThisPi, size: int) -> str:
     """Store the body, check that it is this program's package for this machine, and start the update; its version."""
-    path = pi.host.path(NEW)
+    if not can_update(pi.host):
+        raise HelperRefusal("This package was built without a key for updates: install it with apt in a terminal.")
+    path = pi.host.path(_RECEIVED)
     path.parent.mkdir(parents=True, exist_ok=True)
     left = size
     with path.open("wb") as file:
@@ -51,16 +57,23 @@ def receive(pi: ThisPi, size: int) -> str:
     try:
         if left:
             raise HelperRefusal("The package was not received completely: send it again.")
+        check_signature(path, pi.host.path(SIGNERS))
         found = check_package(path, Machine(pi.host))
+        # Another request may come before the update starts: what it sends is not checked yet.
+        path.replace(pi.host.path(NEW))
         start_update(pi, NEW)
-    except (HelperRefusal, SetupError):
-        path.unlink()
-        raise
+    finally:
+        path.unlink(missing_ok=True)
     return found
 
 
+def can_update(host: Host) -> bool:
+    """True if the installed package knows a key of its releases."""
+    return any(not line.startswith("#") for line in host.read(SIGNERS).splitlines())
+
+
 def check_package(path: Path, machine: Machine) -> str:
-    """The version of a package that can be installed here; HelperRefusal if it is damaged or another one."""
+    """The version of a signed package that can be installed here; HelperRefusal if it is damaged or does not fit."""
     try:
         name, version, architecture = machine.run((*_SHOW, str(path))).split()
     except (SetupError, ValueError):
@@ -70,6 +83,14 @@ def check_package(path: Path, machine: Machine) -> str:
         raise HelperRefusal(f"This is the package of {name}, not of {_NAME}.")
     if architecture not in (own, "all"):
         raise HelperRefusal(f"This package is for {architecture}; this Pi needs the one for {own}.")
+    installed = machine.run(("dpkg-query", "--showformat", "${Version}", "--show", _NAME)).strip()
+    try:
+        machine.run(("dpkg", "--compare-versions", version, "ge", installed))
+    except SetupError:
+        way = "go back to the version before the last update below, or use apt in a terminal"
+        raise HelperRefusal(
+            f"This package has version {version}, older than {installed}, which runs now: {way}."
+        ) from None
     try:
         # Unpacks everything once: a damaged file fails here and not half-way through the installation.
         machine.run(("dpkg-deb", "--contents", str(path)), _TIMEOUT_S)

@@ -21,9 +21,11 @@ from service.machine.helper_socket import UNITS
 from service.machine.host import Host
 from service.settings import SettingsError
 from storage.os_error import reason
+from storage.small_files import open_regular
 
 _USER = "naze-bridge"
-_LOCK = Path("/run/naze-bridge-helper/lock")
+#: Locked by the request that is carried out: a file that all units can open.
+_LOCK = Path(__file__)
 _MAX_REQUEST = _PIECE = 1 << 16
 #: Between two pieces of an upload.
 _TIMEOUT_S = 30.0
@@ -58,7 +60,7 @@ def _carry_out(pi: ThisPi, lock: Path, actions: Mapping[str, Action]) -> Json:
 
 @contextmanager
 def _alone(lock: Path) -> Iterator[None]:
-    with lock.open("w") as file:
+    with open_regular(lock) as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:

@@ -8,7 +8,8 @@ import { currentToken } from "./token.js";
 const PIECE = 256 * 1024, MOST_BYTES = 128 * 1024 * 1024;
 const LATER = "The bridge restarts during the installation, which takes some minutes. Then open this again to see the result.";
 
-export function updatePanel({ version, previous }) {
+export function updatePanel({ version, previous, can_update: canUpdate }) {
+  if (!canUpdate) return make("details", {}, make("summary", {}, "Update"), make("p", {}, `This is version ${version}. It was built without a key that updates could be checked by: install a package with apt in a terminal.`));
   const result = make("p", { class: "result", role: "status" });
   const bar = make("progress", { hidden: "", "aria-label": "Package sent" });
   const file = make("input", { type: "file", accept: ".deb" });
@@ -16,7 +17,7 @@ export function updatePanel({ version, previous }) {
   const update = form({ class: "row" }, () => pressed(send, result, () => install(file.files[0], bar, result)),
     make("label", {}, "Package (.deb) ", file), send, bar, result);
   const back = action(`Back to version ${previous}`, result, () => askPi({ action: "downgrade" }).then(() => LATER));
-  return make("details", {}, make("summary", {}, "Update"), make("p", {}, `This is version ${version}. If the new version does not run, this one is reinstalled.`), update, ...(previous ? [back] : []));
+  return make("details", {}, make("summary", {}, "Update"), make("p", {}, `This is version ${version}. A newer package from the releases is installed if its signature is right. If the new version does not run, this one is reinstalled.`), update, ...(previous ? [back] : []));
 }
 
 async function install(file, bar, result) {

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from service.cli.helper.signature import SIGNERS
 from service.cli.setup.answers import KEY_FILE, SETTINGS_FILE
 from tests.service.cli.doctor.test_fixes import console
 from tests.service.cli.helper.test_packages import packed
@@ -142,7 +143,7 @@ def test_a_setting_of_another_file_is_shown_with_its_place(
 def test_an_update_from_a_file(
     browsers: Browsers, bench: tuple[WebBench, FixablePi], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    web, _ = bench
+    web, pi = bench
     received: list[int] = []
 
     def receive(pi: object, size: int) -> str:
@@ -151,6 +152,11 @@ def test_an_update_from_a_file(
 
     monkeypatch.setattr("service.cli.helper.actions.receive", receive)
     package = packed(tmp_path)
+    with browsers.tab(web.port, PHONE) as page:
+        opened(page, web)
+        unfold(page, "Update")
+        page.wait_text("#pi", "built without a key")
+    pi.write(SIGNERS, "naze-bridge ssh-ed25519 AAAA\n")
     with browsers.tab(web.port, PHONE) as page:
         opened(page, web)
         unfold(page, "Update")

@@ -13,8 +13,10 @@ from service.cli.helper import packages
 from service.cli.helper.action import HelperRefusal, ThisPi, parse_action
 from service.cli.helper.actions import ACTIONS
 from service.cli.helper.packages import NEW, PREVIOUS, check_package, update, update_outcome, version_of
+from service.cli.helper.signature import SIGNERS
 from service.cli.setup.change import Machine, SetupError
 from service.machine.host import Host
+from tests.support.release_key import ReleaseKey
 
 _HOST = subprocess.run(["dpkg", "--print-architecture"], capture_output=True, text=True, check=True).stdout.strip()
 
@@ -38,6 +40,8 @@ class Apt(Machine):
                     self.installed = version
             case ["dpkg-query", "--listfiles", _]:
                 return "/.\n/usr\n/usr/bin\n/usr/bin/naze-bridge\n/usr/bin/link\n"
+            case ["dpkg-query", "--showformat", "${Version}", *_]:
+                return self.installed
             case ["dpkg-query", "--status", _]:
                 return _control("naze-bridge", self.installed, _HOST, "Status: install ok installed\n")
             case ["systemd-run", *_]:
@@ -79,6 +83,7 @@ def host(tmp_path: Path) -> Host:
         ({"name": "openssh-server"}, "This is the package of openssh-server, not of naze-bridge"),
         ({"architecture": "s390x"}, f"This package is for s390x; this Pi needs the one for {_HOST}"),
         ({"version": "6.6"}, "does not fit this system: `apt-get` failed: no room for 6.6"),
+        ({"version": "1.0~rc1"}, "This package has version 1.0~rc1, older than 1.0, which runs now: go back"),
     ],
 )
 def test_a_package_that_does_not_fit(tmp_path: Path, host: Host, wrong: dict[str, str], why: str) -> None:
@@ -104,19 +109,32 @@ def test_a_package_that_fits(tmp_path: Path, host: Host) -> None:
 
 @pytest.mark.parametrize("missing", [0, 1, 5000])
 def test_it_is_received(tmp_path: Path, host: Host, monkeypatch: pytest.MonkeyPatch, missing: int) -> None:
+    key = ReleaseKey(tmp_path / "key")
     started: list[str] = []
     monkeypatch.setattr(packages, "Machine", Apt)
     monkeypatch.setattr(Apt, "carry_out", lambda _, change: started.append(change.describe()))
-    data = packed(tmp_path).read_bytes()
+    package = packed(tmp_path)
+    unsigned, data = package.read_bytes(), key.sign(package).read_bytes()
     action = parse_action(to_json({"action": "install", "size": len(data)}).encode(), ACTIONS)
     pi = ThisPi(host, BytesIO(data[: len(data) - missing]))
+    host.path(SIGNERS).parent.mkdir(parents=True)
+    host.path(SIGNERS).write_text("# none yet\n")
+    with pytest.raises(HelperRefusal, match="built without a key"):
+        action(pi)
+    key.signers.rename(host.path(SIGNERS))
     if missing:
         with pytest.raises(HelperRefusal, match="not received completely"):
             action(pi)
         assert not host.path(NEW).exists()
         return
     assert action(pi) == {"version": "2.0"}
-    assert host.path(NEW).read_bytes() == data
+    assert host.path(NEW).read_bytes() == unsigned
+    # What a second request sends does not take the place of the checked package.
+    second = parse_action(b'{"action": "install", "size": 6}', ACTIONS)
+    with pytest.raises(HelperRefusal, match="not signed"):
+        second(ThisPi(host, BytesIO(b"forged")))
+    assert host.path(NEW).read_bytes() == unsigned
+    assert [path.name for path in host.path(NEW).parent.iterdir()] == ["new.deb"]
     assert started[0].endswith(f"-m service.cli.helper.packages {NEW}")
 
 

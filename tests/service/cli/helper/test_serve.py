@@ -17,7 +17,9 @@ from tests.support.fixable_pi import FixablePi
 
 @pytest.fixture
 def lock(tmp_path: Path) -> Path:
-    return tmp_path / "lock"
+    file = tmp_path / "lock"
+    file.touch()
+    return file
 
 
 _RESTART = b'{"action": "fix", "fix": "restart the bridge"}'
