@@ -56,6 +56,9 @@ _HOST = re.compile(r"(?P<name>\[[^\]]*\]|[^:\[\]]+)(:[0-9]*)?")
 _WRONG_NAME = (
     "Open this page by the Pi's address in numbers or its local name, or add this name to the setting web.hosts."
 )
+#: Without the file's name: anyone on the network can ask.
+_REFUSED = "Wrong token. On the Pi, `sudo naze-bridge setup` shows it."
+_READ_ONLY = "This page is read-only: the bridge has no token for it. Its log (web.no_token) says why."
 _FAILED = "The daemon failed to answer; see its log."
 #: The response to an error, whose text is one sentence.
 _STATUS = {
@@ -82,11 +85,11 @@ def is_own_name(host: str, known: Container[str]) -> bool:
 def check_token(request: Request) -> None:
     token = request.app.state.token
     if isinstance(token, TokenError):
-        raise HTTPException(HTTPStatus.FORBIDDEN, f"This page is read-only: {token}.")
+        raise HTTPException(HTTPStatus.FORBIDDEN, _READ_ONLY)
     if not token.is_shown_by(request.headers.get("authorization")):
         peer = None if request.client is None else request.client.host
         _log.warning("web.wrong_token", peer=peer, path=request.url.path)
-        raise HTTPException(HTTPStatus.FORBIDDEN, f"Wrong token. It is in {token.path} on the Pi.")
+        raise HTTPException(HTTPStatus.FORBIDDEN, _REFUSED)
 
 
 def route(method: str, path: str, handler: Handler, *checks: Callable[[Request], None], max_body: int = 0) -> Route:

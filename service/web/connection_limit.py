@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Limits the connections to the status page, so that a hostile browser cannot affect the flight controller.
+"""Limits the connections to the status page, so that hostile browsers affect neither the flight controller nor others.
 
-A connection carries one request and is closed after a few seconds, so that a slow peer occupies nothing for long. The
-number of connections is limited, per address and in total; one too many is reset. The rate is limited, too, but there
-a connection waits for its turn: a page that is loaded twice in a second must not lose one of its files.
+A connection carries one request and is closed after a few seconds. If there are too many, the address with the most
+connections loses the oldest of them. Requests take turns between addresses, so many hosts cannot keep the page from
+another one.
 """
 
 import asyncio
-from collections import Counter, deque
+from collections import deque
+from ipaddress import ip_network
+from typing import Protocol
 
 import h11
 from uvicorn.config import Config
@@ -18,91 +20,138 @@ from service.machine.log_setup import warn_once
 
 #: Responses are a few kilobytes and quick to make.
 LIFETIME_S = 15.0
-MAX_CONNECTIONS = 48
-#: One phone must not lock out the others. A page opens six at once.
-MAX_FROM_ONE = 16
-#: An open page sends a request per second, a loading one about thirty. A request costs about a millisecond.
+#: A waiting connection has a few kilobytes. A browser opens six at once.
+MAX_CONNECTIONS = 200
+#: An open page sends a request per second. A request costs about a millisecond.
 MAX_IN_A_SECOND = 100
-MAX_IN_A_SECOND_FROM_ONE = 50
-_TURN_S = 0.1
+#: Served at once: a page that loads sends about as many.
+MAX_AT_ONCE = 30
+_TURN_S = 1 / MAX_IN_A_SECOND
+
+
+class Connection(Protocol):
+    """A connection as the limit sees it."""
+
+    def begin(self) -> None:
+        """Serve the request."""
+
+    def abort(self) -> None: ...
 
 
 class ConnectionLimit:
-    """Counts connections; each is cut off after `lifetime_s`."""
+    """The open connections by host, and those that wait for their turn. Times are seconds."""
 
-    def __init__(self, lifetime_s: float = LIFETIME_S) -> None:
-        self.lifetime_s = lifetime_s
-        #: The open connections.
-        self.transports: set[asyncio.Transport] = set()
-        self._inside: Counter[str] = Counter()
-        self._lately: deque[tuple[float, str]] = deque(maxlen=MAX_IN_A_SECOND)
+    def __init__(self) -> None:
+        #: The oldest first.
+        self._open: dict[str, list[Connection]] = {}
+        #: The host whose turn is next comes first.
+        self._waiting: dict[str, deque[Connection]] = {}
+        #: When the turns taken so far are used up, at the highest rate.
+        self._used_until = 0.0
+        self._timer: asyncio.TimerHandle | None = None
         self._malformed = 0
         self._warned: set[str] = set()
 
-    def admit(self, address: str) -> bool:
-        """True if there is room for a connection. Each admitted one must `leave`."""
-        if self._inside.total() >= MAX_CONNECTIONS or self._inside[address] >= MAX_FROM_ONE:
-            return False
-        self._inside[address] += 1
-        return True
+    def enter(self, address: str, connection: Connection) -> None:
+        """Take a connection; if there are too many, the oldest one of the host with the most is closed."""
+        host = _host(address)
+        if sum(map(len, self._open.values())) >= MAX_CONNECTIONS:
+            largest = max(self._open, key=lambda each: (len(self._open[each]), each == host))
+            oldest = self._open[largest][0]
+            self._remove(largest, oldest)
+            oldest.abort()
+        self._open.setdefault(host, []).append(connection)
+        self._waiting.setdefault(host, deque()).append(connection)
 
-    def take_turn(self, address: str, now: float) -> bool:
-        """True if an admitted connection may send its request now (seconds); else it asks again."""
-        while self._lately and self._lately[0][0] <= now - 1:
-            self._lately.popleft()
-        lately = sum(one == address for _, one in self._lately)
-        if len(self._lately) >= MAX_IN_A_SECOND or lately >= MAX_IN_A_SECOND_FROM_ONE:
-            return False
-        self._lately.append((now, address))
-        return True
+    def serve(self, now: float) -> float | None:
+        """Begin the connections whose turn it is; the time of the next turn, None if no connection waits."""
+        while self._waiting:
+            free_at = self._used_until - (MAX_AT_ONCE - 1) * _TURN_S
+            if free_at > now:
+                return free_at
+            self._used_until = max(self._used_until, now) + _TURN_S
+            host = next(iter(self._waiting))
+            waiting = self._waiting.pop(host)
+            connection = waiting.popleft()
+            if waiting:
+                self._waiting[host] = waiting
+            connection.begin()
+        return None
 
-    def leave(self, address: str) -> None:
-        self._inside[address] -= 1
-        if not self._inside[address]:
-            del self._inside[address]
+    def serve_in_time(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Begin the connections whose turn it is, now and later."""
+        if self._timer is None and (due := self.serve(loop.time())) is not None:
+            self._timer = loop.call_at(due, self._turn_came, loop)
+
+    def _turn_came(self, loop: asyncio.AbstractEventLoop) -> None:
+        self._timer = None
+        self.serve_in_time(loop)
+
+    def leave(self, address: str, connection: Connection) -> None:
+        self._remove(_host(address), connection)
 
     def count_malformed(self, address: str) -> None:
         self._malformed += 1
         warn_once(self._warned, "web.malformed", peer=address, count=self._malformed)
 
     def close(self) -> None:
-        for transport in list(self.transports):
-            transport.abort()
+        if self._timer is not None:
+            self._timer.cancel()
+        for connection in [each for connections in self._open.values() for each in connections]:
+            connection.abort()
+
+    def _remove(self, host: str, connection: Connection) -> None:
+        for kept in (self._open, self._waiting):
+            if connection in kept.get(host, ()):
+                kept[host].remove(connection)
+                if not kept[host]:
+                    del kept[host]
+
+
+def _host(address: str) -> str:
+    """An IPv6 host may use any address of its network."""
+    return str(ip_network(f"{address.partition('%')[0]}/64", strict=False)) if ":" in address else address
 
 
 class BoundedConnection(H11Protocol):
     """uvicorn's side of a connection, which begins when its turn comes."""
 
-    def __init__(self, limit: ConnectionLimit, config: Config, state: ServerState) -> None:
+    def __init__(
+        self, limit: ConnectionLimit, config: Config, state: ServerState, lifetime_s: float = LIFETIME_S
+    ) -> None:
         super().__init__(config, state, {})
         self._limit = limit
+        self._lifetime_s = lifetime_s
         self._address = ""
-        self._admitted: asyncio.Transport | None = None
-        self._end: asyncio.TimerHandle | None = None
-        self._turn: asyncio.Handle | None = None
+        self._timers: list[asyncio.Handle] = []
         self._is_served = False
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Wait for its turn; abort it if there is no room."""
+        self.transport = transport
         peer = transport.get_extra_info("peername")
-        if peer is None or not self._limit.admit(peer[0]):
+        if peer is None:
             transport.abort()
             return
         self._address = peer[0]
-        self._admitted = transport
-        self._limit.transports.add(transport)
-        self._end = self.loop.call_later(self._limit.lifetime_s, transport.abort)
+        self._limit.enter(self._address, self)
         # Python 3.11.2, which Debian 12 has, begins to read after this call even if it was told to pause.
-        self._turn = self.loop.call_soon(self._await_turn, transport)
+        self._timers = [
+            self.loop.call_later(self._lifetime_s, transport.abort),
+            self.loop.call_soon(self._await_turn),
+        ]
 
-    def _await_turn(self, transport: asyncio.Transport) -> None:
-        if not self._limit.take_turn(self._address, self.loop.time()):
-            transport.pause_reading()
-            self._turn = self.loop.call_later(_TURN_S, self._await_turn, transport)
-            return
+    def _await_turn(self) -> None:
+        self._limit.serve_in_time(self.loop)
+        if not self._is_served:
+            self.transport.pause_reading()
+
+    def begin(self) -> None:
         self._is_served = True
-        super().connection_made(transport)
-        transport.resume_reading()
+        super().connection_made(self.transport)
+        self.transport.resume_reading()
+
+    def abort(self) -> None:
+        self.transport.abort()
 
     def send_400_response(self, msg: str) -> None:
         """Refuse a request that is not HTTP. Its head may have been: then its handler already runs, or has answered."""
@@ -116,11 +165,8 @@ class BoundedConnection(H11Protocol):
             self.transport.close()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        for timer in self._end, self._turn:
-            if timer is not None:
-                timer.cancel()
-        if self._admitted is not None:
-            self._limit.transports.discard(self._admitted)
-            self._limit.leave(self._address)
+        for timer in self._timers:
+            timer.cancel()
+        self._limit.leave(self._address, self)
         if self._is_served:
             super().connection_lost(exc)

@@ -40,9 +40,9 @@ def test_a_stored_mission_is_written_with_the_token(browsers: Browsers, bench: W
         page.wait_text("tr.detail h3", "Mission 1")
         page.find("tr.detail input").send_keys("not the token")
         page.press("tr.detail button.write")
-        page.wait_text(DETAIL, "Wrong token. It is in ")
+        page.wait_text(DETAIL, "Wrong token. On the Pi")
         assert is_visible(page, DETAIL)
-        assert page.run("return window.innerWidth") == PHONE[0]  # the long path does not widen the page
+        assert page.run("return window.innerWidth") == PHONE[0]
         assert bench.board.records() != first
 
         bench.restore(1)  # another client's success must not replace the error
