@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The bridge as a whole: one flight controller on one side, ground stations on the other. Sans-IO.
 
-The service feeds in bytes, time and the store's answers, and then takes the output for lines, links and the store.
+The service feeds in bytes, time and the store's answers, and then takes the effects (bridge/effects.py).
 The path of a byte from the UART:
-    fc_received -> FcSession -> MspLink -> Vehicle -> OwnVehicle -> Ground -> take_datagrams
+    fc_received -> FcSession -> MspLink -> Vehicle -> OwnVehicle -> Ground -> take
 The path of a mission item to the flight controller, and back for verification:
     gcs_received -> Incoming -> GroundStation -> MessageRouter -> MissionUploads -> ListCheck
         -> MissionService.deliver -> FcMissionStore.push -> MspLink
@@ -11,25 +11,26 @@ An autopilot that speaks MAVLink itself is not represented but passed through, b
     FcSession <-> Routes <-> Ground
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import count
 from math import inf
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 from bridge.config import BridgeConfig, PassThroughRule
+from bridge.effects import BridgeEffect, PublishGroups, RecordFrames, RememberFlight, SendToBoard
 from bridge.fc.profile import FlightController, RuleSettings, Spoken
 from bridge.fc.session import FcSession
-from bridge.gcs.ground import FrameListener, Ground
+from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import GroundStation
 from bridge.gcs.rights import LinkAccess
 from bridge.gcs.routes import Routes
 from bridge.gcs.station import Peer, Severity
 from bridge.line.msp_link import RoundTrips
 from bridge.line.runner import Runner
-from bridge.missions.mission_service import NO_LINK, EndingListener, MissionService
+from bridge.missions.mission_service import NO_LINK, MissionService
 from bridge.missions.place_lists import PlaceLists
-from bridge.model.events import Armed, Disarmed, Emit
+from bridge.model.events import Armed, Disarmed
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.settings import SettingsState
 from bridge.model.vehicle import FlightState, Health, MissionLeg, Readiness
@@ -37,7 +38,7 @@ from bridge.settings.board_settings import BoardSettings
 from bridge.settings.local_settings import LocalSettings
 from bridge.settings.own_parameters import OwnParameters
 from bridge.settings.parameters import Parameters
-from bridge.settings.settings_backups import BackupTaker, OnBackup
+from bridge.settings.settings_backups import BackupTaker
 from bridge.settings.settings_seal import SettingsSeal
 from bridge.sharing.msp_sharing import MspSharing
 from bridge.sharing.program import Program
@@ -57,20 +58,6 @@ from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.mission_item import MissionResult
 from reports.vehicle_groups import Group
-
-
-class FcOutput(NamedTuple):
-    """For the flight controller's port: the bytes to write, in order, and the speed it must have, None if it has none.
-
-    `may_gather`: so much is read that waiting a little for more saves time. `asks`: a reply to this must not wait.
-    `complete_at`: before this time only a part of the replies that telemetry waits for can have arrived.
-    """
-
-    data: Sequence[bytes]
-    speed: int | None
-    may_gather: bool
-    asks: bool
-    complete_at: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,34 +91,34 @@ class TimedPart(Protocol):
 class Bridge:
     """The whole bridge. Its public methods are all that service/ uses; the parts behind them are private.
 
-    After each input, take the output (`take_datagrams`, `take_fc_output`, `store_effects`), and call `tick` at `due`:
+    After each input, carry out the effects, and call `tick` at `due`:
 
     >>> bridge.gcs_received(peer, data, now, datagram=True)
-    >>> for peer, datagram in bridge.take_datagrams(): sock.sendto(datagram, peer.key)
+    >>> for effect in bridge.take():
+    ...     match effect:
+    ...         case SendToBoard(data): port.write(b"".join(data))
     """
 
-    def __init__(
-        self,
-        config: BridgeConfig,
-        emit: Emit,
-        now: float,
-        on_frames: FrameListener | None = None,
-        on_ending: EndingListener = lambda _mission, _delivery: None,
-        on_backup: OnBackup = lambda _backup: None,
-    ) -> None:
+    def __init__(self, config: BridgeConfig, now: float) -> None:
         self._config, owner = config, config.settings
-        self._emit = emit
+        #: To be carried out, in order. Datagrams and bytes for the board are added by `take`.
+        self._effects: list[BridgeEffect] = []
+        emit = self._emit = self._effects.append
         self._was_armed = False
-        #: The line's state, speed or polls may have changed since the last `take_fc_output`. A conversation that starts
-        #: has output, or waits for a reply or timeout that the line already expects.
+        #: The line's state, speed or polls may have changed since the last `take`. A conversation that starts has
+        #: output, or waits for a reply or timeout that the line already expects.
         self._has_line_changed = True
-        self._line_due = now  # of the line itself, as of the last `take_fc_output`
-        #: The armed craft, for the BridgeConfig of a restarted bridge; it changes rarely. None: it is not armed.
-        self.flight = config.flight
+        #: Since the last `take` only frames of a passed-through autopilot arrived, which postpone `due`: for thousands
+        #: a second, anything else would cost too much.
+        self._has_only_passed_on = False
+        #: The time of the next `tick`, and of the line's own, as of the last `take`.
+        self.due = self._line_due = now
+        #: The armed craft as last remembered; it changes rarely.
+        self._flight = config.flight
         #: True while an autopilot speaks MAVLink itself: the bridge then sends nothing in its name.
         self.is_passing_through = False
         self._announcer = LinkAnnouncer(
-            self._say, lambda: self._session.state.trouble, now, was_found=self.flight is not None
+            self._say, lambda: self._session.state.trouble, now, was_found=config.flight is not None
         )
         incidents = count(1)
 
@@ -141,13 +128,13 @@ class Bridge:
             config.compid,
             emit,
             self._newcomer,
-            on_frames,
             {name: replace(access, passes_everything=passes_everything) for name, access in config.links.items()},
             LinkAccess(passes_everything=passes_everything),
             config.is_near,
+            is_recorded=config.has_log,
         )
         self._routes = Routes(ground)
-        runner = self._runner = Runner()
+        runner = self._runner = Runner(emit)
         session = self._session = FcSession(
             config.speeds,
             config.profiles,
@@ -161,7 +148,7 @@ class Bridge:
         )
         #: Its readings, which are kept when it is lost.
         self.vehicle = self._session.vehicle
-        missions = self._missions = MissionService(self.vehicle, runner, on_ending)
+        missions = self._missions = MissionService(self.vehicle, runner, emit)
         self._sharing = MspSharing(session, runner, missions, emit, self._say_refused)
 
         def is_transferring() -> bool:
@@ -174,7 +161,7 @@ class Bridge:
         self._board_settings.on_change = self._changed_settings
         self._seal.on_found_change = self._found_changed_settings
         self._sharing.on_change = self._program_changed_settings
-        self._backups = BackupTaker(on_backup)
+        self._backups = BackupTaker(emit)
         self._seal.on_identified = self._backups.identified
         self._board_settings.on_read = lambda table: self._backups.read(table, self._board_settings.unsaved)
         self._board_settings.on_saved = self._backups.saved
@@ -228,20 +215,54 @@ class Bridge:
             self._announcer,
             self._calibration,
             own,
+            self._reporter,
         )
 
         # The front door: calls that one part answers. First the ground stations' side.
-        self.gcs_received, self.take_datagrams = self._incoming.received, ground.take_datagrams
+        self.gcs_received = self._incoming.received
         self.add_default_peer, self.remove_default_peer = ground.add_default_peer, ground.remove_default_peer
         #: Other programs, on a share.
         self.program_joined, self.program_left = self._sharing.join, self._sharing.leave
         #: Shows a text to each ground station that connects from now on.
         self.notify = ground.notices.append
-        #: The store's work, in order, and its replies.
-        self.store_effects, self.store_answered = runner.store_effects, runner.store_answered
+        self.store_answered = runner.store_answered
         #: Ends the running conversation cleanly.
         self.abort = runner.stop
-        self.report, self.group, self.take_fresh = self._reporter.whole, self._reporter.group, self._reporter.take_fresh
+        self.report, self.group = self._reporter.whole, self._reporter.group
+
+    def take(self) -> list[BridgeEffect]:
+        """What is to be done since the last call, in order. Mostly a few datagrams, or bytes for the board."""
+        effects: list[BridgeEffect] = []
+        if self._effects:
+            effects += self._effects
+            self._effects.clear()
+        if datagrams := self._ground.take_datagrams():
+            effects.append(datagrams)
+        if recorded := self._ground.recorded:
+            effects.append(RecordFrames(tuple(recorded)))
+            recorded.clear()
+        if fresh := self._reporter.fresh:
+            effects.append(PublishGroups(frozenset(fresh)))
+            fresh.clear()
+        if self._has_only_passed_on:
+            self._has_only_passed_on = False
+            return effects
+        session = self._session
+        if session.output or self._has_line_changed:
+            state = session.state
+            self._has_line_changed, self._line_due = False, state.due
+            data = [*session.output]
+            session.output.clear()
+            # Heartbeats and other broadcasts are not replied to.
+            asks = not self.is_passing_through or any(MavlinkFrame(frame).has_target_field for frame in data)
+            complete_at = -inf if state.link is None else state.link.complete_at
+            effects.append(SendToBoard(data, state.speed, self.is_passing_through, asks, complete_at))
+        due = self._line_due
+        for part in self._parts:
+            if (part_due := part.due) < due:
+                due = part_due
+        self.due = due
+        return effects
 
     # The flight controller's side.
 
@@ -259,20 +280,8 @@ class Bridge:
         self._has_line_changed = True
         self._session.received(data, now)
         self._follow_line(now)
+        self._has_only_passed_on = self.is_passing_through
         return not self._session.state.is_mid_frame
-
-    def take_fc_output(self) -> FcOutput | None:
-        """The output for the port; None if there is none, as after most data of ground stations."""
-        if not (self._session.output or self._has_line_changed):
-            return None
-        state = self._session.state
-        self._has_line_changed, self._line_due = False, state.due
-        data = [*self._session.output]
-        self._session.output.clear()
-        # Heartbeats and other broadcasts are not replied to.
-        asks = not self.is_passing_through or any(MavlinkFrame(frame).has_target_field for frame in data)
-        complete_at = -inf if state.link is None else state.link.complete_at
-        return FcOutput(data, state.speed, self.is_passing_through, asks, complete_at)
 
     @property
     def fc_trouble(self) -> str:
@@ -313,7 +322,7 @@ class Bridge:
     # For metrics, the status and other followers.
 
     def watch(self, groups: Iterable[Group]) -> None:
-        """Poll for these groups from now on; `take_fresh` returns the updated ones."""
+        """Poll for these groups from now on, and have the updated ones published."""
         self._has_line_changed = True
         self._reporter.watch(groups)
 
@@ -343,15 +352,6 @@ class Bridge:
         self._has_line_changed = True
         self._runner.reset(now)
         self._session.restart(why, now)
-
-    @property
-    def due(self) -> float:
-        """The time of the next `tick`."""
-        due = self._line_due
-        for part in self._parts:  # a loop: this is asked after every reply
-            if (part_due := part.due) < due:
-                due = part_due
-        return due
 
     def tick(self, now: float) -> None:
         self._has_line_changed = True
@@ -452,9 +452,13 @@ class Bridge:
     def _remember_flight(self, now: float) -> None:
         if self.vehicle.armed is None or self.is_passing_through:
             return
-        before, memory = self.flight, self._session.flight_memory(now)
-        if before is None or memory is None or replace(memory, made_at=before.made_at, mode=before.mode) != before:
-            self.flight = memory
+        before, memory = self._flight, self._session.flight_memory(now)
+        is_same = memory is before
+        if before is not None and memory is not None:
+            is_same = replace(memory, made_at=before.made_at, mode=before.mode) == before
+        if not is_same:
+            self._flight = memory
+            self._effects.append(RememberFlight(memory))
 
     def _follow_arming(self, now: float) -> None:
         armed = self.vehicle.armed

@@ -52,8 +52,8 @@ class BridgeConfig:
 
     `version`: of the bridge itself. `unix_time_s`: the time of day at a monotonic time, None if unknown.
     `links`: access rules by link name; every station may write over other links. `is_near`: True for an IP address on
-    this machine's own networks, without a router in between. `flight`: of the craft that a previous
-    bridge left armed. `seals`: of the settings of the boards seen before.
+    this machine's own networks, without a router in between. `has_log`: there is a telemetry log. `flight`: of the
+    craft that a previous bridge left armed. `seals`: of the settings of the boards seen before.
     """
 
     speeds: Sequence[int | None]
@@ -64,5 +64,6 @@ class BridgeConfig:
     is_near: Callable[[str], bool] = lambda _address: True
     version: str = ""
     unix_time_s: Callable[[float], float | None] = lambda _now: None
+    has_log: bool = False
     flight: FlightMemory | None = None
     seals: SealMemory = field(default_factory=SealsOfThisRun)

@@ -15,7 +15,7 @@ from typing import Any
 
 from bridge.gcs.ground import Ground
 from bridge.gcs.rights import LinkAccess
-from bridge.gcs.station import Peer, Severity, Station
+from bridge.gcs.station import Datagrams, Peer, Severity, Station
 from bridge.line.conversation import Conversation, Pause
 from bridge.line.runner import Runner
 from bridge.missions.fc_mission_store import PushProgress, StoreReport, StoreState
@@ -118,8 +118,9 @@ class Relay:
         if self._end is not None:
             self._end.ground.remove_default_peer(peer)
 
-    def take_datagrams(self) -> list[tuple[Peer, bytes]]:
-        return [] if self._end is None else self._end.ground.take_datagrams()
+    def take(self) -> Datagrams:
+        """The datagrams to send."""
+        return Datagrams() if self._end is None else self._end.ground.take_datagrams()
 
     def gcs_received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> None:
         """Handle bytes from a ground station; before the vehicle was heard they are passed on."""
@@ -168,8 +169,8 @@ class _End:
         self.ids = ids
         self._to_vehicle = to_vehicle
         self._targets = {(system, component) for system in (0, ids[0]) for component in (0, ids[1])}
-        self.ground = Ground(*ids, _ignore, lambda _station, _now: None, None, {}, LinkAccess(), is_near)
-        self._runner = Runner()
+        self.ground = Ground(*ids, _ignore, lambda _station, _now: None, {}, LinkAccess(), is_near)
+        self._runner = Runner(lambda _effect: None)
         self.missions = _RemoteMissions(Vehicle(), self._runner, self.ground, write)
         self.uploads = MissionUploads(self.missions, self.ground, _ignore, count(1), lambda _peer, _now: None)
         downloads = self._downloads = MissionDownloads(self.missions, self.ground)
@@ -266,7 +267,7 @@ class _RemoteMissions(MissionService):
     def __init__(
         self, vehicle: Vehicle, runner: Runner, ground: Ground, write: Callable[[Sequence[MissionItem]], object]
     ) -> None:
-        super().__init__(vehicle, runner, lambda _mission, _delivery: None)
+        super().__init__(vehicle, runner, lambda _ended: None)
         self._ground = ground
         self._write = write
         self.is_local = False

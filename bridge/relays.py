@@ -4,10 +4,10 @@
 Sans-IO, like the Relay of each vehicle.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from math import inf
 
-from bridge.gcs.station import Peer
+from bridge.gcs.station import Datagrams, Peer
 from bridge.relay import MISSION_REQUESTS, Relay
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 
@@ -86,8 +86,9 @@ class Relays:
         self.remove(name)
         self._clashes(name, other, system)
 
-    def take_datagrams(self) -> Sequence[tuple[Peer, bytes]]:
-        return [each for relay in self._relays.values() for each in relay.take_datagrams()]
+    def take(self) -> Datagrams:
+        """The datagrams to send."""
+        return Datagrams(each for relay in self._relays.values() for each in relay.take())
 
     def _addresses(self, frame: MavlinkFrame, name: str) -> bool:
         system, _ = frame.target

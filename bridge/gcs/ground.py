@@ -10,7 +10,7 @@ from bridge.gcs.cost import Cost
 from bridge.gcs.ground_station import GroundStation, Speaker
 from bridge.gcs.return_path import ReturnPath
 from bridge.gcs.rights import LinkAccess, Standing
-from bridge.gcs.station import RECORDER, Peer, Severity, Station
+from bridge.gcs.station import RECORDER, Datagrams, Peer, Severity, Station
 from bridge.gcs.texts import cut_text, split_text
 from bridge.model.events import Emit, GcsFound, GcsSilent, GcsText
 from bridge.model.refusal import Refusal
@@ -35,16 +35,13 @@ _MAX_TEXT_ID = 0xFFFF
 #: Mission Planner, QGroundControl, MAVSDK and MAVProxy read several frames in a datagram; MAVROS cuts at 296 bytes.
 MAX_DATAGRAM_SIZE = 280
 
-#: A frame listener: called with all frames to and from ground stations, each once.
-FrameListener = Callable[[Sequence[bytes]], None]
-
 
 class Ground:
     """The ground stations. `on_newcomer` is called for one that is new or returns after a silence.
 
     `access`: the rules of each link; a link without rules is `open_access`. A station that may only read gets telemetry
     and answers, but no texts for everyone, and is not recorded. `is_near`: True for an address on the machine's own
-    networks, without a router in between.
+    networks, without a router in between. `is_recorded`: there is a telemetry log.
     """
 
     def __init__(
@@ -53,16 +50,17 @@ class Ground:
         compid: int,
         emit: Emit,
         on_newcomer: Callable[[GroundStation, float], None],
-        on_frames: FrameListener | None,
         access: Mapping[str, LinkAccess],
         open_access: LinkAccess,
         is_near: Callable[[str], bool] = lambda _host: True,
+        *,
+        is_recorded: bool = False,
     ) -> None:
         self._ids = sysid, compid
         self._emit = emit
         self._on_newcomer = on_newcomer
-        self._logs_flights = on_frames is not None
-        self.on_frames = on_frames or _drop
+        #: Frames to and from ground stations for the telemetry log, each once; None if there is no log.
+        self.recorded: list[bytes] | None = [] if is_recorded else None
         self._access = access
         self._open_access = open_access
         self._is_near = is_near
@@ -252,8 +250,8 @@ class Ground:
             self._outgoing[station].append(writer.frame(heartbeat, 1))
 
     def record(self, station: GroundStation, frame: MavlinkFrame) -> None:
-        if self.on_frames is not _drop and not station.is_listener and station.allows(Cost.RECORDED):
-            self.on_frames([frame.raw])
+        if self.recorded is not None and not station.is_listener and station.allows(Cost.RECORDED):
+            self.recorded.append(frame.raw)
 
     def allows(self, station: Station, cost: Cost) -> bool:
         """Count work that a ground station causes; False if that exceeds its limit."""
@@ -267,7 +265,7 @@ class Ground:
 
     def record_flight(self, *, on: bool) -> None:
         """Log everything that a connected ground station would get, even if there is none."""
-        if on and self._logs_flights:
+        if on and self.recorded is not None:
             self.add_default_peer(RECORDER, until_answered=False)
         else:
             self.remove_default_peer(RECORDER)
@@ -307,9 +305,9 @@ class Ground:
 
     # Messages to stations.
 
-    def take_datagrams(self) -> list[tuple[Peer, bytes]]:
-        """The datagrams to send; each holds whole frames. Those of one station are in order."""
-        datagrams: list[tuple[Peer, bytes]] = []
+    def take_datagrams(self) -> Datagrams:
+        """The datagrams to send; those of one station are in order."""
+        datagrams = Datagrams()
         for station, frames in self._outgoing.items():
             if station.return_path is not None:
                 frames = [*filter(station.return_path.allows, frames)]
@@ -344,8 +342,8 @@ class Ground:
         for message in together:  # a loop: a comprehension is a call
             frames.append(writer.frame(pack(message), version))  # noqa: PERF401
         self._outgoing[receiver] += frames
-        if self.on_frames is not _drop and not receiver.is_listener:
-            self.on_frames(frames)
+        if self.recorded is not None and not receiver.is_listener:
+            self.recorded += frames
 
     def broadcast(self, message: Message) -> None:
         self.multicast(pack(message), self.everyone())
@@ -354,7 +352,7 @@ class Ground:
         """Send a packed message to several stations that can read it."""
         frame = None
         # A flight is logged at the default rates, independent of the stations' requests.
-        is_logged = self.on_frames is not _drop and RECORDER not in self._default_peers
+        is_logged = RECORDER not in self._default_peers
         for station in stations:
             if station.frame_version == 1 and packed.is_v2_only:
                 continue
@@ -363,8 +361,8 @@ class Ground:
                 is_logged = True
             else:
                 self._outgoing[station].append(frame)
-        if frame is not None and is_logged:
-            self.on_frames([frame])
+        if self.recorded is not None and frame is not None and is_logged:
+            self.recorded.append(frame)
 
     def beat(self, heartbeat: Message, stations: Iterable[GroundStation]) -> None:
         """Send the heartbeat in MAVLink 2, then in MAVLink 1 too, to stations that have not sent MAVLink 2.
@@ -380,8 +378,8 @@ class Ground:
             logged = logged or frames[0]
             if station.peer is not RECORDER:
                 self._outgoing[station] += frames
-        if logged is not None:
-            self.on_frames([logged])
+        if self.recorded is not None and logged is not None:
+            self.recorded.append(logged)
 
     def say(self, severity: Severity, text: str, to: Station | None = None, *, is_reminder: bool = False) -> None:
         """Show a text on one ground station or on all; a refusal only once per attempt, unless `is_reminder`."""
@@ -424,10 +422,6 @@ class Ground:
         """Send whole frames unchanged."""
         for station in stations:
             self._outgoing[station] += frames
-
-
-def _drop(_frames: Sequence[bytes]) -> None:
-    """The frame listener of a bridge without a log."""
 
 
 def _in_datagrams(frames: Sequence[bytes], together: bytes) -> list[bytes]:

@@ -99,9 +99,13 @@ class Routes:
         if system == 0:
             self._send([frame.raw])
             return
-        self._ground.on_frames([frame.raw])
+        self._record([frame.raw])
         self._ground.forward([frame.raw], self._stations_of(system, component))
 
     def _send(self, frames: Sequence[bytes]) -> None:
-        self._ground.on_frames(frames)
+        self._record(frames)
         self._ground.forward(frames, self._ground.everyone())
+
+    def _record(self, frames: Sequence[bytes]) -> None:
+        if self._ground.recorded is not None:
+            self._ground.recorded += frames

@@ -24,6 +24,12 @@ class Peer(NamedTuple):  # hashed several times for each message: as a tuple, in
         return f"{self.link} [{host}]:{port}" if ":" in host else f"{self.link} {host}:{port}"
 
 
+class Datagrams(list[tuple[Peer, bytes]]):  # made thousands of times a second: as a list, in C
+    """Whole frames to be sent to ground stations, in order."""
+
+    __slots__ = ()
+
+
 #: The telemetry log as a peer: it is served like a ground station, but no datagram is sent.
 RECORDER = Peer("log", "flight")
 

@@ -63,13 +63,13 @@ class _BegunSave:
 class Runner:
     """Runs conversations in the order they were started. Time is passed in.
 
-    The service takes the `store_effects`, and answers each with `store_answered`.
+    `do` gets the effects for the store; each is answered with `store_answered`.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, do: Callable[[StoreEffect], object]) -> None:
+        self._do = do
         #: The commands whose replies the running conversation waits for.
         self.awaited_replies: frozenset[int] = frozenset()
-        self.store_effects: deque[StoreEffect] = deque()
         self._link: MspLink | None = None
         self._transmit: Callable[[Packed], bool] | None = None
         self._queue: deque[Task[Any]] = deque()
@@ -219,7 +219,7 @@ class Runner:
                         deadline = min(now + seconds, task.ends_at)
                     case BeginSave(mission):
                         self._begun = _BegunSave(mission)
-                        self.store_effects.append(mission)
+                        self._do(mission)
                         continue
                     case EndSave():
                         assert self._begun is not None
@@ -228,7 +228,7 @@ class Runner:
                             continue
                         deadline = now + _ACK_WAITS_S
                     case Save() | Conclude() | Recall() | NoteReader() | FindPending():
-                        self.store_effects.append(effect)
+                        self._do(effect)
                         deadline = now + (_ACK_WAITS_S if isinstance(effect, Conclude) else _STORE_TIMEOUT_S)
                 self._awaited = effect
                 self.due = deadline

@@ -111,8 +111,12 @@ _UNKNOWN = Refusal(MissionResult.DENIED, "Armed: the mission on board is not kno
 OCCUPIED = Refusal(MissionResult.DENIED, "Another mission transfer is running")
 
 
-#: Called with each mission that was completed or rejected.
-EndingListener = Callable[[ArrivedMission, DeliveryResult], None]
+@dataclass(frozen=True, slots=True)
+class MissionEnded:
+    """An effect: a received mission was completed or rejected."""
+
+    mission: ArrivedMission
+    delivery: DeliveryResult
 
 
 class MissionService:
@@ -123,10 +127,10 @@ class MissionService:
     #: The current flight controller stores such lists, or did until it was lost. Missions are always answered.
     are_stored: bool = True
 
-    def __init__(self, vehicle: Vehicle, runner: Runner, on_ending: EndingListener) -> None:
+    def __init__(self, vehicle: Vehicle, runner: Runner, do: Callable[[MissionEnded], object]) -> None:
         self.vehicle = vehicle
         self.runner = runner
-        self._on_ending = on_ending
+        self._do = do
         #: The mission store of the current flight controller, or the reply to every attempt.
         self.fc_store: AnyFcMissionStore | Refusal = NO_LINK
         self._owner: object | None = None
@@ -314,7 +318,7 @@ class MissionService:
         if number is not None and outcome is not None and not (yield from conclude(number, outcome, text)):
             number = None
         delivery = DeliveryResult(ack, text, number, is_lossy, change)
-        self._on_ending(arrived, delivery)
+        self._do(MissionEnded(arrived, delivery))
         return delivery
 
     def _held_now(self, arrived: ArrivedMission, identity: ListIdentity) -> HeldMission:

@@ -25,7 +25,7 @@ class PlaceLists(MissionService):
     def __init__(
         self, mission_type: int, name: str, vehicle: Vehicle, runner: Runner, on_change: Callable[[], None]
     ) -> None:
-        super().__init__(vehicle, runner, lambda _mission, _delivery: None)
+        super().__init__(vehicle, runner, lambda _ended: None)
         self.mission_type = mission_type
         self._name, self._on_change = name, on_change
         self.fc_store, self.are_stored = NO_PLACES, False

@@ -63,14 +63,14 @@ class VehicleReporter:
     _settings: SettingsSeal
     _want: Callable[[Mapping[type[v.Reading], float]], None]
     _progress: MissionProgress
-    #: Groups updated since the last `take_fresh`; some may no longer be watched.
-    fresh: set[Group] = field(default_factory=set)
-    #: The groups in use: they are polled, and `take_fresh` returns the updated ones.
+    #: The groups in use: they are polled, and the updated ones published.
     watched: frozenset[Group] = frozenset()
+    #: The updated ones.
+    fresh: set[Group] = field(default_factory=set)
     _published_at: dict[Group, float] = field(default_factory=dict)
     #: The readings that were fresh, and when the first of them becomes stale.
     _current: set[type[v.Reading]] = field(default_factory=set)
-    _stale_due: float = inf
+    due: float = inf
 
     def __post_init__(self) -> None:
         self._makers: Mapping[Group, Callable[[float], Any]] = {
@@ -81,14 +81,14 @@ class VehicleReporter:
         """Note new readings. To be called while groups are watched."""
         for reading in news:
             group, pause_s = _NEWS_OF.get(reading, (Group.LINK, inf))
-            if now >= self._published_at.get(group, -inf) + pause_s:
+            if group in self.watched and now >= self._published_at.get(group, -inf) + pause_s:
                 self.fresh.add(group)
                 self._published_at[group] = now
         self._current.update(news)
-        if self._stale_due == inf:
-            self._follow_ages(now)
+        if self.due == inf:
+            self.tick(now)
 
-    def _follow_ages(self, now: float) -> None:
+    def tick(self, now: float) -> None:
         """Publish the groups of readings that have become stale."""
         before, fresh = self._current, self._session.vehicle.fresh
         readings = {kind: fresh(kind, now) for kind, (group, _) in _NEWS_OF.items() if group in self.watched}
@@ -98,22 +98,15 @@ class VehicleReporter:
         ages = (reading.heard_at + stale_s.get(kind, v.STALE_S) for kind, reading in readings.items() if reading)
         due = min(ages, default=inf)
         # A little later: it is fresh until then. One that is heard meanwhile is fresh for STALE_S at least.
-        self._stale_due = due if due == inf else min(due, now + v.STALE_S) + _SOON_S
+        self.due = due if due == inf else min(due, now + v.STALE_S) + _SOON_S
 
     def watch(self, groups: Iterable[Group]) -> None:
         self.watched = frozenset(groups)
+        self.fresh &= self.watched
         wanted: dict[type[v.Reading], float] = {}
         for group in self.watched:
             wanted |= _SHOWS[group]
         self._want(wanted)
-
-    def take_fresh(self, now: float) -> frozenset[Group]:
-        """The watched groups updated since the last call."""
-        if now >= self._stale_due:
-            self._follow_ages(now)
-        fresh = self.watched & self.fresh
-        self.fresh.clear()
-        return fresh
 
     def group(self, group: Group, now: float) -> Any:
         """The current values of a group: an instance of its class in reports.vehicle_groups."""

@@ -143,7 +143,7 @@ class FleetRelay:
         self._flush()
 
     def _flush(self) -> None:
-        for peer, data in self._relays.take_datagrams():
+        for peer, data in self._relays.take():
             self._links[peer.link].send(peer, data)
         if self._timer is not None:
             self._timer.cancel()

@@ -7,6 +7,7 @@ from collections import defaultdict
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from math import inf
 from typing import Any, TypeVar
 
@@ -14,12 +15,15 @@ import structlog
 
 from bridge.bridge import Bridge
 from bridge.config import BridgeConfig
+from bridge.effects import PublishGroups, RecordFrames, RememberFlight, SendToBoard
 from bridge.fc.states.searching import SPEEDS
 from bridge.gcs.rights import LinkAccess
-from bridge.line.conversation import StoreEffect
-from bridge.missions.mission_service import DeliveryResult
+from bridge.gcs.station import Datagrams
+from bridge.line.conversation import Conclude, FindPending, NoteReader, Recall, Save, StoreEffect
+from bridge.missions.mission_service import DeliveryResult, MissionEnded
 from bridge.model.events import Armed, BridgeEvent, Disarmed
 from bridge.model.mission_log import ArrivedMission
+from bridge.settings.settings_backups import TakenBackup
 from payloads.mission_data import Json
 from reports.vehicle_groups import Group, VehicleReport
 from service.daemon.fc_connection import FcConnection
@@ -70,7 +74,7 @@ class Follower:
 
 
 class Daemon:
-    """Feeds the bridge and carries out its outputs. Must be made on a running event loop."""
+    """Feeds the bridge and carries out its effects. Must be made on a running event loop."""
 
     def __init__(self, settings: Settings, host: Host | None = None) -> None:
         self._loop = event_loop.running()
@@ -94,19 +98,16 @@ class Daemon:
                 links={**self._signing.links, **_ZENOH},
                 is_near=OwnNetworks(host),
                 version=version(),
+                has_log=self._tlog is not None,
                 unix_time_s=lambda now: time.time() - self._loop.time() + now,
                 flight=self._flight.load(self._loop.time()),
                 seals=self._seals,
             ),
-            self._happened,
             self._loop.time(),
-            None if self._tlog is None else self._tlog.on_frames,
-            self._mission_ended,
-            lambda backup: self.store.back_up(backup.board.uid or self.fc.where, backup),
         )
         #: Per link; the flight controller's port is named "fc".
         self.traffic: defaultdict[str, Traffic] = defaultdict(Traffic)
-        self.fc = FcConnection(settings, host, self.bridge, self.traffic["fc"], self.flush, self._forward)
+        self.fc = FcConnection(settings, host, self.bridge, self.traffic["fc"], self.flush)
         self.gcs = GcsConnections(self.bridge, self.traffic, self.flush)
         #: Why missions are kept in memory only; empty if they are stored.
         self.store_trouble = ""
@@ -167,25 +168,32 @@ class Daemon:
         self.settings = replace(self.settings, gcs=self.gcs.change(self.settings.gcs, gcs))
 
     def flush(self) -> None:
-        """Carry out the outputs that the bridge has after an input."""
-        bridge = self.bridge
-        self._forward()  # first: telemetry is shown without delay
-        if (output := bridge.take_fc_output()) is not None:
-            self.fc.carry_out(output)
-        while effects := bridge.store_effects:
-            self._carry_out(effects.popleft())
-        if bridge.flight is not self._flight.saved:
-            self._flight.save(bridge.flight)
-        self._lane.set_timer(bridge.due, self._tick)
-
-    def _forward(self) -> None:
-        """Carry out only the outputs of pass-through: the rest would cost too much thousands of times a second."""
-        self.gcs.send()
-        if self._tlog is not None:
-            self._tlog.record()
-        if self._followers and (fresh := self.bridge.take_fresh(self._loop.time())):
-            for follower in self._followers:
-                follower.telemetry(fresh)
+        """Carry out the effects that the bridge has after an input, and set its timer."""
+        for effect in self.bridge.take():
+            match effect:
+                case Datagrams():
+                    self.gcs.send(effect)
+                case SendToBoard():
+                    self.fc.carry_out(effect)
+                case RecordFrames(frames):
+                    assert self._tlog is not None
+                    self._tlog.record(frames)
+                case PublishGroups(groups):
+                    for follower in self._followers:
+                        follower.telemetry(groups)
+                case BridgeEvent():
+                    self._happened(effect)
+                case Save() | Conclude() | Recall() | NoteReader() | FindPending():
+                    self.store.carry_out(effect, partial(self._store_answered, effect))
+                case MissionEnded(mission, delivery):
+                    for follower in self._followers:
+                        follower.mission_ended(mission, delivery)
+                case TakenBackup(board):
+                    self.store.back_up(board.uid or self.fc.where, effect)
+                case RememberFlight(flight):
+                    self._flight.save(flight)
+        if self.bridge.due != self._lane.timer_at:
+            self._lane.set_timer(self.bridge.due, self._tick)
 
     async def answer(self, start: Callable[[Callable[[T], None], float], None]) -> T:
         """Start an operation of the bridge at the given time, and wait until it calls back with its result."""
@@ -219,10 +227,6 @@ class Daemon:
             await asyncio.sleep(_REST_INTERVAL_S)
         return not self.bridge.is_busy
 
-    def _mission_ended(self, mission: ArrivedMission, delivery: DeliveryResult) -> None:
-        for follower in self._followers:
-            follower.mission_ended(mission, delivery)
-
     def _happened(self, event: BridgeEvent) -> None:
         getattr(_log, event.level)(event.name_in_log, **event.facts())
         if self._tlog is not None and isinstance(event, Armed | Disarmed):
@@ -255,12 +259,9 @@ class Daemon:
         self.bridge.tick(now)
         self.flush()
 
-    def _carry_out(self, effect: StoreEffect) -> None:
-        def answered(answer: object) -> None:
-            self.bridge.store_answered(effect, answer, self._loop.time())
-            self.flush()
-
-        self.store.carry_out(effect, answered)
+    def _store_answered(self, effect: StoreEffect, answer: object) -> None:
+        self.bridge.store_answered(effect, answer, self._loop.time())
+        self.flush()
 
 
 def _speeds(address: FcAddress) -> Sequence[int | None]:

@@ -9,7 +9,8 @@ from math import inf
 import serial
 import structlog
 
-from bridge.bridge import Bridge, FcOutput
+from bridge.bridge import Bridge
+from bridge.effects import SendToBoard
 from bridge.model.events import BridgeEvent, FcFound, FcInCommandLine, FcLost, PortLost
 from protocols.uart_capture import UartAction
 from service.links.fc_device import PortError, device_opener, open_serial
@@ -32,7 +33,7 @@ _log = structlog.get_logger()
 class FcConnection:
     """Feeds the port's bytes to the bridge. SettingsError if it cannot be recorded.
 
-    `flush` carries out the bridge's outputs; `forward` only those of pass-through, which is quicker.
+    `flush` carries out the bridge's effects.
     """
 
     def __init__(
@@ -42,13 +43,11 @@ class FcConnection:
         bridge: Bridge,
         traffic: Traffic,
         flush: Callable[[], None],
-        forward: Callable[[], None],
     ) -> None:
         self._address = settings.fc
         self._bridge = bridge
         self._traffic = traffic
         self._flush = flush
-        self._forward = forward
         self._loop = asyncio.get_running_loop()
         self.capture = None if settings.record_uart is None else UartRecorder(settings.record_uart)
         self._finder: PortFinder | None = None
@@ -124,7 +123,7 @@ class FcConnection:
         if self.capture is not None:
             self.capture.close()
 
-    def carry_out(self, output: FcOutput) -> None:
+    def carry_out(self, output: SendToBoard) -> None:
         if output.speed != self._speed:
             self._speed = output.speed
             self._port.set_speed(output.speed)
@@ -158,13 +157,9 @@ class FcConnection:
     def _received(self, data: bytes, now: float) -> None:
         if self.capture is not None:
             self.capture.note(UartAction.READ, self._speed, data)
-        bridge = self._bridge
         if self._finder is not None:
             self._finder.received(data)
-        has_changed = bridge.fc_received(data, now)
-        if bridge.is_passing_through:
-            self._forward()
-        elif has_changed:
+        if self._bridge.fc_received(data, now):
             self._flush()
 
     def _closed(self, why: str) -> None:

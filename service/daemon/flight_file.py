@@ -28,32 +28,31 @@ class FlightFile:
     def __init__(self, folder: Path | None, port: str, host: Host) -> None:
         self._file = None if folder is None else StateFile(folder, FLIGHT_FILE, "a flight begins again")
         self._key = {"port": port, "boot_id": host.read(_BOOT_ID).strip()}
-        #: The memory that was saved last.
-        self.saved: FlightMemory | None = None
+        self._saved: FlightMemory | None = None
 
     def load(self, now: float) -> FlightMemory | None:
         """The craft that the previous daemon left armed, if it counts; `now`: monotonic seconds."""
         if self._file is not None:
-            self.saved = self._file.load(lambda kept: self._read(kept, now))
-            if self.saved is not None:
+            self._saved = self._file.load(lambda kept: self._read(kept, now))
+            if self._saved is not None:
                 # The next stop may be a crash, which leaves no time.
                 self._save(None)
-        return self.saved
+        return self._saved
 
     def save(self, flight: FlightMemory | None) -> None:
-        self.saved = flight
+        self._saved = flight
         self._save(None)
 
     def close(self, now: float) -> None:
         """Note the time of the stop, and finish writing."""
         if self._file is not None:
-            if self.saved is not None:
+            if self._saved is not None:
                 self._save(now)
             self._file.close()
 
     def _save(self, stopped_at: float | None) -> None:
         if self._file is not None:
-            flight = self.saved
+            flight = self._saved
             plain = None if flight is None else asdict(flight) | {"mode": flight.mode and flight.mode.name}
             self._file.save({**self._key, "stopped_at": stopped_at, "flight": plain})
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import structlog
 
 from bridge.bridge import Bridge
-from bridge.gcs.station import Peer
+from bridge.gcs.station import Datagrams, Peer
 from service.links.gcs_links import GcsLink, LinkError, open_link
 from service.links.traffic import Traffic
 from service.machine.package import page
@@ -21,7 +21,7 @@ _log = structlog.get_logger()
 class GcsConnections:
     """Feeds the links' bytes to the bridge. Implements service.links.gcs_events.GcsEvents.
 
-    `flush` carries out the bridge's outputs.
+    `flush` carries out the bridge's effects.
     """
 
     def __init__(self, bridge: Bridge, traffic: Mapping[str, Traffic], flush: Callable[[], None]) -> None:
@@ -62,8 +62,8 @@ class GcsConnections:
                     self.warn(address)
         return tuple(address for address in new if str(address) in self._links)
 
-    def send(self) -> None:
-        for peer, data in self._bridge.take_datagrams():
+    def send(self, datagrams: Datagrams) -> None:
+        for peer, data in datagrams:
             self._links[peer.link].send(peer, data)
             traffic = self._traffic[peer.link]
             traffic.pieces_sent += 1

@@ -20,7 +20,7 @@ _Taken = tuple[int, bool, Sequence[bytes]]
 
 
 class TlogRecorder:
-    """Takes whole frames that were received or are being sent by `on_frames`.
+    """Takes whole frames that were received or sent.
 
     Within a file time advances evenly; when the clock is set a new file begins.
 
@@ -36,16 +36,10 @@ class TlogRecorder:
         self._epoch_us = self._present_epoch_us()
         self._is_flying = False
         self._awaits_vehicle = True
-        self._frames: list[bytes] = []
-        self.on_frames: Callable[[Sequence[bytes]], None] = self._frames.extend
         self._writer = DiskWriter("telemetry log", self._write, self._folder.close)
 
-    def record(self) -> None:
-        """Record the frames taken since the last call: after the datagrams were sent, which must not wait for this."""
-        if self._frames:
-            frames = tuple(self._frames)
-            self._frames.clear()
-            self._writer.put((time.monotonic_ns(), self._is_flying, frames), sum(map(len, frames)))
+    def record(self, frames: Sequence[bytes]) -> None:
+        self._writer.put((time.monotonic_ns(), self._is_flying, frames), sum(map(len, frames)))
 
     def flies(self, *, is_flying: bool) -> None:
         """Mark the following frames as part of a flight, or not."""
@@ -57,7 +51,6 @@ class TlogRecorder:
         return f"telemetry log: {self._folder.describe()}{dropped}"
 
     def close(self) -> None:
-        self.record()
         self._writer.close()
 
     def _write(self, taken: list[_Taken]) -> None:

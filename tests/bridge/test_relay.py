@@ -67,7 +67,7 @@ class Bench:
         return next((each for _, each in reversed(self.frames) if each.get_type() == kind), None)
 
     def _take(self) -> None:
-        for _, data in self.relay.take_datagrams():
+        for _, data in self.relay.take():
             for frame in MavlinkSplitter().feed(data):
                 message = decode(frame)
                 assert message is not None

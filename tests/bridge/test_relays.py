@@ -50,7 +50,7 @@ class Bench:
         return self.heard()
 
     def heard(self) -> list[tuple[int, Message]]:
-        frames = [frame for _, data in self.relays.take_datagrams() for frame in MavlinkSplitter().feed(data)]
+        frames = [frame for _, data in self.relays.take() for frame in MavlinkSplitter().feed(data)]
         return [(frame.sysid, message) for frame in frames for message in self._messages(frame.raw)]
 
     def _messages(self, data: bytes) -> list[Message]:

@@ -11,7 +11,7 @@ import pytest
 from bridge.controllers.harakiri.mission_store import HarakiriMissions
 from bridge.controllers.harakiri.profile import PATCHED
 from bridge.fc.profile import FlightController, RuleSettings
-from bridge.line.conversation import Conversation
+from bridge.line.conversation import Conversation, StoreEffect
 from bridge.line.msp_link import MspLink
 from bridge.line.runner import Runner
 from bridge.missions.fc_mission_store import PushResult
@@ -77,9 +77,10 @@ class Line:
         self.resets = 0
         self.now = 0.0
         self._disturb = disturb
+        self._store_effects: list[StoreEffect] = []
         self._link = MspLink(_BAUD, [], self.now)
         self._link.receiver_timeout_s = info.inter_byte_timeout_ms / 1000
-        self._runner = Runner()
+        self._runner = Runner(self._store_effects.append)
         self._runner.link_up(self._link)
         self._order = count()
         self._wire: list[tuple[float, int, Callable[[bytes], None], bytes]] = []
@@ -113,7 +114,7 @@ class Line:
         self.now = max(self.now, self._up_at)
 
     def _step(self) -> None:
-        assert not self._runner.store_effects
+        assert not self._store_effects
         due = [self._link.due, self._runner.due, *(at for at, *_ in self._wire[:1])]
         self.now = max(self.now, min(due))
         self._tell_the_board_the_time()

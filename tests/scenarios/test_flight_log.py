@@ -2,7 +2,6 @@
 """A flight is logged from arming to disarming, with or without a ground station."""
 
 from collections import Counter
-from collections.abc import Sequence
 
 import pytest
 from pymavlink.dialects.v20 import all as m
@@ -12,55 +11,47 @@ from simulator.board.options import SimOptions, TelemetryProtocol
 from tests.support.world import GroundStation, World
 
 
-class Log:
-    def __init__(self) -> None:
-        self.frames: list[bytes] = []
-
-    def __call__(self, frames: Sequence[bytes]) -> None:
-        self.frames += frames
-
-    def take(self) -> Counter[str]:
-        """Messages logged since the last call, counted by name."""
-        found = MavlinkSplitter().feed(b"".join(self.frames))
-        self.frames.clear()
-        return Counter(m.mavlink_map[frame.msgid].msgname for frame in found)
+def take(world: World) -> Counter[str]:
+    """Messages logged since the last call, counted by name."""
+    found = MavlinkSplitter().feed(b"".join(world.recorded))
+    world.recorded.clear()
+    return Counter(m.mavlink_map[frame.msgid].msgname for frame in found)
 
 
-def logged(protocol: TelemetryProtocol) -> tuple[World, Log]:
-    log = Log()
-    world = World(SimOptions(tele_prot=protocol), on_frames=log)
+def logged(protocol: TelemetryProtocol) -> World:
+    world = World(SimOptions(tele_prot=protocol), has_log=True)
     world.wait_ready(30)
     world.run(3)
-    return world, log
+    return world
 
 
 @pytest.mark.parametrize("protocol", [TelemetryProtocol.MSP, TelemetryProtocol.MAVLINK])
 def test_a_flight_without_a_ground_station_is_logged_at_full_rates(protocol: TelemetryProtocol) -> None:
-    world, log = logged(protocol)
-    assert log.take() == {}
+    world = logged(protocol)
+    assert take(world) == {}
     world.faults.armed = True
     world.run(5)
-    log.take()
+    take(world)
     world.run(10)
-    flown = log.take()
+    flown = take(world)
     assert flown["ATTITUDE"] == pytest.approx(100, rel=0.1)
     assert flown["GLOBAL_POSITION_INT"] >= 20
     assert {"BATTERY_STATUS", "SYS_STATUS", "RC_CHANNELS", "VFR_HUD", "HEARTBEAT"} <= set(flown)
     world.faults.armed = False
     world.run(6)
-    log.take()
+    take(world)
     world.run(5)
-    assert log.take() == {}
+    assert take(world) == {}
 
 
 def test_low_requested_rates_do_not_slow_the_log() -> None:
-    world, log = logged(TelemetryProtocol.MSP)
+    world = logged(TelemetryProtocol.MSP)
     station = GroundStation(world)
     station.send(m.MAVLink_request_data_stream_message(1, 1, 0, 1, 1))
     world.faults.armed = True
     world.run(5)
-    log.take()
+    take(world)
     station.take()
     world.run(10)
     assert len(station.messages("ATTITUDE")) == pytest.approx(10, abs=2)
-    assert log.take()["ATTITUDE"] == pytest.approx(100, rel=0.1)
+    assert take(world)["ATTITUDE"] == pytest.approx(100, rel=0.1)

@@ -92,7 +92,7 @@ def test_no_reply_raises(seed: int) -> None:
         station.send(messages.MAVLink_mission_request_list_message(1, 1))
         world.run(0.5)
         faults.armed = inputs.random.random() < 0.5
-        for group in world.bridge.take_fresh(world.now):
+        for group in world.take_published():
             to_json(asdict(world.bridge.group(group, world.now)))
     world.run(1)
 

@@ -148,7 +148,7 @@ class Sinks:
     def step(self, *, is_compared: bool = True) -> None:
         for _ in range(5):
             self.world.run(STEP_S / 5)
-            for group in self.world.bridge.take_fresh(self.world.now):
+            for group in self.world.take_published():
                 self.published[group] = self.world.now, plain(self.world.bridge.group(group, self.world.now))
         self.past.append((self.world.now, self.world.naze.truth(self.world.now)))
         if is_compared:

@@ -23,15 +23,16 @@ from bridge.controllers.harakiri import profile as harakiri
 from bridge.controllers.inav import profile as inav
 from bridge.controllers.multiwii import profile as multiwii
 from bridge.controllers.table import PROFILES
+from bridge.effects import PublishGroups, RecordFrames, RememberFlight, SendToBoard
 from bridge.fc.profile import Profile
 from bridge.fc.states.cli import Cli
 from bridge.fc.states.mavlink import MavlinkLine
 from bridge.fc.states.msp import Polling
 from bridge.fc.states.searching import SPEEDS
-from bridge.gcs.ground import FrameListener
 from bridge.gcs.rights import LinkAccess
-from bridge.gcs.station import Peer
+from bridge.gcs.station import Datagrams, Peer
 from bridge.line.conversation import Conclude, FindPending, NoteReader, Recall, Save, StoreEffect
+from bridge.missions.mission_service import MissionEnded
 from bridge.model.events import BridgeEvent, Level
 from bridge.model.flight_memory import FlightMemory
 from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission, RecalledMission
@@ -48,6 +49,7 @@ from protocols.msp.nav import SET_WP_INDEX
 from protocols.rights.effect import Effect
 from protocols.rights.mavlink import effect_of
 from protocols.rights.msp import Firmware, msp_right
+from reports.vehicle_groups import Group
 from reports.verdict import SentSeqs
 from simulator.board.flash import ERASED, PAGE_SIZE, NorFlash
 from simulator.board.line import garble
@@ -157,7 +159,7 @@ class World:
         is_near: Callable[[str], bool] = lambda _host: True,
         profiles: Sequence[Profile] = PROFILES,
         passes_everything: bool = False,
-        on_frames: FrameListener | None = None,
+        has_log: bool = False,
         seals: SealMemory | None = None,
     ) -> None:
         self.random = random.Random(seed)
@@ -183,8 +185,12 @@ class World:
             is_near=is_near,
             profiles=profiles,
             seals=seals or SealsOfThisRun(),
+            has_log=has_log,
         )
-        self._on_frames = on_frames
+        #: The frames for the telemetry log, if there is one.
+        self.recorded: list[bytes] = []
+        self.flight: FlightMemory | None = None
+        self._published: set[Group] = set()
         self.backups: list[TakenBackup] = []
         self._start_bridge()
         if powered:
@@ -207,7 +213,7 @@ class World:
 
     def restart_bridge(self, away_s: float = 2.0, *, flight: bool = True) -> None:
         """Kill the bridge, and start another one after `away_s`, with the flight that the previous one left."""
-        left = self.bridge.flight if flight else None
+        left = self.flight if flight else None
         self._plugged = False
         self._start_bridge()
         self._is_away = True
@@ -299,7 +305,13 @@ class World:
         return tuple(unpack_records(self.naze.stored))
 
     def events(self, name: str) -> list[Event]:
+        self._flush()  # for tests that call the bridge themselves
         return [event for event in self.log_event if event.name == name]
+
+    def take_published(self) -> set[Group]:
+        """The watched groups with new values since the last call."""
+        published, self._published = self._published, set()
+        return published
 
     def assert_line_was_clean(self) -> None:
         """Assert that no hazard run and no ring overflow occurred. True on any line without damage."""
@@ -314,7 +326,8 @@ class World:
 
     def _start_bridge(self, flight: FlightMemory | None = None) -> None:
         config = replace(self._config, flight=flight)
-        self.bridge = Bridge(config, self._note, self.now, self._on_frames, on_backup=self.backups.append)
+        self.flight = flight
+        self.bridge = Bridge(config, self.now)
         self.inside = Inside(self.bridge)
 
     def _step(self, end: float) -> None:
@@ -346,16 +359,32 @@ class World:
             raise AssertionError(f"the bridge spins at {self.now}: {self.inside.session.state}")
 
     def _flush(self) -> None:
-        if (output := self.bridge.take_fc_output()) is not None:
-            for data in output.data:
-                self._write(data)
-        assert self.bridge.due <= self.inside.session.state.due, "the line is due before the bridge"
-        for peer, frame in self.bridge.take_datagrams():
-            station = self.stations.get(peer)
-            if station is not None:
-                station.carry(frame)
-        while effects := self.bridge.store_effects:
-            self._carry_out(effects.popleft())
+        effects = self.bridge.take()
+        is_known = self.bridge.is_passing_through or self.bridge.due <= self.inside.session.state.due
+        assert is_known, "the line is due before the bridge"
+        for effect in effects:
+            match effect:
+                case SendToBoard(written):
+                    for data in written:
+                        self._write(data)
+                case Datagrams():
+                    for peer, frame in effect:
+                        if (station := self.stations.get(peer)) is not None:
+                            station.carry(frame)
+                case RecordFrames(frames):
+                    self.recorded += frames
+                case PublishGroups(groups):
+                    self._published |= groups
+                case RememberFlight():
+                    self.flight = effect.flight
+                case BridgeEvent():
+                    self.log_event.append(Event(self.now, effect.level, effect.name_in_log, effect.facts()))
+                case TakenBackup():
+                    self.backups.append(effect)
+                case Save() | Conclude() | Recall() | NoteReader() | FindPending():
+                    self._carry_out(effect)
+                case MissionEnded():
+                    pass
 
     def _write(self, data: bytes) -> None:
         assert self._plugged
@@ -394,9 +423,6 @@ class World:
             self._flush()
 
         self.after(self.store.delay_s, answer)
-
-    def _note(self, event: BridgeEvent) -> None:
-        self.log_event.append(Event(self.now, event.level, event.name_in_log, event.facts()))
 
 
 @lru_cache(4096)  # the same few requests are sent over and over

@@ -32,7 +32,7 @@ def test_groups_are_made_from_a_mavlink_autopilot() -> None:
     autopilot.outgoing += m.MAVLink_attitude_message(1, 1.0, 1.0, 1.0, 0, 0, 0).pack(gimbal)
     world.run(0.05)
     bridge = world.bridge
-    assert bridge.take_fresh(world.now) == {
+    assert world.take_published() == {
         Group.ATTITUDE, Group.POSITION, Group.GPS, Group.BATTERY, Group.RC, Group.STATUS
     }  # fmt: skip
     assert without_age(bridge.group(Group.ATTITUDE, world.now)) == Attitude(

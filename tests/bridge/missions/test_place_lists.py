@@ -11,7 +11,7 @@ from tests.support.conversations import Upload
 
 
 def test_before_a_board_is_found_none_are_stored() -> None:
-    lists = PlaceLists(RALLY, "Rally points", Vehicle(), Runner(), lambda: None)
+    lists = PlaceLists(RALLY, "Rally points", Vehicle(), Runner(lambda _effect: None), lambda: None)
     lists.use(NO_LINK, 0.0, is_same_board=True)
     assert lists.fc_store is NO_PLACES
     assert not lists.are_stored

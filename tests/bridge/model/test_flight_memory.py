@@ -56,7 +56,7 @@ def test_mode_arming_and_home_stay_as_they_are(protocol: TelemetryProtocol, boxe
     assert set(screens.mission_planner.armed.values(restarted_at)) <= {True}
     assert set(screens.mission_planner.mode.values(restarted_at)) <= {before.mode}
     assert home(station) == placed
-    assert world.bridge.vehicle.home == world.bridge.flight.home  # type: ignore[union-attr]
+    assert world.bridge.vehicle.home == world.flight.home  # type: ignore[union-attr]
 
 
 def test_without_memory_the_mode_is_a_guess() -> None:
@@ -75,20 +75,20 @@ def test_a_landing_that_nobody_saw_ends_the_flight() -> None:
     world.wait_ready()
     world.run(8)
     assert not screens.glance().armed
-    assert world.bridge.flight is None
+    assert world.flight is None
     assert home(station)[:2] != placed[:2]
 
 
 def test_a_board_that_was_restarted_and_armed_again_is_another_flight() -> None:
     world, _, _ = flying(TelemetryProtocol.MAVLINK_57600)
-    before = world.bridge.flight
+    before = world.flight
     world.power_off()
     world.faults.armed = False
     world.naze.power_on(world.now)
     world.at(world.now + 10.0, lambda: setattr(world.faults, "armed", True))
     world.restart_bridge(20.0)
     world.run(10)
-    after = world.bridge.flight
+    after = world.flight
     assert before is not None
     assert after is not None
     assert after.armed_at > before.armed_at + 20
@@ -97,14 +97,14 @@ def test_a_board_that_was_restarted_and_armed_again_is_another_flight() -> None:
 
 def test_the_memory_is_made_on_arming_and_ends_on_disarming() -> None:
     world, _, _ = flying(TelemetryProtocol.MAVLINK_57600)
-    memories = {id(world.bridge.flight)}
+    memories = {id(world.flight)}
     for _ in range(60):
         world.run(1)
-        memories.add(id(world.bridge.flight))
+        memories.add(id(world.flight))
     assert len(memories) == 1
     world.faults.armed = False
     world.run(10)
-    assert world.bridge.flight is None
+    assert world.flight is None
 
 
 def test_a_craft_that_is_not_found_again_is_lost() -> None:

@@ -36,7 +36,7 @@ class PausingSettings(FcSettings):
 
 
 def reader(on_end: Callable[[SettingTable | None, float], None]) -> TableReader:
-    return TableReader(Runner(), lambda _size: 0.0, lambda _now: None, on_end)
+    return TableReader(Runner(lambda _effect: None), lambda _size: 0.0, lambda _now: None, on_end)
 
 
 def test_the_line_is_free_between_two_requests() -> None:

@@ -514,9 +514,8 @@ def test_signed_frames_reach_the_autopilot_unchanged() -> None:
 
 @pytest.mark.parametrize("access", [LinkAccess(), LinkAccess(signing(), LINK_ID)])
 def test_setup_signing_is_never_forwarded(access: LinkAccess) -> None:
-    logged: list[bytes] = []
     world, autopilot = passing({"udp": access})
-    world.inside.ground.on_frames = lambda frames: logged.append(tlog_records(frames, 0))
+    world.inside.ground.recorded = []
     GroundStation(world, "other", sysid=250).send(READS[0])
     world.run(0.1)
     autopilot.received.clear()
@@ -532,7 +531,7 @@ def test_setup_signing_is_never_forwarded(access: LinkAccess) -> None:
     received = b"".join(b"".join(each.frames) for each in world.stations.values())
     for place in (
         received,
-        b"".join(logged),
+        tlog_records(world.recorded, 0),
         repr(world.log_event).encode(),
         repr(world.inside.ground._access).encode(),
     ):

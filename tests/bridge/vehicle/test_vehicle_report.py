@@ -93,18 +93,18 @@ def test_watched_groups_are_polled_and_published_with_each_reply() -> None:
     world = World()
     world.wait_ready()
     bridge = world.bridge
-    assert bridge.take_fresh(world.now) == frozenset()
+    assert world.take_published() == set()
     bridge.watch({Group.ATTITUDE})
     found = 0
     for _ in range(100):
         world.run(0.02)
-        fresh = bridge.take_fresh(world.now)
+        fresh = world.take_published()
         assert fresh <= {Group.ATTITUDE}
         found += len(fresh)
     assert 15 <= found <= 25
     bridge.watch(())
     world.run(2.0)
-    assert bridge.take_fresh(world.now) == frozenset()
+    assert world.take_published() == set()
 
 
 def test_the_age_of_a_value_grows_while_the_bridge_hears_nothing_and_has_nothing_to_do() -> None:

@@ -7,7 +7,7 @@ from math import inf
 
 import pytest
 
-from bridge.bridge import FcOutput
+from bridge.effects import SendToBoard
 from bridge.fc.session import FcSession
 from service.daemon.daemon import Daemon
 from service.links.fc_port import STOPPED, FcPort
@@ -67,13 +67,13 @@ async def test_the_port_is_held_until_the_replies_to_polls_can_have_arrived() ->
     await until_async(lambda: is_found(daemon), "the flight controller")
     loop = event_loop.running()
     complete_at = loop.time() + 3600
-    daemon.fc.carry_out(FcOutput([], None, may_gather=False, asks=True, complete_at=complete_at))
+    daemon.fc.carry_out(SendToBoard([], None, may_gather=False, asks=True, complete_at=complete_at))
     assert loop.lane.held_until == complete_at
-    daemon.fc.carry_out(FcOutput([], None, may_gather=False, asks=True, complete_at=-inf))
+    daemon.fc.carry_out(SendToBoard([], None, may_gather=False, asks=True, complete_at=-inf))
     assert loop.lane.held_until == -inf
     # Pass-through gathers by itself.
     daemon.fc._port.hold(complete_at)
-    daemon.fc.carry_out(FcOutput([], None, may_gather=True, asks=False, complete_at=-inf))
+    daemon.fc.carry_out(SendToBoard([], None, may_gather=True, asks=False, complete_at=-inf))
     assert loop.lane.held_until == complete_at
     running.cancel()
     await asyncio.wait([running])

@@ -27,7 +27,7 @@ def computer(root: Path, boot_id: str) -> Host:
 
 def leave(folder: Path, flight: FlightMemory | None, *, stopped_at: float = 200.0) -> None:
     file = FlightFile(folder, "/dev/ttyAMA0", computer(folder, "boot 1"))
-    if flight is not file.saved:
+    if flight is not None:
         file.save(flight)
     file.close(stopped_at)
 

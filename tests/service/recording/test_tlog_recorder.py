@@ -27,8 +27,7 @@ def test_a_step_of_the_clock_begins_a_new_file(tmp_path: Path, step_ns: int) -> 
     recorder = TlogRecorder(tmp_path, TlogLimits(), lambda: time.time_ns() + ahead_ns)
     deadline = time.monotonic() + TIMEOUT_S
     for number in count():
-        recorder.on_frames([frame(number)])
-        recorder.record()
+        recorder.record([frame(number)])
         files = set(tmp_path.iterdir())
         if files:
             # The first file exists; now the clock is set.
@@ -60,23 +59,19 @@ def test_the_first_heartbeat_in_a_file_is_the_vehicles(tmp_path: Path, version: 
     vehicle = heartbeat(messages.MAV_TYPE_QUADROTOR, 1, version=version)
     ahead_ns = 0
     recorder = TlogRecorder(tmp_path, TlogLimits(), lambda: time.time_ns() + ahead_ns)
-    recorder.on_frames([station, frame(1)])
-    recorder.record()
-    recorder.on_frames([frame(2), station, vehicle, station])
-    recorder.record()
+    recorder.record([station, frame(1)])
+    recorder.record([frame(2), station, vehicle, station])
     deadline = time.monotonic() + TIMEOUT_S
     while not (first := list(tmp_path.iterdir())):
         assert time.monotonic() < deadline
         time.sleep(0.01)
     ahead_ns = HOUR_NS
     while len(later := set(tmp_path.iterdir()) - set(first)) == 0:
-        recorder.on_frames([station])
-        recorder.record()
-        recorder.on_frames([frame(3)])
-        recorder.record()
+        recorder.record([station])
+        recorder.record([frame(3)])
         assert time.monotonic() < deadline
         time.sleep(0.01)
-    recorder.on_frames([vehicle, station])
+    recorder.record([vehicle, station])
     recorder.close()
     begun = [record.frame.raw for record in read_tlog(first[0].read_bytes())]
     assert begun[:4] == [frame(1), frame(2), vehicle, station]
@@ -89,8 +84,7 @@ def test_a_small_correction_of_the_clock_changes_nothing(tmp_path: Path) -> None
     recorder = TlogRecorder(tmp_path, TlogLimits(), lambda: time.time_ns() + next(corrections))
     deadline = time.monotonic() + TIMEOUT_S
     while not any(path.stat().st_size > 200 for path in tmp_path.iterdir()):
-        recorder.on_frames([frame(1)])
-        recorder.record()
+        recorder.record([frame(1)])
         assert time.monotonic() < deadline
         time.sleep(0.05)
     recorder.close()

@@ -33,7 +33,7 @@ ALPHABETS = {
 
 
 def begin(*speeds: int, good: tuple[int, ...] = ()) -> Searching:
-    port = Port(speeds, Autopilot.AUTO, (), Runner(), lambda _frames, _kinds: None)
+    port = Port(speeds, Autopilot.AUTO, (), Runner(lambda _effect: None), lambda _frames, _kinds: None)
     port.good_speeds.extend(good)
     return Searching(port, PortOpened(), 0.0)
 

@@ -9,8 +9,9 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from bridge.controllers import other
+from bridge.effects import SendToBoard
 from bridge.gcs.rights import LinkAccess
-from bridge.gcs.station import Peer
+from bridge.gcs.station import Datagrams, Peer
 from protocols.mavlink.codec import FrameWriter, Packed
 from protocols.mavlink.frame import MavlinkSplitter
 from simulator.naze.board import SimulatedNaze
@@ -162,8 +163,7 @@ def test_only_a_frame_with_a_target_asks_for_a_reply() -> None:
     ):
         frame = bytes(message.pack(mavlink.MAVLink(None, srcSystem=station.sysid, srcComponent=station.compid)))
         world.bridge.gcs_received(station.peer, frame, world.now, datagram=True)
-        output = world.bridge.take_fc_output()
-        assert output is not None
+        (output,) = (effect for effect in world.bridge.take() if isinstance(effect, SendToBoard))
         assert output.data == [frame]
         asks.append(output.asks)
     assert asks == [False, True]
@@ -320,7 +320,7 @@ def test_a_crowd_does_not_multiply_frames() -> None:
     for number in range(400):
         world.bridge.gcs_received(stranger.peer, hello, world.now + number / 200, datagram=True)
     assert 100 < len(ground.take_datagrams()) < 1000
-    copies = []
+    copies: list[tuple[Peer, bytes]] = []
     for _ in range(400):
         world.bridge.fc_received(autopilot.pack(mavlink.MAVLink_attitude_message(0, *[0.0] * 6)), world.now)
         copies += ground.take_datagrams()
@@ -381,4 +381,4 @@ def test_frames_that_arrive_together_share_a_datagram() -> None:
         mavlink.MAVLink_vfr_hud_message(1, 1, 1, 1, 1, 1)
     )
     world.bridge.fc_received(together, world.now)
-    assert list(world.bridge.take_datagrams()) == [(station.peer, together) for station in stations]
+    assert world.bridge.take() == [Datagrams((station.peer, together) for station in stations)]
