@@ -138,7 +138,7 @@ class OwnVehicle:
     def _inform_newcomers(self, everyone: Sequence[GroundStation], now: float) -> None:
         """Tell home and the reasons not to arm."""
         newcomers = [station for station in everyone if not station.is_informed]
-        for message in self._moment(now).made(_HOME) if newcomers else ():
+        for message in self._moment(now).made(*_HOME) if newcomers else ():
             self._ground.multicast(pack(message), newcomers)
         for station in newcomers:
             station.is_informed = True
@@ -169,7 +169,7 @@ class OwnVehicle:
                 self._send_current(stations, now)
             elif stations:
                 at = at or self._moment(now)
-                for message in at.made(row.makers):
+                for message in at.made(row.maker):
                     self._ground.multicast(pack(message), stations)
 
     def also_want(self, readings: Mapping[type[Reading], float]) -> None:
@@ -192,9 +192,9 @@ class OwnVehicle:
         elif msgid == messages.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
             # A restarted station would otherwise show home at 0, 0.
             version = make.autopilot_version(self._session.vehicle, self.capabilities())
-            made = [version, *self._moment(now).made((make.home_position,))]
+            made = [version, *self._moment(now).made(make.home_position)]
         elif (row := _ROWS.get(msgid)) is not None:
-            made = self._moment(now, self.sent_seqs(self._ground.station(station.peer))).made(row.makers)
+            made = self._moment(now, self.sent_seqs(self._ground.station(station.peer))).made(row.maker)
         else:
             return None
         for message in made:
@@ -396,7 +396,7 @@ class OwnVehicle:
         home = self._session.vehicle.home
         if home == self._announced_home:
             return
-        for message in self._moment(now).made(_HOME):
+        for message in self._moment(now).made(*_HOME):
             self._announced_home = home
             self._ground.broadcast(message)
 

@@ -27,7 +27,7 @@ class Row:
     reading: type[v.Reading] | None
     interval_s: float
     stream: int
-    makers: tuple[make.Maker, ...]
+    maker: make.Maker
     other: type[v.Reading] | None = None
 
     @property
@@ -41,26 +41,22 @@ class Row:
 
 
 TELEMETRY = (
-    Row(m.MAVLINK_MSG_ID_ATTITUDE, v.Orientation, 0.1, EXTRA1, (make.attitude,)),
-    Row(m.MAVLINK_MSG_ID_GPS_RAW_INT, v.GpsFix, 0.2, EXTENDED_STATUS, (make.gps_raw_int,)),
-    Row(m.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, v.GlobalPosition, 0.2, POSITION, (make.global_position_int,), v.Height),
-    Row(m.MAVLINK_MSG_ID_VFR_HUD, v.Height, 0.2, EXTRA2, (make.vfr_hud,), v.GpsFix),
-    Row(m.MAVLINK_MSG_ID_SYS_STATUS, v.Health, 0.5, EXTENDED_STATUS, (make.sys_status,), v.Power),
-    Row(m.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, v.FlightState, 1.0, EXTENDED_STATUS, (make.extended_sys_state,)),
-    Row(m.MAVLINK_MSG_ID_NAMED_VALUE_INT, v.Health, 1.0, EXTRA3, (make.cycle_time, make.i2c_errors)),
-    Row(m.MAVLINK_MSG_ID_BATTERY_STATUS, v.Power, 0.5, EXTRA3, (make.battery_status,)),
-    Row(m.MAVLINK_MSG_ID_RC_CHANNELS, v.Sticks, 0.5, RC_CHANNELS, (make.rc_channels,)),
-    Row(m.MAVLINK_MSG_ID_RC_CHANNELS_RAW, v.Sticks, 0.5, RC_CHANNELS, (make.rc_channels_raw,)),
-    Row(m.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT, v.GlobalPosition, 0.5, EXTRA3, (make.home_distance, make.home_direction)),
-    Row(m.MAVLINK_MSG_ID_HOME_POSITION, v.GlobalPosition, inf, NO_STREAM, (make.home_position,)),
-    Row(m.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, None, inf, NO_STREAM, (make.gps_global_origin,)),
-    Row(m.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW, v.Motors, 0.5, RC_CHANNELS, (make.servo_output_raw,)),
-    Row(m.MAVLINK_MSG_ID_SCALED_PRESSURE, v.Pressure, 0.5, RAW_SENSORS, (make.scaled_pressure,)),
-    Row(m.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, v.Orientation, inf, NO_STREAM, (make.attitude_quaternion,)),
-    Row(m.MAVLINK_MSG_ID_LOCAL_POSITION_NED, v.GlobalPosition, inf, POSITION, (make.local_position_ned,)),
-    Row(m.MAVLINK_MSG_ID_RAW_IMU, v.ImuSample, inf, RAW_SENSORS, (make.raw_imu,)),
-    Row(m.MAVLINK_MSG_ID_MISSION_CURRENT, None, 1.0, EXTENDED_STATUS, (make.mission_current,)),
-    Row(m.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT, None, 1.0, EXTENDED_STATUS, (make.nav_controller_output,)),
-    Row(m.MAVLINK_MSG_ID_SYSTEM_TIME, None, 1.0, EXTRA3, (make.system_time,)),
-    Row(m.MAVLINK_MSG_ID_CURRENT_MODE, None, 1.0, EXTENDED_STATUS, (make.current_mode,)),
+    Row(m.MAVLINK_MSG_ID_ATTITUDE, v.Orientation, 0.1, EXTRA1, make.attitude),
+    Row(m.MAVLINK_MSG_ID_GPS_RAW_INT, v.GpsFix, 0.2, EXTENDED_STATUS, make.gps_raw_int),
+    Row(m.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, v.GlobalPosition, 0.2, POSITION, make.global_position_int, v.Height),
+    Row(m.MAVLINK_MSG_ID_VFR_HUD, v.Height, 0.2, EXTRA2, make.vfr_hud, v.GpsFix),
+    Row(m.MAVLINK_MSG_ID_SYS_STATUS, v.Health, 0.5, EXTENDED_STATUS, make.sys_status, v.Power),
+    Row(m.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, v.FlightState, 1.0, EXTENDED_STATUS, make.extended_sys_state),
+    Row(m.MAVLINK_MSG_ID_BATTERY_STATUS, v.Power, 0.5, EXTRA3, make.battery_status),
+    Row(m.MAVLINK_MSG_ID_RC_CHANNELS, v.Sticks, 0.5, RC_CHANNELS, make.rc_channels),
+    Row(m.MAVLINK_MSG_ID_HOME_POSITION, v.GlobalPosition, inf, NO_STREAM, make.home_position),
+    Row(m.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, None, inf, NO_STREAM, make.gps_global_origin),
+    Row(m.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW, v.Motors, 0.5, RC_CHANNELS, make.servo_output_raw),
+    Row(m.MAVLINK_MSG_ID_SCALED_PRESSURE, v.Pressure, 0.5, RAW_SENSORS, make.scaled_pressure),
+    Row(m.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, v.Orientation, inf, NO_STREAM, make.attitude_quaternion),
+    Row(m.MAVLINK_MSG_ID_LOCAL_POSITION_NED, v.GlobalPosition, inf, POSITION, make.local_position_ned),
+    Row(m.MAVLINK_MSG_ID_RAW_IMU, v.ImuSample, inf, RAW_SENSORS, make.raw_imu),
+    Row(m.MAVLINK_MSG_ID_MISSION_CURRENT, None, 1.0, EXTENDED_STATUS, make.mission_current),
+    Row(m.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT, None, 1.0, EXTENDED_STATUS, make.nav_controller_output),
+    Row(m.MAVLINK_MSG_ID_SYSTEM_TIME, None, 1.0, EXTRA3, make.system_time),
 )

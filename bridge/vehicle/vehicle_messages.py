@@ -126,7 +126,7 @@ class Moment:
             raise Unknown
         return reading
 
-    def made(self, makers: Iterable["Maker"]) -> list[Message]:
+    def made(self, *makers: "Maker") -> list[Message]:
         """The messages of these makers that are not Unknown."""
         made = []
         for maker in makers:
@@ -174,13 +174,6 @@ def heartbeat(at: Moment) -> Message:
     return messages.MAVLink_heartbeat_message(
         vehicle.airframe, messages.MAV_AUTOPILOT_ARDUPILOTMEGA, base_mode, _custom_mode(vehicle, mode), status, 3
     )
-
-
-def current_mode(at: Moment) -> Message:
-    mode = at.need(v.Mode).mode
-    if not isinstance(mode, FlightMode):
-        raise Unknown
-    return messages.MAVLink_current_mode_message(_standard_mode(at.vehicle, mode), _custom_mode(at.vehicle, mode), 0)
 
 
 def available_modes(vehicle: v.Vehicle) -> list[Message]:
@@ -414,12 +407,6 @@ def rc_channels(at: Moment) -> Message:
     return messages.MAVLink_rc_channels_message(at.boot_ms, len(channels), *fields)
 
 
-def rc_channels_raw(at: Moment) -> Message:
-    """RC_CHANNELS_RAW: the first eight."""
-    fields = *_padded(at.need(v.Sticks).channels_us, _RAW_CHANNELS), _rssi(at)
-    return messages.MAVLink_rc_channels_raw_message(at.boot_ms, 0, *fields)
-
-
 def raw_imu(at: Moment) -> Message:
     """RAW_IMU: 1/1000 g; gyro and compass in the flight controller's own scale."""
     imu = at.need(v.ImuSample)
@@ -533,28 +520,6 @@ def _landed_state(at: Moment) -> int:
     if abs(height.height_m) > _FLYING_M or abs(height.climb_m_s) > _FLYING_M_S or (speed or 0) > _FLYING_M_S:
         return int(messages.MAV_LANDED_STATE_IN_AIR)
     return int(messages.MAV_LANDED_STATE_ON_GROUND)
-
-
-def cycle_time(at: Moment) -> Message:
-    """NAMED_VALUE_INT: the main loop's cycle time, microseconds."""
-    return messages.MAVLink_named_value_int_message(at.boot_ms, b"cycle_us", known(at.need(v.Health).cycle_time_us))
-
-
-def i2c_errors(at: Moment) -> Message:
-    """NAMED_VALUE_INT: failed sensor reads since boot."""
-    return messages.MAVLink_named_value_int_message(at.boot_ms, b"i2c_err", known(at.need(v.Health).i2c_errors))
-
-
-def home_distance(at: Moment) -> Message:
-    """NAMED_VALUE_FLOAT: distance to home, metres."""
-    distance = distance_m(at.need(v.GlobalPosition), known(at.vehicle.home))
-    return messages.MAVLink_named_value_float_message(at.boot_ms, b"home_m", distance)
-
-
-def home_direction(at: Moment) -> Message:
-    """NAMED_VALUE_FLOAT: the direction of home, degrees."""
-    direction = bearing_deg(at.need(v.GlobalPosition), known(at.vehicle.home))
-    return messages.MAVLink_named_value_float_message(at.boot_ms, b"home_deg", direction)
 
 
 def home_position(at: Moment) -> Message:

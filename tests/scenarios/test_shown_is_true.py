@@ -52,10 +52,6 @@ def velocity_cm_s(craft: Craft, direction_deg: float) -> float:
     return craft.flight.speed_ms * 100 * math.cos(math.radians(craft.flight.course - direction_deg))
 
 
-def named(name: str) -> Callable[[Message], float | None]:
-    return lambda message: message.value if message.name == name else None
-
-
 def known_volts(message: Message) -> float | None:
     return None if message.voltage_battery == 65535 else message.voltage_battery
 
@@ -91,7 +87,6 @@ SCREEN = {
     "HUD altitude": Shown("VFR_HUD", lambda msg: msg.alt, lambda c: c.flight.altitude_m, 0.011),
     "volts": Shown("BATTERY_STATUS", battery_mv, lambda c: c.flight.volts * 1e3, 51),
     "volts too": Shown("SYS_STATUS", known_volts, lambda c: c.flight.volts * 1e3, 51),
-    "home distance": Shown("NAMED_VALUE_FLOAT", named("home_m"), of_home, 0.2),
     "speed north": Shown("GLOBAL_POSITION_INT", lambda msg: msg.vx, lambda c: velocity_cm_s(c, 0), 30),
     "speed east": Shown("GLOBAL_POSITION_INT", lambda msg: msg.vy, lambda c: velocity_cm_s(c, 90), 30),
     "throttle": Shown("RC_CHANNELS", lambda msg: msg.chan3_raw, lambda c: 1450 if c.armed else 1000, 0),
@@ -101,7 +96,7 @@ SCREEN = {
 FRSKY = "FrSky"
 FRSKY_RESOLUTION = {
     "lat": 17, "lon": 17, "height": 11, "altitude": 11, "climb": 8, "speed north": 50, "speed east": 50,
-    "heading": 0.6, "volts": 160, "volts too": 160, "home distance": 0.4,
+    "heading": 0.6, "volts": 160, "volts too": 160,
 }  # fmt: skip
 
 SCREEN_BY_KIND = {

@@ -99,8 +99,7 @@ class TestConnecting:
     def test_no_receiver_is_missing_before_its_channels_are_read(self) -> None:
         """Mission Planner's "NO RC Receiver" was also shown while nothing asked the board for its channels."""
         world, station, screens = on_the_ground()
-        for msgid in (m.MAVLINK_MSG_ID_RC_CHANNELS, m.MAVLINK_MSG_ID_RC_CHANNELS_RAW):
-            ask(station, m.MAVLink_command_long_message(1, 1, 511, 0, msgid, -1, 0, 0, 0, 0, 0))
+        ask(station, m.MAVLink_command_long_message(1, 1, 511, 0, m.MAVLINK_MSG_ID_RC_CHANNELS, -1, 0, 0, 0, 0, 0))
         world.run(10)
         assert all(is_quiet(glance) for glance in screens.look())
 

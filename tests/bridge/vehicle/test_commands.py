@@ -16,7 +16,7 @@ ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
 #: Minimum time between two equal refusal texts.
 _SILENCE_S = 10.1
 #: Unsolicited messages.
-TELEMETRY_TYPES = {"HEARTBEAT", "MISSION_CURRENT", "CURRENT_MODE"} | {
+TELEMETRY_TYPES = {"HEARTBEAT", "MISSION_CURRENT"} | {
     m.mavlink_map[row.msgid].msgname for row in TELEMETRY if row.reading is not None and row.interval_s < math.inf
 }
 

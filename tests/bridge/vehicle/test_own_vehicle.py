@@ -10,14 +10,6 @@ from tests.support.world import World
 ANGLE, BARO, GPS_HOME, GPS_HOLD, GPS_AUTO = 1 << 0, 1 << 2, 1 << 6, 1 << 7, 1 << 8
 
 
-def test_values_without_a_mavlink_field_are_sent_as_named_values() -> None:
-    _, station = flown(20)
-    named = {message.name: message.value for message in station.messages("NAMED_VALUE_INT", "NAMED_VALUE_FLOAT")}
-    assert (named["cycle_us"], named["i2c_err"]) == (3000, 0)
-    assert named["home_m"] == pytest.approx(41, abs=3)  # after 20 s on the circle
-    assert 180 <= named["home_deg"] <= 270
-
-
 def test_no_ground_station_shows_a_false_alarm() -> None:
     """MAVProxy shows "fence breach" without the fence bit, Mission Planner "SAFE" without the motor bit."""
     _, station = flown(3)
