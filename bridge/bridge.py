@@ -221,6 +221,7 @@ class Bridge:
         # The front door: calls that one part answers. First the ground stations' side.
         self.gcs_received = self._incoming.received
         self.add_default_peer, self.remove_default_peer = ground.add_default_peer, ground.remove_default_peer
+        self.is_connected = ground.is_connected
         #: Other programs, on a share.
         self.program_joined, self.program_left = self._sharing.join, self._sharing.leave
         #: Shows a text to each ground station that connects from now on.

@@ -109,6 +109,9 @@ class Ground:
     def station(self, peer: Peer) -> GroundStation | None:
         return self._heard.get(peer) or self._unheard.get(peer) or self._unproven.get(peer)
 
+    def is_connected(self, peer: Peer) -> bool:
+        return peer in self._heard
+
     def speaker(self, station: Station) -> Speaker:
         """The sender with the station's ids; an empty one if its address has too many to remember."""
         there = self._heard.get(station.peer) or self.station(station.peer)

@@ -30,6 +30,7 @@ class GcsConnections:
         self._flush = flush
         self._loop = asyncio.get_running_loop()
         self._links: dict[str, GcsLink] = {}
+        self.is_connected = bridge.is_connected
         self.add_default_peer = bridge.add_default_peer
         self.remove_default_peer = bridge.remove_default_peer
 

@@ -12,6 +12,9 @@ class GcsEvents(Protocol):
     def gcs_data(self, peer: Peer, data: bytes, *, datagram: bool) -> None:
         """Bytes arrived; a datagram holds whole frames."""
 
+    def is_connected(self, peer: Peer) -> bool:
+        """True if this peer is a ground station that has shown that it receives what is sent to it."""
+
     def gcs_gone(self, peer: Peer) -> None:
         """A connection was closed."""
 

@@ -34,3 +34,25 @@ def test_the_text_of_a_refusal_goes_only_to_the_refused_station(bench: Bench, st
             assert happens(lambda: attack.count > 600)
             assert_uploads(pilot, bench.board, plain_plan(20))
         assert monitor.frames[m.MAVLINK_MSG_ID_STATUSTEXT] <= 4
+
+
+def test_a_flood_to_the_open_port_loses_no_request_of_a_connected_station(bench: Bench, stack: ExitStack) -> None:
+    """For some seconds, 15,000 foreign datagrams a second: ten times what the kernel's queue of the port holds."""
+    strangers = [Stranger(bench.daemon.address, f"127.0.1.{number + 1}") for number in range(50)]
+    for stranger in strangers:
+        stack.callback(stranger.close)
+    foreign = bytes(HELLO.pack(m.MAVLink(None, srcSystem=99, srcComponent=190)))
+
+    def flood() -> None:
+        for stranger in strangers:
+            stranger.send_bytes(foreign)
+
+    with udp_station(bench.daemon.address) as pilot:
+        for _ in range(3):
+            pilot.send(HELLO)
+            pilot.wait_for("HEARTBEAT")
+        with Attack(flood, per_s=300) as attack:
+            assert happens(lambda: attack.count > 100)
+            for number in range(150):
+                pilot.send(m.MAVLink_ping_message(0, number, 0, 0))
+                assert pilot.wait_for("PING").seq == number

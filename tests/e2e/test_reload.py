@@ -54,12 +54,13 @@ def daemon(start: Starter) -> ConfiguredDaemon:
 
 def test_links_come_and_go_while_the_others_continue(daemon: ConfiguredDaemon) -> None:
     with udp_station(("127.0.0.1", daemon.port)) as first:
-        first.send_heartbeat()
-        first.wait_for("HEARTBEAT")
+        for _ in range(2):
+            first.send_heartbeat()
+            first.wait_for("HEARTBEAT")
         daemon.write(f'{daemon.first_link}, "udpin:127.0.0.1:{daemon.second}", "tcpin:127.0.0.1:{daemon.tcp}"')
         daemon.reload("config.reloaded")
         with udp_station(("127.0.0.1", daemon.second)) as second, tcp_station(daemon.tcp) as third:
-            for station in (second, third):
+            for station in (second, third, second):
                 station.send_heartbeat()
                 station.wait_for("HEARTBEAT")
             assert len(daemon.stations()) == 3

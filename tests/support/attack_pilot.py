@@ -5,6 +5,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -37,10 +38,11 @@ class Stranger:
 
     def send(self, *messages: Message) -> None:
         for message in messages:
-            try:
-                self._socket.send(bytes(message.pack(self._codec)))
-            except ConnectionRefusedError:
-                continue
+            self.send_bytes(bytes(message.pack(self._codec)))
+
+    def send_bytes(self, data: bytes) -> None:
+        with suppress(ConnectionRefusedError):
+            self._socket.send(data)
 
     def received(self) -> list[Any]:
         found: list[Any] = []

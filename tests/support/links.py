@@ -18,9 +18,13 @@ class RecordedEvents:
         self.received: list[tuple[Peer, bytes]] = []
         self.default_peers: dict[Peer, bool] = {}
         self.gone: list[Peer] = []
+        self.connected: set[Peer] = set()
 
     def gcs_data(self, peer: Peer, data: bytes, *, datagram: bool) -> None:
         self.received.append((peer, data))
+
+    def is_connected(self, peer: Peer) -> bool:
+        return peer in self.connected
 
     def gcs_gone(self, peer: Peer) -> None:
         self.gone.append(peer)

@@ -29,6 +29,9 @@ class Listener:
     def gcs_data(self, peer: Peer, data: bytes, *, datagram: bool) -> None:
         raise AssertionError("no data expected")
 
+    def is_connected(self, _peer: Peer) -> bool:
+        raise AssertionError("asked for UDP only")
+
     def gcs_gone(self, peer: Peer) -> None:
         """The connection is closed."""
 
