@@ -15,21 +15,22 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import count
 from math import inf
-from typing import Protocol
+from typing import Any, Protocol
 
 from bridge.config import BridgeConfig, PassThroughRule
 from bridge.effects import BridgeEffect, PublishGroups, RecordFrames, RememberFlight, SendToBoard
 from bridge.fc.profile import FlightController, RuleSettings, Spoken
 from bridge.fc.session import FcSession
+from bridge.fc.states.base import Port
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import GroundStation
 from bridge.gcs.rights import LinkAccess
 from bridge.gcs.routes import Routes
 from bridge.gcs.station import Peer, Severity
+from bridge.line.conversation import StoreEffect
 from bridge.line.msp_link import RoundTrips
 from bridge.line.runner import Runner
 from bridge.missions.mission_service import NO_LINK, MissionService
-from bridge.missions.place_lists import PlaceLists
 from bridge.model.events import Armed, Disarmed
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.settings import SettingsState
@@ -42,22 +43,21 @@ from bridge.settings.settings_backups import BackupTaker
 from bridge.settings.settings_seal import SettingsSeal
 from bridge.sharing.msp_sharing import MspSharing
 from bridge.sharing.program import Program
-from bridge.transfers.downloads import MissionDownloads
 from bridge.transfers.local_missions import LocalMissions
+from bridge.transfers.mission_types import MissionTypes
 from bridge.transfers.mission_watch import MissionWatch
-from bridge.transfers.uploads import FC_LOST, STOPPED, MissionUploads
+from bridge.transfers.uploads import FC_LOST, STOPPED
 from bridge.vehicle.calibration import Calibration
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.incoming import Incoming
 from bridge.vehicle.link_announcer import LinkAnnouncer
-from bridge.vehicle.message_router import MessageRouter, Transfers
+from bridge.vehicle.message_router import MessageRouter
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.set_waypoint import SetWaypoint
 from bridge.vehicle.vehicle_report import VehicleReporter
-from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.mission_item import MissionResult
-from reports.vehicle_groups import Group
+from reports.vehicle_groups import Group, VehicleReport
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,11 +100,9 @@ class Bridge:
     """
 
     def __init__(self, config: BridgeConfig, now: float) -> None:
-        self._config, owner = config, config.settings
+        self._config = config
         #: To be carried out, in order. Datagrams and bytes for the board are added by `take`.
         self._effects: list[BridgeEffect] = []
-        emit = self._emit = self._effects.append
-        self._was_armed = False
         #: The line's state, speed or polls may have changed since the last `take`. A conversation that starts has
         #: output, or waits for a reply or timeout that the line already expects.
         self._has_line_changed = True
@@ -115,121 +113,59 @@ class Bridge:
         self.due = self._line_due = now
         #: The armed craft as last remembered; it changes rarely.
         self._flight = config.flight
+        self._was_armed = False
         #: True while an autopilot speaks MAVLink itself: the bridge then sends nothing in its name.
         self.is_passing_through = False
-        self._announcer = LinkAnnouncer(
-            self._say, lambda: self._session.state.trouble, now, was_found=config.flight is not None
-        )
-        incidents = count(1)
 
-        passes_everything = owner.pass_through is PassThroughRule.EVERYTHING
+        owner, emit, incidents = config.settings, self._effects.append, count(1)
+        ids = owner.sysid, config.compid
+        # Ground stations, and the line to the flight controller.
         ground = self._ground = Ground(
-            owner.sysid,
-            config.compid,
-            emit,
-            self._newcomer,
-            {name: replace(access, passes_everything=passes_everything) for name, access in config.links.items()},
-            LinkAccess(passes_everything=passes_everything),
-            config.is_near,
-            is_recorded=config.has_log,
+            *ids, emit, self._newcomer, *_access(config), config.is_near, is_recorded=config.has_log
         )
-        self._routes = Routes(ground)
+        routes = self._routes = Routes(ground)
         runner = self._runner = Runner(emit)
-        session = self._session = FcSession(
-            config.speeds,
-            config.profiles,
-            runner,
-            emit,
-            incidents,
-            self._controller_changed,
-            self._routes.from_autopilot,
-            owner.autopilot,
-            config.flight,
-        )
-        #: Its readings, which are kept when it is lost.
-        self.vehicle = self._session.vehicle
-        missions = self._missions = MissionService(self.vehicle, runner, emit)
-        self._sharing = MspSharing(session, runner, missions, emit, self._say_refused)
-
-        def is_transferring() -> bool:
-            return self.missions.transfer is not None
-
-        own = self._own_vehicle = OwnVehicle(session, missions, ground, self._announcer, config.unix_time_s, now)
-        #: The seal of the flight controller's settings.
-        self._seal = SettingsSeal(session, missions, ground, emit, config.seals, is_transferring)
-        self._board_settings = BoardSettings(session, missions, emit, is_transferring, lambda: self._sharing.due < inf)
-        self._board_settings.on_change = self._changed_settings
-        self._seal.on_found_change = self._found_changed_settings
-        self._sharing.on_change = self._program_changed_settings
-        self._backups = BackupTaker(emit)
-        self._seal.on_identified = self._backups.identified
-        self._board_settings.on_read = lambda table: self._backups.read(table, self._board_settings.unsaved)
-        self._board_settings.on_saved = self._backups.saved
-        #: The board's settings, for the command line, the page and zenoh.
-        self.settings = LocalSettings(self._board_settings, session)
-        self._reporter = VehicleReporter(session, missions, ground, self._seal, own.also_want, own.progress)
-        self._uploads = MissionUploads(missions, ground, emit, incidents, own.let_read)
-        #: Missions, for the same.
-        self.missions = LocalMissions(missions, self._uploads, ground, emit, incidents)
+        port = Port(config.speeds, owner.autopilot, config.profiles, runner, routes.from_autopilot)
+        session = self._session = FcSession(port, emit, incidents, self._controller_changed, config.flight)
+        #: The flight controller's readings, which are kept when it is lost.
+        self.vehicle = port.vehicle
+        announcer = self._announcer = LinkAnnouncer(self._say, self._trouble, now, was_found=config.flight is not None)
+        # Missions, fences and rally points.
+        missions = self._missions = MissionService(port.vehicle, runner, emit)
+        types = self._types = MissionTypes(missions, ground, emit, incidents, self._let_read)
         self._watch = MissionWatch(missions, ground, emit)
-        fence, rally = messages.MAV_MISSION_TYPE_FENCE, messages.MAV_MISSION_TYPE_RALLY
-        # The check of a mission also uses them.
-        changed = missions.settings_changed
-        self._fences = PlaceLists(fence, "Fence", self.vehicle, runner, changed)
-        self._rally = PlaceLists(rally, "Rally points", self.vehicle, runner, changed)
-        transfers = {
-            messages.MAV_MISSION_TYPE_MISSION: Transfers(missions, self._uploads, MissionDownloads(missions, ground))
-        }
-        for places in (self._fences, self._rally):
-            uploads = MissionUploads(places, ground, emit, incidents, own.let_read)
-            uploads.answers.are_only_missions_stored = False
-            transfers[places.mission_type] = Transfers(places, uploads, MissionDownloads(places, ground))
-        self._all_uploads = tuple(each.uploads for each in transfers.values())
-        own.capabilities = self._capabilities
+        #: Missions, for the command line, the page and zenoh.
+        self.missions = LocalMissions(missions, types.of_missions, ground, emit, incidents)
+        # The board's settings, and other programs' requests.
+        sharing = self._sharing = MspSharing(session, missions, ground, emit, self._program_changed_settings)
+        seal = self._seal = SettingsSeal(session, missions, ground, emit, config.seals, self._is_transferring)
+        settings = self._board_settings = BoardSettings(
+            session, missions, emit, self._is_transferring, lambda: sharing.due < inf
+        )
+        settings.on_change = self._changed_settings
+        seal.on_found_change = self._found_changed_settings
+        self._backups = BackupTaker(emit)
+        seal.on_identified = self._backups.identified
+        settings.on_read = lambda table: self._backups.read(table, settings.unsaved)
+        settings.on_saved = self._backups.saved
+        #: Settings, for the command line, the page and zenoh.
+        self.settings = LocalSettings(settings, session)
+        # The vehicle that ground stations see.
+        own = self._own_vehicle = OwnVehicle(
+            session, missions, ground, announcer, types.capabilities, config.unix_time_s, now
+        )
+        self._reporter = VehicleReporter(session, missions, ground, seal, own.also_want, own.progress)
         own_parameters = OwnParameters(missions, ground, owner.sysid)
-        own_parameters.on_radius_set = self._board_settings.saved_with_mission
-        parameters = self._parameters = Parameters(own_parameters, self._board_settings, ground)
-        self._calibration = Calibration(ground, session, missions, self._announcer, self._board_settings)
-        commands = CommandService(
-            ground,
-            own,
-            session,
-            self._calibration,
-            self._board_settings,
-            parameters,
-            SetWaypoint(missions, own, ground),
-            config.version,
-        )
-        router = MessageRouter(ground, transfers, parameters, commands, own)
-        self._incoming = Incoming(ground, router, parameters, session.send_mavlink, owner.sysid, config.compid, emit)
+        own_parameters.on_radius_set = settings.saved_with_mission
+        parameters = self._parameters = Parameters(own_parameters, settings, ground)
+        calibration = self._calibration = Calibration(ground, session, missions, announcer, settings)
+        waypoint = SetWaypoint(missions, own, ground)
+        commands = CommandService(ground, own, session, calibration, settings, parameters, waypoint, config.version)
+        router = MessageRouter(ground, types.by_type, parameters, commands, own)
+        self._incoming = Incoming(ground, router, parameters, session.send_mavlink, *ids, emit)
         #: Served in this order, after the line itself.
-        self._parts: tuple[TimedPart, ...] = (
-            runner,
-            self._sharing,
-            *self._all_uploads,
-            self._watch,
-            self._seal,
-            self._board_settings,
-            parameters,
-            ground,
-            self._announcer,
-            self._calibration,
-            own,
-            self._reporter,
-        )
-
-        # The front door: calls that one part answers. First the ground stations' side.
-        self.gcs_received = self._incoming.received
-        self.add_default_peer, self.remove_default_peer = ground.add_default_peer, ground.remove_default_peer
-        self.is_connected = ground.is_connected
-        #: Other programs, on a share.
-        self.program_joined, self.program_left = self._sharing.join, self._sharing.leave
-        #: Shows a text to each ground station that connects from now on.
-        self.notify = ground.notices.append
-        self.store_answered = runner.store_answered
-        #: Ends the running conversation cleanly.
-        self.abort = runner.stop
-        self.report, self.group = self._reporter.whole, self._reporter.group
+        self._parts: list[TimedPart] = [runner, sharing, *types.uploads, self._watch, seal, settings]
+        self._parts += [parameters, ground, announcer, calibration, own, self._reporter]
 
     def take(self) -> list[BridgeEffect]:
         """What is to be done since the last call, in order. Mostly a few datagrams, or bytes for the board."""
@@ -279,7 +215,9 @@ class Bridge:
     def fc_received(self, data: bytes, now: float) -> bool:
         """Handle bytes from the port; False if they ended inside a frame and nothing else has changed."""
         self._has_line_changed = True
-        self._session.received(data, now)
+        event = self._session.state.receive(data, now)
+        if event is not None:
+            self._session.handle(event, now)
         self._follow_line(now)
         self._has_only_passed_on = self.is_passing_through
         return not self._session.state.is_mid_frame
@@ -287,7 +225,7 @@ class Bridge:
     @property
     def fc_trouble(self) -> str:
         """The reason why the board cannot be used, and the remedy; empty if it can be."""
-        return self._session.state.trouble
+        return self._trouble()
 
     @property
     def is_searching(self) -> bool:
@@ -296,29 +234,59 @@ class Bridge:
 
     # The ground stations' side.
 
+    def gcs_received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> bool:
+        """Handle bytes from a ground station; False if they are dropped. A datagram holds whole frames only."""
+        return self._incoming.received(peer, data, now, datagram=datagram)
+
     def gcs_gone(self, peer: Peer, now: float) -> None:
-        for uploads in self._all_uploads:
-            uploads.peer_gone(peer, now)
+        self._types.peer_gone(peer, now)
         self._ground.gone(peer)
+
+    def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
+        """Send to `peer` before it is heard; `until_answered`: only while no peer is heard on its link (broadcast)."""
+        self._ground.add_default_peer(peer, until_answered=until_answered)
+
+    def remove_default_peer(self, peer: Peer) -> None:
+        self._ground.remove_default_peer(peer)
+
+    def is_connected(self, peer: Peer) -> bool:
+        return self._ground.is_connected(peer)
+
+    def notify(self, text: str) -> None:
+        """Show a text to each ground station that connects from now on."""
+        self._ground.notices.append(text)
 
     def link_closed(self, name: str, now: float) -> None:
         """A link is closed, and all ground stations on it are gone."""
         for peer in self._ground.remove_link(name):
-            for uploads in self._all_uploads:
-                uploads.peer_gone(peer, now)
+            self._types.peer_gone(peer, now)
 
     # Other programs, on a share.
+
+    def program_joined(self, program: Program) -> None:
+        self._sharing.join(program)
+
+    def program_left(self, program: Program) -> None:
+        self._sharing.leave(program)
 
     def program_received(self, program: Program, data: bytes, now: float) -> None:
         self._has_line_changed = True
         self._sharing.received(program, data, now)
 
+    # The store, and the end of the bridge.
+
+    def store_answered(self, effect: StoreEffect, answer: object, now: float) -> None:
+        self._runner.store_answered(effect, answer, now)
+
     def stop_missions(self, now: float) -> None:
         """Accept no more transfers. An upload that still receives items ends; a running push continues."""
-        for lists in (self._missions, self._fences, self._rally):
-            lists.close()
+        self._types.close()
         self._sharing.stop()
-        self._end_uploads(STOPPED, now)
+        self._types.end_uploads(STOPPED, now)
+
+    def abort(self, now: float) -> None:
+        """End the running conversation cleanly."""
+        self._runner.stop(now)
 
     # For metrics, the status and other followers.
 
@@ -326,6 +294,13 @@ class Bridge:
         """Poll for these groups from now on, and have the updated ones published."""
         self._has_line_changed = True
         self._reporter.watch(groups)
+
+    def report(self, now: float) -> VehicleReport:
+        return self._reporter.whole(now)
+
+    def group(self, group: Group, now: float) -> Any:
+        """The current values of a group: an instance of its class in reports.vehicle_groups."""
+        return self._reporter.group(group, now)
 
     def counters(self) -> Counters:
         state = self._session.state
@@ -368,18 +343,14 @@ class Bridge:
         if not self.is_passing_through:
             self._ground.say(severity, text)
 
-    def _say_refused(self, text: str) -> None:
-        """A program's request was refused. In flight a warning would cover what concerns the craft."""
-        self._ground.say(Severity.NOTICE if self.vehicle.armed else Severity.WARNING, text)
+    def _trouble(self) -> str:
+        return self._session.state.trouble
 
-    def _end_uploads(self, refusal: Refusal, now: float) -> None:
-        for uploads in self._all_uploads:
-            if uploads.due < inf:
-                uploads.end(refusal, now)
+    def _is_transferring(self) -> bool:
+        return self.missions.transfer is not None
 
-    def _capabilities(self) -> int:
-        fence = self._fences.are_stored and messages.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
-        return fence | (self._rally.are_stored and messages.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY)
+    def _let_read(self, peer: Peer, now: float) -> None:
+        self._own_vehicle.let_read(peer, now)
 
     def _changed_settings(self, now: float) -> None:
         self._seal.changed_here(now)
@@ -407,22 +378,16 @@ class Bridge:
         self._seal.found(controller, now)
         self._board_settings.found(controller, now)
         if controller is None:
-            trouble = self._session.state.trouble
-            refusal = Refusal(MissionResult.DENIED, trouble) if trouble else NO_LINK
-            for lists in (self._missions, self._fences, self._rally):
-                lists.use(refusal, now, is_same_board=True)
-            self._end_uploads(FC_LOST, now)
+            trouble = self._trouble()
+            self._types.lost(Refusal(MissionResult.DENIED, trouble) if trouble else NO_LINK, FC_LOST, now)
             self._announcer.lost(now if self.vehicle.heard_at is None else self.vehicle.heard_at)
             return
-        missions = controller.profile.missions
-        rules = RuleSettings(self._config.settings.takeoff_max_m)
+        profile, rules = controller.profile, RuleSettings(self._config.settings.takeoff_max_m)
+        missions = profile.missions
         store = missions if isinstance(missions, Refusal) else missions(controller, self.vehicle, rules)
+        stores = store, profile.fences(controller, self.vehicle), profile.rally(controller, self.vehicle)
         # On a port that was opened since, an armed board may be another one.
-        is_same_board = self._session.met_family == controller.profile.family
-        self._missions.use(store, now, is_same_board=is_same_board)
-        for places, opened in ((self._fences, controller.profile.fences), (self._rally, controller.profile.rally)):
-            places.use(opened(controller, self.vehicle), now, is_same_board=is_same_board)
-        self._uploads.answers.are_only_missions_stored = not self._capabilities()
+        self._types.use(stores, now, is_same_board=self._session.met_family == profile.family)
         self._announcer.found(controller, now)
         self._calibration.controller_found(now)
         if not isinstance(store, Refusal):
@@ -468,7 +433,15 @@ class Bridge:
             return
         self._was_armed = armed
         if armed:
-            self._end_uploads(ARMED, now)
+            self._types.end_uploads(ARMED, now)
             self._seal.armed()
-        self._ground.record_flight(on=armed and not self.is_passing_through)
-        self._emit(Armed() if armed else Disarmed())
+        if self._config.has_log:
+            self._ground.record_flight(on=armed and not self.is_passing_through)
+        self._effects.append(Armed() if armed else Disarmed())
+
+
+def _access(config: BridgeConfig) -> tuple[Mapping[str, LinkAccess], LinkAccess]:
+    """The rules of each link, and of those without rules."""
+    everything = config.settings.pass_through is PassThroughRule.EVERYTHING
+    links = {name: replace(access, passes_everything=everything) for name, access in config.links.items()}
+    return links, LinkAccess(passes_everything=everything)

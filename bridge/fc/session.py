@@ -4,16 +4,15 @@
 `TRANSITIONS` is the whole state machine; `bridge.fc.states` has a class for each state.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 
-from bridge.fc.profile import Autopilot, FlightController, Profile, Spoken
+from bridge.fc.profile import FlightController, Spoken
 from bridge.fc.states.base import Closed, Event, Found, Identified, Lost, Port, PortClosed, PortOpened, State
 from bridge.fc.states.cli import Cli
 from bridge.fc.states.frsky import Frsky
 from bridge.fc.states.mavlink import HarakiriMavlink, PassThrough
 from bridge.fc.states.msp import Identifying, Polling
 from bridge.fc.states.searching import Searching
-from bridge.line.runner import Runner
 from bridge.model.events import Emit, FcFound, FcInCommandLine, FcLost, FcSensed, PortLost
 from bridge.model.flight_memory import FlightMemory
 
@@ -37,24 +36,19 @@ TRANSITIONS: Mapping[type[State], _Next] = {
 class FcSession:
     """Runs the state machine of one port.
 
-    `on_change` is called with each flight controller that is found, and with None when it is lost or cannot be used.
-    `on_mavlink` gets its MAVLink frames and their kinds (protocols.mavlink.frame). `incidents`: numbers for the ids of
-    related log lines. `flight`: of the craft that a previous bridge left armed.
+    `incidents`: numbers for the ids of related log lines. `on_change` is called with each flight controller that is
+    found, and with None when it is lost or cannot be used. `flight`: of the craft that a previous bridge left armed.
     """
 
     def __init__(
         self,
-        speeds: Sequence[int | None],
-        profiles: Sequence[Profile],
-        runner: Runner,
+        port: Port,
         emit: Emit,
         incidents: Iterator[int],
         on_change: Callable[[FlightController | None, float], None],
-        on_mavlink: Callable[[list[bytes], list[bytes]], None],
-        autopilot: Autopilot,
         flight: FlightMemory | None,
     ) -> None:
-        self._port = Port(speeds, autopilot, profiles, runner, on_mavlink)
+        self._port = port
         #: The flight controller's readings, kept when it is lost.
         self.vehicle = self._port.vehicle
         self.polls = self._port.polls
@@ -84,29 +78,24 @@ class FcSession:
     def opened(self, now: float) -> None:
         # Another board may have been connected.
         self._port.met_family = None
-        self._handle(PortOpened(), now)
+        self.handle(PortOpened(), now)
 
     def closed(self, now: float, why: str | None) -> None:
         if isinstance(self.state, Closed):
             return
-        self._handle(PortClosed(why), now)
+        self.handle(PortClosed(why), now)
         if why is not None:
             self._emit(PortLost(why=why, incident=self._follow_incident()))
 
     def restart(self, why: str, now: float) -> None:
         """Forget the flight controller and search again, after a fault in the bridge itself."""
         if not isinstance(self.state, Closed):
-            self._handle(Lost(why, pending=self.state.unanswered()), now)
-
-    def received(self, data: bytes, now: float) -> None:
-        event = self.state.receive(data, now)
-        if event is not None:
-            self._handle(event, now)
+            self.handle(Lost(why, pending=self.state.unanswered()), now)
 
     def tick(self, now: float) -> None:
         event = self.state.tick(now)
         if event is not None:
-            self._handle(event, now)
+            self.handle(event, now)
 
     def settle_telemetry(self) -> None:
         """Update the vehicle from the messages of a passed-through autopilot."""
@@ -118,7 +107,8 @@ class FcSession:
         if isinstance(self.state, PassThrough):
             self._port.output.append(frame)
 
-    def _handle(self, event: Event, now: float) -> None:
+    def handle(self, event: Event, now: float) -> None:
+        """Go to the next state."""
         before = self.state
         after = TRANSITIONS[type(before)][event.spoken if isinstance(event, Found) else type(event)]
         if not isinstance(event, Identified):

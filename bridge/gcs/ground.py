@@ -268,7 +268,7 @@ class Ground:
 
     def record_flight(self, *, on: bool) -> None:
         """Log everything that a connected ground station would get, even if there is none."""
-        if on and self.recorded is not None:
+        if on:
             self.add_default_peer(RECORDER, until_answered=False)
         else:
             self.remove_default_peer(RECORDER)

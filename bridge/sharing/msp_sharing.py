@@ -17,9 +17,10 @@ from bridge.fc.profile import FlightController
 from bridge.fc.session import FcSession
 from bridge.gcs.budget import TokenBucket
 from bridge.gcs.cost import Rate
+from bridge.gcs.ground import Ground
+from bridge.gcs.station import Severity
 from bridge.line.conversation import Conversation, LinkLost, Receive, Send, ask_armed
 from bridge.line.msp_link import MspLink
-from bridge.line.runner import Runner
 from bridge.missions.mission_service import MissionService
 from bridge.model.events import Emit, Level, ShareRefused, ShareUnanswered
 from bridge.sharing.permission import ARMED, is_unknown_read, refusal, right_of
@@ -47,16 +48,16 @@ _NO_REPLY = "no reply from the flight controller"
 
 @dataclass(eq=False)
 class MspSharing:
-    """`_tell` sends a text to all ground stations.
+    """`_on_change` is called after a request that may have changed settings.
 
     `refused`: requests that were refused or not answered in time, by reason.
     """
 
     _session: FcSession
-    _runner: Runner
     _missions: MissionService
+    _ground: Ground
     _emit: Emit
-    _tell: Callable[[str], None]
+    _on_change: Callable[[float], None]
     _programs: deque[Program] = field(default_factory=deque)  # the next one to have a request forwarded first
     _total: Shares = field(default_factory=partial(Shares, _TOTAL))
     _forwarded: WaitingRequest | None = None
@@ -66,8 +67,6 @@ class MspSharing:
     _reported: dict[tuple[str, bool], float] = field(default_factory=dict)  # by host and kind, the oldest first
     _reports: TokenBucket = field(default_factory=partial(TokenBucket, _REPORTS))
     refused: Counter[str] = field(default_factory=Counter)
-    #: Called after a request that may have changed settings.
-    on_change: Callable[[float], None] = lambda _now: None
     #: The time of the next `tick`; infinity while no request waits.
     due: float = inf
 
@@ -149,7 +148,7 @@ class MspSharing:
     def _forward_next(self, now: float) -> None:
         """Forward the first request that needs the line, of the program whose turn it is."""
         link, controller = self._session.state.link, self._session.state.controller
-        if self._obstacle() or self._runner.is_busy or link is None or controller is None:
+        if self._obstacle() or self._missions.runner.is_busy or link is None or controller is None:
             return
         if self._session.polls.due(link) <= now:
             return  # telemetry first
@@ -174,7 +173,7 @@ class MspSharing:
             return ARMED if armed else "not yet known to be disarmed"
         if self._stopped:
             return "naze-bridge is stopping"
-        return "a mission transfer is running" if self._runner.needs_line else ""
+        return "a mission transfer is running" if self._missions.runner.needs_line else ""
 
     def _forward(self, program: Program, request: WaitingRequest, controller: FlightController, now: float) -> None:
         self._forwarded = request
@@ -187,7 +186,7 @@ class MspSharing:
             if not isinstance(reply, MspFrame):
                 program.blocked_until = at + _PAUSE_AFTER_LOSS_S
             if request.is_change:
-                self.on_change(at)
+                self._on_change(at)
                 if (link := self._session.state.link) is not None:
                     link.replies.forget()
             if request.is_change and request in program.waiting:
@@ -201,7 +200,7 @@ class MspSharing:
             self.tick(at)
 
         conversation = _carry(request, frame_size(request.frame.command, right.reply), controller.arm_bit)
-        self._runner.start(conversation, done, now, in_background=True)
+        self._missions.runner.start(conversation, done, now, in_background=True)
 
     def _refuse(self, program: Program, request: WaitingRequest, name: str, why: str, now: float) -> None:
         if request.frame.command in _CLOCK:
@@ -210,7 +209,9 @@ class MspSharing:
         level = self._level(program, name, why, now, is_change=True)
         self._emit(ShareRefused(level=level, program=program.name, command=name, why=why))
         if level == "warning":
-            self._tell(f"{program.host}: {name} refused ({why})")
+            # In flight a warning would cover the texts that concern the craft.
+            severity = Severity.NOTICE if self._session.vehicle.armed else Severity.WARNING
+            self._ground.say(severity, f"{program.host}: {name} refused ({why})")
         self._disconnect(program, request)
 
     def _give_up(self, program: Program, request: WaitingRequest, now: float) -> None:

@@ -34,7 +34,7 @@ class ArmingReasons:
         """Update the reasons, before SYS_STATUS is made of them, and report them if they have changed."""
         self.current = self._find(now)
         # A text would be too early during the first search.
-        is_searching = self._announcer.why_unknown and not self._announcer.is_lost
+        is_searching = not (self._announcer.was_found or self._announcer.is_lost)
         lines = [] if is_searching else prearm_lines(self.current)
         if lines == self._told and now < self._told_at + _RENEWED_S:
             return

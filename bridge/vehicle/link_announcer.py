@@ -39,7 +39,8 @@ class LinkAnnouncer:
         self._say = say
         self._trouble = trouble
         self._known: str | None = None
-        self._was_found = was_found
+        #: True once a flight controller was found.
+        self.was_found = was_found
         self._silent_since: float | None = now
         self.due = now + (_LOST_S if was_found else _NOT_FOUND_S)
         #: No loss is reported until then: the silence is expected.
@@ -50,7 +51,7 @@ class LinkAnnouncer:
     @property
     def why_unknown(self) -> str:
         """The reason for missing values while the flight controller is lost or was never found; else empty."""
-        if not self._was_found:
+        if not self.was_found:
             return "no flight controller: check power, wiring" if self.is_lost else "looking for the flight controller"
         return "flight controller lost" if self.is_lost else ""
 
@@ -68,7 +69,7 @@ class LinkAnnouncer:
     def found(self, controller: FlightController, now: float) -> None:
         silent_since, self._silent_since, self.due = self._silent_since, None, inf
         was_lost, self.is_lost = self.is_lost, False
-        was_found, self._was_found = self._was_found, True
+        was_found, self.was_found = self.was_found, True
         profile, before = controller.profile, self._known
         is_switch = profile.spoken is Spoken.MAVLINK and before is not None
         if not is_switch:
@@ -89,7 +90,7 @@ class LinkAnnouncer:
         self.due = now + _REPEAT_S
         if trouble := self._trouble():
             self._say(Severity.WARNING, trouble)
-        elif not self._was_found:
+        elif not self.was_found:
             self.due = now + _NOT_FOUND_REPEAT_S
             self._say(Severity.WARNING, "No flight controller found: check power, wiring")
         else:

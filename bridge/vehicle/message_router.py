@@ -4,16 +4,15 @@
 from collections.abc import Callable, Mapping
 from functools import partial
 from math import inf
-from typing import NamedTuple
 
 from bridge.gcs.cost import Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import GroundStation
 from bridge.gcs.station import Severity, Station
-from bridge.missions.mission_service import MissionService
 from bridge.missions.place_lists import NO_PLACES
 from bridge.settings.parameters import Parameters
 from bridge.transfers.downloads import MissionDownloads
+from bridge.transfers.mission_types import Transfers
 from bridge.transfers.uploads import MissionUploads
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.own_vehicle import OwnVehicle
@@ -51,14 +50,6 @@ _READS = frozenset(
 )
 
 _Handler = Callable[[Station, Message, float], object]
-
-
-class Transfers(NamedTuple):
-    """The lists of one mission type, and their transfers."""
-
-    lists: MissionService
-    uploads: MissionUploads
-    downloads: MissionDownloads
 
 
 class MessageRouter:

@@ -67,6 +67,7 @@ class OwnVehicle:
         missions: MissionService,
         ground: Ground,
         announcer: LinkAnnouncer,
+        capabilities: Callable[[], int],
         unix_time_s: Callable[[float], float | None],
         now: float,
     ) -> None:
@@ -82,7 +83,7 @@ class OwnVehicle:
         self._rows: dict[type[Reading] | None, list[_Trigger]] = {}
         self.progress = MissionProgress()
         #: The capability bits of this flight controller, besides the bridge's own.
-        self.capabilities: Callable[[], int] = lambda: 0
+        self._capabilities = capabilities
         self._announced_home: Home | None = None
         self._also_wanted: Mapping[type[Reading], float] = {}
         #: The intervals of the messages and readings that `_rows` and the polls follow.
@@ -191,7 +192,7 @@ class OwnVehicle:
                 return None
         elif msgid == messages.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
             # A restarted station would otherwise show home at 0, 0.
-            version = make.autopilot_version(self._session.vehicle, self.capabilities())
+            version = make.autopilot_version(self._session.vehicle, self._capabilities())
             made = [version, *self._moment(now).made(make.home_position)]
         elif (row := _ROWS.get(msgid)) is not None:
             made = self._moment(now, self.sent_seqs(self._ground.station(station.peer))).made(row.maker)

@@ -25,10 +25,10 @@ from tests.support.walks import TracedDaemon, WakeUp, Walk, measure, run_traced
 #: Lower these whenever a walk has become shorter. Raised once, by a return each: to ask when all replies can be there
 #: saves a fifth of the wake-ups.
 CEILINGS = {
-    "attitude": Walk(calls=42, returns=13, files=20),
-    "item": Walk(calls=63, returns=25, files=16),
-    "ack": Walk(calls=462, returns=240, files=40),
-    "arming": Walk(calls=76, returns=25, files=26),
+    "attitude": Walk(calls=41, returns=13, files=19),
+    "item": Walk(calls=62, returns=25, files=16),
+    "ack": Walk(calls=459, returns=239, files=39),
+    "arming": Walk(calls=72, returns=22, files=26),
 }
 #: A walk may be this much shorter than its ceiling.
 _SLACK = 0.05

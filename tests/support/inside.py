@@ -13,7 +13,7 @@ class Inside:
         self.ground = bridge._ground
         self.incoming = bridge._incoming
         self.missions = bridge._missions
-        self.uploads = bridge._uploads
+        self.uploads = bridge._types.of_missions
         self.sharing = bridge._sharing
         self.seal = bridge._seal
         self.board_settings = bridge._board_settings

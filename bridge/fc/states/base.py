@@ -72,7 +72,10 @@ Event = PortOpened | PortClosed | Found | Identified | Lost
 
 @dataclass(slots=True)
 class Port:
-    """Everything that outlives a state: settings, knowledge about the port, and shared parts of the bridge."""
+    """Everything that outlives a state: settings, knowledge about the port, and shared parts of the bridge.
+
+    `on_mavlink` gets the MAVLink frames of a passed-through autopilot and their kinds (protocols.mavlink.frame).
+    """
 
     speeds: Sequence[int | None]
     autopilot: Autopilot
