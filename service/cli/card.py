@@ -14,66 +14,98 @@ from pathlib import Path
 import click
 from segno.helpers import make_wifi_data
 
+from service.cli.package_file import read_package
 from service.cli.setup.answers import PAGE_PORT
 from service.cli.setup.command import check_answers, secret_line
-from service.cli.setup.hotspot import ADDRESS
+from service.cli.setup.hotspot import ADDRESS, CONNECTION
+from service.machine.package import version
 from service.settings.passphrase import STRONGER, new_passphrase, weakness
 from service.web.token import new_token
 from storage.os_error import reason
-from storage.small_files import open_regular, read_bounded
+from storage.small_files import read_bounded
 from terminal.options import PATH
 from terminal.secret_text import show_secret
 from terminal.sentences import complain, fail
 
 FOLDER = "naze-bridge"
-#: deb(5): an ar archive whose first member is debian-binary.
-_MAX_BYTES = 1 << 20
-_DEB = b"!<arch>\ndebian-binary"
 _LOG = "/var/log/naze-bridge-card.log"
 _UNIT = "/etc/systemd/system/naze-bridge-card.service"
+#: A user's files for the first start may be long.
+_MAX_BYTES = 1 << 20
+_ARCHITECTURES = ("arm64", "armhf")
+_LINK = "/etc/systemd/system/multi-user.target.wants/naze-bridge-card.service"
+RESULT = "naze-bridge-RESULT.txt"
 #: The boot partition's place: from bookworm on, and before.
 _FIND = "for boot in /boot/firmware /boot; do [ ! -e $boot/naze-bridge/{0} ] || exec sh $boot/naze-bridge/{0}; done"
+#: Once the folder is renamed, all is done; a power cut may have left a part of it.
+_CLEAN_UP = f"rm -rf /boot/firmware/{FOLDER}.done /boot/{FOLDER}.done; rm -f {_UNIT} {_LINK}"
 #: In firstrun.sh, where no network runs; the Imager's cmdline.txt restarts the Pi after it.
 _IN_FIRSTRUN = f"({_FIND.format('enable.sh')})"
 #: In user-data, once the system is up.
 _IN_USER_DATA = "[sh, /boot/firmware/naze-bridge/enable.sh, start]"
 _ENABLE = f"""\
 #!/bin/sh
-# Written by `naze-bridge card`: enables the unit that sets the bridge up, and repeats it after a start that failed.
+# Written by `naze-bridge card`: enables the unit that sets the bridge up, and repeats it until it succeeds.
 cat >{_UNIT} <<'UNIT'
 [Unit]
 Description=Set naze-bridge up from the boot partition, once
 After=NetworkManager.service
+StartLimitIntervalSec=0
 [Service]
 Type=oneshot
 TimeoutStartSec=20min
-ExecStart=/bin/sh -c '{_FIND.format("first-boot.sh").replace("$", "$$")}'
+Restart=on-failure
+RestartSec=30
+ExecStart=/bin/sh -c '{f"{_FIND.format('first-boot.sh')}; {_CLEAN_UP}".replace("$", "$$")}'
 UNIT
-mkdir -p /etc/systemd/system/multi-user.target.wants
-ln -sf {_UNIT} /etc/systemd/system/multi-user.target.wants/
+mkdir -p {_LINK.rpartition("/")[0]}
+ln -sf {_UNIT} {_LINK}
 [ "${{1-}}" != start ] || {{ systemctl daemon-reload; systemctl start --no-block naze-bridge-card; }}
 """
+#: Each step may be cut by the end of the power, and is then repeated. The result is for a person with the card in a PC.
 _FIRST_BOOT = """\
 #!/bin/sh
 # Written by `naze-bridge card`. Its log is {log}.
 set -eu
 here=$(dirname "$(realpath "$0")")
+result=$(dirname "$here")/{result}
 umask 077
 exec >>{log} 2>&1
 umask 022
-dpkg --install "$here"/naze-bridge.deb
+tell() {{
+    printf '%s\\r\\n' "$@" >"$result.new"
+    mv "$result.new" "$result"
+    sync
+}}
+step() {{
+    step=$1 remedy=$2
+    echo "-- $step"
+    tell "naze-bridge is not set up yet. Now: $step." "Leave the Pi on for 5 minutes. If this text stays: $remedy"
+}}
+trap '[ $? = 0 ] || tell "naze-bridge is not set up: $step failed. The Pi tries again every 30 s while it is on." \\
+    "$remedy" "" "The end of the log:" "$(tail -n 5 {log})"' EXIT
+package="$here/naze-bridge.deb" format='${{db:Status-Status}} ${{Version}}'
+step 'installing the package' 'Prepare the card again, with a package that you fetched again.'
+wanted="installed $(dpkg-deb --field "$package" Version)"
+if [ "$(dpkg-query --showformat="$format" --show naze-bridge || true)" != "$wanted" ]; then
+    dpkg --install "$package"
+fi
+step 'storing the token' 'Write the card again: its file system is damaged or full.'
 state=/var/lib/private/naze-bridge
 mkdir -p -m 700 /var/lib/private
 install -d -o naze-bridge -m 700 $state
-[ -e $state/web-token ] || install -o naze-bridge -m 600 "$here/web-token" $state/web-token
-# Status 1 is also doctor's, for a flight controller that is not connected yet.
-naze-bridge setup --yes {options} || [ -e /etc/naze-bridge/setup.toml ]
-# A separate process opens the hotspot.
-while systemctl is-active --quiet naze-bridge-hotspot.timer || systemctl is-active --quiet naze-bridge-hotspot; do
-    sleep 1
-done
-rm -rf "$here"
-rm -f {unit} /etc/systemd/system/multi-user.target.wants/naze-bridge-card.service
+if [ ! -s $state/web-token ]; then
+    install -o naze-bridge -m 600 "$here/web-token" $state/web-token.new
+    mv $state/web-token.new $state/web-token
+fi
+step 'setting the Pi up' 'Look at the end of the log, and prepare the card again with other answers.'
+# Status 1 is also doctor's, for a flight controller that is not connected yet, and a hotspot's that does not open.
+naze-bridge setup --yes --keep-hotspot {options} || [ -e /etc/naze-bridge/setup.toml ]
+step 'opening the hotspot' 'Does this Pi have Wi-Fi, and is the country right? Then prepare the card again.'
+LC_ALL=C nmcli --get-values GENERAL.STATE connection show {connection} | grep -x activated
+tell 'naze-bridge is set up. The Pi restarts once; then join its hotspot:' {ssid} '' 'The status page: {page}'
+mv "$here" "$here.done"
+{clean_up}
 if [ -d /run/systemd/system ]; then systemctl reboot --no-block; fi
 """
 
@@ -113,10 +145,10 @@ def card(
     if key and (weak := weakness(key)) is not None:
         complain(f"warning: the key {weak}; {STRONGER}")
     token = new_token()
-    named = ["--hotspot", hotspot, "--country", country.upper(), *(["--name", name] if name else [])]
+    named = ["--country", country.upper(), *(["--name", name] if name else [])]
     secrets = {"password": password, "web-token": token, **({"key": key} if key else {})}
     try:
-        prepare(boot, package, named, secrets)
+        prepare(boot, package, hotspot, named, secrets)
     except CardError as error:
         fail(error)
     except OSError as error:
@@ -131,8 +163,8 @@ def card(
         show_secret("The key, for ground stations that may make changes", key, f"{kept_in}/key", key)
 
 
-def prepare(boot: Path, package: Path, options: list[str], secrets: dict[str, str]) -> None:
-    """Add the folder and the hook. `options`: of setup; `secrets`: by file name. It may be repeated.
+def prepare(boot: Path, package: Path, ssid: str, options: list[str], secrets: dict[str, str]) -> None:
+    """Add the folder and the hook. `options`: more of setup; `secrets`: by file name. It may be repeated.
 
     CardError: this is no freshly written card; nothing was changed.
     """
@@ -140,46 +172,83 @@ def prepare(boot: Path, package: Path, options: list[str], secrets: dict[str, st
         raise CardError(
             f"{boot} is not the boot partition of a Raspberry Pi OS card: it has no cmdline.txt or config.txt"
         )
-    if package.suffix != ".deb" or not package.is_file() or not _is_package(package):
-        raise CardError(f"{package} is not a package: build one with `make deb`, or take one from the releases")
-    hook, text = _hooked(boot)
+    _check_package(package, boot)
+    hook = _hooked(boot)
     folder = boot / FOLDER
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
+    (boot / RESULT).unlink(missing_ok=True)
     shutil.copyfile(package, folder / "naze-bridge.deb")
     for file, secret in secrets.items():
         (folder / file).write_text(f"{secret}\n")
     words = (
-        shlex.join(options)
+        shlex.join([*options, "--hotspot", ssid])
         + ' --password-file "$here/password"'
         + (' --key-file "$here/key"' if "key" in secrets else "")
     )
-    _write(folder / "first-boot.sh", _FIRST_BOOT.format(log=_LOG, unit=_UNIT, options=words))
+    _write(folder / "first-boot.sh", _first_boot(ssid, words))
     _write(folder / "enable.sh", _ENABLE)
-    _write(hook, text)  # last: a card that was pulled out before it starts as if untouched
+    if hook is not None:
+        _write(*hook)  # last: a card that was pulled out before it starts as if untouched
 
 
-def _is_package(path: Path) -> bool:
-    with open_regular(path) as file:
-        return file.read(len(_DEB)) == _DEB
+def _first_boot(ssid: str, options: str) -> str:
+    page = f"http://{ADDRESS}:{PAGE_PORT}/"
+    named = {"connection": CONNECTION, "ssid": shlex.quote(ssid), "page": page, "clean_up": _CLEAN_UP}
+    return _FIRST_BOOT.format(log=_LOG, result=RESULT, options=options, **named)
+
+
+def _check_package(path: Path, boot: Path) -> None:
+    try:
+        package = read_package(path)
+    except ValueError as error:
+        raise CardError(f"{error}. Releases have packages, and `make deb` builds one") from error
+    own, needed = version(), _architecture(boot)
+    if package.name != "naze-bridge":
+        raise CardError(f"{path} is the package of {package.name}, not of naze-bridge")
+    if package.architecture not in _ARCHITECTURES or needed not in (package.architecture, None):
+        wanted = needed or " or ".join(_ARCHITECTURES)
+        raise CardError(f"{path} is for {package.architecture}; this card needs the one for {wanted}")
+    if _numbers(package.version) < _numbers(own):
+        raise CardError(f"{path} has version {package.version}; this program is {own}, and prepares no older ones")
+
+
+def _architecture(boot: Path) -> str | None:
+    """The architecture of the card's system, by its kernels; None if they do not decide it."""
+    is_32_bit = any((boot / f"kernel{kind}.img").exists() for kind in ("", "7", "7l"))
+    is_64_bit = (boot / "kernel8.img").exists()
+    runs_64_bit = re.search("^arm_64bit=1", _text(boot / "config.txt"), re.MULTILINE)
+    if is_32_bit:
+        return None if runs_64_bit else "armhf"
+    return "arm64" if is_64_bit else None
+
+
+def _numbers(version_text: str) -> list[int]:
+    """The release that a version belongs to or comes before: 0.2.1~dev7 is 0.2.1."""
+    return [int(number) for number in re.findall("[0-9]+", version_text)[:3]]
 
 
 def _text(path: Path) -> str:
-    return read_bounded(path, _MAX_BYTES).decode().replace("\r\n", "\n")
+    try:
+        return read_bounded(path, _MAX_BYTES).decode().replace("\r\n", "\n")
+    except UnicodeDecodeError:
+        raise CardError(f"{path} is not text in UTF-8: write the card again") from None
 
 
 def _write(path: Path, text: str) -> None:
     path.write_bytes(text.encode())  # without carriage returns, even on Windows
 
 
-def _hooked(boot: Path) -> tuple[Path, str]:
-    """The file for the first start, and its text with our line."""
+def _hooked(boot: Path) -> tuple[Path, str] | None:
+    """The file for the first start, and its text with our line; None if the Pi has already begun."""
     user_data, firstrun = boot / "user-data", boot / "firstrun.sh"
     if user_data.exists():
         text = _text(user_data)
         if not text.startswith("#cloud-config"):
             raise CardError(f"{user_data} is not cloud-init's: write the card again")
         return user_data, text if _IN_USER_DATA in text else _with_command(user_data, text)
+    if not firstrun.exists() and (boot / FOLDER / "first-boot.sh").exists():
+        return None
     if not firstrun.exists() or "systemd.run=" not in _text(boot / "cmdline.txt"):
         raise CardError(
             f"{boot} has neither user-data nor firstrun.sh: write the card with Raspberry Pi Imager, and give it a "

@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 
 from deb.build import PYTHONS, build, fetch
-from service.cli.card import prepare
+from service.cli import card
 from service.cli.helper.signature import SIGNERS
 from service.machine.helper_socket import UNITS
 from tests.support.bare_root import BareRoot
@@ -63,6 +63,17 @@ _UNITS = (
     *(".service", "-captive.socket", "-captive.service"),
     *(f"-helper-{unit}{kind}" for unit in UNITS for kind in (".socket", "@.service")),
 )
+#: Every file written since with one of the secrets in it, also as in a key file: name, owner and mode.
+_SECRETS = """
+find / -xdev -newer /root/before -type f -size -4M \\
+    -exec grep -lF -e '{0}' -e 'correct\\shorse' -e '{1}' -e '{2}' {{}} + | xargs -r stat -c '%n %U %a'
+"""
+_EXPECTED_SECRETS = [
+    "/etc/NetworkManager/system-connections/naze-bridge-hotspot.nmconnection root 600",
+    "/etc/naze-bridge/gcs.key naze-bridge 600",
+    "/etc/naze-bridge/undo.json root 600",
+    "/var/lib/private/naze-bridge/web-token naze-bridge 600",
+]
 _STOP = "kill $(cat /run/pid); while grep -q . /proc/$(cat /run/pid)/cmdline; do sleep 0.1; done"
 
 
@@ -266,21 +277,27 @@ def test_it_is_installed_used_upgraded_removed_and_purged(
 
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("system", ["bookworm", "trixie"])
-def test_in_a_bare_root_a_card_sets_itself_up_at_its_first_start(
-    package: Path, root: BareRoot, tmp_path: Path, system: str
+def test_in_a_bare_root_a_card_sets_itself_up_and_leaves_no_secret(
+    package: Path, root: BareRoot, tmp_path: Path, system: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(card, "_ARCHITECTURES", (_HOST,))
     boot = tmp_path / "boot"
     boot.mkdir()
     (boot / "config.txt").write_text("[all]\n")
     (boot / "cmdline.txt").write_text("console=serial0,115200 console=tty1 rootwait systemd.run=/boot/firstrun.sh\n")
     hook = boot / ("firstrun.sh" if system == "bookworm" else "user-data")
     hook.write_text("#!/bin/bash\nset +e\nexit 0\n" if system == "bookworm" else "#cloud-config\n")
-    prepare(boot, package, ["--hotspot", "kite", "--country", "DE"], {"password": "long-enough", "web-token": "t" * 16})
+    secrets = {"password": "correct horse", "web-token": "2345-token-6789", "key": "w9rt4-b2npq-8kfhd-zm3sv"}
+    card.prepare(boot, package, "kite", ["--country", "DE"], secrets)
     packed = tmp_path / "boot.tar"
     with tarfile.open(packed, "w") as archive:
         archive.add(boot, "firmware")
     root.put(packed, "/root/boot.tar")
-    root.run("mkdir -p /boot && tar -xf /root/boot.tar -C /boot")
+    root.run("touch /root/before; mkdir -p /boot && tar -xf /root/boot.tar -C /boot && rm /root/boot.tar")
+    # NetworkManager, whose radio works once there is this file.
+    root.put(b"#!/bin/sh\n[ -e /root/radio ] && echo activated\n", "/usr/bin/nmcli")
+    root.run("chmod +x /usr/bin/nmcli")
+    root.run("ln -s private/naze-bridge /var/lib/naze-bridge")  # as DynamicUser= makes it
 
     if system == "bookworm":
         root.run("bash /boot/firmware/firstrun.sh")
@@ -290,20 +307,35 @@ def test_in_a_bare_root_a_card_sets_itself_up_at_its_first_start(
         root.run(command.replace(",", "").removesuffix(" start"))
     unit = root.run("cat /etc/systemd/system/multi-user.target.wants/naze-bridge-card.service")
     (started,) = re.findall("^ExecStart=(.*)$", unit, re.MULTILINE)
-    root.run(started.replace("$$", "$"))
+    start = started.replace("$$", "$")
+    root.run(start, status=1)
+    result = root.run("cat /boot/firmware/naze-bridge-RESULT.txt")
+    assert "naze-bridge is not set up: opening the hotspot failed. The Pi tries again every 30 s" in result
+    assert "Does this Pi have Wi-Fi" in result
+    root.run("ls /boot/firmware/naze-bridge/first-boot.sh")
+    root.run("touch /root/radio")
+    root.run(start)
+    root.run(start)  # the power was cut before the unit was removed
+    assert "naze-bridge is set up." in root.run("cat /boot/firmware/naze-bridge-RESULT.txt")
 
-    assert "Set up" not in root.run("cat /var/log/naze-bridge-card.log")
+    # Installed once, although it was tried twice.
+    assert root.run("cat /var/log/naze-bridge-card.log").count("Unpacking naze-bridge") == 1
     assert "naze-bridge, version" in root.run("naze-bridge --version")
     assert "0.0.0.0:8080" in root.run("cat /etc/naze-bridge/setup.toml")
     hotspot = root.run("cat /etc/NetworkManager/system-connections/naze-bridge-hotspot.nmconnection")
     assert "ssid=107;105;116;101;\n" in hotspot
     assert "autoconnect=true" in hotspot
-    assert root.run("stat -c '%U %a' /var/lib/private/naze-bridge/web-token") == "naze-bridge 600\n"
     assert "console=serial0" not in root.run("cat /boot/firmware/cmdline.txt")
     root.run("ls /etc/systemd/system/multi-user.target.wants/naze-bridge.service")
-    # Neither the password nor the unit is left.
-    assert "naze-bridge" not in root.run("ls /boot/firmware")
+    assert root.run("ls /boot/firmware").split().count("naze-bridge") == 0
     assert "card" not in root.run("ls /etc/systemd/system /etc/systemd/system/multi-user.target.wants")
+
+    # A setup again, and a run with the page.
+    root.run("naze-bridge setup --yes --fc sim: >/root/setup.log 2>&1")
+    root.run(_START)
+    root.run(_STOP)
+    found = root.run(_SECRETS.format(*secrets.values())).split("\n")
+    assert sorted(filter(None, found)) == _EXPECTED_SECRETS
 
 
 @pytest.mark.timeout(1800)

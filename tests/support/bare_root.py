@@ -49,8 +49,8 @@ class BareRoot:
         self._process.kill()
         self._process.communicate()
 
-    def put(self, source: Path, path: str) -> None:
-        self.run(f"cat > {path}", stdin=source.read_bytes())
+    def put(self, source: Path | bytes, path: str) -> None:
+        self.run(f"cat > {path}", stdin=source if isinstance(source, bytes) else source.read_bytes())
 
     def run(self, script: str, status: int = 0, stdin: bytes = b"") -> str:
         """Run a shell script; return its output."""

@@ -25,9 +25,9 @@ _MAX_KEY_FILE = 4096
 class SetupChoices:
     """The pilot's choices.
 
-    `fc` None: the bridge looks for it. `hotspot`: its name and password; None keeps the network. `name`: the host name,
-    for NAME.local. `key`: the passphrase of MAVLink signing; None keeps the current key, or leaves writing open to the
-    whole network.
+    `fc` None: the bridge looks for it. `hotspot`: its name and password; None keeps the network. `keeps_hotspot`: even
+    if no device joins it. `name`: the host name, for NAME.local. `key`: the passphrase of MAVLink signing; None keeps
+    the current key, or leaves writing open to the whole network.
     """
 
     fc: str | None = None
@@ -36,6 +36,7 @@ class SetupChoices:
     country: str | None = None
     name: str | None = None
     key: str | None = None
+    keeps_hotspot: bool = False
 
 
 def earlier_choices(host: Host) -> SetupChoices | None:

@@ -51,6 +51,7 @@ _HOST_NAME = re.compile("[A-Za-z0-9](?:[A-Za-z0-9-]{0,61}[A-Za-z0-9])?")
 @click.option("--fc", metavar="FC", help="The flight controller, as for `run`. Default: the last answer, else auto.")
 @click.option("--hotspot", metavar="SSID", help="Open a Wi-Fi network of this name. Default: keep the current one.")
 @click.option("--password-file", type=PATH, help="File with the hotspot's password.")
+@click.option("--keep-hotspot", is_flag=True, help="Keep the hotspot even if no device joins it within 3 minutes.")
 @click.option("--country", metavar="CC", help="Wi-Fi country, such as DE: the radio stays off without one.")
 @click.option("--name", metavar="HOST", help="Name of this machine on the network: HOST.local.")
 @click.option("--page/--no-page", default=None, help="Serve the status page, or not.")
@@ -64,6 +65,7 @@ def setup(
     fc: str | None,
     hotspot: str | None,
     password_file: Path | None,
+    keep_hotspot: bool,
     country: str | None,
     name: str | None,
     page: bool | None,
@@ -118,6 +120,7 @@ def setup(
         country=None if country is None else country.upper(),
         name=name,
         key=new_passphrase() if new_key else key,
+        keeps_hotspot=keep_hotspot,
     )
     used = answers.key or current_key(host)
     if used and (weak := weakness(used)) is not None:
@@ -143,12 +146,12 @@ def setup(
         if steps:
             _await_flight_controller()
         is_well = diagnose()
-    _switch_network([step for step in steps if step.cuts_network], log, hotspot, ask=not yes)
+    _switch_network([step for step in steps if step.cuts_network], log, hotspot, ask=not yes, is_kept=keep_hotspot)
     if not is_well:
         raise SystemExit(1)
 
 
-def _switch_network(steps: list[Step], log: UndoLog, hotspot: str | None, *, ask: bool) -> None:
+def _switch_network(steps: list[Step], log: UndoLog, hotspot: str | None, *, ask: bool, is_kept: bool) -> None:
     """Open the hotspot last: it may end the connection over which setup is run."""
     if not steps:
         return
@@ -156,9 +159,10 @@ def _switch_network(steps: list[Step], log: UndoLog, hotspot: str | None, *, ask
         _carry_out(steps, log)
         return
     click.echo(
-        f"\nNow the Wi-Fi changes to the hotspot {hotspot!r}, and a connection over the present Wi-Fi network ends.\n"
-        f"Join it within {JOIN_S // 60} minutes: if no device does, the Pi returns to the current network."
+        f"\nNow the Wi-Fi changes to the hotspot {hotspot!r}, and a connection over the present Wi-Fi network ends."
     )
+    if not is_kept:
+        click.echo(f"Join it within {JOIN_S // 60} minutes: if no device does, the Pi returns to the current network.")
     if ask:
         click.prompt("Press Enter when you have noted the above", default="", show_default=False)
     _carry_out(steps, log)

@@ -35,9 +35,11 @@ _OFF, _ON = "autoconnect=false", "autoconnect=true"
 #: Time for setup's last lines to reach the pilot.
 _DELAY_S = 3
 _RELOAD = ("nmcli", "connection", "reload")
+_OPEN = ("nmcli", "connection", "up", CONNECTION)
 
 
-def hotspot_steps(host: Host, hotspot: tuple[str, str] | None) -> Iterator[Step]:
+def hotspot_steps(host: Host, hotspot: tuple[str, str] | None, *, is_kept: bool = False) -> Iterator[Step]:
+    """Open the hotspot; if `is_kept`, at once and for good."""
     if hotspot is None:
         return
     ssid, password = hotspot
@@ -56,6 +58,9 @@ def hotspot_steps(host: Host, hotspot: tuple[str, str] | None) -> Iterator[Step]
             yield Step(purpose, [WriteFile(HOTSPOT_FILE, text, secret=True)])
         return
     if host.read(HOTSPOT_FILE) == text and hotspot_is_open(host):
+        return
+    if is_kept:
+        yield Step(purpose, [WriteFile(HOTSPOT_FILE, text, secret=True), Run(_RELOAD), Run(_OPEN)], cuts_network=True)
         return
     # Not opened at boot before a device has joined it once.
     changes: list[Change] = [WriteFile(HOTSPOT_FILE, text.replace(_ON, _OFF), secret=True), Run(_RELOAD, undo=_RELOAD)]
@@ -122,9 +127,13 @@ def open_hotspot(host: Host, machine: Machine, sleep: Callable[[float], None] = 
     previous = next((line.split(":")[0] for line in active.splitlines() if line.endswith(f":{HOTSPOT_CARD}")), None)
     leases = host.read(_LEASES)
     try:
-        machine.run(("nmcli", "connection", "up", CONNECTION))
+        machine.run(_OPEN)
     except SetupError as error:
-        return f"{error}; {_return_to(previous, machine)}"
+        if previous is not None:
+            return f"{error}; {_return_to(previous, machine)}"
+        # It is the only way to this Pi: NetworkManager tries again by itself, and at each start.
+        _open_at_boot(host, machine, is_on=True)
+        return f"{error}; it is tried again, because there is no other network"
     for _ in range(JOIN_S if previous is not None else 0):
         if host.read(_LEASES) != leases or _has_neighbour(host):
             break
@@ -144,7 +153,7 @@ def close_hotspot(host: Host, machine: Machine, sleep: Callable[[float], None] =
         if set(host.ipv4_addresses()) - {ADDRESS}:
             return "the hotspot is closed"
         sleep(1)
-    machine.run(("nmcli", "connection", "up", CONNECTION))
+    machine.run(_OPEN)
     _open_at_boot(host, machine, is_on=True)
     return "the Pi has no other network in reach; the hotspot is open again"
 
@@ -156,12 +165,10 @@ def _open_at_boot(host: Host, machine: Machine, *, is_on: bool) -> None:
     machine.run(_RELOAD)
 
 
-def _return_to(previous: str | None, machine: Machine) -> str:
+def _return_to(previous: str, machine: Machine) -> str:
     """Close the hotspot; the connection is removed, so that a restart does not open it either."""
     machine.carry_out(RemoveFile(HOTSPOT_FILE))
     machine.run(_RELOAD)
-    if previous is None:
-        return "there was no other network"
     machine.run(("nmcli", "connection", "up", previous))
     return "back on the previous network"
 

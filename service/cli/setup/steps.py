@@ -32,7 +32,7 @@ def missing_steps(host: Host, answers: SetupChoices) -> list[Step]:
     makers = (_console, uart_steps, _country, _name, _key, settings_steps, _others, _announcement, _service)
     steps = [step for make in makers for step in make(host, answers)]
     steps += captive_steps(host, answers.hotspot, has_page=answers.page)
-    return [*steps, *hotspot_steps(host, answers.hotspot)]
+    return [*steps, *hotspot_steps(host, answers.hotspot, is_kept=answers.keeps_hotspot)]
 
 
 def _console(host: Host, answers: SetupChoices) -> Iterator[Step]:

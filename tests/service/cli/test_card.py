@@ -14,23 +14,20 @@ from click.testing import CliRunner, Result
 
 from service.cli.main import main
 from terminal import secret_text
+from tests.service.cli.helper.test_packages import packed
 
 _SYSTEMD_RUN = "systemd.run=/boot/firstrun.sh systemd.run_success_action=reboot systemd.unit=kernel-command-line.target"
 _FIRSTRUN = "#!/bin/bash\n\nset +e\n\necho kite >/etc/hostname\nrm -f /boot/firstrun.sh\nexit 0\n"
 _USER_DATA = "#cloud-config\nhostname: kite\nusers:\n- name: pilot\n  shell: /bin/bash\n"
-
-#: The beginning of a Debian package.
-_PACKAGE = b"!<arch>\ndebian-binary   1700000000  "
 
 
 class Card:
     def __init__(self, folder: Path) -> None:
         self.boot = folder / "boot"
         self.boot.mkdir()
-        for name, text in (("cmdline.txt", "console=tty1 rootwait"), ("config.txt", "[all]\n")):
+        for name, text in (("cmdline.txt", "console=tty1 rootwait"), ("config.txt", "[all]\n"), ("kernel8.img", "")):
             (self.boot / name).write_text(text)
-        self.package = folder / "naze-bridge_1.0_arm64.deb"
-        self.package.write_bytes(_PACKAGE)
+        self.package = packed(folder, version="99.0", architecture="arm64")
         self.password = folder / "password"
         self.password.write_text("long-enough\n")
 
@@ -112,7 +109,7 @@ def test_the_folder_has_the_package_the_answers_and_valid_scripts(card: Card, mo
     monkeypatch.setattr(secret_text, "is_terminal", lambda: True)
     done = card.prepare("--new-key", "--name", "kite")
     folder = card.boot / "naze-bridge"
-    assert (folder / "naze-bridge.deb").read_bytes() == _PACKAGE
+    assert (folder / "naze-bridge.deb").read_bytes() == card.package.read_bytes()
     assert (folder / "password").read_text() == "long-enough\n"
     key, token = ((folder / name).read_text().strip() for name in ("key", "web-token"))
     assert f": {key}" in done.output
@@ -135,9 +132,23 @@ def test_the_folder_has_the_package_the_answers_and_valid_scripts(card: Card, mo
     ("change", "words"),
     [
         (lambda card: (card.boot / "config.txt").unlink(), "is not the boot partition"),
-        (lambda card: card.package.unlink(), "is not a package"),
-        (lambda card: card.package.write_bytes(b""), "is not a package"),
-        (lambda card: card.package.write_bytes(b"<html>"), "is not a package"),
+        (lambda card: card.package.unlink(), "cannot be read: No such file"),
+        (lambda card: card.package.write_bytes(b""), "is not a Debian package (.deb), or it is damaged"),
+        (lambda card: card.package.write_bytes(b"<html>"), "is not a Debian package"),
+        (lambda card: card.package.write_bytes(card.package.read_bytes()[:-200]), "or it is damaged: fetch it again"),
+        (
+            lambda card: packed(card.boot.parent, architecture="amd64"),
+            "is for amd64; this card needs the one for arm64",
+        ),
+        (
+            lambda card: packed(card.boot.parent, architecture="armhf"),
+            "is for armhf; this card needs the one for arm64",
+        ),
+        (
+            lambda card: packed(card.boot.parent, version="0.1.0", architecture="arm64"),
+            "has version 0.1.0; this program",
+        ),
+        (lambda card: packed(card.boot.parent, name="other", version="99.0"), "is the package of other"),
         (lambda card: (card.boot / "user-data").unlink(), "Raspberry Pi Imager"),
         (lambda card: (card.boot / "user-data").write_text("x: 1\n"), "is not cloud-init's"),
         (lambda card: (card.boot / "user-data").write_text("#cloud-config\nruncmd: [ls]\n"), "list of lines"),
@@ -152,6 +163,38 @@ def test_another_folder_is_refused_and_left_as_it_is(card: Card, change: object,
     assert done.exit_code == 1
     assert words in " ".join(done.output.split())
     assert sorted(card.boot.rglob("*")) == before
+
+
+@pytest.mark.parametrize(
+    ("kernels", "config", "accepted"),
+    [
+        (("kernel8.img", "kernel_2712.img"), "arm_64bit=1\n", {"arm64"}),
+        (("kernel.img", "kernel7.img", "kernel7l.img", "kernel8.img"), "[all]\n", {"armhf"}),
+        (("kernel7.img", "kernel8.img"), "arm_64bit=1\n", {"arm64", "armhf"}),
+        ((), "", {"arm64", "armhf"}),
+    ],
+)
+def test_the_cards_kernels_decide_the_architecture(
+    card: Card, kernels: tuple[str, ...], config: str, accepted: set[str]
+) -> None:
+    card.trixie()
+    (card.boot / "kernel8.img").unlink()
+    for name in kernels:
+        (card.boot / name).touch()
+    (card.boot / "config.txt").write_text(config)
+    for architecture in ("arm64", "armhf", "amd64"):
+        packed(card.boot.parent, version="99.0", architecture=architecture)
+        assert (card.prepare().exit_code == 0) is (architecture in accepted)
+
+
+def test_a_card_whose_first_start_failed_is_prepared_again(card: Card) -> None:
+    card.bookworm()
+    assert card.prepare().exit_code == 0
+    (card.boot / "firstrun.sh").unlink()  # it ran
+    (card.boot / "naze-bridge-RESULT.txt").write_text("naze-bridge is not set up")
+    assert card.prepare("--name", "kite").exit_code == 0
+    assert "--name kite" in (card.boot / "naze-bridge" / "first-boot.sh").read_text()
+    assert not (card.boot / "naze-bridge-RESULT.txt").exists()
 
 
 def test_wrong_answers_are_refused(card: Card) -> None:

@@ -3,6 +3,7 @@
 
 import re
 import subprocess
+import uuid
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -126,6 +127,25 @@ def test_a_hotspot_that_cannot_open_leaves_the_previous_network(pi: FaultyMachin
     manager = NetworkManager(pi, radio_works=False)
     assert open_hotspot(pi, manager, lambda _: None).endswith("no radio; back on the previous network")
     assert manager.active == "home-uuid"
+
+
+def test_a_hotspot_that_cannot_open_is_kept_if_it_is_the_only_way_to_the_pi(pi: FaultyMachine) -> None:
+    manager = NetworkManager(pi, previous=None, radio_works=False)
+    assert "tried again, because there is no other network" in open_hotspot(pi, manager, lambda _: None)
+    assert opens_at_boot(pi)
+    assert hotspot_name(pi) == " naze\\field"
+
+
+def test_a_kept_hotspot_is_opened_at_once_and_waits_for_no_device(pi: FaultyMachine) -> None:
+    (step,) = hotspot_steps(pi, _NETWORKS[0], is_kept=True)
+    assert [change.describe() for change in step.changes[1:]] == [
+        *("run nmcli connection reload", f"run nmcli connection up {CONNECTION}")
+    ]
+    Machine(pi).carry_out(step.changes[0])
+    assert opens_at_boot(pi)
+    assert list(hotspot_steps(pi, _NETWORKS[0], is_kept=True)) != []  # it is not open
+    pi.write("/run/NetworkManager/devices/3", f"connection-uuid={uuid.uuid5(uuid.NAMESPACE_DNS, _NETWORKS[0][0])}\n")
+    assert list(hotspot_steps(pi, _NETWORKS[0], is_kept=True)) == []
 
 
 def test_without_a_previous_network_it_waits_for_nobody(pi: FaultyMachine) -> None:
