@@ -39,8 +39,6 @@ from bridge.settings.board_settings import BoardSettings
 from bridge.settings.local_settings import LocalSettings
 from bridge.settings.own_parameters import OwnParameters
 from bridge.settings.parameters import Parameters
-from bridge.settings.settings_backups import BackupTaker
-from bridge.settings.settings_seal import SettingsSeal
 from bridge.sharing.msp_sharing import MspSharing
 from bridge.sharing.program import Program
 from bridge.transfers.local_missions import LocalMissions
@@ -137,26 +135,18 @@ class Bridge:
         #: Missions, for the command line, the page and zenoh.
         self.missions = LocalMissions(missions, types.of_missions, ground, emit, incidents)
         # The board's settings, and other programs' requests.
-        sharing = self._sharing = MspSharing(session, missions, ground, emit, self._program_changed_settings)
-        seal = self._seal = SettingsSeal(session, missions, ground, emit, config.seals, self._is_transferring)
+        sharing = self._sharing = MspSharing(session, missions, ground, emit, self._settings_may_have_changed)
         settings = self._board_settings = BoardSettings(
-            session, missions, emit, self._is_transferring, lambda: sharing.due < inf
+            session, missions, ground, emit, config.settings_memory, self._is_transferring, lambda: sharing.due < inf
         )
-        settings.on_change = self._changed_settings
-        seal.on_found_change = self._found_changed_settings
-        self._backups = BackupTaker(emit)
-        seal.on_identified = self._backups.identified
-        settings.on_read = lambda table: self._backups.read(table, settings.unsaved)
-        settings.on_saved = self._backups.saved
         #: Settings, for the command line, the page and zenoh.
         self.settings = LocalSettings(settings, session)
         # The vehicle that ground stations see.
         own = self._own_vehicle = OwnVehicle(
             session, missions, ground, announcer, types.capabilities, config.unix_time_s, now
         )
-        self._reporter = VehicleReporter(session, missions, ground, seal, own.also_want, own.progress)
-        own_parameters = OwnParameters(missions, ground, owner.sysid)
-        own_parameters.on_radius_set = settings.saved_with_mission
+        self._reporter = VehicleReporter(session, missions, ground, settings, own.also_want, own.progress)
+        own_parameters = OwnParameters(missions, settings, ground, owner.sysid)
         parameters = self._parameters = Parameters(own_parameters, settings, ground)
         calibration = self._calibration = Calibration(ground, session, missions, announcer, settings)
         waypoint = SetWaypoint(missions, own, ground)
@@ -164,7 +154,7 @@ class Bridge:
         router = MessageRouter(ground, types.by_type, parameters, commands, own)
         self._incoming = Incoming(ground, router, parameters, session.send_mavlink, *ids, emit)
         #: Served in this order, after the line itself.
-        self._parts: list[TimedPart] = [runner, sharing, *types.uploads, self._watch, seal, settings]
+        self._parts: list[TimedPart] = [runner, sharing, *types.uploads, self._watch, settings]
         self._parts += [parameters, ground, announcer, calibration, own, self._reporter]
 
     def take(self) -> list[BridgeEffect]:
@@ -313,7 +303,7 @@ class Bridge:
             fc_requests_lost=None if state.link is None else state.link.requests_lost,
             fc_round_trips=None if state.link is None else state.link.round_trips,
             firmware_version=self.vehicle.version,
-            settings=self._seal.state,
+            settings=self._board_settings.known.state,
         )
 
     # Time.
@@ -352,16 +342,7 @@ class Bridge:
     def _let_read(self, peer: Peer, now: float) -> None:
         self._own_vehicle.let_read(peer, now)
 
-    def _changed_settings(self, now: float) -> None:
-        self._seal.changed_here(now)
-        self._missions.settings_changed()
-
-    def _found_changed_settings(self, now: float) -> None:
-        self._board_settings.may_have_changed(now)
-        self._missions.settings_changed()
-
-    def _program_changed_settings(self, now: float) -> None:
-        self._changed_settings(now)
+    def _settings_may_have_changed(self, now: float) -> None:
         self._board_settings.may_have_changed(now)
 
     def _newcomer(self, station: GroundStation, now: float) -> None:
@@ -374,8 +355,6 @@ class Bridge:
         self._incoming.routes = self._routes if self.is_passing_through else None
         # A passed-through autopilot represents itself.
         self._own_vehicle.due = inf if self.is_passing_through else min(self._own_vehicle.due, now)
-        self._backups.found()
-        self._seal.found(controller, now)
         self._board_settings.found(controller, now)
         if controller is None:
             trouble = self._trouble()
@@ -434,7 +413,7 @@ class Bridge:
         self._was_armed = armed
         if armed:
             self._types.end_uploads(ARMED, now)
-            self._seal.armed()
+        self._board_settings.arming_changed(now, is_armed=armed)
         if self._config.has_log:
             self._ground.record_flight(on=armed and not self.is_passing_through)
         self._effects.append(Armed() if armed else Disarmed())

@@ -11,7 +11,7 @@ from bridge.controllers.table import PROFILES
 from bridge.fc.profile import Autopilot, Profile
 from bridge.gcs.rights import LinkAccess
 from bridge.model.flight_memory import FlightMemory
-from bridge.model.settings import SealMemory, SealsOfThisRun
+from bridge.model.settings import MemoryOfThisRun, SettingsMemory
 
 
 class PassThroughRule(Enum):
@@ -66,4 +66,4 @@ class BridgeConfig:
     unix_time_s: Callable[[float], float | None] = lambda _now: None
     has_log: bool = False
     flight: FlightMemory | None = None
-    seals: SealMemory = field(default_factory=SealsOfThisRun)
+    settings_memory: SettingsMemory = field(default_factory=MemoryOfThisRun)

@@ -10,7 +10,7 @@ from bridge.line.conversation import StoreEffect
 from bridge.missions.mission_service import MissionEnded
 from bridge.model.events import BridgeEvent
 from bridge.model.flight_memory import FlightMemory
-from bridge.settings.settings_backups import TakenBackup
+from bridge.model.settings import TakenBackup
 from reports.vehicle_groups import Group
 
 

@@ -4,17 +4,19 @@
 A part is always written whole: it is read again right before, so that only one value of it changes.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from bridge.fc.fc_settings import NO_ANSWER, NOT_TAKEN, FcSettings, SettingRefusal, TableReading, fixed
+from bridge.fc.fc_settings import NO_ANSWER, NOT_TAKEN, Cause, FcSettings, SettingRefusal, TableReading, fixed
 from bridge.fc.profile import FlightController
 from bridge.line.conversation import Conversation, Pause, ask, ask_surely
 from bridge.model.board_setting import BoardSetting, SettingTable, Value, ValueKind, table_of
 from protocols.msp.command_line import is_clean
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, request
-from protocols.msp.settings import RANGE_SIZE, SETTINGS, Field, Part, SettingNames, SettingsRequest, fields
+from protocols.msp.mode_ranges import range_writes, ranges_text
+from protocols.msp.settings import SETTINGS, Field, Part, SettingsRequest, fields
 from protocols.msp.telemetry import decode_box_names
 from protocols.rights.effect import Effect
 from protocols.rights.msp import msp_right
@@ -23,15 +25,18 @@ _ARM = "the arm switch is set with the board's own configurator, a wrong one cou
 _PULSE = "disarmed motors get this pulse: set it with the board's own configurator"
 _UNKNOWN = "this firmware's way to set it is not known"
 _HAZARD = "the firmware could take bytes of this change for typed keys: try another value"
+_FIXED = {"BOX ARM": _ARM, "min command": _PULSE}
 #: Permanent id of the box that arms.
 _ARM_ID = 0
+#: A mode's ranges, as a text.
+_LONGEST_RANGES = 80
 
 
 class _Place(NamedTuple):
-    """A setting's handle."""
+    """A setting's handle. place: its field, or the mode's permanent id."""
 
     part: SettingsRequest
-    field: Field
+    place: Field | int
 
 
 class MspPartSettings(FcSettings):
@@ -40,16 +45,25 @@ class MspPartSettings(FcSettings):
     def __init__(self, board: FlightController, *parts: SettingsRequest) -> None:
         self._parts = parts or SETTINGS[board.firmware]
         self._firmware = board.firmware
-        self._names = SettingNames(boxes=board.boxes)
+        self._boxes = board.boxes
+        self._pids: tuple[str, ...] = ()
+        #: Names of modes, by permanent id.
+        self._modes: Mapping[int, str] = {}
         self._accepts_any_byte = board.profile.accepts_any_byte
+        #: The last payloads, by command; empty for a command that the board does not know.
+        self._held: dict[int, bytes] = {}
 
     def read(self, previous: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
         found: list[BoardSetting] = []
         for part in self._parts:
-            if part.part is Part.PIDS and not self._names.pids:
-                names = yield from self._payload(Msp.PIDNAMES)
-                self._names = replace(self._names, pids=decode_box_names(names or b""))
-            payload = yield from self._payload(part.command)
+            if part.part is Part.PIDS and not self._pids:
+                self._pids = decode_box_names((yield from self.payload(Msp.PIDNAMES)) or b"")
+            elif part.part is Part.RANGES and not self._modes:
+                ids = yield from self.payload(Msp.BOXIDS)
+                names = decode_box_names((yield from self.payload(Msp.BOXNAMES)) or b"")
+                # With many modes the names are cut.
+                self._modes = dict(zip(ids or b"", [*names, *map(str, (ids or b"")[len(names) :])], strict=False))
+            payload = yield from self.payload(part.command)
             if payload is None:
                 return None
             # Without a payload the board does not have this part.
@@ -57,66 +71,86 @@ class MspPartSettings(FcSettings):
             yield Pause(reading.pace(2 * len(payload)))
         return table_of(*found)
 
-    def change(
-        self, table: SettingTable, setting: BoardSetting, value: Value
-    ) -> Conversation[SettingTable | SettingRefusal]:
-        part, field = setting.handle
-        before = yield from self._payload(part.command)
+    def write(self, setting: BoardSetting, value: Value) -> Conversation[SettingRefusal | None]:
+        part, place = setting.handle
+        before = yield from self.payload(part.command)
         if before is None:
             return NO_ANSWER
-        present = {each.name: each for each in self._shown(part, before)}
-        if setting.name not in present or present[setting.name].fixed:
-            return fixed(present.get(setting.name, replace(setting, fixed="the board's settings have changed")))
-        after = field.put(before, int(value))
-        if part.command == Msp.MODE_RANGES:
-            number = field.at // RANGE_SIZE
-            after = bytes((number,)) + after[number * RANGE_SIZE : (number + 1) * RANGE_SIZE]
-            if after[1] == _ARM_ID and after[1:] != before[number * RANGE_SIZE : (number + 1) * RANGE_SIZE]:
-                return fixed(replace(setting, fixed=_ARM))
-        frame = request(part.setter, after)
-        if not (self._accepts_any_byte or is_clean(frame)):
-            return fixed(replace(setting, fixed=_HAZARD))
-        right = msp_right(self._firmware, part.setter, after)
-        if right.effect is not Effect.CHANGE:
-            return fixed(replace(setting, fixed=_UNKNOWN))
-        reply = yield from ask(frame, part.setter, right.reply)
-        held = yield from self._payload(part.command)
-        if reply is None or not held:
-            return NO_ANSWER
-        return NOT_TAKEN if reply.direction is Direction.ERROR else table.updated(*self._shown(part, held))
+        present = {each.name: each for each in self._shown(part, before)}.get(setting.name)
+        if present is None or present.fixed:
+            return fixed(present or replace(setting, fixed="the board's settings have changed"))
+        try:
+            payloads = _payloads(before, place, value)
+        except ValueError as error:
+            return SettingRefusal(Cause.OUT_OF_RANGE, f"{setting.name}: {error}")
+        if payloads is None:
+            return fixed(replace(setting, fixed="the board has no free range"))
+        for payload in payloads:
+            frame, right = request(part.setter, payload), msp_right(self._firmware, part.setter, payload)
+            if not (self._accepts_any_byte or is_clean(frame)):
+                return fixed(replace(setting, fixed=_HAZARD))
+            if right.effect is not Effect.CHANGE:
+                return fixed(replace(setting, fixed=_UNKNOWN))
+            reply = yield from ask(frame, part.setter, right.reply)
+            if reply is None:
+                return NO_ANSWER
+            if reply.direction is Direction.ERROR:
+                return NOT_TAKEN
+        return None
 
-    def _payload(self, command: int) -> Conversation[bytes | None]:
+    def read_back(self, setting: BoardSetting) -> Conversation[Sequence[BoardSetting]]:
+        part, _ = setting.handle
+        return self._shown(part, (yield from self.payload(part.command)) or b"")
+
+    def payload(self, command: int) -> Conversation[bytes | None]:
         """The reply's payload, empty if the board does not know the command; None if it does not answer."""
         right = msp_right(self._firmware, command, b"")
-        if right.effect is not Effect.READ:
+        held = self._held.get(command)
+        if right.effect is not Effect.READ or held == b"":
             return b""
-        reply = yield from ask_surely(request(command), command, right.reply)
+        # A payload as heard before was not damaged.
+        reply = yield from ask(request(command), command, right.reply)
+        if reply is not None and reply.payload != held:
+            reply = yield from ask_surely(request(command), command, right.reply)
         if reply is None:
             return None
-        return reply.payload if reply.direction is Direction.REPLY else b""
+        self._held[command] = reply.payload if reply.direction is Direction.REPLY else b""
+        return self._held[command]
 
     def _shown(self, part: SettingsRequest, payload: bytes) -> list[BoardSetting]:
-        found = []
-        for field in fields(part, payload, self._names):
-            name = "".join(letter if letter.isalnum() else "_" for letter in field.name).upper()
-            found.append(
+        if part.part is Part.RANGES:
+            return [
                 BoardSetting(
-                    name,
-                    ValueKind.INTEGER,
+                    _name(f"mode {name}"),
+                    ValueKind.TEXT,
                     0,
-                    (1 << 8 * field.size) - 1,
-                    field.value(payload),
-                    fixed=self._fixed(part, field, payload),
-                    handle=_Place(part, field),
+                    _LONGEST_RANGES,
+                    ranges_text(payload, number),
+                    fixed=_ARM if number == _ARM_ID else "",
+                    handle=_Place(part, number),
                 )
+                for number, name in (self._modes.items() if payload else ())
+            ]
+        return [
+            BoardSetting(
+                _name(field.name),
+                ValueKind.INTEGER,
+                0,
+                (1 << 8 * field.size) - 1,
+                field.value(payload),
+                fixed=_FIXED.get(field.name, ""),
+                handle=_Place(part, field),
             )
-        return found
+            for field in fields(part, payload, self._pids, self._boxes)
+        ]
 
-    def _fixed(self, part: SettingsRequest, field: Field, payload: bytes) -> str:
-        if part.command == Msp.MODE_RANGES:
-            first = field.at // RANGE_SIZE * RANGE_SIZE
-            _, _, low, high = payload[first : first + RANGE_SIZE]
-            return _ARM if payload[first] == _ARM_ID and low < high else ""
-        if field.name == "BOX ARM":
-            return _ARM
-        return _PULSE if field.name == "min command" else ""
+
+def _name(words: str) -> str:
+    return "".join(letter if letter.isalnum() else "_" for letter in words).upper()
+
+
+def _payloads(before: bytes, place: Field | int, value: Value) -> list[bytes] | None:
+    """The payloads that set a value; None without room for it. ValueError: the form of a mode's ranges."""
+    if isinstance(place, Field):
+        return [place.put(before, int(value))]
+    return range_writes(before, place, str(value))

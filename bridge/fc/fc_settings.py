@@ -6,17 +6,16 @@ Each kind of flight controller has its own way to read, change and save them: `b
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from math import isfinite
-from typing import ClassVar, TypeVar
+from typing import ClassVar
 
-from bridge.line.conversation import Conversation, ask, ask_armed, ask_status
+from bridge.line.conversation import Conversation, ask, ask_status
 from bridge.model.board_setting import BoardSetting, SettingTable, Value, ValueKind, shown
 from protocols.msp.frame import Direction, request
 
-T = TypeVar("T")
 _EEPROM_WRITE = 250
 _ACK_SIZE = 2
 #: Their timeouts together exceed the flash time of an STM32H743.
@@ -93,17 +92,16 @@ class FcSettings(ABC):
     def read(self, previous: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
         """All settings; None if the board does not answer. Other work may use the line at each Pause.
 
-        previous: as last read, maybe from another board.
+        previous: as last read, maybe from another board: it may be returned if it is still the board's.
         """
 
     @abstractmethod
-    def change(
-        self, table: SettingTable, setting: BoardSetting, value: Value
-    ) -> Conversation[SettingTable | SettingRefusal]:
-        """Change one setting in RAM; the table with the value read back from the board.
+    def write(self, setting: BoardSetting, value: Value) -> Conversation[SettingRefusal | None]:
+        """Write one setting into the board's RAM. A value that the board does not take need not be refused here."""
 
-        A value that the board does not take is no refusal here: the table has the old one.
-        """
+    @abstractmethod
+    def read_back(self, setting: BoardSetting) -> Conversation[Sequence[BoardSetting]]:
+        """A setting that was written, as the board holds it, and maybe others; empty if it does not answer."""
 
     def save(self) -> Conversation[SettingRefusal | None]:
         """Write the settings in RAM to the board's flash; None if they are stored."""
@@ -117,15 +115,3 @@ def write_eeprom() -> Conversation[SettingRefusal | None]:
     if reply is None or status is None:
         return NO_ANSWER
     return NOT_SAVED if reply.direction is Direction.ERROR else None
-
-
-def while_disarmed(arm_bit: int | None, conversation: Conversation[T]) -> Conversation[T | SettingRefusal]:
-    """Hold a conversation that changes or saves settings, if STATUS says disarmed now: telemetry may not show it yet.
-
-    arm_bit: see FlightController.
-    """
-    armed = yield from ask_armed(arm_bit)
-    if armed is False:
-        return (yield from conversation)
-    conversation.close()
-    return ARMED if armed else NO_ANSWER

@@ -104,8 +104,8 @@ class SettingTable:
 
     def differences(self, later: "SettingTable") -> tuple[str, ...]:
         """The names of settings with another value, or only in one of the tables."""
-        names = dict.fromkeys((*self.settings, *later.settings))
-        return tuple(name for name in names if _value(self, name) != _value(later, name))
+        before, after = ({each.name: each.value for each in table} for table in (self, later))
+        return tuple(name for name in {**before, **after} if before.get(name) != after.get(name))
 
 
 def table_of(*settings: BoardSetting, is_complete: bool = True) -> SettingTable:
@@ -119,8 +119,3 @@ def shown(value: Value) -> str:
     if isinstance(value, str):
         return value
     return str(int(value)) if abs(value) < 1e15 and value == int(value) else f"{value:.7g}"
-
-
-def _value(table: SettingTable, name: str) -> Value | None:
-    setting = table.settings.get(name)
-    return None if setting is None else setting.value

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The flight controller's settings: their seal, and changes made outside the bridge."""
+"""What is remembered of a flight controller's settings, and changes made outside the bridge."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import Enum
 from typing import Protocol
-from zlib import crc32
 
-from protocols.msp.settings import Part
+from bridge.model.board_setting import Value
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,39 +18,17 @@ class BoardId:
 
 
 @dataclass(frozen=True, slots=True)
-class Seal:
-    """The settings as last read: the bytes of each part that the board has."""
-
-    parts: Mapping[Part, bytes]
-
-    def __str__(self) -> str:
-        """A checksum over all parts, 8 hexadecimal digits."""
-        crc = 0
-        for part in Part:
-            crc = crc32(b"%d:" % len(payload) + payload if (payload := self.parts.get(part)) is not None else b"-", crc)
-        return f"{crc:08x}"
-
-
-@dataclass(frozen=True, slots=True)
-class ChangedPart:
-    """A part that changed; `names`: of its settings, as far as they are known."""
-
-    part: Part
-    names: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
 class SettingsChange:
     """A change that did not come through the bridge. `at`: when it was noticed, monotonic s."""
 
-    parts: Sequence[ChangedPart]
+    names: tuple[str, ...]
     at: float
 
     def text(self, most: int | None = None) -> str:
         """For the pilot: all names, or as many as fit into `most` characters."""
-        longest = max((len(changed.names) for changed in self.parts), default=0)
-        for names in range(longest, -1, -1):
-            text = "Settings changed elsewhere: " + "; ".join(_shown(each, names) for each in self.parts)
+        for count in range(len(self.names), -1, -1):
+            more = [f"+{len(self.names) - count}"] if count < len(self.names) else []
+            text = "Settings changed elsewhere: " + ", ".join([*self.names[:count], *more])
             if most is None or len(text) <= most:
                 break
         return text
@@ -58,36 +36,50 @@ class SettingsChange:
 
 @dataclass(frozen=True, slots=True)
 class SettingsState:
-    """`change`: the last one made outside the bridge, while this board was connected; None: there was none."""
+    """`seal`: a checksum of all settings as last read, 8 hexadecimal digits.
+
+    `change`: the last one made outside the bridge, while this board was connected; None: there was none.
+    """
 
     board: BoardId
-    seal: Seal
+    seal: str
     change: SettingsChange | None = None
 
 
-class SealMemory(Protocol):
-    """Remembers the seal of each board, even after a restart of the daemon."""
+class Occasion(Enum):
+    """Why a backup was taken, as shown to the pilot."""
 
-    def recall(self, board: BoardId) -> Seal | None: ...
+    CONNECTED = "connected"
+    SAVED = "saved"
+    CHANGED_ELSEWHERE = "changed elsewhere"
 
-    def keep(self, board: BoardId, seal: Seal) -> None: ...
+
+@dataclass(frozen=True, slots=True)
+class TakenBackup:
+    """The whole table of a board; mostly equal to the one before."""
+
+    board: BoardId
+    values: Mapping[str, Value]
+    occasion: Occasion
 
 
-class SealsOfThisRun:
-    """Remembers seals while the program runs, for commands without a state directory, and tests."""
+class SettingsMemory(Protocol):
+    """Remembers the settings of each board, even after a restart of the daemon."""
+
+    def recall(self, board: BoardId) -> Mapping[str, Value]:
+        """Empty if none are known, or if they may have changed through the bridge since."""
+
+    def keep(self, board: BoardId, values: Mapping[str, Value]) -> None: ...
+
+
+class MemoryOfThisRun:
+    """Remembers settings while the program runs, for commands without a state directory, and tests."""
 
     def __init__(self) -> None:
-        self._seals: dict[BoardId, Seal] = {}
+        self._values: dict[BoardId, Mapping[str, Value]] = {}
 
-    def recall(self, board: BoardId) -> Seal | None:
-        return self._seals.get(board)
+    def recall(self, board: BoardId) -> Mapping[str, Value]:
+        return self._values.get(board, {})
 
-    def keep(self, board: BoardId, seal: Seal) -> None:
-        self._seals[board] = seal
-
-
-def _shown(changed: ChangedPart, most: int) -> str:
-    names = list(changed.names[:most])
-    if names and len(changed.names) > most:
-        names.append(f"+{len(changed.names) - most}")
-    return f"{changed.part.value} {', '.join(names)}".rstrip()
+    def keep(self, board: BoardId, values: Mapping[str, Value]) -> None:
+        self._values[board] = values

@@ -1,39 +1,44 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The flight controller's settings for all clients: the table as last read, one change at a time, and the save.
+"""The flight controller's settings for all clients: read, watched for changes without the bridge, changed and saved.
 
-The table is read when the board is found, or when a client asks for it if reading disturbs the board; only while it is
-disarmed and no mission needs the line. It is kept when the board is lost or armed, and read again when something else
-may have changed it. Changes are in the board's RAM until they are saved.
+They are read when the board is found, or when a client asks if reading disturbs the board, and again once a minute and
+after each change; only while it is disarmed and no mission needs the line. A reading that finds no change costs a few
+requests. Changes are in the board's RAM until they are saved.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import inf
 
-from bridge.fc.fc_settings import (
-    ARMED,
-    NO_ANSWER,
-    Cause,
-    FcSettings,
-    SettingRefusal,
-    fixed,
-    out_of_range,
-    while_disarmed,
-)
-from bridge.fc.profile import FlightController
+from bridge.fc.fc_settings import ARMED, NO_ANSWER, Cause, FcSettings, SettingRefusal, TableReading, fixed, out_of_range
+from bridge.fc.profile import FlightController, Spoken
 from bridge.fc.session import FcSession
-from bridge.line.conversation import LinkLost
+from bridge.gcs.ground import Ground
+from bridge.gcs.station import Severity
+from bridge.line.conversation import Conversation, LinkLost, Pause, ask_surely
 from bridge.missions.mission_service import MissionService
-from bridge.model.board_setting import BoardSetting, SettingTable, Value, shown
-from bridge.model.events import Emit, SettingChanged, SettingsRead, SettingsSaved
-from bridge.settings.setting_clients import Change, Changes, OnChanged, OnTable, TableClients
-from bridge.settings.table_reader import TableReader
+from bridge.model.board_setting import SettingTable, Value, shown
+from bridge.model.events import BridgeEvent, SettingChanged, SettingsChangedOnBoard, SettingsRead, SettingsSaved
+from bridge.model.settings import BoardId, SettingsChange, SettingsMemory, TakenBackup
+from bridge.settings.known_settings import Freshness, KnownSettings
+from bridge.settings.setting_work import Answer, OnDone, SettingChange, SettingsSave, SettingWork, WorkEvent
+from protocols.msp.commands import Msp
+from protocols.msp.frame import Direction, request
+from protocols.rights.effect import Effect
+from protocols.rights.msp import msp_right
 
-#: After the board was found: its list is read first.
-_FIRST_S, _RETRY_S, _AFTER_CHANGE_S = 0.2, 0.3, 5.0
+#: After the board was found: its list is read first. A program that changes settings sends several requests.
+_FIRST_S, _AFTER_CHANGE_S, _INTERVAL_S = 0.2, 5.0, 60.0
+#: While the line is needed for something else; and after a failure, doubled after each further one.
+_RETRY_S, _MOST_RETRY_S = 0.3, 60.0
 #: Names in the log of settings that have changed.
 _MOST_NAMED = 20
 #: A change is a handful of short requests.
 _CHANGE_SIZE = 200
+#: Items that wait: of one client, which repeats them, and of all.
+_MOST_OF_ONE, _MOST_WAITING = 8, 64
+#: Two chunks of STATUSTEXT.
+_MOST_TEXT = 99
+_UID_SIZE = 12
 #: A client waits this long for a table: INAV's takes 20 s, a Harakiri's over MAVLink 24 s, and again for a lost value.
 READ_WITHIN_S = 60.0
 
@@ -43,7 +48,7 @@ _UNREAD = SettingRefusal(Cause.OCCUPIED, "The settings have not been read yet: t
 _TOO_MANY = SettingRefusal(Cause.OCCUPIED, "Too many changes at once: try again")
 _NO_ARM_FLAG = SettingRefusal(Cause.REFUSED, "Nothing is changed: this board does not report whether it is armed")
 
-OnSaved = Callable[[SettingRefusal | None, float], None]
+OnTable = Callable[[SettingTable | SettingRefusal, float], None]
 
 
 class BoardSettings:
@@ -53,39 +58,49 @@ class BoardSettings:
         self,
         session: FcSession,
         missions: MissionService,
-        emit: Emit,
+        ground: Ground,
+        emit: Callable[[BridgeEvent | TakenBackup], None],
+        memory: SettingsMemory,
         is_transferring: Callable[[], bool],
         others_wait: Callable[[], bool],
     ) -> None:
         self._session = session
         self._missions = missions
+        self._ground = ground
         self._emit = emit
         self._is_transferring = is_transferring
         self._others_wait = others_wait
+        self.known = KnownSettings(memory)
         self._controller: FlightController | None = None
         self._fc_settings: FcSettings | None = None
-        #: The one that the table was read from.
-        self._read_from: FcSettings | None = None
-        #: Something else may have changed the table since; a client waits for it.
-        self._is_doubtful, self._is_asked = True, False
-        self._reader = TableReader(missions.runner, self._pace, self._paused, self._read)
-        self._table_clients = TableClients()
-        self._changes, self._is_changing = Changes(), False
-        #: When the line has carried the last change.
-        self._line_free_at = 0.0
-        #: As last read; also of a board that is armed or lost since.
-        self.table: SettingTable | None = None
-        #: The settings that were changed here, and not saved since.
-        self.unsaved: dict[str, Value] = {}
-        #: True if the board's flash is known to hold the settings in its RAM.
-        self.is_saved = False
-        #: Called after each reading of the whole table; when the table has changed; after a save; after a change here
-        #: that others must not mistake for one from elsewhere.
-        self.on_read: Callable[[SettingTable], None] = lambda _table: None
+        self._work: list[SettingWork] = []
+        #: Clients that wait for the table, with their deadlines.
+        self._readers: list[tuple[float, OnTable]] = []
+        self._reading: Conversation[SettingTable | None] | None = None
+        #: A part of the work or of the reading is on the line, which has carried the one before at this time.
+        self._is_on_line, self._line_free_at = False, 0.0
+        self._read_at, self._retry_s = inf, _RETRY_S
+        #: The text for ground stations that connect later.
+        self._told = ""
+        #: Called when the table has changed.
         self.on_table: Callable[[SettingTable, float], None] = lambda _table, _now: None
-        self.on_saved: Callable[[], None] = lambda: None
-        self.on_change: Callable[[float], None] = lambda _now: None
         self.due = inf
+
+    @property
+    def is_checked(self) -> bool:
+        """True if the table was read from this board since anything else may have changed it."""
+        return self.known.freshness >= Freshness.CHANGED and self._session.vehicle.armed is False
+
+    def obstacle(self) -> SettingRefusal | None:
+        """The reason why settings can be neither read nor changed now; None if they can."""
+        armed = self._session.vehicle.armed
+        if armed:
+            return ARMED
+        if self._fc_settings is None:
+            return _NO_BOARD
+        if self._missions.occupied() is not None or self._is_transferring():
+            return _OCCUPIED
+        return None if armed is False else _UNREAD
 
     # The board.
 
@@ -93,49 +108,33 @@ class BoardSettings:
         """Follow another flight controller, or another protocol of the same; None: it was lost."""
         opens = None if controller is None else controller.profile.settings
         self._controller = controller
-        self._fc_settings = None if opens is None or controller is None else opens(controller)
-        self._reader.forget_failures()
-        self._reader.stop()
-        self._is_asked = False
-        if self._fc_settings is not None:
-            self._is_doubtful = True
-            self.due = now + _FIRST_S
+        self._fc_settings = fc_settings = None if opens is None or controller is None else opens(controller)
+        self.known.found()
+        self._stop_reading()
+        self._retry_s = _RETRY_S
+        self._read_at = now + _FIRST_S if fc_settings is not None and not fc_settings.is_read_when_asked else inf
+        if fc_settings is None:
+            self._answer_readers(self._as_last_read(), now)
+        self.due = now
+
+    def arming_changed(self, now: float, *, is_armed: bool) -> None:
+        """A pilot who has armed has decided to fly: stations that connect later get no text about earlier changes."""
+        if is_armed:
+            self._tell_newcomers("")
         else:
-            self._table_clients.answer(self._as_last_read(), now)
+            self._read_again(now + _FIRST_S)
 
     def may_have_changed(self, now: float) -> None:
-        """Something else may have changed settings: read them again."""
-        self._is_doubtful, self.is_saved = True, False
-        if self._fc_settings is not None:
-            self.due = min(self.due, now + _AFTER_CHANGE_S)
-
-    def changed_with_others(self, now: float) -> None:
-        """The bridge has begun a calibration, which may change settings."""
-        self.on_change(now)
-        self.may_have_changed(now)
+        """The bridge, or a program through it, may have changed settings."""
+        self.known.may_have_changed()
+        self._missions.settings_changed()
+        self._read_again(now + _AFTER_CHANGE_S)
 
     def saved_with_mission(self, now: float) -> None:
         """The board has written its whole configuration, to store a setting of the mission's."""
-        self.changed_with_others(now)
-        self.unsaved.clear()
-        self.is_saved = True
-
-    def obstacle(self) -> SettingRefusal | None:
-        """The reason why settings can be neither read nor changed now; None if they can."""
-        armed = self._session.vehicle.armed
-        if armed:
-            return ARMED
-        if self._fc_settings is None or self._controller is None:
-            return _NO_BOARD
-        if self._missions.occupied() is not None or self._is_transferring():
-            return _OCCUPIED
-        return None if armed is False else _UNREAD
-
-    @property
-    def is_checked(self) -> bool:
-        """True if the table was read from this board since anything else may have changed it."""
-        is_read = self._read_from is not None and self._read_from is self._fc_settings
-        return is_read and not self._is_doubtful and self._session.vehicle.armed is False
+        self.known.saved()
+        self._missions.settings_changed()
+        self._read_again(now + _AFTER_CHANGE_S)
 
     # For clients.
 
@@ -144,182 +143,245 @@ class BoardSettings:
         if self._fc_settings is None or self._session.vehicle.armed or self._missions.occupied() is not None:
             on_done(self._as_last_read(), now)
             return
-        self._table_clients.add(now + within_s, on_done)
-        self._is_asked, self.due = True, now
+        self._readers.append((now + within_s, on_done))
+        if self._retry_s == _RETRY_S:
+            self._read_at = now
+        self.due = now
 
-    def change(self, name: str, value: Value, on_done: OnChanged, now: float, client: str = "") -> None:
+    def change(self, name: str, value: Value, on_done: OnDone, now: float, client: str = "") -> None:
         """Change a setting in the board's RAM; `on_done` gets it as read back, maybe before this returns.
 
         The same request of a client that still waits is not repeated, and gets no answer of its own.
         """
-        change = Change(name, value, client, on_done)
-        if change in self._changes:
+        change = SettingChange(client, on_done, name=name, value=value)
+        of_client = [each for each in self._work if each.client == client]
+        if any(isinstance(each, SettingChange) and (each.name, each.value) == (name, value) for each in of_client):
             return
-        refused = self._refusal(name, value)
-        if refused is None and not self._changes.has_room_for(change):
-            refused = _TOO_MANY
-        if refused is not None:
-            on_done(refused, now)
+        if len(self._work) >= _MOST_WAITING or len(of_client) >= _MOST_OF_ONE:
+            change.end(_TOO_MANY, now)
             return
-        self._changes.append(change)
+        self._work.append(change)
         self._next(now)
 
-    def save(self, on_done: OnSaved, now: float) -> None:
+    def save(self, on_done: OnDone, now: float) -> None:
         """Write the settings to the board's flash."""
-        obstacle, fc_settings, controller = self.obstacle(), self._fc_settings, self._controller
-        if obstacle is None and fc_settings is not None and fc_settings.read_only:
-            obstacle = SettingRefusal(Cause.FIXED, f"Nothing is saved: {fc_settings.read_only}")
-        if obstacle is not None or fc_settings is None or controller is None:
-            on_done(obstacle or _NO_BOARD, now)
-            return
+        self._work.append(SettingsSave("", on_done))
+        self._next(now)
 
-        def done(result: SettingRefusal | LinkLost | None, at: float) -> None:
-            refused = NO_ANSWER if isinstance(result, LinkLost) else result
-            if refused is None:
-                self._emit(SettingsSaved(changed=", ".join(self.unsaved)))
-                self.unsaved.clear()
-            self.on_change(at)
-            on_done(refused, at)
-            if refused is None and self.table is not None:
-                self.on_saved()
-            # A firmware may correct settings that contradict each other.
-            self._is_doubtful, self.due = True, at
-            self.is_saved = refused is None
-
-        self._missions.runner.start(while_disarmed(controller.arm_bit, fc_settings.save()), done, now)
+    # The line: one part of the work or of a reading after the other.
 
     def tick(self, now: float) -> None:
-        self.due = inf
-        self._table_clients.answer(self.table or self.obstacle() or _UNREAD, now, if_late=True)
+        late = [reader for reader in self._readers if now >= reader[0]]
+        self._answer_readers(self.known.table or self.obstacle() or _UNREAD, now, late)
         self._next(now)
-        if self._fc_settings is None or not (self._is_wanted(self._fc_settings) or self._changes):
-            self._reader.stop()
+
+    def _next(self, now: float) -> None:
+        """Start what comes next: work, else the next part of a reading."""
+        while self._work and not self._is_on_line and now >= self._line_free_at:
+            self._begin(self._work[0], now)
+        waits_until = min((until for until, _ in self._readers), default=inf)
+        if self._is_on_line:
+            self.due = waits_until
             return
-        next_at = max(self._line_free_at, self._reader.next_at)
-        self.due = next_at if next_at > now else now + _RETRY_S
-        if self._session.vehicle.armed:
-            self._reader.stop()
-        elif now >= next_at and self._may_read():
-            self._reader.read_on(self._fc_settings, self.table, self._is_doubtful, now)
+        next_at = self._line_free_at if self._work else max(self._line_free_at, self._read_at)
+        if next_at <= now:
+            self._read_on(now)
+            next_at = inf if self._is_on_line or self._session.vehicle.armed else now + _RETRY_S
+        self.due = min(next_at, waits_until)
+
+    def _begin(self, work: SettingWork, now: float) -> None:
+        controller, fc_settings = self._controller, self._fc_settings
+        answer = self._known_answer(work)
+        if answer is not None or controller is None or fc_settings is None:
+            self._work.remove(work)
+            work.end(_NO_BOARD if answer is None else answer, now)
+            return
+
+        def done(result: Answer | LinkLost, at: float) -> None:
+            self._is_on_line = False
+            self._line_free_at = at + self._pace(_CHANGE_SIZE)
+            # The values read so far may be out of date.
+            self._stop_reading()
+            self._work.remove(work)
+            result = NO_ANSWER if isinstance(result, LinkLost) else result
+            if isinstance(work, SettingChange):
+                result = self._changed(work, result, at)
+            elif not isinstance(result, SettingRefusal):
+                self._emit(SettingsSaved(changed=", ".join(self.known.unsaved)))
+                self.known.saved()
+            if isinstance(result, SettingRefusal) and work.may_have_acted:
+                self.known.may_have_changed()
+            if work.may_have_acted:
+                self._missions.settings_changed()
+                self._read_again(at if isinstance(work, SettingsSave) else at + _AFTER_CHANGE_S)
+            work.end(result, at)
+            self._next(at)
+
+        work.advance(WorkEvent.TURN)
+        self._is_on_line = True
+        is_change = isinstance(work, SettingChange)
+        self._missions.runner.start(work.carry_out(fc_settings, controller.arm_bit), done, now, in_background=is_change)
+
+    def _known_answer(self, work: SettingWork) -> Answer | None:
+        """The answer without asking the board, if there is one."""
+        table, obstacle, fc_settings = self.known.table, self.obstacle(), self._fc_settings
+        read_only = "" if fc_settings is None else fc_settings.read_only
+        if not isinstance(work, SettingChange):
+            is_fixed = obstacle is None and read_only
+            return SettingRefusal(Cause.FIXED, f"Nothing is saved: {read_only}") if is_fixed else obstacle
+        name, value = work.name, work.value
+        work.before = setting = None if table is None else table.find(name)
+        if table is not None and setting is None:
+            return SettingRefusal(Cause.UNKNOWN_NAME, f"This flight controller has no setting {name[:32]}")
+        if obstacle is not None:
+            return obstacle
+        if setting is None or self.known.freshness is Freshness.UNREAD:
+            return _UNREAD
+        if (read_only or setting.fixed) and value != setting.value:
+            return fixed(setting, read_only)
+        if not setting.accepts(value):
+            return out_of_range(setting, value)
+        if setting.holds(value):
+            return (setting,)
+        has_arm_flag = self._controller is not None and self._controller.arm_bit is not None
+        return None if has_arm_flag else _NO_ARM_FLAG
+
+    def _changed(self, work: SettingChange, result: Answer, now: float) -> Answer:
+        """The answer to a change, from the settings read back."""
+        before = work.before
+        assert before is not None
+        if isinstance(result, SettingRefusal):
+            if result.cause is Cause.NO_ANSWER and work.may_have_acted:
+                self.known.unsaved[before.name] = work.value
+            return result
+        if table := self.known.changed(result):
+            self.on_table(table, now)
+        after = next((each for each in result if each.name == before.name), before)
+        if not after.holds(work.value):
+            text = f"{before.name} stays {shown(after.value)}: the flight controller refused it"
+            return SettingRefusal(Cause.REFUSED, text)
+        self.known.unsaved[after.name] = after.value
+        self._emit(
+            SettingChanged(setting=after.name, before=shown(before.value), after=shown(after.value), by=work.client)
+        )
+        return (after,)
 
     # Reading.
 
-    def _is_wanted(self, fc_settings: FcSettings) -> bool:
-        return self._is_asked or (self._is_doubtful and not fc_settings.is_read_when_asked)
+    def _read_again(self, at: float) -> None:
+        if self._fc_settings is not None and not self._fc_settings.is_read_when_asked:
+            self._read_at = at
+            self.due = min(self.due, at)
 
-    def _may_read(self) -> bool:
-        is_busy = self._reader.is_asking or self._is_changing or self._changes
-        is_free = not (is_busy or self._others_wait() or self._missions.runner.needs_line)
-        return is_free and self.obstacle() is None
+    def _read_on(self, now: float) -> None:
+        """Begin to read the table, or continue until the next pause; unless that must wait."""
+        fc_settings, runner = self._fc_settings, self._missions.runner
+        if self._session.vehicle.armed or fc_settings is None:
+            self._stop_reading()
+        if fc_settings is None or self._others_wait() or runner.needs_line or self.obstacle() is not None:
+            return
+        if self._reading is None:
+            self._reading = self._whole(fc_settings)
+        reading = self._reading
 
-    def _paused(self, now: float) -> None:
-        self.due = self._reader.line_free_at
-        self._next(now)
+        def done(result: SettingTable | Pause | LinkLost | None, at: float) -> None:
+            self._is_on_line = False
+            if self._reading is reading and isinstance(result, Pause):
+                self._line_free_at = at + result.seconds
+            elif self._reading is reading:
+                self._reading = None
+                self._read(result if isinstance(result, SettingTable) else None, at)
+            self._next(at)
+
+        self._is_on_line = True
+        runner.start(_up_to_pause(reading), done, now, in_background=True)
+
+    def _stop_reading(self) -> None:
+        """Forget the values read so far: they may be out of date."""
+        if self._reading is not None and not self._is_on_line:
+            self._reading.close()
+        self._reading = None
+
+    def _whole(self, fc_settings: FcSettings) -> Conversation[SettingTable | None]:
+        controller, known = self._controller, self.known
+        if known.board is None and controller is not None and controller.profile.spoken is Spoken.MSP:
+            known.identified((yield from _identify(controller)))
+        is_doubtful = known.freshness <= Freshness.DOUBTFUL
+        return (yield from fc_settings.read(known.table, TableReading(self._pace, is_doubtful)))
 
     def _read(self, table: SettingTable | None, now: float) -> None:
-        """The reader has ended; None: without a table."""
-        fc_settings = self._fc_settings
-        if table is not None:
-            self._is_doubtful = self._is_asked = False
-            self._read_from = fc_settings
-            self._take(table, now)
-            self.on_read(table)
-            self._table_clients.answer(self._as_last_read(), now)
-        elif fc_settings is not None and fc_settings.is_read_when_asked:
-            self._is_asked = False
-            self._table_clients.answer(NO_ANSWER, now)
-        else:
-            self.due = self._reader.next_at
-        self._next(now)
+        """A reading has ended; None: without a table."""
+        if table is None and self._fc_settings is not None and self._fc_settings.is_read_when_asked:
+            self._read_at = inf
+            self._answer_readers(NO_ANSWER, now)
+            return
+        if table is None:
+            self._retry_s = min(2 * self._retry_s, _MOST_RETRY_S)
+            self._read_at = now + self._retry_s
+            return
+        self._retry_s, self._read_at = _RETRY_S, inf
+        self._read_again(now + _INTERVAL_S)
+        is_first = self.known.table is None
+        reading = self.known.read(table, now)
+        if is_first or reading.changed:
+            names = ", ".join(reading.changed[:_MOST_NAMED])
+            self._emit(SettingsRead(settings=len(table), changed=names, left_out=table.left_out))
+            self.on_table(table, now)
+        if reading.elsewhere is not None:
+            self._report(reading.elsewhere)
+        if reading.backup is not None:
+            self._emit(reading.backup)
+        self._answer_readers(table, now)
+
+    def _report(self, change: SettingsChange) -> None:
+        self._missions.settings_changed()
+        self._ground.say(Severity.WARNING, change.text(_MOST_TEXT))
+        self._tell_newcomers(change.text(_MOST_TEXT))
+        assert self.known.state is not None
+        self._emit(SettingsChangedOnBoard(detail=change.text(), seal=self.known.state.seal))
+
+    def _tell_newcomers(self, text: str) -> None:
+        """A board is mostly found before the first ground station connects. An empty text: no more."""
+        if self._told in self._ground.notices:
+            self._ground.notices.remove(self._told)
+        self._told = text
+        if text:
+            self._ground.notices.append(text)
 
     def _pace(self, size: int) -> float:
         """The rest of the line carries these bytes in this time, which has already passed in part."""
         link = self._session.state.link
         return 0.0 if link is None else max(self._session.polls.rest_s(size) - size * link.byte_s, 0.0)
 
-    def _take(self, table: SettingTable, now: float) -> None:
-        former, self.table = self.table, table
-        changed = table.differences(former or table)
-        if former is None or changed:
-            self._emit(
-                SettingsRead(settings=len(table), changed=", ".join(changed[:_MOST_NAMED]), left_out=table.left_out)
-            )
-            self.on_table(table, now)
-
     def _as_last_read(self) -> SettingTable | SettingRefusal:
-        return self.table or self.obstacle() or _NO_BOARD
+        return self.known.table or self.obstacle() or _NO_BOARD
 
-    # Changing.
+    def _answer_readers(
+        self, answer: SettingTable | SettingRefusal, now: float, readers: Sequence[tuple[float, OnTable]] | None = None
+    ) -> None:
+        """Answer these clients, or all that wait."""
+        readers = self._readers if readers is None else readers
+        self._readers = [each for each in self._readers if each not in readers]
+        for _, on_done in readers:
+            on_done(answer, now)
 
-    def _refusal(self, name: str, value: Value) -> SettingRefusal | None:
-        table = self.table
-        setting = None if table is None else table.find(name)
-        if table is not None and setting is None:
-            return SettingRefusal(Cause.UNKNOWN_NAME, f"This flight controller has no setting {name[:32]}")
-        if (obstacle := self.obstacle()) is not None:
-            return obstacle
-        if setting is None:
-            return _UNREAD
-        read_only = "" if self._fc_settings is None else self._fc_settings.read_only
-        if (read_only or setting.fixed) and value != setting.value:
-            return fixed(setting, read_only)
-        if not setting.accepts(value):
-            return out_of_range(setting, value)
-        if self._read_from is not self._fc_settings:
-            return _UNREAD
-        if setting.holds(value):
-            return None
-        return _NO_ARM_FLAG if self._controller is not None and self._controller.arm_bit is None else None
 
-    def _next(self, now: float) -> None:
-        """Carry out the next change."""
-        if self._reader.is_asking or self._is_changing or not self._changes:
-            return
-        line_free_at = max(self._line_free_at, self._reader.line_free_at)
-        if now < line_free_at:
-            self.due = min(self.due, line_free_at)
-            return
-        change, fc_settings, table, controller = self._changes[0], self._fc_settings, self.table, self._controller
-        refused = self._refusal(change.name, change.value)
-        setting = None if table is None else table.find(change.name)
-        if refused is not None or fc_settings is None or table is None or setting is None or controller is None:
-            self._end(change, refused or _NO_BOARD, now)
-            return
-        if setting.holds(change.value):
-            self._end(change, setting, now)
-            return
+def _identify(controller: FlightController) -> Conversation[BoardId]:
+    right = msp_right(controller.firmware, Msp.UID, b"")
+    reply = None
+    if right.effect is Effect.READ:
+        reply = yield from ask_surely(request(Msp.UID), Msp.UID, right.reply)
+    uid = reply.payload if reply is not None and reply.direction is Direction.REPLY else b""
+    return BoardId(controller.kind, uid.hex() if len(uid) == _UID_SIZE and len(set(uid)) > 1 else "")
 
-        def done(result: SettingTable | SettingRefusal | LinkLost, at: float) -> None:
-            self._is_changing = False
-            self._line_free_at = at + self._pace(_CHANGE_SIZE)
-            # Without a reply it may still have changed.
-            self.on_change(at)
-            # The values read so far may be out of date.
-            self._reader.stop()
-            self.is_saved = False
-            if isinstance(result, SettingTable) and self._fc_settings is fc_settings:
-                self._take(result, at)
-                self._end(change, self._changed(change, setting), at)
-            else:
-                self.may_have_changed(at)
-                self._end(change, result if isinstance(result, SettingRefusal) else NO_ANSWER, at)
 
-        self._is_changing = True
-        conversation = while_disarmed(controller.arm_bit, fc_settings.change(table, setting, change.value))
-        self._missions.runner.start(conversation, done, now, in_background=True)
-
-    def _changed(self, change: Change, before: BoardSetting) -> BoardSetting | SettingRefusal:
-        after = None if self.table is None else self.table.find(before.name)
-        if after is None or not after.holds(change.value):
-            value = shown(before.value if after is None else after.value)
-            return SettingRefusal(Cause.REFUSED, f"{before.name} stays {value}: the flight controller refused it")
-        self.unsaved[after.name] = after.value
-        self._emit(
-            SettingChanged(setting=after.name, before=shown(before.value), after=shown(after.value), by=change.client)
-        )
-        return after
-
-    def _end(self, change: Change, result: BoardSetting | SettingRefusal, now: float) -> None:
-        self._changes.popleft()
-        change.on_done(result, now)
-        self._next(now)
+def _up_to_pause(conversation: Conversation[SettingTable | None]) -> Conversation[SettingTable | Pause | None]:
+    """Go on with a conversation up to its next pause, or its end."""
+    answer = None
+    try:
+        while not isinstance(effect := conversation.send(answer), Pause):
+            answer = yield effect
+    except StopIteration as end:
+        table: SettingTable | None = end.value
+        return table
+    return effect

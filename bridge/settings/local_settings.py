@@ -5,16 +5,19 @@ A restore sets each value in the board's RAM and reads it back, then saves all o
 before the save leaves the saved settings as they were.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Generator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 from bridge.fc.fc_settings import Cause, SettingRefusal
 from bridge.fc.session import FcSession
-from bridge.model.board_setting import BoardSetting, SettingTable, Value
-from bridge.settings.board_settings import READ_WITHIN_S, BoardSettings
+from bridge.model.board_setting import SettingTable, Value
+from bridge.settings.board_settings import READ_WITHIN_S, BoardSettings, OnTable
 from bridge.settings.parameter_names import parameter_names
-from bridge.settings.restore_plan import LeftOut, PlannedChange, RestorePlan, is_restored, plan_restore
-from bridge.settings.setting_clients import OnTable
+from bridge.settings.restore_plan import LeftOut, PlannedChange, RestorePlan, plan_restore
+from bridge.settings.setting_work import Answer
+from protocols.param_file import is_equal
 
 _MOST_NAMES = 8
 _NO_BOARD = SettingRefusal(Cause.NO_LINK, "The flight controller is not connected")
@@ -40,7 +43,7 @@ OnRestored = Callable[[RestoreResult | SettingRefusal, float], None]
 def by_setting(values: Mapping[str, Value], known: Collection[str]) -> dict[str, Value]:
     """The values by the names of known settings, where a ground station's file has a parameter's shorter name."""
     names = parameter_names(known)
-    return {name if name in known else names.get(name, name): value for name, value in values.items()}
+    return {name if name in known else names.get(name.upper(), name): value for name, value in values.items()}
 
 
 def by_parameter(values: Mapping[str, Value]) -> dict[str, Value]:
@@ -57,7 +60,7 @@ class LocalSettings:
     def __init__(self, settings: BoardSettings, session: FcSession) -> None:
         self._settings = settings
         self._session = session
-        self._running: _Restore | None = None
+        self._is_restoring = False
         self.change, self.save = settings.change, settings.save
 
     @property
@@ -95,7 +98,7 @@ class LocalSettings:
         if is_checked:
             self.read(read, now)
         else:
-            read(self._settings.table or _NO_BOARD, now)
+            read(self._settings.known.table or _NO_BOARD, now)
 
     def restore(
         self,
@@ -107,109 +110,89 @@ class LocalSettings:
         now: float,
     ) -> None:
         """Make the plan again and carry it out. progress: gets the number of settings set so far."""
-
-        def planned(plan: RestorePlan | SettingRefusal, at: float) -> None:
-            if isinstance(plan, SettingRefusal):
-                on_done(plan, at)
-                return
-            self._running = _Restore(self._settings, plan, client, progress, done)
-            self._running.start(at)
-
-        def done(result: RestoreResult, at: float) -> None:
-            self._running = None
-            on_done(result, at)
-
-        refused = self._settings.obstacle() or (_RUNNING if self._running is not None else None)
+        refused = self._settings.obstacle() or (_RUNNING if self._is_restoring else None)
         if refused is not None:
             on_done(refused, now)
-        else:
-            self.plan(wanted, source, planned, now)
-
-
-@dataclass
-class _Restore:
-    """One restore. _client: its name in the log."""
-
-    _settings: BoardSettings
-    _plan: RestorePlan
-    _client: str
-    _progress: Callable[[int], None]
-    _on_done: Callable[[RestoreResult, float], None]
-    _changed: list[PlannedChange] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        self._waiting = [*reversed(self._plan.changes)]
-        self._left_out = [*self._plan.left_out]
-
-    def start(self, now: float) -> None:
-        """Set the first value; everything else follows from the board's answers."""
-        if not self._waiting:
-            self._save(now)
             return
-        change = self._waiting.pop()
+        self._is_restoring = True
+        plan = partial(self.plan, wanted, source)
+        self._go_on(_restore(self._settings, plan, client, progress), on_done, None, now)
 
-        def done(result: BoardSetting | SettingRefusal, at: float) -> None:
-            if isinstance(result, BoardSetting):
-                self._changed.append(change)
-                self._progress(len(self._changed))
-            elif result.cause is Cause.FIXED:
-                # The board accepts other values of this setting, but not this one.
-                self._left_out.append(LeftOut(change.name, change.becomes, change.was, result.text))
-            else:
-                self._stop(result.text, at)
-                return
-            self.start(at)
-
-        self._settings.change(change.name, change.becomes, done, now, self._client)
-
-    def _save(self, now: float) -> None:
-        if not self._changed:
-            text = (
-                f"Nothing written: {_count(self._left_out)} cannot be set" if self._left_out else "Nothing to restore"
-            )
-            self._end(text, now, is_saved=not self._left_out)
-            return
-        # A later change may have had an effect on an earlier one, or another client may have changed it.
-        if missed := self._missed(self._settings.table):
-            self._stop(missed, now)
-            return
-        self._settings.save(self._saved, now)
-
-    def _saved(self, refusal: SettingRefusal | None, now: float) -> None:
-        if refusal is None:
-            self._settings.current(self._verified, now, READ_WITHIN_S)
-        elif refusal.cause in _BEFORE_SAVE:
-            self._stop(f"the save failed ({refusal.text})", now)
+    def _go_on(self, steps: "_Steps", on_done: OnRestored, answer: object, now: float) -> None:
+        """Take the next step; each goes on with its answer."""
+        try:
+            step = steps.send(answer)
+        except StopIteration as end:
+            self._is_restoring = False
+            on_done(end.value, now)
         else:
-            # Also if the firmware has corrected a value after the save.
-            self._end(f"Not known to be saved: {refusal.text}. The board has its old or its new settings", now)
+            step(lambda result, at: self._go_on(steps, on_done, result, at), now)
 
-    def _verified(self, table: SettingTable | SettingRefusal, now: float) -> None:
-        if isinstance(table, SettingRefusal) or not self._settings.is_checked:
-            self._end(f"{_count(self._changed)} saved, but they could not be read again: compare them later", now)
-        elif missed := self._missed(table):
-            self._end(f"Saved, but now {missed}", now)
-        else:
-            left_out = f", {len(self._left_out)} left out" if self._left_out else ""
-            self._end(f"{_count(self._changed)} restored, saved and verified{left_out}", now, is_saved=True)
 
-    def _missed(self, table: SettingTable | None) -> str:
+#: Starts something, and gets a function for the answer.
+_Step = Callable[[Callable[[Any, float], None], float], None]
+_Steps = Generator[_Step, Any, RestoreResult | SettingRefusal]
+
+
+def _restore(settings: BoardSettings, make_plan: _Step, client: str, progress: Callable[[int], None]) -> _Steps:
+    """One restore. client: its name in the log."""
+    plan: RestorePlan | SettingRefusal = yield make_plan
+    if isinstance(plan, SettingRefusal):
+        return plan
+    changed: list[PlannedChange] = []
+    left_out = [*plan.left_out]
+
+    def ended(text: str, *, is_saved: bool = False) -> RestoreResult:
+        return RestoreResult(is_saved, text, tuple(change.name for change in changed), tuple(left_out))
+
+    def stopped(why: str) -> RestoreResult:
+        if not changed:
+            return ended(f"Nothing written: {why}")
+        written = f"{len(changed)} of {len(plan.changes)} settings were changed in the board's memory"
+        names = _listed([change.name for change in changed])
+        go_back = "to return to the saved settings, switch its power off and on"
+        return ended(f"Nothing saved: {why}. {written} ({names}): {go_back}")
+
+    def missed(table: SettingTable | SettingRefusal) -> str:
         """The settings that the board does not hold as planned; empty if it holds all."""
-        names = [change.name for change in self._changed if table is None or not is_restored(table, change)]
+        known = {} if isinstance(table, SettingRefusal) else table.settings
+        names = [
+            each.name
+            for each in changed
+            if each.name not in known or not is_equal(known[each.name].value, each.becomes)
+        ]
         return f"{_listed(names)} {'has' if len(names) == 1 else 'have'} another value" if names else ""
 
-    def _stop(self, why: str, now: float) -> None:
-        if not self._changed:
-            self._end(f"Nothing written: {why}", now)
-            return
-        written = f"{len(self._changed)} of {len(self._plan.changes)} settings were changed in the board's memory"
-        names = _listed([change.name for change in self._changed])
-        go_back = "to return to the saved settings, switch its power off and on"
-        self._end(f"Nothing saved: {why}. {written} ({names}): {go_back}", now)
-
-    def _end(self, text: str, now: float, *, is_saved: bool = False) -> None:
-        changed = tuple(change.name for change in self._changed)
-        self._on_done(RestoreResult(is_saved, text, changed, tuple(self._left_out)), now)
+    for change in plan.changes:
+        result: Answer = yield partial(settings.change, change.name, change.becomes, client=client)
+        if not isinstance(result, SettingRefusal):
+            changed.append(change)
+            progress(len(changed))
+        elif result.cause is Cause.FIXED:
+            # The board accepts other values of this setting, but not this one.
+            left_out.append(LeftOut(change.name, change.becomes, change.was, result.text))
+        else:
+            return stopped(result.text)
+    if not changed:
+        text = f"Nothing written: {_count(left_out)} cannot be set" if left_out else "Nothing to restore"
+        return ended(text, is_saved=not left_out)
+    # A later change may have had an effect on an earlier one, or another client may have changed it.
+    read_again = partial(settings.current, within_s=READ_WITHIN_S)
+    if why := missed((yield read_again)):
+        return stopped(why)
+    refused: Answer = yield settings.save
+    if isinstance(refused, SettingRefusal) and refused.cause in _BEFORE_SAVE:
+        return stopped(f"the save failed ({refused.text})")
+    if isinstance(refused, SettingRefusal):
+        # Also if the firmware has corrected a value after the save.
+        return ended(f"Not known to be saved: {refused.text}. The board has its old or its new settings")
+    table: SettingTable | SettingRefusal = yield read_again
+    if isinstance(table, SettingRefusal) or not settings.is_checked:
+        return ended(f"{_count(changed)} saved, but they could not be read again: compare them later")
+    if why := missed(table):
+        return ended(f"Saved, but now {why}")
+    more = f", {len(left_out)} left out" if left_out else ""
+    return ended(f"{_count(changed)} restored, saved and verified{more}", is_saved=True)
 
 
 def _count(settings: Sequence[object]) -> str:

@@ -33,11 +33,10 @@ _VOWELS = frozenset("aeiou")
 
 
 def parameter_names(settings: Iterable[str], taken: Collection[str] = ()) -> Mapping[str, str]:
-    """Setting by parameter; the parameters are distinct, and none of them is `taken`."""
-    settings = tuple(settings)
-    short = {name: _short(name) for name in settings}
+    """Setting by parameter; the parameters are distinct and in upper case, and none of them is `taken`."""
+    short = {name: _short(name).upper() for name in settings}
     often = Counter([*short.values(), *taken])
-    return {_hashed(name) if often[parameter] > 1 else parameter: name for name, parameter in short.items()}
+    return {_hashed(name).upper() if often[parameter] > 1 else parameter: name for name, parameter in short.items()}
 
 
 def _short(name: str) -> str:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """MAVLink parameters: the bridge's own, and every setting of the flight controller. Values are REAL32, as ArduPilot's.
 
+Names are in upper case, as MAVProxy and DroneKit send all names; a name is recognised in any case.
+
 https://mavlink.io/en/services/parameter.html
 
 Ground stations keep the number of parameters that they heard first, so a list waits until the settings were read, and
@@ -9,6 +11,7 @@ is sent again to the stations that had got a shorter one.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from math import inf, isfinite
 from weakref import WeakKeyDictionary
 
@@ -19,9 +22,10 @@ from bridge.gcs.ground_station import GroundStation
 from bridge.gcs.station import Severity, Station
 from bridge.model.board_setting import BoardSetting, SettingTable, ValueKind, shown
 from bridge.settings.board_settings import BoardSettings
-from bridge.settings.own_parameters import OwnParameters
+from bridge.settings.own_parameters import WP_RADIUS, OwnParameters
 from bridge.settings.parameter_files import GENERAL_URI, ParameterFiles
 from bridge.settings.parameter_names import parameter_names
+from bridge.settings.setting_work import Answer
 from protocols.float32 import single
 from protocols.mavlink.codec import pack, pack_component_metadata
 from protocols.mavlink.dialect import Message, messages
@@ -59,8 +63,9 @@ class Parameters:
         self._own = own
         self._settings = settings
         self._ground = ground
-        #: The flight controller's settings by parameter.
+        #: The settings that are numbers, and their names, by parameter.
         self._named: Mapping[str, BoardSetting] = {}
+        self._names: Mapping[str, str] = {}
         #: The values that stations know, once one has read them.
         self._told: dict[str, float] = {}
         self._files = ParameterFiles()
@@ -68,6 +73,8 @@ class Parameters:
         settings.on_table = self._take
         #: The time of the next `tick`; infinity while no list is sent.
         self.due = inf
+        #: True if the last PARAM_SET was refused: Mission Planner then asks for a save all the same.
+        self.was_refused = False
 
     def request_list(self, station: Station, now: float) -> None:
         """PARAM_REQUEST_LIST."""
@@ -86,34 +93,58 @@ class Parameters:
 
     def send_one(self, station: Station, name: str, index: int, now: float) -> None:
         """PARAM_REQUEST_READ: by index, or by name where index is -1."""
-        names = list(self._values())
+        values = self._values()
         if index >= 0:
-            self.send(station, names[index] if index < len(names) else "")
+            name = next(islice(values, index, None), "")
+        if index >= 0 or name.upper() in values or self._settings.known.table is not None:
+            self._send(station, name)
             return
 
         def done(table: SettingTable | SettingRefusal, _at: float) -> None:
             if not isinstance(table, SettingRefusal) or table.cause is not Cause.OCCUPIED:
-                self.send(station, name)
+                self._send(station, name)
 
-        if name in names or self._settings.table is not None:
-            self.send(station, name)
-        else:
-            self._settings.current(done, now, _LIST_WITHIN_S)
+        self._settings.current(done, now, _LIST_WITHIN_S)
 
     def set(self, station: Station, name: str, value: float, now: float) -> None:
-        """PARAM_SET: answered with the value that is then in force, as the protocol requires."""
+        """PARAM_SET: answered once, with the value that is then in force, as the protocol requires."""
+        name = name.upper()
+        self.was_refused = name not in self._values()
         setting = self._named.get(name)
+
+        def done(result: Answer | None, _at: float) -> None:
+            if isinstance(result, SettingRefusal):
+                self.refuse(station, name, result)
+            elif not self._told:
+                self._ground.broadcast(self._message(name))
+            elif setting is None:
+                self.follow()
+
         if setting is None:
-            self._own.set(station, name, value, now, lambda to: self.send(to, name))
+            if not self._own.set(station, name, value, now, done):
+                self._send(station, name)
         elif value == single(float(setting.value)):
-            self.send(station, name)
+            self._send(station, name)
         elif setting.kind is ValueKind.INTEGER and isfinite(value) and abs(value) >= _MOST_EXACT:
             above = f"{name} stays {shown(setting.value)}: only up to {_MOST_EXACT - 1} over MAVLink"
-            self._refuse(station, name, SettingRefusal(Cause.OUT_OF_RANGE, above))
+            self.refuse(station, name, SettingRefusal(Cause.OUT_OF_RANGE, above))
         else:
-            self._settings.change(
-                setting.name, value, lambda result, _at: self._changed(station, name, result), now, str(station)
-            )
+            self._settings.change(setting.name, value, done, now, str(station))
+
+    def refuse(self, station: Station, name: str, refused: SettingRefusal | None = None) -> None:
+        """Send the reason, then the value in force. PARAM_ERROR, which MAVLink 1 lacks, spares MAVSDK a wait.
+
+        refused: None if the station has been told the reason.
+        """
+        self.was_refused = True
+        cause = Cause.ARMED if refused is None else refused.cause
+        if refused is not None:
+            # Each Write in Mission Planner sends its default radius of 30 m if its plan screen was open first.
+            is_routine = name == WP_RADIUS and cause is Cause.OUT_OF_RANGE
+            self._ground.say(Severity.NOTICE if is_routine else Severity.ERROR, refused.text, station)
+        if name.upper() in self._values():
+            self._error(station, name, _ERRORS.get(cause, messages.MAV_PARAM_ERROR_PERMISSION_DENIED))
+        self._send(station, name)
 
     def answer_file(self, station: Station, payload: Sequence[int], now: float) -> None:
         """FILE_TRANSFER_PROTOCOL."""
@@ -144,10 +175,10 @@ class Parameters:
         if not self._told:
             return
         before, self._told = self._told, self._values()
-        if len(before) == len(self._told):
-            for name, value in self._told.items():
-                if before.get(name) != value:
-                    self._ground.broadcast(self._message(self._told, name))
+        if before.keys() == self._told.keys():
+            for index, (name, value) in enumerate(self._told.items()):
+                if before[name] != value:
+                    self._ground.broadcast(_message(name, value, len(before), index))
 
     def tick(self, now: float) -> None:
         """Send the next parameters of each list."""
@@ -155,16 +186,16 @@ class Parameters:
         self.due = now + _INTERVAL_S if lists else inf
         if not lists:
             return
-        self._told = values = self._values()
-        names = [*values]
+        self._told = self._values()
+        values = [*self._told.items()]
         each = max(_EACH // len(lists), 1)
         for ground_station, dialogue in lists[:_EACH]:
             assert dialogue.next is not None
-            for index in range(dialogue.next, min(dialogue.next + each, len(names))):
-                self._ground.to(dialogue.station, self._value_at(values, names[index], index))
+            for index, (name, value) in enumerate(values[dialogue.next : dialogue.next + each], dialogue.next):
+                self._ground.to(dialogue.station, _message(name, value, len(values), index))
             dialogue.next += each
-            if dialogue.next >= len(names):
-                dialogue.next, dialogue.count = None, len(names)
+            if dialogue.next >= len(values):
+                dialogue.next, dialogue.count = None, len(values)
             # The others' turn.
             self._dialogues[ground_station] = self._dialogues.pop(ground_station)
 
@@ -177,28 +208,17 @@ class Parameters:
         return self._dialogues[ground_station]
 
     def _take(self, table: SettingTable, now: float) -> None:
-        """The settings were read, or one of them has changed."""
-        reserved = self._own.values()
+        """The settings were read, or some have changed."""
         numbers = {setting.name: setting for setting in table if setting.kind is not ValueKind.TEXT}
-        self._named = {name: numbers[long] for name, long in parameter_names(numbers, reserved).items()}
+        if numbers.keys() != {*self._names.values()}:
+            self._names = parameter_names(numbers, self._own.values())
+        self._named = {parameter: numbers[name] for parameter, name in self._names.items()}
         self.follow()
         count = len(self._values())
         for dialogue in self._dialogues.values():
             if 0 < dialogue.count != count and dialogue.next is None:
                 dialogue.next = 0
                 self.due = min(self.due, now)
-
-    def _changed(self, station: Station, name: str, result: BoardSetting | SettingRefusal) -> None:
-        if isinstance(result, SettingRefusal):
-            self._refuse(station, name, result)
-        else:
-            self.send(station, name)
-
-    def _refuse(self, station: Station, name: str, refused: SettingRefusal) -> None:
-        """Send the reason, then the value in force. PARAM_ERROR, which MAVLink 1 lacks, spares MAVSDK a wait."""
-        self._ground.say(Severity.ERROR, refused.text, station)
-        self._error(station, name, _ERRORS.get(refused.cause, messages.MAV_PARAM_ERROR_PERMISSION_DENIED))
-        self.send(station, name)
 
     def _values(self) -> dict[str, float]:
         """Every parameter. The bridge's own keep their indexes on every board."""
@@ -207,26 +227,22 @@ class Parameters:
             values[name] = float(setting.value)
         return values
 
-    def send(self, station: Station | None, name: str) -> None:
-        """Send PARAM_VALUE, or PARAM_ERROR without such a parameter; None: to all stations, which keep a copy."""
-        values = self._values()
-        if name not in values:
-            if station is not None and name:
-                self._error(station, name, messages.MAV_PARAM_ERROR_DOES_NOT_EXIST)
-        elif station is None:
-            self._ground.broadcast(self._message(values, name))
-            self._told |= {name: values[name]} if self._told else {}
-        else:
-            self._ground.to(station, self._message(values, name))
+    def _send(self, station: Station, name: str) -> None:
+        """Send PARAM_VALUE, or PARAM_ERROR without such a parameter."""
+        if name.upper() in self._values():
+            self._ground.to(station, self._message(name.upper()))
+        elif name:
+            self._error(station, name, messages.MAV_PARAM_ERROR_DOES_NOT_EXIST)
 
     def _error(self, station: Station, name: str, error: int) -> None:
         message = messages.MAVLink_param_error_message(station.sysid, station.compid, name.encode(), -1, error)
         if (receiver := self._ground.station(station.peer)) is not None:
             self._ground.multicast(pack(message), [receiver])
 
-    def _message(self, values: Mapping[str, float], name: str) -> Message:
-        return self._value_at(values, name, list(values).index(name))
+    def _message(self, name: str) -> Message:
+        values = self._values()
+        return _message(name, values[name], len(values), list(values).index(name))
 
-    @staticmethod
-    def _value_at(values: Mapping[str, float], name: str, index: int) -> Message:
-        return messages.MAVLink_param_value_message(name.encode(), values[name], _REAL32, len(values), index)
+
+def _message(name: str, value: float, count: int, index: int) -> Message:
+    return messages.MAVLink_param_value_message(name.encode(), value, _REAL32, count, index)

@@ -30,12 +30,10 @@ class LeftOut:
 
 @dataclass(frozen=True, slots=True)
 class RestorePlan:
-    """kept: settings of the board that the source lacks. notice: a warning; empty if there is nothing to warn of."""
+    """notice: a warning; empty if there is nothing to warn of."""
 
     changes: tuple[PlannedChange, ...]
     left_out: tuple[LeftOut, ...]
-    equal_count: int
-    kept: tuple[str, ...]
     notice: str = ""
 
 
@@ -50,14 +48,12 @@ def plan_restore(
         return SettingRefusal(Cause.REFUSED, f"These settings are from {source}, but the board has {board}")
     changes: list[PlannedChange] = []
     left_out: list[LeftOut] = []
-    found: set[str] = set()
     settings = table.find_all(wanted)
     for name, value in wanted.items():
         setting = settings.get(name)
         if setting is None:
             left_out.append(LeftOut(name, value, None, "the board has no such setting"))
             continue
-        found.add(setting.name)
         becomes = _of_kind(setting, value)
         if is_equal(setting.value, becomes):
             continue
@@ -65,13 +61,11 @@ def plan_restore(
             left_out.append(LeftOut(setting.name, becomes, setting.value, why))
         else:
             changes.append(PlannedChange(setting.name, setting.value, becomes))
-    if not found:
+    if not settings:
         return SettingRefusal(Cause.REFUSED, f"The board ({board}) has none of these settings")
-    equal_count = len(wanted) - len(changes) - len(left_out)
-    kept = tuple(setting.name for setting in table if setting.name not in found)
     is_other = source not in ("", board)
     notice = f"The settings are from {source}, the board has {board}: some may mean something else there"
-    return RestorePlan(tuple(changes), tuple(left_out), equal_count, kept, notice if is_other else "")
+    return RestorePlan(tuple(changes), tuple(left_out), notice if is_other else "")
 
 
 def _refusal(setting: BoardSetting, value: Value) -> str:
@@ -81,12 +75,6 @@ def _refusal(setting: BoardSetting, value: Value) -> str:
     if not setting.accepts(value):
         return f"it must be {setting.range_text}"
     return setting.raised if setting.raised and float(value) > float(setting.value) else ""
-
-
-def is_restored(table: SettingTable, change: PlannedChange) -> bool:
-    """True if the board holds the planned value."""
-    held = table.settings.get(change.name)
-    return held is not None and is_equal(held.value, change.becomes)
 
 
 def _of_kind(setting: BoardSetting, value: Value) -> Value:

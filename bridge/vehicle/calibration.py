@@ -168,7 +168,7 @@ class Calibration:
         if self._restarts:
             self._announcer.expect_silence(now + _LONGEST_S)
         self.tick(now)
-        self._settings.changed_with_others(now)
+        self._settings.may_have_changed(now)
 
     def tick(self, now: float) -> None:
         """Report a running calibration, and end it when its time has passed."""

@@ -20,6 +20,7 @@ from bridge.model.refusal import Refusal
 from bridge.model.vehicle import MissionLeg, Switches
 from bridge.settings.board_settings import BoardSettings
 from bridge.settings.parameters import Parameters
+from bridge.settings.setting_work import Answer
 from bridge.vehicle.calibration import CALIBRATE_ACCELEROMETER, CALIBRATE_COMPASS, Calibration, FcAction
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.set_waypoint import SetWaypoint
@@ -211,23 +212,25 @@ class CommandService:
         if what != _SAVE:
             self._ground.say(Severity.ERROR, "Settings are only saved, not loaded or reset", station)
             self._acknowledge(station, command, CommandResult.DENIED)
-        elif settings.is_saved or not (settings.unsaved or settings.obstacle() is None):
+        elif not settings.known.unsaved and (
+            settings.known.is_saved or self._parameters.was_refused or settings.obstacle() is not None
+        ):
             self._acknowledge(station, command, CommandResult.ACCEPTED)
         elif not self._ground.allows(station, Cost.FLASH):
             self._ground.say(Severity.ERROR, TOO_MANY_WRITES, station)
             self._acknowledge(station, command, CommandResult.TEMPORARILY_REJECTED)
         else:
-            settings.save(lambda refused, _at: self._stored(station, command, refused), now)
+            settings.save(lambda result, _at: self._stored(station, command, result), now)
 
-    def _stored(self, station: Station, command: int, refused: SettingRefusal | None) -> None:
-        if refused is None:
+    def _stored(self, station: Station, command: int, result: Answer) -> None:
+        if not isinstance(result, SettingRefusal):
             self._ground.say(Severity.INFO, "Settings saved", station)
             self._acknowledge(station, command, CommandResult.ACCEPTED)
             return
-        if refused.cause is not Cause.NO_ANSWER:
+        if result.cause is not Cause.NO_ANSWER:
             self._ground.not_written(station)
-        self._ground.say(Severity.ERROR, refused.text, station)
-        self._acknowledge(station, command, _NOT_STORED.get(refused.cause, CommandResult.DENIED))
+        self._ground.say(Severity.ERROR, result.text, station)
+        self._acknowledge(station, command, _NOT_STORED.get(result.cause, CommandResult.DENIED))
 
     def _send_once(self, station: Station, msgid: int, now: float, index: int = 0) -> CommandResult:
         is_known = self._vehicle.send_once(station, msgid, now, index)

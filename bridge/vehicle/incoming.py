@@ -127,8 +127,7 @@ class Incoming:
         if answer is not None:
             answers(answer)
         elif message is not None and frame.msgid == m.MAVLINK_MSG_ID_PARAM_SET and self.routes is None:
-            # The protocol's answer is the current value.
-            self._parameters.send(station, message.param_id)
+            self._parameters.refuse(station, message.param_id)
         text = f"Refused: {refused.why}"
         if not refused.is_routine and sender.texts.is_new(text, sender.heard_at) and sender.allows(Cost.TEXT):
             answers(m.MAVLink_statustext_message(Severity.WARNING, text.encode()))

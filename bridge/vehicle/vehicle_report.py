@@ -14,7 +14,7 @@ from bridge.model import vehicle as v
 from bridge.model.flight_mode import FlightMode
 from bridge.model.ground_track import bearing_deg, distance_m
 from bridge.model.mission_progress import MissionProgress
-from bridge.settings.settings_seal import SettingsSeal
+from bridge.settings.board_settings import BoardSettings
 from protocols.msp.telemetry import Sensor
 from reports.vehicle_groups import (
     Attitude,
@@ -60,7 +60,7 @@ class VehicleReporter:
     _session: FcSession
     _missions: MissionService
     _ground: Ground
-    _settings: SettingsSeal
+    _settings: BoardSettings
     _want: Callable[[Mapping[type[v.Reading], float]], None]
     _progress: MissionProgress
     #: The groups in use: they are polled, and the updated ones published.
@@ -122,8 +122,8 @@ class VehicleReporter:
                 state, item = self._progress.progress.text, self._missions.seq_of(self._progress.number) or None
             mission = MissionIdentity(held.identity.count, f"{held.identity.checksum:08x}", state, item)
         settings = None
-        if (sealed := self._settings.state) is not None:
-            settings = SettingsIdentity(str(sealed.seal), None if sealed.change is None else sealed.change.text())
+        if (sealed := self._settings.known.state) is not None:
+            settings = SettingsIdentity(sealed.seal, None if sealed.change is None else sealed.change.text())
         groups = {group.value: self.group(group, now) for group in Group}
         return VehicleReport(**groups, last_heard=self._last_heard(now), mission=mission, settings=settings)
 

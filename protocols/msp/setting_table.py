@@ -7,7 +7,6 @@ from enum import IntEnum
 from typing import NamedTuple
 from zlib import crc32
 
-from protocols.msp.frame import FRAME_OVERHEAD
 from protocols.msp.mission import ReplyStatus, masked_request
 
 #: The index that means all settings: their checksum, or a save.
@@ -117,8 +116,6 @@ def encode_read_settings(first: int, count: int) -> bytes:
 
 
 TABLE_REQUEST = encode_read_settings(WHOLE_TABLE, 1)
-#: Its masked payload.
-TABLE_BODY = TABLE_REQUEST[FRAME_OVERHEAD - 1 : -1]
 
 
 def encode_set_setting(index: int, setting: Setting, value: float) -> bytes:

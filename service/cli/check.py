@@ -135,7 +135,7 @@ def _saved_settings(path: Path, kind: str) -> SavedSettings:
     except FileError as error:
         raise click.UsageError(str(error)) from error
     names = parameter_names(SETTING_NAMES)
-    return saved._replace(values={names.get(name, name): value for name, value in saved.values.items()})
+    return saved._replace(values={names.get(name.upper(), name): value for name, value in saved.values.items()})
 
 
 def _check_file(path: Path, rules: MissionRules, home: tuple[int, int] | None, strict: bool, as_json: bool) -> ExitCode:

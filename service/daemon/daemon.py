@@ -23,13 +23,13 @@ from bridge.line.conversation import Conclude, FindPending, NoteReader, Recall, 
 from bridge.missions.mission_service import DeliveryResult, MissionEnded
 from bridge.model.events import Armed, BridgeEvent, Disarmed
 from bridge.model.mission_log import ArrivedMission
-from bridge.settings.settings_backups import TakenBackup
+from bridge.model.settings import TakenBackup
 from payloads.mission_data import Json
 from reports.vehicle_groups import Group, VehicleReport
 from service.daemon.fc_connection import FcConnection
 from service.daemon.flight_file import FlightFile
 from service.daemon.gcs_connections import GcsConnections
-from service.daemon.seal_file import SealFile
+from service.daemon.last_settings import LastSettings
 from service.daemon.store_worker import StoreWorker
 from service.links.msp_share import open_share
 from service.links.signing_state import SigningState
@@ -89,7 +89,7 @@ class Daemon:
             self._tlog = TlogRecorder(settings.state_dir / TLOG_FOLDER, settings.tlog)
         host = host or Host()
         self._flight = FlightFile(settings.state_dir, str(settings.fc), host)
-        self._seals = SealFile(settings.state_dir, lambda: self.fc.where)
+        self._last_settings = LastSettings(settings.state_dir, lambda: self.fc.where)
         self._signing = SigningState(settings.state_dir, settings.gcs, settings.access)
         self.bridge = Bridge(
             BridgeConfig(
@@ -101,7 +101,7 @@ class Daemon:
                 has_log=self._tlog is not None,
                 unix_time_s=lambda now: time.time() - self._loop.time() + now,
                 flight=self._flight.load(self._loop.time()),
-                seals=self._seals,
+                settings_memory=self._last_settings,
             ),
             self._loop.time(),
         )
@@ -132,7 +132,7 @@ class Daemon:
             if self._tlog is not None:
                 stack.callback(self._tlog.close)
             stack.callback(lambda: self._flight.close(self._loop.time()))
-            for part in (self._signing, self._seals, self.store, self.gcs, self.fc):
+            for part in (self._signing, self._last_settings, self.store, self.gcs, self.fc):
                 stack.callback(part.close)
             stack.callback(self._lane.stop_timer)
             for address in self.settings.gcs:

@@ -101,10 +101,8 @@ class SettingsApi:
         setting = await self._setting(request)
         value = _value(setting, str(request.get("value")))
 
-        def start(done: Callable[[BoardSetting | SettingRefusal, float], None], now: float) -> None:
-            self._daemon.bridge.settings.change(setting.name, value, done, now, "command line")
-
-        after = await self._answer(start)
+        change = partial(self._daemon.bridge.settings.change, setting.name, value, client="command line")
+        (after,) = await self._answer(change)
         if after.value == setting.value:
             text = f"{setting.name} is {_shown(after)} already"
         else:

@@ -14,7 +14,7 @@ import structlog
 
 from bridge.line.conversation import Conclude, FindPending, NoteReader, Recall, Save, StoreEffect
 from bridge.model.mission_log import ArrivedMission, PendingMission, RecalledMission
-from bridge.settings.settings_backups import Occasion, TakenBackup
+from bridge.model.settings import Occasion, TakenBackup
 from protocols.mission_record import ListIdentity, identify, pack_records
 from service.machine.threads import BackgroundThread, post
 from storage.mission_store import MissionStore, ReceivedMission, open_store, store_in_memory

@@ -26,6 +26,8 @@ NOT_RUN = {
     "naze-bridge fleet list": "needs a router: tests/fleet/test_command.py runs it",
     "naze-bridge fleet watch": "needs a router: tests/fleet/test_watch_screen.py runs it",
     "naze-bridge fleet push": "needs a router: tests/fleet/test_push.py runs it",
+    "naze-bridge settings get MODE_ANGLE": "needs an INAV: tests/bridge/controllers/test_msp_parts.py",
+    "naze-bridge settings set MODE_ANGLE": "needs an INAV: tests/bridge/controllers/test_msp_parts.py",
     "naze-bridge fleet settings": "needs a router: tests/fleet/test_settings_command.py runs it",
     "naze-bridge fleet verify": "needs a router: tests/fleet/test_push_command.py runs it",
     "naze-bridge fleet pull": "needs a router: tests/fleet/test_push_command.py runs it",

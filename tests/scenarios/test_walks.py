@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The length of four walks through the code: a budget that may only shrink.
+"""The length of five walks through the code: a budget that may only shrink.
 
 A walk is one or more whole wake-ups of a daemon on a simulated Naze (one UDP station, memory instead of a disk, no log
 file), from the event loop's callback until it returns. Counted with sys.setprofile are the Python functions called in
@@ -10,6 +10,7 @@ attitude: a reply to MSP_ATTITUDE is read and sent on, at the default rates.
 item: a MISSION_ITEM_INT in the middle of a list of nine is received, and the next one requested.
 ack: from the last of three items to its MISSION_ACK: the list is stored, pushed, verified and concluded. Telemetry that
 arrives meanwhile counts, too.
+setting: from a PARAM_SET to its PARAM_VALUE: the board is asked whether it is armed, then the value is written.
 arming: a reply to MSP_STATUS in which the craft is armed, and the heartbeat that reports it, with no other telemetry.
 """
 
@@ -28,6 +29,7 @@ CEILINGS = {
     "attitude": Walk(calls=41, returns=13, files=19),
     "item": Walk(calls=63, returns=25, files=16),
     "ack": Walk(calls=460, returns=239, files=39),
+    "setting": Walk(calls=279, returns=116, files=53),
     "arming": Walk(calls=72, returns=22, files=26),
 }
 #: A walk may be this much shorter than its ceiling.
@@ -76,15 +78,26 @@ async def _ack(daemon: TracedDaemon) -> Walk:
     return measure(*daemon.wake_ups[: daemon.wake_ups.index(ack) + 1])
 
 
-async def _arming(daemon: TracedDaemon) -> Walk:
+async def _without_telemetry(daemon: TracedDaemon) -> None:
     daemon.send(m.MAVLink_request_data_stream_message(*_TARGET, m.MAV_DATA_STREAM_ALL, 0, 0))
     await asyncio.sleep(2.3)  # STATUS is polled alone from now on, except each full second
     daemon.wake_ups.clear()
+
+
+async def _setting(daemon: TracedDaemon) -> Walk:
+    await _without_telemetry(daemon)
+    daemon.send(m.MAVLink_param_set_message(*_TARGET, b"P_ROLL", 44.0, m.MAV_PARAM_TYPE_REAL32))
+    answer = await daemon.until(lambda wake_up: "PARAM_VALUE" in wake_up.types)
+    return measure(*daemon.wake_ups[: daemon.wake_ups.index(answer) + 1])
+
+
+async def _arming(daemon: TracedDaemon) -> Walk:
+    await _without_telemetry(daemon)
     daemon.faults.armed = True
     return measure(await daemon.until(_reports_armed))
 
 
-_WALKS = {"attitude": _attitude, "item": _middle_item, "ack": _ack, "arming": _arming}
+_WALKS = {"attitude": _attitude, "item": _middle_item, "ack": _ack, "setting": _setting, "arming": _arming}
 
 
 @pytest.mark.parametrize("name", CEILINGS)

@@ -15,7 +15,6 @@ class Inside:
         self.missions = bridge._missions
         self.uploads = bridge._types.of_missions
         self.sharing = bridge._sharing
-        self.seal = bridge._seal
         self.board_settings = bridge._board_settings
         self.parameters = bridge._parameters
 

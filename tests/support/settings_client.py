@@ -6,9 +6,11 @@ from dataclasses import dataclass
 
 from bridge.fc.fc_settings import Cause, SettingRefusal
 from bridge.model.board_setting import BoardSetting, SettingTable, Value
+from bridge.settings.setting_work import Answer
 from protocols.msp.frame import MspParser
 from simulator.board.options import Faults, SimOptions
 from simulator.commands.fc_kinds import make_board
+from simulator.inav.boxes import BOXES
 from simulator.inav.setting_table import SETTINGS as INAV_SETTINGS
 from simulator.naze.setting_table import SETTINGS as NAZE_SETTINGS
 from tests.support.inside import inside
@@ -25,31 +27,31 @@ class SettingsClient:
     @property
     def is_idle(self) -> bool:
         """True while no table is read."""
-        return self._settings._reader._reading is None
+        return self._settings._reading is None
 
     def wait_read(self, seconds: float = 30) -> SettingTable:
-        self._world.wait_until(lambda _: self._settings.table is not None, seconds)
-        table = self._settings.table
+        self._world.wait_until(lambda _: self._settings.known.table is not None, seconds)
+        table = self._settings.known.table
         assert table is not None
         return table
 
     def value(self, name: str) -> Value:
-        table = self._settings.table
+        table = self._settings.known.table
         assert table is not None
         return table.settings[name].value
 
     def change(self, name: str, value: Value) -> BoardSetting | SettingRefusal:
-        found: list[BoardSetting | SettingRefusal] = []
+        found: list[Answer] = []
         self._settings.change(name, value, lambda result, _at: found.append(result), self._world.now, self._name)
         self._world.wait_until(lambda _: bool(found), 20)
         (result,) = found
-        return result
+        return result if isinstance(result, SettingRefusal) else result[0]
 
     def save(self) -> SettingRefusal | None:
-        found: list[SettingRefusal | None] = []
+        found: list[Answer] = []
         self._settings.save(lambda result, _at: found.append(result), self._world.now)
         self._world.wait_until(lambda _: bool(found), 20)
-        return found[0]
+        return found[0] if isinstance(found[0], SettingRefusal) else None
 
     def current(self) -> SettingTable | SettingRefusal:
         found: list[SettingTable | SettingRefusal] = []
@@ -83,13 +85,12 @@ def unpatched(faults: Faults) -> World:
     return on(None)(faults)
 
 
-MODES = 40 * 4
 BOARDS = {
     "patched Harakiri": Board(on(None), len(NAZE_SETTINGS) + 15, "p_roll", 35, 36, 201),
     "Harakiri": Board(unpatched, 30 + 15 + 7, "YAW_P", 40, 36, 256),
-    "INAV": Board(on("inav"), len(INAV_SETTINGS) + MODES, "nav_rth_altitude", 1000, 1300, 65001),
+    "INAV": Board(on("inav"), len(INAV_SETTINGS) + len(BOXES["9.1.0"]), "nav_rth_altitude", 1000, 1300, 65001),
     "MultiWii": Board(on("multiwii"), 59, "PITCH_P", 33, 40, 256),
-    "Betaflight": Board(on("betaflight"), 114, "PITCH_D", 34, 35, 256),
+    "Betaflight": Board(on("betaflight"), 52, "PITCH_D", 34, 35, 256),
     "baseflight": Board(on("baseflight"), 60, "RC_RATE", 90, 70, -1),
 }
 
@@ -107,7 +108,7 @@ def value_of(result: BoardSetting | SettingRefusal) -> Value:
     return result.value
 
 
-def cause_of(result: BoardSetting | SettingRefusal | None) -> Cause:
+def cause_of(result: object) -> Cause:
     assert isinstance(result, SettingRefusal), result
     assert result.text
     assert "\n" not in result.text
@@ -117,3 +118,11 @@ def cause_of(result: BoardSetting | SettingRefusal | None) -> Cause:
 def asked(world: World, command: int, since: float = 0.0) -> int:
     frames = (frame for at, _, data in world.written if at >= since for frame in MspParser().feed(data))
     return sum(frame.command == command for frame in frames)
+
+
+def restart(world: World) -> None:
+    world.power_off()
+    world.run(5)
+    world.power_on()
+    world.wait_until(lambda world: world.is_found, 40)
+    SettingsClient(world).current()

@@ -36,8 +36,7 @@ from bridge.missions.mission_service import MissionEnded
 from bridge.model.events import BridgeEvent, Level
 from bridge.model.flight_memory import FlightMemory
 from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission, RecalledMission
-from bridge.model.settings import SealMemory, SealsOfThisRun
-from bridge.settings.settings_backups import TakenBackup
+from bridge.model.settings import MemoryOfThisRun, SettingsMemory, TakenBackup
 from bridge.sharing.program import Program
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.frame import MAGIC_V1, MavlinkSplitter
@@ -160,7 +159,7 @@ class World:
         profiles: Sequence[Profile] = PROFILES,
         passes_everything: bool = False,
         has_log: bool = False,
-        seals: SealMemory | None = None,
+        memory: SettingsMemory | None = None,
     ) -> None:
         self.random = random.Random(seed)
         self.now = 0.0
@@ -184,7 +183,7 @@ class World:
             links=links or {},
             is_near=is_near,
             profiles=profiles,
-            seals=seals or SealsOfThisRun(),
+            settings_memory=memory or MemoryOfThisRun(),
             has_log=has_log,
         )
         #: The frames for the telemetry log, if there is one.
@@ -260,7 +259,7 @@ class World:
         settings = self.inside.board_settings
 
         def is_ready(world: World) -> bool:
-            is_idle = not world.bridge.is_busy or settings._reader._reading is not None
+            is_idle = not world.bridge.is_busy or settings._reading is not None
             return world.is_found and is_idle and not world.inside.runner.needs_line
 
         return self.wait_until(is_ready, seconds)

@@ -5,7 +5,7 @@ It sends one every 100 ms or so, between its telemetry, and answers no PARAM_REQ
 whole list is requested again. Until the list ends it does not go back to MSP.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import isfinite
 
 from bridge.controllers.harakiri.setting_texts import TEXTS
@@ -77,11 +77,13 @@ class HarakiriMavlinkSettings(FcSettings):
                 break
         return _table(found, count) if found else None
 
-    def change(
-        self, table: SettingTable, setting: BoardSetting, value: Value
-    ) -> Conversation[SettingTable | SettingRefusal]:
+    def write(self, setting: BoardSetting, value: Value) -> Conversation[SettingRefusal | None]:
         yield from ()
         return fixed(setting)
+
+    def read_back(self, setting: BoardSetting) -> Conversation[Sequence[BoardSetting]]:
+        yield from ()
+        return ()
 
     def save(self) -> Conversation[SettingRefusal | None]:
         yield from ()

@@ -3,6 +3,8 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import count
+from typing import NamedTuple
 
 from bridge.controllers.harakiri.setting_texts import TEXTS
 from bridge.controllers.msp_parts import MspPartSettings
@@ -58,14 +60,22 @@ _FIXED = dict.fromkeys(
 _LOWERED_ONLY = {"esc_moff": "it can only be lowered, a disarmed board sends it to the motors"}
 
 
+class _Place(NamedTuple):
+    """A setting's handle: its place and description in the board's table."""
+
+    number: int
+    setting: Setting
+
+
 class HarakiriFcSettings(FcSettings):
-    """The settings of one patched Harakiri; a setting's handle is its description there."""
+    """The settings of one patched Harakiri."""
 
     def __init__(self, board: FlightController) -> None:
         self._modes = MspPartSettings(board, BOXES)
         #: For a build with an earlier mission extension.
         self._parts = MspPartSettings(board)
         self._lists_all: bool | None = None
+        self._reply: SettingsReply | None = None
 
     def read(self, previous: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
         """The values of the previous table if their checksum is still the board's: then that is three requests."""
@@ -89,16 +99,13 @@ class HarakiriFcSettings(FcSettings):
                 return None
         return None
 
-    def change(
-        self, table: SettingTable, setting: BoardSetting, value: Value
-    ) -> Conversation[SettingTable | SettingRefusal]:
-        if not isinstance(setting.handle, Setting):
-            return (yield from self._modes.change(table, setting, value))
-        index = list(table.settings).index(setting.name)
-        frame = encode_set_setting(index, setting.handle, float(value))
-        reply = None
+    def write(self, setting: BoardSetting, value: Value) -> Conversation[SettingRefusal | None]:
+        if not isinstance(setting.handle, _Place):
+            return (yield from self._modes.write(setting, value))
+        number, described = setting.handle
+        frame = encode_set_setting(number, described, float(value))
         for _ in range(_BUSY_TRIES):
-            reply = yield from _ask(frame, SettingCommand.SET_SETTING, 1)
+            self._reply = reply = yield from _ask(frame, SettingCommand.SET_SETTING, 1)
             if reply is None or reply.status is not ReplyStatus.BUSY:
                 break
             yield Pause(_BUSY_INTERVAL_S)
@@ -108,16 +115,16 @@ class HarakiriFcSettings(FcSettings):
             return fixed(replace(setting, fixed=setting.raised))
         if reply.status not in (ReplyStatus.OK, ReplyStatus.RANGE):
             return {ReplyStatus.ARMED: ARMED, ReplyStatus.BUSY: BUSY}.get(reply.status, NOT_TAKEN)
-        held = yield from _ask(encode_read_settings(index, 1), SettingCommand.SETTING, 1)
-        whole = yield from _whole()
-        if held is None or whole is None or (held.first, len(held.settings)) != (index, 1):
-            return NO_ANSWER
-        changed = table.updated(_shown(held.settings[0]))
-        if _is(_listed(changed), whole):
-            return changed
-        # The change had an effect on others: another sensor loses its calibration.
-        read = yield from self.read(None, TableReading())
-        return NO_ANSWER if read is None else read
+        return None
+
+    def read_back(self, setting: BoardSetting) -> Conversation[Sequence[BoardSetting]]:
+        """From the reply to the write, which the board has read from its RAM."""
+        if not isinstance(setting.handle, _Place):
+            return (yield from self._modes.read_back(setting))
+        reply, (number, described) = self._reply, setting.handle
+        if reply is None or (reply.first, [each.setting for each in reply.settings]) != (number, [described]):
+            return ()
+        return (_shown(number, reply.settings[0]),)
 
     def save(self) -> Conversation[SettingRefusal | None]:
         if not self._lists_all:
@@ -169,22 +176,22 @@ def _read(total: int, reading: TableReading) -> Conversation[list[BoardSetting] 
             if reply is None or damaged > _READINGS:
                 return None
             continue
-        found += map(_shown, reply.settings)
+        found += map(_shown, count(len(found)), reply.settings)
         yield Pause(reading.pace(len(frame) + FRAME_OVERHEAD + len(reply.encode())))
     return found
 
 
 def _listed(table: SettingTable) -> list[BoardSetting]:
     """The settings of a table that the board lists by SETTING, in its order."""
-    return [setting for setting in table if isinstance(setting.handle, Setting)]
+    return [setting for setting in table if isinstance(setting.handle, _Place)]
 
 
 def _is(listed: Sequence[BoardSetting], whole: TableReply) -> bool:
-    held = [HeldSetting(setting.handle, float(setting.value)) for setting in listed]
+    held = [HeldSetting(each.handle.setting, float(each.value)) for each in listed]
     return (len(held), table_checksum(held)) == (whole.total, whole.checksum)
 
 
-def _shown(held: HeldSetting) -> BoardSetting:
+def _shown(number: int, held: HeldSetting) -> BoardSetting:
     described, value = held
     kind = ValueKind.FLOAT if described.type is SettingType.FLOAT else ValueKind.INTEGER
     unit, text = TEXTS.get(described.name, ("", ""))
@@ -198,5 +205,5 @@ def _shown(held: HeldSetting) -> BoardSetting:
         text=text,
         fixed=_FIXED.get(described.name, ""),
         raised=_LOWERED_ONLY.get(described.name, ""),
-        handle=described,
+        handle=_Place(number, described),
     )

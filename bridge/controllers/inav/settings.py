@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """All settings of an INAV, one request each, by their place in its table; and its modes."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from bridge.controllers.msp_parts import MspPartSettings
@@ -16,6 +16,7 @@ from bridge.fc.fc_settings import (
 from bridge.fc.profile import FlightController
 from bridge.line.conversation import Conversation, Pause, ask
 from bridge.model.board_setting import BoardSetting, SettingTable, Value, ValueKind, table_of
+from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame, frame_size, request
 from protocols.msp.inav_settings import (
     COMMON_SET_SETTING,
@@ -34,6 +35,8 @@ _REPLY_SIZE = 160
 #: INAV has about 650; a board that never ends its table must not be asked for ever.
 _MOST = 2000
 _TRIES = 3
+#: PIDs, modes, rates and MISC. With EZ Tune on (its first byte), each reading of the PIDs lets INAV compute them again.
+_SOME = (Msp.INAV_EZ_TUNE, Msp.PID_V2, Msp.MODE_RANGES, Msp.INAV_RATE_PROFILE, Msp.INAV_MISC)
 _KINDS = {InavType.FLOAT: ValueKind.FLOAT, InavType.STRING: ValueKind.TEXT}
 #: Disarmed motors get these pulses.
 _LOWERED_ONLY = {"min_command": "it can only be lowered, disarmed motors get this pulse"}
@@ -45,11 +48,16 @@ class InavFcSettings(FcSettings):
 
     def __init__(self, board: FlightController) -> None:
         self._modes = MspPartSettings(board, RANGES)
-        self._is_read = False
+        #: The replies to `_SOME` when the whole table was read; None after a change through the bridge.
+        self._some: list[bytes] | None = None
 
     def read(self, previous: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
-        """The last table if it was read from this board and nothing can have changed since: INAV has no checksum."""
-        if self._is_read and not reading.is_doubtful:
+        """INAV has no checksum: while none changes of some settings, the others are taken to be the same."""
+        some = yield from self._ask_some()
+        if some is None:
+            return None
+        if previous is not None and not reading.is_doubtful and self._some in (None, some):
+            self._some = some
             return previous
         found: list[BoardSetting] = []
         skipped = 0
@@ -71,23 +79,38 @@ class InavFcSettings(FcSettings):
                     break
                 skipped += 1
         modes = yield from self._modes.read(None, reading)
-        self._is_read = True
+        self._some = some
         return table_of(*found, *modes or (), is_complete=modes is not None and not skipped) if found else None
 
-    def change(
-        self, table: SettingTable, setting: BoardSetting, value: Value
-    ) -> Conversation[SettingTable | SettingRefusal]:
+    def write(self, setting: BoardSetting, value: Value) -> Conversation[SettingRefusal | None]:
+        self._some = None
         if not isinstance(setting.handle, InavType):
-            return (yield from self._modes.change(table, setting, value))
+            return (yield from self._modes.write(setting, value))
         if setting.raised and float(value) > float(setting.value):
             return fixed(replace(setting, fixed=setting.raised))
         payload = encode_about_name(setting.name) + pack_value(setting.handle, value)
         reply = yield from ask(request(COMMON_SET_SETTING, payload), COMMON_SET_SETTING, 0)
-        after = yield from _ask(encode_about_name(setting.name))
-        info = None if after is None else decode_setting_info(after.payload)
-        if reply is None or info is None or info.name != setting.name:
+        if reply is None:
             return NO_ANSWER
-        return NOT_TAKEN if reply.direction is Direction.ERROR else table.updated(_shown(info))
+        return NOT_TAKEN if reply.direction is Direction.ERROR else None
+
+    def read_back(self, setting: BoardSetting) -> Conversation[Sequence[BoardSetting]]:
+        if not isinstance(setting.handle, InavType):
+            return (yield from self._modes.read_back(setting))
+        reply = yield from _ask(encode_about_name(setting.name))
+        info = None if reply is None else decode_setting_info(reply.payload)
+        return () if info is None or info.name != setting.name else (_shown(info),)
+
+    def _ask_some(self) -> Conversation[list[bytes] | None]:
+        found: list[bytes] = []
+        for command in _SOME:
+            if command == Msp.PID_V2 and any(found[0][:1]):
+                continue
+            payload = yield from self._modes.payload(command)
+            if payload is None:
+                return None
+            found.append(payload)
+        return found
 
 
 def read_values(names: Iterable[str]) -> Conversation[dict[str, Value] | None]:

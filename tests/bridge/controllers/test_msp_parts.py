@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+import pytest
+
 from bridge.fc.fc_settings import Cause
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction
@@ -41,3 +43,18 @@ def test_settings_of_an_unknown_firmware_are_shown_and_never_written() -> None:
     assert client.wait_read().settings["PITCH_P"].value == 41
     assert cause_of(client.change("PITCH_P", 45)) is Cause.FIXED
     assert SET_PID not in board.asked
+
+
+@pytest.mark.parametrize("name", ["INAV", "Betaflight"])
+def test_a_mode_gets_whole_ranges_and_the_others_keep_theirs(name: str) -> None:
+    world, client = ready(BOARDS[name])
+    before = {each.name: each.value for each in client.wait_read() if each.name.startswith("MODE_")}
+    for ranges in ("AUX1 1300-1700; AUX3 900-1200", "AUX4 1000-1500", ""):
+        assert value_of(client.change("MODE_HORIZON", ranges)) == ranges
+        after = {each.name: each.value for each in client.wait_read() if each.name.startswith("MODE_")}
+        assert after == before | {"MODE_HORIZON": ranges}
+    result = client.change("MODE_HORIZON", "AUX1 1310-1700")
+    assert cause_of(result) is Cause.OUT_OF_RANGE
+    assert cause_of(client.change("MODE_ARM", "AUX1 900-2100")) is Cause.FIXED
+    world.run(75)
+    assert world.events("settings.changed_on_board") == []

@@ -5,13 +5,14 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.fc.fc_settings import Cause, SettingRefusal
-from bridge.model.board_setting import BoardSetting, Value, shown
+from bridge.model.board_setting import Value, shown
+from bridge.settings.setting_work import Answer
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from protocols.msp.setting_table import SettingCommand
 from simulator.board.options import Faults
 from simulator.commands.fc_kinds import make_board
 from tests.support.inside import inside
-from tests.support.settings_client import BOARDS, SettingsClient, asked, cause_of, ready, value_of
+from tests.support.settings_client import BOARDS, SettingsClient, asked, cause_of, ready, restart, value_of
 from tests.support.world import GroundStation, World
 
 SET_PID, EEPROM_WRITE = 202, 250
@@ -30,18 +31,10 @@ def test_all_settings_are_read_one_is_changed_and_survives_only_a_save(name: str
     assert client.value(board.name) == board.before
     assert value_of(client.change(board.name, board.after)) == board.after
     assert client.save() is None
-    assert inside(world.bridge).board_settings.unsaved == {}
+    assert not inside(world.bridge).board_settings.known.unsaved
     if name != "Harakiri":  # its simulator keeps its PIDs only as long as it is powered
         restart(world)
         assert client.value(board.name) == board.after
-
-
-def restart(world: World) -> None:
-    world.power_off()
-    world.run(5)
-    world.power_on()
-    world.wait_until(lambda world: world.is_found, 40)
-    SettingsClient(world).current()
 
 
 @pytest.mark.parametrize("name", BOARDS)
@@ -111,7 +104,7 @@ def test_telemetry_keeps_four_fifths_of_its_rate_while_the_list_is_read(kind: st
         return (asked(world, 108) - before) / seconds
 
     usual = attitudes_per_s(10)
-    settings.table = None
+    settings.known.table = None
     settings.found(inside(world.bridge).session.state.controller, world.now)
     world.run(0.25)
     assert not client.is_idle
@@ -124,9 +117,9 @@ def test_telemetry_keeps_four_fifths_of_its_rate_while_the_list_is_read(kind: st
     [
         ("patched Harakiri", "gbl_flg", 3), ("patched Harakiri", "align_mag_x", 1),
         ("patched Harakiri", "esc_moff", 1001), ("patched Harakiri", "BOX_ARM", 1),
-        ("INAV", "min_command", 1001), ("INAV", "3d_neutral", 1500), ("INAV", "MODE1_LOW", 0), ("INAV", "MODE2_ID", 0),
-        ("MultiWii", "MIN_COMMAND", 1000), ("MultiWii", "BOX_ARM", 0), ("Betaflight", "MODE1_HIGH", 0),
-        ("Betaflight", "MODE3_HIGH", 48), ("baseflight", "MIN_COMMAND", 1400),
+        ("INAV", "min_command", 1001), ("INAV", "3d_neutral", 1500), ("INAV", "MODE_ARM", ""),
+        ("MultiWii", "MIN_COMMAND", 1000), ("MultiWii", "BOX_ARM", 0), ("Betaflight", "MODE_ARM", "AUX1 900-2100"),
+        ("baseflight", "MIN_COMMAND", 1400),
     ],
 )  # fmt: skip
 def test_nothing_that_could_arm_or_spin_or_crash_is_set(board: str, name: str, value: Value) -> None:
@@ -145,7 +138,7 @@ def test_nothing_that_could_arm_or_spin_or_crash_is_set(board: str, name: str, v
 def test_a_change_through_the_bridge_raises_no_alarm(name: str) -> None:
     board = BOARDS[name]
     world, client = ready(board)
-    world.wait_until(lambda world: inside(world.bridge).seal.state is not None, 20)
+    world.wait_until(lambda world: inside(world.bridge).board_settings.known.state is not None, 60)
     setting = {"INAV": "mc_p_roll", "MultiWii": "ROLL_P"}.get(name, "BOX_ANGLE")
     assert value_of(client.change(setting, 7)) == 7
     assert client.save() is None
@@ -155,7 +148,7 @@ def test_a_change_through_the_bridge_raises_no_alarm(name: str) -> None:
 
 def test_a_change_on_the_board_itself_is_found_by_the_seal_and_read() -> None:
     world, client = ready(BOARDS["MultiWii"])
-    world.wait_until(lambda world: inside(world.bridge).seal.state is not None, 20)
+    world.wait_until(lambda world: inside(world.bridge).board_settings.known.state is not None, 60)
     pids = bytes((77,)) + bytes((33, 30, 23)) * 9 + bytes((33, 30))
     world.naze.receive(MspFrame(Direction.REQUEST, SET_PID, pids).encode(), world.now)
     world.naze.advance(world.now + 0.02)
@@ -183,7 +176,7 @@ def test_nothing_is_known_without_a_board() -> None:
 
 def test_a_board_that_is_lost_in_the_middle_of_a_change_ends_it() -> None:
     world, _ = ready(BOARDS["patched Harakiri"])
-    results: list[BoardSetting | SettingRefusal] = []
+    results: list[Answer] = []
     settings = inside(world.bridge).board_settings
     for value in (40, 41, 42):
         settings.change("p_roll", value, lambda result, _at: results.append(result), world.now, "test")
@@ -194,7 +187,7 @@ def test_a_board_that_is_lost_in_the_middle_of_a_change_ends_it() -> None:
 
 def test_a_flood_of_changes_is_bounded_for_each_client_and_for_all() -> None:
     world, _ = ready(BOARDS["patched Harakiri"])
-    results: list[BoardSetting | SettingRefusal] = []
+    results: list[Answer] = []
     settings = inside(world.bridge).board_settings
     for client in range(20):
         for value in range(20):

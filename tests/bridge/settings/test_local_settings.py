@@ -10,8 +10,7 @@ from bridge.model.board_setting import SettingTable, Value
 from bridge.settings.local_settings import RestoreResult, by_parameter, by_setting
 from protocols.msp.frame import MspParser
 from simulator.board.options import Faults
-from tests.bridge.settings.test_board_settings import restart
-from tests.support.settings_client import BOARDS, ready, value_of
+from tests.support.settings_client import BOARDS, ready, restart, value_of
 from tests.support.world import World
 
 EEPROM_WRITE, SET_SETTING = 250, 198

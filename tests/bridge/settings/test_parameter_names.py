@@ -12,18 +12,18 @@ def test_all_names_are_short_and_distinct() -> None:
     for settings in (HARAKIRI, INAV):
         names = parameter_names(settings)
         assert [*names.values()] == settings
-        assert all(len(name) <= LONGEST for name in names)
+        assert all(len(name) <= LONGEST and name == name.upper() for name in names)
 
 
 def test_a_name_that_fits_is_kept() -> None:
-    assert all(name in parameter_names(HARAKIRI) for name in HARAKIRI if len(name) <= LONGEST)
+    assert all(name.upper() in parameter_names(HARAKIRI) for name in HARAKIRI if len(name) <= LONGEST)
 
 
 def test_long_names_stay_readable() -> None:
     parameter = {name: parameter for parameter, name in parameter_names([*HARAKIRI, *INAV]).items()}
-    assert parameter["LED_Toggle_Delay2"] == "LED_Tog_Delay2"
-    assert parameter["pitch_direction_l"] == "pitch_dir_l"
-    assert parameter["failsafe_procedure"] == "failsafe_prcdr"
+    assert parameter["LED_Toggle_Delay2"] == "LED_TOG_DELAY2"
+    assert parameter["pitch_direction_l"] == "PITCH_DIR_L"
+    assert parameter["failsafe_procedure"] == "FAILSAFE_PRCDR"
 
 
 def test_names_that_would_coincide_get_a_checksum() -> None:

@@ -66,7 +66,7 @@ def test_the_list_has_the_bridges_own_parameters_and_all_settings_of_the_board(
     assert len({message.param_id for message in received}) == ALL
     held = {each.setting.name: each.value for each in SETTINGS}
     shown = {name: value for name, value, _ in found}
-    assert all(shown[name] == pytest.approx(value) for name, value in held.items() if len(name) <= 16)
+    assert all(shown[name.upper()] == pytest.approx(value) for name, value in held.items() if len(name) <= 16)
 
 
 @pytest.mark.parametrize(
@@ -316,8 +316,8 @@ def test_a_setting_is_set_on_the_board_and_sent_to_all() -> None:
     world, station = settled_world()
     other = GroundStation(world, "other", sysid=254)
     other.send(m.MAVLink_ping_message(0, 0, 0, 0))
-    received = reply_to(world, station, b"p_roll", 44.0)
-    assert {(each.param_id, each.param_value) for each in received} == {("p_roll", 44.0)}
+    received = reply_to(world, station, b"P_ROLL", 44.0)
+    assert {(each.param_id, each.param_value) for each in received} == {("P_ROLL", 44.0)}
     assert [each.param_value for each in other.messages("PARAM_VALUE")] == [44.0]
     assert SettingsClient(world).value("p_roll") == 44
 
@@ -325,7 +325,7 @@ def test_a_setting_is_set_on_the_board_and_sent_to_all() -> None:
 @pytest.mark.parametrize(
     ("name", "value", "kept", "error", "sentence"),
     [
-        (b"p_roll", 201.0, 35.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "p_roll stays 35: 1..200"),
+        (b"P_ROLL", 201.0, 35.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "p_roll stays 35: 1..200"),
         (b"p_roll", 40.5, 35.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "p_roll stays 35: a whole number, 1..200"),
         (b"p_roll", math.nan, 35.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "p_roll stays 35: 1..200"),
         (b"p_roll", math.inf, 35.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "p_roll stays 35: 1..200"),
@@ -359,8 +359,8 @@ def test_armed_a_setting_is_refused() -> None:
     world, station = settled_world()
     world.faults.armed = True
     world.run(1)
-    received = reply_to(world, station, b"p_roll", 44.0)
-    assert (received[-1].param_id, received[-1].param_value) == ("p_roll", 35.0)
+    received = reply_to(world, station, b"P_ROLL", 44.0)
+    assert (received[-1].param_id, received[-1].param_value) == ("P_ROLL", 35.0)
     assert "disarm" in " ".join(station.texts())
 
 
@@ -370,7 +370,7 @@ def command_of_storage(what: float) -> Message:
 
 def test_preflight_storage_saves_once_and_only_what_was_changed() -> None:
     world, station = settled_world()
-    reply_to(world, station, b"p_roll", 44.0)
+    reply_to(world, station, b"P_ROLL", 44.0)
     operations = world.naze.flash_operations
     for _ in range(3):
         station.send(command_of_storage(1))
@@ -385,9 +385,30 @@ def test_preflight_storage_saves_once_and_only_what_was_changed() -> None:
     assert SettingsClient(world).value("p_roll") == 44
 
 
+@pytest.mark.parametrize(("name", "value"), [(b"P_ROLL", 201.0), (b"NO_SUCH_NAME", 1.0), (b"SYSID_THISMAV", 7.0)])
+def test_a_save_after_a_refused_change_writes_and_says_nothing(name: bytes, value: float) -> None:
+    """Mission Planner asks for it by itself, 10 s after any PARAM_SET."""
+    world, station = settled_world()
+    operations = world.naze.flash_operations
+    assert any(each.get_type() == "PARAM_ERROR" for each in reply_to(world, station, name, value))
+    station.take()
+    station.send(command_of_storage(1))
+    world.run(2)
+    assert [ack.result for ack in station.messages("COMMAND_ACK")] == [m.MAV_RESULT_ACCEPTED]
+    assert station.texts() == []
+    assert world.naze.flash_operations == operations
+
+
+@pytest.mark.parametrize("has_listed", [False, True])
+def test_a_change_is_answered_once(has_listed: bool) -> None:
+    world, station = settled_world() if has_listed else radius_world()
+    (answer,) = reply_to(world, station, b"p_roll", 44.0)
+    assert (answer.get_type(), answer.param_id, answer.param_value) == ("PARAM_VALUE", "P_ROLL", 44.0)
+
+
 def test_preflight_storage_in_flight_is_denied_while_something_is_unsaved() -> None:
     world, station = settled_world()
-    reply_to(world, station, b"p_roll", 44.0)
+    reply_to(world, station, b"P_ROLL", 44.0)
     world.faults.armed = True
     world.run(1)
     station.send(command_of_storage(1))

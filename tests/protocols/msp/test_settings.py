@@ -1,47 +1,44 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings in which two replies differ, by name."""
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocols.msp.settings import SETTINGS, Part, SettingNames, SettingsRequest, changed_names
+from protocols.msp.settings import SETTINGS, Part, SettingsRequest, fields
 from protocols.rights.msp import Firmware
 
 REQUESTS = [request for requests in SETTINGS.values() for request in requests]
 
 
-def of(firmware: Firmware, part: Part) -> SettingsRequest:
-    return next(request for request in SETTINGS[firmware] if request.part is part)
-
-
-@given(request=st.sampled_from([request for request in REQUESTS if request.layout]), data=st.data())
-def test_a_changed_field_is_named_alone_and_a_counter_is_no_change(
-    request: SettingsRequest, data: st.DataObject
+@given(request=st.sampled_from(REQUESTS), payload=st.binary(max_size=60), data=st.data())
+def test_every_field_is_within_the_reply_and_another_value_changes_it_alone(
+    request: SettingsRequest, payload: bytes, data: st.DataObject
 ) -> None:
-    size = sum(bytes_ for _, bytes_ in request.layout)
-    before = data.draw(st.binary(min_size=size, max_size=size))
-    at = data.draw(st.integers(0, size - 1))
-    after = bytes(byte ^ (place == at) for place, byte in enumerate(before))
-    fields = [name for name, bytes_ in request.layout for _ in range(bytes_)]
-    names = changed_names(request, request.settings(before), request.settings(after), SettingNames())
-    assert names == ((fields[at],) if fields[at] else ())
+    found = fields(request, payload, ("ROLL", "PITCH"), ("ARM", "", "ANGLE"))
+    assert len({field.name for field in found}) == len(found)
+    if not found:
+        return
+    changed = data.draw(st.sampled_from(found))
+    after = changed.put(payload, changed.value(payload) ^ 1)
+    assert len(after) == len(payload)
+    assert [field for field in found if field.value(after) != field.value(payload)] == [changed]
 
 
-@given(request=st.sampled_from(REQUESTS), before=st.binary(max_size=60), after=st.binary(max_size=60))
-def test_any_two_replies_are_compared(request: SettingsRequest, before: bytes, after: bytes) -> None:
-    names = SettingNames(("ROLL", "PITCH"), ("ARM", "ANGLE"), {0: "ARM"})
-    found = changed_names(request, before, after, names)
-    assert len(found) == len(set(found))
-    assert changed_names(request, before, before, names) == ()
+@pytest.mark.parametrize(
+    ("firmware", "part", "size", "names"),
+    [
+        (Firmware.HARAKIRI, Part.PIDS, 6, ("ROLL P", "ROLL I", "ROLL D", "PITCH P", "PITCH I", "PITCH D")),
+        (Firmware.HARAKIRI, Part.BOXES, 6, ("BOX ARM", "BOX ANGLE")),
+        (Firmware.BETAFLIGHT, Part.RANGES, 80, ()),
+    ],
+)
+def test_settings_are_named(firmware: Firmware, part: Part, size: int, names: tuple[str, ...]) -> None:
+    request = next(request for request in SETTINGS[firmware] if request.part is part)
+    found = fields(request, bytes(size), ("ROLL", "PITCH"), ("ARM", "", "ANGLE"))
+    assert tuple(field.name for field in found) == names
 
 
-def test_a_pid_is_named() -> None:
-    names = SettingNames(("ROLL", "PITCH", "YAW"))
-    assert changed_names(of(Firmware.HARAKIRI, Part.PIDS), bytes(9), bytes(3) + b"\1" + bytes(5), names) == ("PITCH",)
-
-
-def test_a_range_that_only_moved_within_the_reply_is_no_change() -> None:
-    request, names = of(Firmware.INAV, Part.MODES), SettingNames(boxes_by_id={0: "ARM", 1: "ANGLE"})
-    arm, angle, unused = b"\0\1\x10\x20", b"\1\2\x08\x18", bytes(4)
-    assert changed_names(request, arm + angle + unused, unused + angle + arm, names) == ()
-    assert changed_names(request, arm + angle + unused, arm + unused + unused, names) == ("ANGLE",)
+def test_the_counters_of_a_multiwii_are_no_settings() -> None:
+    misc = next(request for request in SETTINGS[Firmware.MULTIWII] if request.part is Part.MISC)
+    counters = range(10, 16)
+    assert not [field for field in fields(misc, bytes(22), (), ()) if field.at in counters]

@@ -38,7 +38,7 @@ from protocols.msp.nav import (
     encode_read_wp,
     encode_set_wp,
 )
-from protocols.msp.setting_table import SettingCommand, encode_save
+from protocols.msp.setting_table import TABLE_REQUEST, SettingCommand, encode_save
 from protocols.msp.settings import SETTINGS
 from protocols.rights.effect import Effect
 from protocols.rights.msp import MSP_RIGHTS, Firmware, msp_right
@@ -74,8 +74,9 @@ READS: list[tuple[Iterable[Firmware], bytes]] = [
     (HARAKIRI, INFO_REQUEST),
     (MISSIONS, encode_read(0, 15)),
     (MISSIONS, FLIGHT_REQUEST),
-    *(((firmware,), request(wanted.command, wanted.body)) for firmware, parts in SETTINGS.items() for wanted in parts),
-    (INAV, request(Msp.INAV_EZ_TUNE)),
+    *(((firmware,), request(wanted.command)) for firmware, parts in SETTINGS.items() for wanted in parts),
+    *((INAV, request(Msp(command))) for command in (0x2070, 0x2030, 34, 0x2007, 0x2003)),
+    (MISSIONS, TABLE_REQUEST),
     (EVERY, request(Msp.PIDNAMES)),
     (NUMBERED, request(Msp.UID)),
 ]

@@ -42,7 +42,7 @@ def test_a_backup_shows_its_changes_and_what_restoring_it_would_change(tuned: We
     assert first["plan"]["changes"] == [{"name": "p_roll", "was": 44, "becomes": 35}]
     file = tuned.ask("/api/settings/1/file")
     assert "settings-1.param" in file.headers["Content-Disposition"]
-    assert read_param_file(file.body, "x").values["p_roll"] == 35
+    assert read_param_file(file.body, "x").values["P_ROLL"] == 35
     assert tuned.state()["newest_backup"] == 2
 
 

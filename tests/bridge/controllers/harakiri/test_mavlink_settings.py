@@ -266,7 +266,7 @@ def test_impossible_values_are_not_shown(name: str, value: float, count: int, in
     while world.now < end:
         world.run(0.2)
         world.receive_from_fc(frame)
-    table = world.inside.board_settings.table
+    table = world.inside.board_settings.known.table
     assert isinstance(table, SettingTable)
     assert all(math.isfinite(float(each.value)) for each in table)
     assert len(table) >= 185

@@ -25,17 +25,21 @@ def test_the_list_takes_less_than_two_seconds_and_later_ones_come_from_memory() 
 
 def test_a_change_that_touches_others_is_read_back_whole() -> None:
     """Another accelerometer makes the calibration of the first one void."""
-    _, client = ready(BOARDS["patched Harakiri"])
+    world, client = ready(BOARDS["patched Harakiri"])
     assert value_of(client.change("rc_trm_rll", 12.5)) == 12.5
     client.change("acc_hdw", 1)
+    world.run(10)
     assert client.value("rc_trm_rll") == 0.0
+    assert world.events("settings.changed_on_board") == []
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_bad_line_gives_the_true_table_or_none(seed: int) -> None:
     world = World(faults=Faults(bit_error_rate=1e-4), speeds=(115200,), seed=seed)
     table = SettingsClient(world).wait_read(120)
-    held = [HeldSetting(setting.handle, float(setting.value)) for setting in table if "BOX_" not in setting.name]
+    held = [
+        HeldSetting(setting.handle.setting, float(setting.value)) for setting in table if "BOX_" not in setting.name
+    ]
     assert table_checksum(held) == table_checksum(NAZE_SETTINGS)
 
 

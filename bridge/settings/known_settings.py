@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is known of the board's settings, and how far it can be relied on.
+
+The settings of each board are remembered, so that a change without the bridge between two flights is noticed.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from zlib import crc32
+
+from bridge.model.board_setting import BoardSetting, SettingTable, Value
+from bridge.model.settings import BoardId, Occasion, SettingsChange, SettingsMemory, SettingsState, TakenBackup
+
+
+class Freshness(IntEnum):
+    """How far the table is the board's."""
+
+    #: Not read from this board since it was found.
+    UNREAD = 0
+    #: Any setting may have changed through the bridge.
+    DOUBTFUL = 1
+    #: A change through the bridge was read back. It may have had an effect on other settings.
+    CHANGED = 2
+    CHECKED = 3
+
+
+@dataclass(frozen=True, slots=True)
+class ReadResult:
+    """The result of reading all settings. changed: names of settings that differ from the table before.
+
+    elsewhere: the change without the bridge. backup: the table, if it is worth a backup.
+    """
+
+    changed: tuple[str, ...]
+    elsewhere: SettingsChange | None
+    backup: TakenBackup | None
+
+
+class KnownSettings:
+    """The table as last read, its freshness, and the board that it belongs to."""
+
+    def __init__(self, memory: SettingsMemory) -> None:
+        self._memory = memory
+        #: Also of a board that is armed or lost since.
+        self.table: SettingTable | None = None
+        self.freshness = Freshness.UNREAD
+        #: The board that was found; None until it is identified.
+        self.board: BoardId | None = None
+        #: The settings that were changed here, and not saved since.
+        self.unsaved: dict[str, Value] = {}
+        #: True if the board's flash is known to hold the settings in its RAM.
+        self.is_saved = False
+        #: None until the settings of a board were read; those of a lost board stay.
+        self.state: SettingsState | None = None
+        #: Changes through the bridge may be among the differences that the next reading finds.
+        self._is_ours = False
+        self._occasion = Occasion.CONNECTED
+        self._backed_up: Mapping[str, Value] | None = None
+
+    def found(self) -> None:
+        """Another board, or the same again."""
+        self.freshness, self.board = Freshness.UNREAD, None
+        self._occasion, self._backed_up = Occasion.CONNECTED, None
+
+    def identified(self, board: BoardId) -> None:
+        self.board = board
+        if self._is_ours:
+            self._memory.keep(board, {})
+
+    def may_have_changed(self, freshness: Freshness = Freshness.DOUBTFUL) -> None:
+        """The bridge, or a program through it, may have changed settings: the differences found next are no news."""
+        self.freshness = min(self.freshness, freshness)
+        self._is_ours, self.is_saved = True, False
+        if self.board is not None:
+            self._memory.keep(self.board, {})  # the daemon may end before the next reading
+
+    def changed(self, settings: Sequence[BoardSetting]) -> SettingTable | None:
+        """The settings read back after a change through the bridge; returns the table if it has changed."""
+        self.may_have_changed(Freshness.CHANGED)
+        former = self.table or SettingTable()
+        self.table = former.updated(*settings)
+        return self.table if self.table.settings != former.settings else None
+
+    def saved(self) -> None:
+        """The board has saved its settings. A firmware may correct some that contradict each other."""
+        self.unsaved.clear()
+        self._occasion = Occasion.SAVED
+        self.may_have_changed()
+        self.is_saved = True
+
+    def read(self, table: SettingTable, now: float) -> ReadResult:
+        """All settings were read."""
+        former, self.table = self.table, table
+        changed = () if former is None else former.differences(table)
+        self.freshness, self._is_ours = Freshness.CHECKED, False
+        if self.board is None or not table:
+            return ReadResult(changed, None, None)
+        values = {setting.name: setting.value for setting in table}
+        remembered = self._memory.recall(self.board)
+        names = tuple(
+            name
+            for name, value in values.items()
+            if repr(remembered.get(name, value)) != repr(value) and name not in self.unsaved
+        )
+        if values != remembered:
+            self._memory.keep(self.board, values)
+        elsewhere = SettingsChange(names, now) if names else None
+        is_same_board = self.state is not None and self.state.board == self.board
+        last = self.state.change if self.state is not None and is_same_board else None
+        seal = f"{crc32(repr(sorted(values.items())).encode()):08x}"
+        self.state = SettingsState(self.board, seal, elsewhere or last)
+        return ReadResult(changed, elsewhere, self._backup(self.board, values) if table.is_complete else None)
+
+    def _backup(self, board: BoardId, values: Mapping[str, Value]) -> TakenBackup | None:
+        """With changes that are not saved yet it is no backup: a restart would lose them."""
+        self.unsaved = {name: value for name, value in self.unsaved.items() if values.get(name) == value}
+        if self.unsaved or (self._occasion is Occasion.CHANGED_ELSEWHERE and values == self._backed_up):
+            return None
+        backup = TakenBackup(board, values, self._occasion)
+        self._occasion, self._backed_up = Occasion.CHANGED_ELSEWHERE, values
+        return backup
