@@ -99,6 +99,10 @@ class StoredMission:
 class MissionStore:
     """The missions of one state directory. One thread at a time; every method may raise StoreError.
 
+    >>> with open_store(state_dir / "missions.db", time.time()).store as store:
+    ...     number = store.add(received)
+    ...     store.conclude(number, VERIFIED, "", time.time())
+
     Once add() or conclude() has returned, its data survives a kill and a power cut.
     """
 

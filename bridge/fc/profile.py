@@ -11,6 +11,7 @@ from enum import Enum
 
 from bridge.fc.fc_settings import FcSettings
 from bridge.fc.interview import Interview
+from bridge.fc.mavlink_telemetry import MavlinkReadings
 from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import POLLS, Poll
 from bridge.missions.fc_mission_store import AnyFcMissionStore
@@ -104,6 +105,7 @@ class Profile:
     fences, rally: its stores of fences and of rally points.
     settings: how its own settings are read and changed; None: not over this protocol.
     check_kind, rules: how `naze-bridge check --kind` calls it, and the rules it applies.
+    mavlink_readings: the meaning of its MAVLink messages.
     mavlink_sender: MAVLink version, sysid and compid it sends with; None matches any.
     restarts_after_calibration: it reboots by itself when a calibration is done. calibrates_six_positions: its
     accelerometer needs one request in each of six positions.
@@ -130,6 +132,7 @@ class Profile:
     settings: OpenSettings | None = None
     check_kind: str | None = None
     rules: Callable[[RuleSettings], MissionRules] | None = None
+    mavlink_readings: type[MavlinkReadings] = MavlinkReadings
     mavlink_sender: tuple[int, int, int] | None = None
     restarts_after_calibration: bool = False
     arming_blockers: Callable[[Vehicle, float], tuple[str, ...] | None] = _none_known

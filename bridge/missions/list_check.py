@@ -188,7 +188,13 @@ def begin_check(count: int, rules: MissionRules, fallback_home: tuple[int, int] 
 def check_list(
     items: Sequence[MissionItem], rules: MissionRules, fallback_home: tuple[int, int] | None = None
 ) -> Verdict[Any]:
-    """Check a whole list; an empty one clears the flight controller's."""
+    """Check a whole list; an empty one clears the flight controller's.
+
+    >>> from bridge.controllers.harakiri.check import HarakiriRules
+    >>> items = [MissionItem(seq, 16, 3, 0, 0, 0, 0, 453_000_000, 84_000_000, 20.4) for seq in range(2)]
+    >>> check_list(items, HarakiriRules()).findings[-1].text()
+    'WP 1: Alt changed from 20.4 to 20 m (whole numbers only)'
+    """
     if not items:
         return CLEARED_LIST
     if rejection := check_count(len(items), rules):

@@ -74,7 +74,13 @@ class VehicleReporter:
 
     def __post_init__(self) -> None:
         self._makers: Mapping[Group, Callable[[float], Any]] = {
-            group: getattr(self, f"_{group.value}") for group in Group
+            Group.ATTITUDE: self._attitude,
+            Group.POSITION: self._position,
+            Group.GPS: self._gps,
+            Group.BATTERY: self._battery,
+            Group.RC: self._rc,
+            Group.STATUS: self._status,
+            Group.LINK: self._link,
         }
 
     def heard(self, news: Collection[type[v.Reading]], now: float) -> None:

@@ -28,9 +28,9 @@ _HEADER_V2 = struct.Struct("<BBBBBBBHB")
 def decode(frame: MavlinkFrame) -> Message | None:
     """The message in a frame; None if pymavlink does not know it.
 
-    >>> for frame in MavlinkSplitter().feed(datagram):
-    ...     if (message := decode(frame)) is not None:
-    ...         print(message.get_type(), message.to_dict())
+    >>> heartbeat = decode(MavlinkFrame(bytes.fromhex("fe0900010100000000000203000403d014")))
+    >>> heartbeat.get_type(), heartbeat.autopilot == messages.MAV_AUTOPILOT_ARDUPILOTMEGA
+    ('HEARTBEAT', True)
     """
     return _PYMAVLINK.decode(bytearray(frame.raw)) if frame.msgid in messages.mavlink_map else None
 
@@ -107,7 +107,11 @@ def pack_component_metadata(uptime_ms: int, file_crc: int, uri: str) -> Packed:
 
 
 class FrameWriter:
-    """Makes the frames of one sender to one receiver.
+    r"""Makes the frames of one sender to one receiver.
+
+    >>> text = messages.MAVLink_statustext_message(messages.MAV_SEVERITY_INFO, b"Mission stored")
+    >>> FrameWriter(1, 1).frame(pack(text), 2)
+    b'\xfd\x0f\x00\x00\x00\x01\x01\xfd\x00\x00\x06Mission storedlX'
 
     Each receiver has its own sequence numbers: ground stations show gaps as a bad link. `sign` returns the
     signature of a MAVLink 2 frame; MAVLink 1 has none.

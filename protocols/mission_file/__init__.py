@@ -34,7 +34,11 @@ def write_mission_file(items: Sequence[MissionItem], name: str) -> str:
 
 
 def read_mission_file(data: bytes, name: str, note: Note = no_note, alt_m: float | None = None) -> list[MissionItem]:
-    """Read the mission of a file in any format that we know, home as item 0.
+    r"""Read the mission of a file in any format that we know, home as item 0.
+
+    >>> plan = b"QGC WPL 110\n0 0 0 16 0 0 0 0 45.3 8.4 131 1\n1 0 3 16 0 0 0 0 45.4 8.5 20 1"
+    >>> [(item.seq, item.lat_e7, item.alt_m) for item in read_mission_file(plan, "field.waypoints")]
+    [(0, 453000000, 131.0), (1, 454000000, 20.0)]
 
     `note` is called for each thing that was fixed or left out. alt_m: the height above home of all points of a path
     (KML, GPX or CSV). MissionFileError is one sentence: the problem, the place in the file `name`, and the remedy.

@@ -73,6 +73,9 @@ def frame_size(command: int, payload_size: int) -> int:
 class MspParser:
     """Finds frames in a byte stream. Never raises: bytes outside frames are counted and skipped.
 
+    >>> MspParser().feed(request(105))
+    [MspFrame(direction=<Direction.REQUEST: 60>, command=105, payload=b'', is_v2=False)]
+
     After a bad checksum the search resumes one byte later, so a frame hidden behind a false header is still found.
     `takes_low_v2`: accept v2 frames of v1's commands, too, as configurators send them; a flight controller sends such
     frames only in reply to them. Call `reset` when the line has been silent: an incomplete frame keeps its bytes.

@@ -33,7 +33,7 @@ _COMMANDS = {
     "demo": LazyCommand("service.cli.demo:demo", "Demonstrate a mission upload to a simulated Naze."),
 }
 
-#: Libraries and their optional dependencies, 12 MB together, that the daemon does not need: OpenSSL, coloured logs.
+#: Libraries and their optional dependencies, 10 MB together, that the daemon does not need: OpenSSL, coloured logs.
 _OPTIONAL = (("hmac", "_hashlib"), ("asyncio", "ssl"), ("structlog", "rich"))
 _UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
@@ -77,6 +77,7 @@ class _Main(LazyGroup):
 
 
 def _import_without(library: str, dependency: str) -> None:
+    """Let the import of an optional dependency fail: None in sys.modules is Python's own way to say so."""
     if library in sys.modules or dependency in sys.modules:
         return
     sys.modules[dependency] = None  # type: ignore[assignment]

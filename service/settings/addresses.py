@@ -126,7 +126,11 @@ def split_gcs(text: str) -> list[str]:
 
 
 def parse_gcs(text: str) -> GcsAddress:
-    """Read one --gcs string; AddressError if it is not valid, or ambiguous."""
+    """Read one --gcs string; AddressError if it is not valid, or ambiguous.
+
+    >>> str(parse_gcs("udpin:0.0.0.0:14550"))
+    'udpin:0.0.0.0:14550'
+    """
     word, colon, rest = text.strip().partition(":")
     kind = _GCS_ALIASES.get(word.lower(), word.lower())
     rest = rest.removeprefix("//")

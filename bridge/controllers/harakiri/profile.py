@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from bridge.controllers.harakiri.check import harakiri_rules
 from bridge.controllers.harakiri.mavlink_missions import HarakiriMavlinkMissions
+from bridge.controllers.harakiri.mavlink_readings import HarakiriReadings
 from bridge.controllers.harakiri.mavlink_settings import HarakiriMavlinkSettings
 from bridge.controllers.harakiri.mission_store import HarakiriMissions
 from bridge.controllers.harakiri.settings import HarakiriFcSettings
@@ -110,6 +111,7 @@ MAVLINK = Profile(
     missions=HarakiriMavlinkMissions,
     settings=lambda _board: HarakiriMavlinkSettings(),
     arming_blockers=arming_blockers,
+    mavlink_readings=HarakiriReadings,
     mavlink_sender=(1, 1, 200),  # baseflight_mavlink.c; other autopilots send as component 1
 )
 FRSKY = Profile(

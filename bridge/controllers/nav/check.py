@@ -8,9 +8,7 @@ from functools import partial
 
 from bridge.controllers.nav.flown_path import flown_size, jump_within_jump, lands_after_rth
 from bridge.controllers.nav.judgement import Departure, Judgement
-from bridge.controllers.nav.jumps import Jumps
-from bridge.controllers.nav.landing import placed_landing
-from bridge.controllers.nav.leg_speed import LegSpeed
+from bridge.controllers.nav.related_items import Jumps, LegSpeed, placed_landing
 from bridge.controllers.nav.rules import (
     HOLD,
     LANDS,

@@ -114,7 +114,7 @@ class PassThrough(MavlinkLine):
     def __init__(self, port: Port, event: Found, now: float) -> None:
         super().__init__(port, event, now)
         if port.telemetry is None or self.controller.profile.family != port.family:
-            port.telemetry = MavlinkTelemetry(port.vehicle, is_harakiri=False)
+            port.telemetry = MavlinkTelemetry(self.controller.profile.mavlink_readings(port.vehicle))
         self.telemetry = port.telemetry
         port.meet(self.controller)
         assert event.heard is not None
@@ -132,7 +132,7 @@ class HarakiriMavlink(MavlinkLine):
 
     def __init__(self, port: Port, event: Found, now: float) -> None:
         super().__init__(port, event, now)
-        port.telemetry = self._telemetry = MavlinkTelemetry(port.vehicle, is_harakiri=True)
+        port.telemetry = self._telemetry = MavlinkTelemetry(self.controller.profile.mavlink_readings(port.vehicle))
         port.meet(self.controller)
         self._msp, self._sender = MspParser(), _HarakiriSender()
         self._probe_due = now + _PROBE_INTERVAL_S

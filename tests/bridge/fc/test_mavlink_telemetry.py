@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as m
 
+from bridge.controllers.harakiri.mavlink_readings import HarakiriReadings
 from bridge.fc.mavlink_telemetry import MavlinkTelemetry
 from bridge.model.vehicle import Signal, Vehicle
 from protocols.mavlink.frame import kinds
@@ -141,7 +142,7 @@ def test_the_second_block_of_channels_does_not_replace_the_first() -> None:
 def test_a_harakiri_that_never_reported_a_signal_has_no_receiver_for_it() -> None:
     """It sends 0 without such a receiver. After the first other value, 0 is a lost signal."""
     vehicle, strengths, sender = Vehicle(), [], m.MAVLink(None, srcSystem=1, srcComponent=1)
-    telemetry = MavlinkTelemetry(vehicle, is_harakiri=True)
+    telemetry = MavlinkTelemetry(HarakiriReadings(vehicle))
     for now, rssi in enumerate((0, 0, 255, 51, 0)):
         frame = bytes(m.MAVLink_rc_channels_raw_message(1, 0, *[1500] * 8, rssi).pack(sender))
         telemetry.take([frame], kinds([frame]), now)

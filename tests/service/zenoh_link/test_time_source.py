@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
-from bridge.fc.mavlink_telemetry import MavlinkTelemetry
+from bridge.fc.mavlink_telemetry import MavlinkReadings, MavlinkTelemetry
 from bridge.model.vehicle import Fix, GpsFix, GpsTime, Source, Vehicle
 from protocols.mavlink.frame import kinds
 from service.zenoh_link.time_source import SampleClock
@@ -60,7 +60,7 @@ def test_without_a_recent_fix_there_is_no_gps_time(tmp_path: Path, fix: Fix, age
 def test_a_mavlink_autopilots_time_is_used_once_it_has_one(unix_s: float, known: float | None) -> None:
     """Until it has the time, ArduPilot counts from its start."""
     vehicle, codec = Vehicle(), m.MAVLink(None, srcSystem=1, srcComponent=1)
-    telemetry = MavlinkTelemetry(vehicle, is_harakiri=False)
+    telemetry = MavlinkTelemetry(MavlinkReadings(vehicle))
     sent = m.MAVLink_heartbeat_message(2, 3, 0, 0, 4, 3), m.MAVLink_system_time_message(round(unix_s * 1e6), 9)
     frames = [bytes(each.pack(codec)) for each in sent]
     telemetry.take(frames, kinds(frames), NOW)
