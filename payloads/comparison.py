@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Two mission lists side by side: as sent and as stored, or two that were sent."""
+"""A mission list as sent and as stored, side by side."""
 
-import difflib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import zip_longest
 
 from payloads.mission_data import Json, correction_texts, mission_findings, mission_items
 from protocols.mavlink.command import command_name
@@ -19,9 +17,9 @@ _VALUES = ("command", "frame", "p1", "p2", "p3", "p4", "lat_e7", "lon_e7", "alt_
 
 @dataclass(frozen=True, slots=True)
 class ItemRow:
-    """An item on both sides, or on one. `kind`: same, changed, dropped, rejected, added or removed.
+    """An item on both sides, or on one. `kind`: same, changed, dropped, rejected or added.
 
-    `changes`: why each value changed, by its name; without a reason between two lists that were sent.
+    `changes`: why each value changed, by its name.
     """
 
     kind: str
@@ -107,35 +105,12 @@ def sent_and_stored(
     return rows
 
 
-def difference(first: Sequence[MissionItem], second: Sequence[MissionItem]) -> list[ItemRow]:
-    """One row per item of either list; an item in only one of them has its own row."""
-    rows = []
-    for before, after in _pairs(first[:MAX_ROWS], second[:MAX_ROWS]):
-        if before is None or after is None:
-            rows.append(ItemRow("added" if before is None else "removed", before, after, {}))
-        else:
-            was, becomes = _key(before), _key(after)
-            changes = {name: "" for name, old, new in zip(_VALUES, was, becomes, strict=True) if old != new}
-            rows.append(ItemRow("changed" if changes else "same", before, after, changes))
-    return rows
-
-
 def shown(item: MissionItem) -> Json:
     """An item for the page: numbers, None for values not given, the command's name and those of p1..p4."""
     params = [value_label(item.command, name) for name in ("p1", "p2", "p3", "p4")]
-    values = dict(zip(_VALUES, _key(item), strict=True))
+    values = {name: _given(getattr(item, name)) for name in _VALUES}
     return {"seq": item.seq, "name": command_name(item.command), "params": params, **values}
 
 
-def _pairs(
-    first: Sequence[MissionItem], second: Sequence[MissionItem]
-) -> Iterator[tuple[MissionItem | None, MissionItem | None]]:
-    matcher = difflib.SequenceMatcher(None, list(map(_key, first)), list(map(_key, second)), autojunk=False)
-    for _, at, to, other_at, other_to in matcher.get_opcodes():
-        yield from zip_longest(first[at:to], second[other_at:other_to])
-
-
-def _key(item: MissionItem) -> tuple[float | None, ...]:
-    """An item's values without its number, comparable: values not given are equal."""
-    values = (getattr(item, name) for name in _VALUES)
-    return tuple(None if value is None or value != value else value for value in values)
+def _given(value: float | None) -> float | None:
+    return None if value is None or value != value else value

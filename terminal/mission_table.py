@@ -2,13 +2,13 @@
 """A mission as sent and as stored, side by side, for a terminal."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from payloads.comparison import ItemRow, sent_and_stored
+from payloads.comparison import sent_and_stored
 from payloads.mission_data import correction_texts
 from protocols.mavlink.command import command_name
 from protocols.mission_item import MissionItem
@@ -34,20 +34,15 @@ def mission_table(
     `stored` is the list as it reads back, empty for a rejected or cleared one; `findings` name the items missing in it,
     and are printed below the table with their reasons, except filled-in defaults. `sent_seqs`: see Verdict.
     """
-    reasons = "".join(f"\n{text}" for text in correction_texts(findings))
-    return rows_table(sent_and_stored(sent, stored, findings, sent_seqs), reasons)
-
-
-def rows_table(rows: Iterable[ItemRow], caption: str) -> Table:
-    """Rows of a comparison, with "left->right" for each value that differs."""
-    table = Table(box=box.SIMPLE_HEAD, padding=0, show_edge=False, caption=Text(caption), caption_justify="left")
+    reasons = Text("".join(f"\n{text}" for text in correction_texts(findings)))
+    table = Table(box=box.SIMPLE_HEAD, padding=0, show_edge=False, caption=reasons, caption_justify="left")
     table.add_column("WP", justify="right", no_wrap=True)
     table.add_column("Command", min_width=_LONGEST_STORED, overflow="fold")
     for title in ("p1", "p2", "p3", "p4", "Latitude", "Longitude", "Height"):
         table.add_column(title, justify="right", overflow="fold", no_wrap=True)
-    for row in rows:
+    for row in sent_and_stored(sent, stored, findings, sent_seqs):
         left, right = (item and _values(item) for item in (row.left, row.right))
-        if left and row.kind in ("dropped", "removed"):
+        if left and row.kind == "dropped":
             table.add_row(f"{left[0]}->-", *left[1:], style=_DROPPED)
         elif left:
             table.add_row(*map(_cell, left, right or left))

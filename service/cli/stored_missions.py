@@ -8,12 +8,11 @@ import click
 from rich.table import Column, Table
 from rich.text import Text
 
-from payloads.comparison import difference
 from payloads.mission_data import MOST, Json, mission_findings, mission_items
 from service.cli.daemon_client import BridgeClient, bridge_options, daemon_options
 from service.cli.mission_commands import show_delivery
 from terminal.command_group import CommandGroup
-from terminal.mission_table import mission_table, rows_table
+from terminal.mission_table import mission_table
 from terminal.printing import print_json, print_table
 from terminal.sentences import say
 
@@ -28,7 +27,7 @@ _NUMBER, _LIMIT = _Number(1, MOST), click.IntRange(1, MOST)
 
 @click.group(cls=CommandGroup)
 def missions() -> None:
-    """List, show, compare and restore the received missions, accepted or not.
+    """List, show and restore the received missions, accepted or not.
 
     All but restore also work without a daemon.
     """
@@ -71,24 +70,6 @@ def show(client: BridgeClient, number: int) -> None:
     print_table(mission_table(sent, stored, findings, received["sent_seqs"]))
     click.echo(f"{_local_time(received['received_at'])} from {received['source']}")
     say(f"{received['verdict']} ({received['ack']}), {mission['outcome']}: {mission['detail']}")
-
-
-@missions.command()
-@click.argument("first", type=_NUMBER)
-@click.argument("second", type=_NUMBER)
-@daemon_options
-def diff(client: BridgeClient, first: int, second: int) -> None:
-    """Compare missions FIRST and SECOND as sent. Exit code 1 if they differ."""
-    before, after = (_fetch(client, number)["received"]["items"] for number in (first, second))
-    changed = [row for row in difference(mission_items(before), mission_items(after)) if row.kind != "same"]
-    if client.as_json:
-        print_json({"equal": not changed, "changes": [row.to_json() for row in changed]})
-    elif changed:
-        print_table(rows_table(changed, f"\nMission {first} -> Mission {second}"))
-    else:
-        click.echo("no difference")
-    if changed:
-        raise SystemExit(1)
 
 
 @missions.command(short_help="Write mission NUMBER to the flight controller again.")

@@ -22,7 +22,7 @@ def start_in(tmp_path: Path) -> Iterator[Starter]:
         yield Starter(tmp_path, stack)
 
 
-_READING = (("list",), ("show", "2"), ("diff", "1", "2"))
+_READING = (("list",), ("show", "2"))
 
 
 def test_stored_missions_are_read_without_a_daemon(start_in: Starter, tmp_path: Path) -> None:
@@ -34,9 +34,6 @@ def test_stored_missions_are_read_without_a_daemon(start_in: Starter, tmp_path: 
     with_daemon = {words: ask(daemon, "missions", *words).stdout for words in _READING}
     daemon.end()
     assert {words: ask(daemon, "missions", *words).stdout for words in _READING} == with_daemon
-    difference = with_daemon["diff", "1", "2"].splitlines()
-    assert [line for line in difference if "->" in line and "WAYPOINT" in line]
-    assert [ask(daemon, "missions", "diff", "1", other).returncode for other in ("1", "2")] == [0, 1]
     assert "no daemon answers" in ask(daemon, "missions", "restore", "1").stderr
     restored = ask(daemon, "missions", "restore", "1", "--fc", "sim")
     assert restored.stdout.endswith("ACCEPTED: Mission verified: 5 records\n"), restored
