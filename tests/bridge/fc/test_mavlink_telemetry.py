@@ -9,10 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as m
 
-from bridge.controllers.harakiri.mavlink_readings import HarakiriReadings
-from bridge.fc.mavlink_telemetry import MavlinkTelemetry
-from bridge.model.vehicle import Signal, Vehicle
-from protocols.mavlink.frame import kinds
 from reports.vehicle_groups import Attitude, Battery, Gps, Group, Position, Rc, Status
 from tests.bridge.fc.states.test_pass_through import Autopilot, passing
 from tests.bridge.vehicle.test_vehicle_report import EMPTY, without_age
@@ -137,18 +133,6 @@ def test_the_second_block_of_channels_does_not_replace_the_first() -> None:
         autopilot.send(m.MAVLink_rc_channels_raw_message(1, port, *[1500 + port] * 8, 127))
         world.run(0.05)
     assert world.bridge.group(Group.RC, world.now).channels_us == (1500,) * 8
-
-
-def test_a_harakiri_that_never_reported_a_signal_has_no_receiver_for_it() -> None:
-    """It sends 0 without such a receiver. After the first other value, 0 is a lost signal."""
-    vehicle, strengths, sender = Vehicle(), [], m.MAVLink(None, srcSystem=1, srcComponent=1)
-    telemetry = MavlinkTelemetry(HarakiriReadings(vehicle))
-    for now, rssi in enumerate((0, 0, 255, 51, 0)):
-        frame = bytes(m.MAVLink_rc_channels_raw_message(1, 0, *[1500] * 8, rssi).pack(sender))
-        telemetry.take([frame], kinds([frame]), now)
-        signal = vehicle.last(Signal)
-        strengths.append(None if signal is None else (signal.strength, signal.heard_at))
-    assert strengths == [None, None, (1.0, 2), (0.2, 3), (0.0, 4)]
 
 
 def test_a_voltage_is_not_renewed_by_the_consumption() -> None:
