@@ -25,12 +25,11 @@ from bridge.missions.mission_service import MissionService
 from bridge.model.events import Emit, Level, ShareRefused, ShareUnanswered
 from bridge.sharing.permission import ARMED, is_unknown_read, refusal, right_of
 from bridge.sharing.program import Program, WaitingRequest
-from bridge.sharing.shares import Shares
 from protocols.msp.frame import Direction, MspFrame, frame_size
 from protocols.rights.effect import Effect
 
-#: The requests of all programs: each of n busy accounts has 1 / (n + 1) of them.
-_TOTAL = Rate(400, 400)
+#: The requests of all programs.
+_TOTAL = Rate(1000, 1000)
 #: For this long a reply also answers the same request of other programs.
 _CURRENT_S = 0.2
 #: An unanswered request occupies the line longer than any other: its program pauses.
@@ -59,7 +58,7 @@ class MspSharing:
     _emit: Emit
     _on_change: Callable[[float], None]
     _programs: deque[Program] = field(default_factory=deque)  # the next one to have a request forwarded first
-    _total: Shares = field(default_factory=partial(Shares, _TOTAL))
+    _total: TokenBucket = field(default_factory=partial(TokenBucket, _TOTAL))
     _forwarded: WaitingRequest | None = None
     #: When the line has carried the last forwarded request and its reply.
     _free_at: float = 0.0
@@ -80,11 +79,11 @@ class MspSharing:
     def received(self, program: Program, data: bytes, now: float) -> None:
         if program not in self._programs:
             return
-        taken = program.take(data, now) if self._total.left(now) > self._total.used(program.account) else None
+        taken = program.take(data, now) if self._total.has(now) else None
         if taken is None:
             self._count("too many requests")
             return
-        self._total.spend(program.account, taken)
+        self._total.spend(taken)
         if program.waiting:
             self.tick(now)
 

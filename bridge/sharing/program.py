@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A program on a share: its budget and its waiting requests."""
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass, field
 
 from bridge.gcs.budget import TokenBucket
@@ -54,8 +54,6 @@ class Program:
     blocked_until: float = 0.0
 
     def __post_init__(self) -> None:
-        #: Over UDP that of its host: another port costs nothing there.
-        self.account: Hashable = self.host if self.close is None else self
         self._parser = MspParser(takes_low_v2=True)
         self._budget = TokenBucket(_LIMIT)
 
