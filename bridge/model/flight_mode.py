@@ -56,7 +56,10 @@ def names_of_active(box_flags: int, boxes: Sequence[str]) -> set[str]:
 
 
 def flight_mode(active: Set[str]) -> FlightMode:
-    return next((mode for mode, names in _BOXES if active & names), FlightMode.ACRO)
+    for mode, names in _BOXES:
+        if active & names:
+            return mode
+    return FlightMode.ACRO
 
 
 def active_boxes(activation: Sequence[int], aux_us: Sequence[int]) -> int:
