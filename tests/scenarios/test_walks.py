@@ -27,10 +27,10 @@ from tests.support.walks import TracedDaemon, WakeUp, Walk, measure, run_traced
 #: saves a fifth of the wake-ups.
 CEILINGS = {
     "attitude": Walk(calls=41, returns=13, files=19),
-    "item": Walk(calls=63, returns=25, files=16),
-    "ack": Walk(calls=460, returns=239, files=39),
+    "item": Walk(calls=61, returns=25, files=16),
+    "ack": Walk(calls=458, returns=239, files=39),
     "setting": Walk(calls=279, returns=116, files=53),
-    "arming": Walk(calls=72, returns=22, files=26),
+    "arming": Walk(calls=70, returns=22, files=26),
 }
 #: A walk may be this much shorter than its ceiling.
 _SLACK = 0.05
