@@ -33,7 +33,7 @@ from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.mission_record import ListIdentity
-from reports.finding import Finding, News, RejectingFinding, without_defaults
+from reports.finding import Finding, RejectingFinding, without_defaults
 from reports.verdict import Result, Verdict
 
 #: As a mission file in a command (service/zenoh_link/commands.py).
@@ -292,7 +292,7 @@ class _RemoteMissions(MissionService):
         while not self.results:
             yield Pause(_LOOK_S)
         result = self.results.pop()
-        is_lossy = any(finding.news is News.WARNING for finding in result.findings)
+        is_lossy = any(finding.is_warning for finding in result.findings)
         if result.items is not None:
             # Until the vehicle publishes it: Mission Planner may read at once.
             self.held = HeldMission(ListIdentity(len(result.items), 0), (), result.items)

@@ -79,8 +79,9 @@ def sent_and_stored(
     """
     dropped = {finding.seq: finding.why for finding in findings if finding.becomes == DROPPED}
     rejected = {finding.seq: finding.why for finding in findings if finding.becomes == REJECTED}
-    reasons = {(finding.seq, finding.field): finding.why for finding in findings}
-    changed = {finding.seq for finding in without_defaults(findings)}
+    changes_made = [finding for finding in findings if finding.was != finding.becomes]
+    reasons = {(finding.seq, finding.field): finding.why for finding in changes_made}
+    changed = {finding.seq for finding in without_defaults(changes_made)}
     numbers = sent_seqs or [seq for seq in range(len(sent)) if seq not in dropped]
     held_of: dict[int, MissionItem] = {}
     inserted_before: dict[int | None, MissionItem] = {}

@@ -35,6 +35,7 @@ Note = Callable[[MissionItem, str, float | None, float | str | None, str], None]
 class News(StrEnum):
     """The importance of a finding to the pilot."""
 
+    DANGER = "danger"  # the flight is refused, stops, or ends badly
     WARNING = "warning"  # something is lost, or flown differently than drawn
     NOTICE = "notice"
     NONE = "none"  # a default was filled in
@@ -58,6 +59,10 @@ class Finding:
     command: int | None = None
     news: News = News.NOTICE
 
+    @property
+    def is_warning(self) -> bool:
+        return self.news in (News.DANGER, News.WARNING)
+
     def text(self, count: int = 1) -> str:
         """One line with the reason; `count` items have the same finding."""
         if self.seq is None:
@@ -75,8 +80,10 @@ class Finding:
 
     def _change(self) -> str:
         """The old and the new value; empty if the reason alone says more."""
-        is_replaced_place = self.field in ("lat_e7", "lon_e7") and self.news is News.WARNING
-        if self.was == self.becomes or self.field == "frame" or is_replaced_place:
+        is_place = self.field in ("lat_e7", "lon_e7")
+        is_return = self.command == Command.NAV_RETURN_TO_LAUNCH and self.field == "alt_m"
+        is_told = (is_place or is_return) and self.is_warning
+        if self.was == self.becomes or self.field == "frame" or is_told:
             return ""
         label = value_label(self.command, self.field)
         unit = " m" if self.field in _METRES or label in _METRES else ""

@@ -30,7 +30,8 @@ class Verdict(Generic[RecordT]):
     `records` is the list for the flight controller, `items` the same as read back; both empty unless ACCEPTED.
     `sent_as` maps a record's place to the MAV_CMD that it was sent as, where the record is ambiguous (a region of
     interest). `sent_seqs` has, for each of `items`, the number of the item as sent; None: a speed change that was
-    inserted. `findings` are in the order of the list; that of a rejection is the last.
+    inserted. `flight`: its length, heights and end in words. `findings` are in the order of the list; that of a
+    rejection is the last.
     """
 
     result: Result
@@ -40,6 +41,7 @@ class Verdict(Generic[RecordT]):
     findings: tuple[Finding, ...] = ()
     sent_as: Mapping[int, int] = field(default_factory=dict)
     sent_seqs: SentSeqs = ()
+    flight: tuple[str, ...] = ()
 
 
 def is_renumbered(sent_seqs: SentSeqs) -> bool:

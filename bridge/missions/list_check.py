@@ -6,10 +6,12 @@ One controller's rules are a `MissionRules` and its `ListCheck`; `bridge.control
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
+from bridge.missions.flown_legs import Judgement
+from protocols.mavlink.command import command_name
 from protocols.mission_item import MAX_LAT_E7, MAX_LON_E7, Command, Frame, MissionItem, MissionResult
 from reports.finding import DROPPED, Finding, News, RejectingFinding, reject, reject_list
 from reports.verdict import CLEARED_LIST, Verdict, rejected
@@ -17,6 +19,8 @@ from reports.verdict import CLEARED_LIST, Verdict, rejected
 RELATIVE_FRAMES = (Frame.GLOBAL_RELATIVE_ALT, Frame.GLOBAL_RELATIVE_ALT_INT)
 SEA_LEVEL_FRAMES = (Frame.GLOBAL, Frame.GLOBAL_INT)
 TERRAIN_FRAMES = (Frame.GLOBAL_TERRAIN_ALT, Frame.GLOBAL_TERRAIN_ALT_INT)
+#: The MISSION_ACK for a field.
+_ACKS = {"lat_e7": MissionResult.INVALID_PARAM5_X, "alt_m": MissionResult.INVALID_PARAM7}
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +58,7 @@ class ListCheck(ABC):
         self._taken = 0
         self._findings: list[Finding] = []
         self._rejection: RejectingFinding | None = None
+        self._verdict: Verdict[Any] | None = None
 
     def take(self, item: MissionItem) -> RejectingFinding | None:
         """Check the next item; a rejection is final and is returned as soon as it is certain."""
@@ -67,8 +72,10 @@ class ListCheck(ABC):
         """The verdict, after the rules for the kept list; ValueError if items are missing."""
         if self._rejection is None and self._taken < self._count:
             raise ValueError(f"{self._taken} of {self._count} items taken")
-        rejection = self._rejection or self._refuse_kept_list()
-        return rejected(tuple(self._findings), rejection) if rejection else self._conclude()
+        if self._verdict is None:
+            rejection = self._rejection or self._refuse_kept_list()
+            self._verdict = rejected(tuple(self._findings), rejection) if rejection else self._conclude()
+        return self._verdict
 
     @abstractmethod
     def _judge(self, item: MissionItem) -> RejectingFinding | None:
@@ -114,6 +121,20 @@ class ListCheck(ABC):
         value = given(getattr(item, name))
         self._note(item, name, value, value, why, News.WARNING)
 
+    def _apply(self, judgements: Iterable[Judgement], sent: Sequence[MissionItem]) -> RejectingFinding | None:
+        """Report judgements on the flight; `sent`: the item of each record. The first that rejects ends it."""
+        for place, field, why, news in judgements:
+            if place is None and news is None:
+                return reject_list(MissionResult.INVALID, self._count, why)
+            if place is None:
+                self._findings.append(Finding(None, "count", None, None, why, news=news or News.DANGER))
+            elif news is None:
+                return reject(_ACKS.get(field, MissionResult.INVALID), sent[place], field, why)
+            else:
+                value = given(getattr(sent[place], field))
+                self._note(sent[place], field, value, value, why, news)
+        return None
+
     def _no_position(self, item: MissionItem, news: News = News.NOTICE) -> None:
         for name, value in (("lat_e7", item.lat_e7), ("lon_e7", item.lon_e7)):
             if value:
@@ -122,11 +143,10 @@ class ListCheck(ABC):
     def _note_home(self, item: MissionItem) -> None:
         """Item 0 is home. MAVSDK's `mission` plugin sends none, so its first waypoint becomes home.
 
-        Mission Planner's "Write Fast" sends home in frame 3, so that frame is no warning.
+        Mission Planner's "Write Fast" sends home in frame 3, too, but shows itself later (Upload.is_write_fast).
         """
-        if item.frame in RELATIVE_FRAMES:
-            news = News.NOTICE if item.frame == Frame.GLOBAL_RELATIVE_ALT else News.WARNING
-            self._note(item, "frame", item.frame, int(Frame.GLOBAL), "first item became home, not flown to", news)
+        if item.frame in (*RELATIVE_FRAMES, *TERRAIN_FRAMES):
+            self._note(item, "frame", item.frame, int(Frame.GLOBAL), "item 0 became home, not flown to", News.WARNING)
 
     def _now_relative(self, item: MissionItem) -> None:
         """Report that an altitude is now relative to a different level."""
@@ -212,6 +232,12 @@ def refuse_frame(item: MissionItem, *, needs_position: bool) -> RejectingFinding
     if known or (item.frame == Frame.MISSION and not needs_position):
         return None
     return reject(MissionResult.UNSUPPORTED_FRAME, item, "frame", f"frame {item.frame} not supported")
+
+
+def refuse_first(item: MissionItem) -> RejectingFinding:
+    """Item 0 is a command, so the list has no home."""
+    why = f"the list has no home, its item 0 is {command_name(item.command)}: put home first"
+    return reject(MissionResult.INVALID, item, "command", why)
 
 
 def refuse_position(item: MissionItem) -> RejectingFinding | None:

@@ -34,7 +34,7 @@ from bridge.missions.fc_mission_store import (
     StoreState,
 )
 from bridge.missions.list_check import check_list
-from bridge.missions.mission_texts import summary
+from bridge.missions.mission_texts import has_losses, summary, with_meant_home
 from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission, RecalledMission
 from bridge.model.mission_progress import FlightReport
 from bridge.model.refusal import ARMED, Refusal
@@ -302,10 +302,14 @@ class MissionService:
                 self.is_settled, self.held, self._former = False, None, None
             if result.failure is None:
                 self.held = self._held_now(arrived, identity)
-                lossy, is_erased = summary(len(arrived.items), verdict), verdict.result is Result.CLEARED
+                verdict = with_meant_home(verdict) if arrived.is_home_meant() else verdict
+                is_erased = verdict.result is Result.CLEARED
                 outcome, ack = Outcome.VERIFIED, MissionResult.ACCEPTED
-                text = lossy or _verified_text(verdict, unchanged=result.unchanged)
-                is_lossy = lossy is not None or (is_erased and not result.unchanged)
+                is_lossy = has_losses(verdict) or (is_erased and not result.unchanged)
+                if is_erased and not verdict.findings:
+                    text = _ALREADY_CLEAR if result.unchanged else _CLEARED
+                else:
+                    text = summary(len(arrived.items), verdict, is_unchanged=result.unchanged)
                 if not result.unchanged:
                     change = "Mission erased" if is_erased else f"New mission, {len(verdict.items)} items"
             else:
@@ -413,10 +417,4 @@ _ACKS = {
     PushFailure.NO_SPACE: MissionResult.NO_SPACE,
     PushFailure.REFUSED: MissionResult.INVALID,
 }
-
-
-def _verified_text(verdict: Verdict[Any], *, unchanged: bool) -> str:
-    """The result of a list without losses."""
-    if verdict.result is Result.ACCEPTED:
-        return f"Mission verified: {len(verdict.records)} records{', unchanged' if unchanged else ''}"
-    return "The flight controller already held no mission" if unchanged else "Mission on the flight controller cleared"
+_CLEARED, _ALREADY_CLEAR = "Mission on the flight controller cleared", "The flight controller already held no mission"

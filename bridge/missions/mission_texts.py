@@ -2,7 +2,7 @@
 """The texts for the pilot about a written mission: the findings with equal ones merged, and a summary line."""
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,34 +13,58 @@ from reports.verdict import Verdict
 _MOST_LINES = 10
 #: A longer text would be split, and Mission Planner's HUD shows only the last piece.
 _LINE_LENGTH = 50
+_RANKS = (News.DANGER, News.WARNING, News.NOTICE)
 
 
-def summary(sent: int, verdict: Verdict[Any]) -> str | None:
-    """A summary of `sent` items and the worst finding; None if nothing was lost or changed its meaning."""
-    warnings = [finding for finding in verdict.findings if finding.news is News.WARNING]
+def with_meant_home(verdict: Verdict[Any]) -> Verdict[Any]:
+    """Without the warning that item 0 became home."""
+    findings = [finding for finding in verdict.findings if (finding.seq, finding.field) != (0, "frame")]
+    return replace(verdict, findings=tuple(findings))
+
+
+def has_losses(verdict: Verdict[Any]) -> bool:
+    """True if anything is lost or flown differently than it reads."""
+    return bool(verdict.findings) and any(finding.is_warning for finding in verdict.findings)
+
+
+def summary(sent: int, verdict: Verdict[Any], *, is_unchanged: bool = False) -> str:
+    """What is stored of `sent` items, the worst findings, and the flight, in one line."""
+    start = f"{len(verdict.items)} of {sent} {'unchanged' if is_unchanged else 'stored'}: "
+    warnings = [finding for finding in verdict.findings if finding.is_warning]
     if not warnings:
-        return None
+        return _fitted(start, [], verdict.flight)
     if not verdict.items:
         return warnings[-1].text()
     dropped = sum(finding.becomes == DROPPED for finding in verdict.findings)
-    kept = [finding for finding in warnings if finding.becomes != DROPPED]
+    kept = [finding for finding in warnings if finding.becomes != DROPPED and finding.news is not News.DANGER]
     relative = sum(finding.field == "frame" and finding.seq != 0 for finding in kept)
     heights = [finding for finding in kept if finding.field == "alt_m" and finding.becomes != finding.was]
     raised, landings = len(heights), sum(finding.command == Command.NAV_LAND for finding in heights)
     home = sum(finding.seq == 0 for finding in kept)
-    differing = len(kept) - relative - raised - home
     counts = {
         "dropped": dropped,
         "Alt now relative": relative,
         "Alt raised": raised - landings,
         "LAND flown to first": landings,
-        "flown differently": differing,
+        "flown differently": len(kept) - relative - raised - home,
     }
-    news = [f"{count} {what}" for what, count in counts.items() if count] or ["check home"]
-    stored = f"{len(verdict.items)} of {sent} stored: "
-    text = stored + ", ".join(news)
+    dangers = sum(finding.news is News.DANGER for finding in warnings)
+    news = [f"{dangers} danger{'s' * (dangers > 1)}"] * (dangers > 0)
+    news += [f"{count} {what}" for what, count in counts.items() if count] + ["check home"] * (home > 0)
+    return _fitted(start, news, verdict.flight)
+
+
+def _fitted(start: str, news: list[str], flight: Sequence[str]) -> str:
+    """As much of the flight as fits the line, then as much of the news."""
+    if len(text := start + ", ".join((*news, *flight))) <= _LINE_LENGTH:
+        return text
+    short = [fact.replace("returns home at", "RTL at").replace("does not land", "no landing") for fact in flight]
+    least = [fact for fact in short if not fact.startswith("highest")]
+    for facts in (short, least, least[:1], ()):
+        if len(text := start + ", ".join((*news, *facts))) <= _LINE_LENGTH:
+            return text
     while len(text) > _LINE_LENGTH:
-        text = stored + ", ".join([*(news := news[:-1]), "more"])
+        text = start + ", ".join([*(news := news[:-1]), "more"])
     return text
 
 
@@ -53,7 +77,7 @@ def finding_lines(findings: Iterable[Finding]) -> list[tuple[News, str]]:
         first.setdefault(kind, finding)
         counts[kind] += 1
     lines = [(finding.news, finding.text(counts[kind])) for kind, finding in first.items()]
-    lines.sort(key=lambda line: line[0] is not News.WARNING)
+    lines.sort(key=lambda line: _RANKS.index(line[0]))
     if len(lines) > _MOST_LINES:
         more = f"and {len(lines) - _MOST_LINES} more: see the status page or naze-bridge missions show"
         lines[_MOST_LINES:] = [(News.NOTICE, more)]

@@ -13,7 +13,6 @@ from bridge.model.refusal import Refusal
 from bridge.model.vehicle import Vehicle
 from protocols.mission_item import MissionResult
 from protocols.mission_record import identify
-from reports.finding import News
 from reports.verdict import Result
 
 NO_PLACES = Refusal(MissionResult.UNSUPPORTED, "No fences or rally points: only missions are stored")
@@ -50,7 +49,7 @@ class PlaceLists(MissionService):
         if result.failure is not None:
             return DeliveryResult(MissionResult.DENIED, f"{self._name}: {result.failure.value}", None)
         self.held = HeldMission(identify(verdict.records), verdict.records, verdict.items)
-        warnings = sum(finding.news is News.WARNING for finding in verdict.findings)
+        warnings = sum(finding.is_warning for finding in verdict.findings)
         done = f"{self._name} " + (f"verified: {len(verdict.items)} items" if verdict.items else "cleared")
         more = [", unchanged"] if result.unchanged else []
         more += [f", warnings: {warnings}"] if warnings else []

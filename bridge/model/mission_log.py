@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The stored record of a received mission."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
@@ -25,13 +25,15 @@ class Outcome(Enum):
 class ArrivedMission:
     """A mission as received: its source as text, the items as sent, and the verdict.
 
-    `sender`: Station.identity of the ground station; empty for other sources.
+    `sender`: Station.identity of the ground station; empty for other sources. `is_home_meant`: True if item 0 is surely
+    home, whatever its frame, asked at the end.
     """
 
     source: str
     items: tuple[MissionItem, ...]
     verdict: Verdict[Any]
     sender: str = ""
+    is_home_meant: Callable[[], bool] = lambda: False
 
 
 @dataclass(frozen=True, slots=True)

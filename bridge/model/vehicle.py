@@ -353,7 +353,7 @@ class Vehicle:
 
     def hear_home(self, lat_e7: int, lon_e7: int, altitude_m: float | None = None) -> None:
         """Take the flight controller's own home, degrees * 1e7. It has none while these are 0 or 190 degrees."""
-        if not (lat_e7 and lon_e7 and is_on_earth(lat_e7, lon_e7)):
+        if not _is_place(lat_e7, lon_e7):
             return
         self.is_home_settled = True
         if self.home is None or (self.home.lat_e7, self.home.lon_e7) != (lat_e7, lon_e7):
@@ -396,7 +396,7 @@ class Vehicle:
     def place(self) -> tuple[int, int] | None:
         """Latitude and longitude of `home_or_position`, degrees * 1e7."""
         here = self.home_or_position()
-        return None if here is None else (here.lat_e7, here.lon_e7)
+        return None if here is None or not _is_place(here.lat_e7, here.lon_e7) else (here.lat_e7, here.lon_e7)
 
     def _place_home(self, *, has_armed: bool) -> None:
         """Home is where the craft was armed. It never moves in flight, even if the link is lost.
@@ -404,7 +404,7 @@ class Vehicle:
         Before the first arming it is the place of the craft. The flight controller's own home overrides both.
         """
         position, height = self.last(GlobalPosition), self.last(Height)
-        if position is None:
+        if position is None or not (position.lat_e7 and position.lon_e7):
             return
         here = Home(position.lat_e7, position.lon_e7, position.altitude_m)
         if has_armed:
@@ -417,3 +417,8 @@ class Vehicle:
                 self.home = replace(self.home, altitude_m=position.altitude_m)
             elif self.armed and height is not None and position.altitude_m is not None:
                 self.home = replace(self.home, altitude_m=position.altitude_m - height.height_m)
+
+
+def _is_place(lat_e7: int, lon_e7: int) -> bool:
+    """False for 0/0 and beyond the poles, which a board without a real fix may report."""
+    return bool(lat_e7 and lon_e7) and is_on_earth(lat_e7, lon_e7)

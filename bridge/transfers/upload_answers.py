@@ -22,6 +22,7 @@ _CANCEL_S = 3.0
 _REMINDERS_S = (2.0, 4.0)
 #: QGroundControl waits 1.5 s for the final ack, and MAVSDK 2.5 s; neither asks for it again. So it is sent three times.
 _ACK_AGAIN_S = (0.4, 0.9)
+_SEVERITIES = {News.DANGER: Severity.WARNING, News.WARNING: Severity.NOTICE}
 _NOT_WHOLE = Refusal(MissionResult.UNSUPPORTED, "A mission can only be written as a whole")
 #: QGroundControl silently leaves out lists that the vehicle does not offer to store.
 _ONLY_MISSIONS = "Fences and rally points are not stored here"
@@ -73,7 +74,8 @@ class UploadAnswers:
     def report(self, station: Station, verdict: Verdict[Any], delivery: DeliveryResult, now: float) -> None:
         """Report everything to the sender, and the change on the aircraft to other ground stations.
 
-        The summary is last, and the only warning: Mission Planner shows the last one, and its voice says the first.
+        The summary is last: Mission Planner shows the last text. Before it only dangers are warnings, which its voice
+        says.
         """
         accepted = delivery.ack is MissionResult.ACCEPTED
         sender = self._ground.station(station.peer)
@@ -83,7 +85,7 @@ class UploadAnswers:
                 self._ground.say(Severity.INFO, _ONLY_MISSIONS, station)
         for news, line in finding_lines(verdict.findings) if accepted else ():
             if line != delivery.text:
-                self._ground.say(Severity.NOTICE if news is News.WARNING else Severity.INFO, line, station)
+                self._ground.say(_SEVERITIES.get(news, Severity.INFO), line, station)
         if delivery.number is None and not self._mission_type:  # the Pi stores no others
             self._ground.say(Severity.WARNING, "The mission could not be stored on the Pi", station)
         severity = Severity.INFO if accepted else Severity.ERROR

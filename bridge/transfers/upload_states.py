@@ -231,6 +231,8 @@ class Upload:
     mission_type: int
     heard_at: float
     number: int = 0
+    #: Its sender has ended it itself, with a MISSION_ACK: only Mission Planner's "Write Fast" does, and sends home.
+    is_write_fast: bool = False
 
     def __post_init__(self) -> None:
         self.state: UploadState = Waiting(self, Event(), self.heard_at)

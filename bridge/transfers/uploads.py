@@ -19,6 +19,7 @@ from bridge.line.conversation import Conversation
 from bridge.missions.fc_mission_store import StoreReport
 from bridge.missions.list_check import begin_check, check_count
 from bridge.missions.mission_service import OCCUPIED, DeliveryResult, MissionService, MissionTransfer, TransferStep
+from bridge.missions.mission_texts import with_meant_home
 from bridge.model.events import Emit, StationMoved, UploadEnded, UploadRefused, UploadStarted
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.refusal import Refusal
@@ -154,7 +155,10 @@ class MissionUploads:
     def ack(self, station: Station, result: int, now: float) -> None:
         """MISSION_ACK from a ground station: an error cancels its upload, ACCEPTED ends "Write Fast"."""
         upload = self._find(station, now)
-        if upload is None or isinstance(upload.state, Delivering):
+        if upload is None:
+            return
+        upload.is_write_fast |= result == MissionResult.ACCEPTED
+        if isinstance(upload.state, Delivering):
             return
         if result != MissionResult.ACCEPTED:
             self._handle(upload, Ended(_cancelled(f"cancelled (result {result})")), now)
@@ -301,7 +305,9 @@ class MissionUploads:
     def _delivery(self, upload: Upload, whole: WholeList) -> Conversation[DeliveryResult]:
         """Store the list and write it; a rejected one is only stored, unless its sender sent too many of them."""
         is_kept = whole.verdict.result is not Result.REJECTED or self._ground.allows(upload.station, Cost.STORED)
-        arrived = ArrivedMission(str(upload.station), whole.items, whole.verdict, upload.station.identity)
+        arrived = ArrivedMission(
+            str(upload.station), whole.items, whole.verdict, upload.station.identity, lambda: upload.is_write_fast
+        )
         return self._missions.deliver(arrived, is_kept=is_kept)
 
     def _delivered(self, upload: Upload, verdict: Verdict[Any], delivery: DeliveryResult | Refusal, now: float) -> None:
@@ -311,7 +317,8 @@ class MissionUploads:
         accepted = delivery.ack is MissionResult.ACCEPTED
         if verdict.result is not Result.REJECTED and accepted and not delivery.change:
             self._ground.not_written(upload.station)
-        self.answers.report(upload.station, verdict, delivery, now)
+        shown = with_meant_home(verdict) if upload.is_write_fast else verdict
+        self.answers.report(upload.station, shown, delivery, now)
         if upload in self._queue.uploads:
             self._answer(upload, delivery.ack, now)
             self._handle(upload, Delivered(), now)

@@ -8,8 +8,10 @@ from typing import Any
 
 import click
 
+from bridge.controllers.harakiri.flight import MAX_LEG_M, USUAL_FLIGHT
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M, USUAL_CAPACITY, USUAL_WP_RADIUS_CM
-from bridge.controllers.inav.limits import SETTING_NAMES
+from bridge.controllers.inav.limits import SETTING_NAMES, InavLimits
+from bridge.controllers.nav.leg_limits import USUAL_LEGS
 from bridge.controllers.nav.rules import INAV_CAPACITY, MULTIWII_CAPACITY
 from bridge.controllers.table import PROFILES
 from bridge.fc.profile import RuleSettings
@@ -34,6 +36,17 @@ from terminal.sentences import complain, say
 #: The rules of each flight controller that stores missions.
 _RULES: Mapping[str, Callable[[RuleSettings], MissionRules]] = {
     profile.check_kind: profile.rules for profile in PROFILES if profile.check_kind and profile.rules
+}
+
+
+_INAV, _MULTIWII = InavLimits(), USUAL_LEGS
+#: The limits of a board's flight with default settings.
+_ASSUMED = {
+    "harakiri": f"mission flight, mission_first {USUAL_FLIGHT.mission_first} m, "
+    f"mission_height {USUAL_FLIGHT.mission_height} m, legs of at most {MAX_LEG_M} m",
+    "inav": f"nav_wp_max_safe_distance {_INAV.nav_wp_max_safe_distance} m, nav_max_altitude off, "
+    f"nav_rth_altitude {_INAV.nav_rth_altitude / 100:g} m, and the other defaults (--settings FILE gives yours)",
+    "multiwii": f"safe_wp_distance {_MULTIWII.stops_at_m} m, nav_max_altitude {_MULTIWII.highest_m} m",
 }
 
 
@@ -123,7 +136,10 @@ def check(
         rules = _RULES[kind](RuleSettings(limit_m, wp_radius_cm, capacity, saved))
     except ValueError as error:
         raise click.UsageError(f"{settings_file}: {error}; save the settings again") from error
+    assumed = "" if saved else _ASSUMED.get(kind, "")
     codes = [_check_file(path, rules, home, strict, as_json) for path in files]
+    if assumed and not as_json and set(codes) != {ExitCode.UNREADABLE}:
+        say(f"Assumed, because no board was asked: {assumed}")
     ctx.exit(max(codes, key=_RANKS.index))
 
 
@@ -174,4 +190,4 @@ def _summary(sent: int, verdict: Verdict[Any]) -> str:
     dropped = sum(finding.becomes == DROPPED for finding in verdict.findings)
     changed = len(without_defaults(verdict.findings)) - dropped
     stored = f"{len(verdict.items)} of {sent} items stored, {dropped} dropped, values changed: {changed}"
-    return f"{stored}; {identify(verdict.records)}"
+    return f"{stored}; {', '.join(verdict.flight)}; {identify(verdict.records)}"

@@ -103,7 +103,8 @@ class Firmware:
         self._board = Board(options, faults, self._config.load())
         self._missions = boot_missions(flash, self._board) if faults.extension else None
         spend_write = self._missions.spend_write if self._missions else lambda: True
-        self._settings = SettingsCommands(self._board, self._config.load_settings(STORED_SIZE), spend_write)
+        stored, has_flight = self._config.load_settings(STORED_SIZE), faults.flight is not None
+        self._settings = SettingsCommands(self._board, stored, spend_write, has_flight=has_flight)
         # The extension enlarges the buffer for its longest CHUNK: mask, number, records.
         self._msp = MspReceiver(3 + options.chunk_records * RECORD_SIZE) if faults.extension else MspReceiver()
         self._answers = MspAnswers(lambda: self.craft_at(self._clock), options.tree)

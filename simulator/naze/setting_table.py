@@ -194,3 +194,15 @@ _ROWS = (
 )
 #: In the board's order.
 SETTINGS = tuple(HeldSetting(Setting(*row[:4]), row[4]) for row in _ROWS)
+#: Those of a build with mission flight (firmware/patches/TestCode3-flight.patch).
+FLIGHT_SETTINGS = tuple(
+    HeldSetting(Setting(name, _U8, low, high), value)
+    for name, low, high, value in (
+        ("mission_fly", 0, 1, 0),
+        ("mission_first", 10, 250, 200),
+        ("mission_height", 5, 250, 100),
+        ("mission_climb", 20, 250, 100),
+        ("mission_nav_p", 5, 200, 70),
+        ("mission_nav_i", 1, 200, 60),
+    )
+)

@@ -15,7 +15,7 @@ from protocols.msp.setting_table import (
     table_checksum,
 )
 from simulator.naze.missions import Board
-from simulator.naze.setting_table import SETTINGS
+from simulator.naze.setting_table import FLIGHT_SETTINGS, SETTINGS
 
 _READ = struct.Struct("<HH")
 _SET = struct.Struct("<HI4s")
@@ -30,19 +30,23 @@ STORED_SIZE = 4 * len(SETTINGS)
 
 
 class SettingsCommands:
-    """The settings in RAM since boot. `stored`: their values in the configuration; empty: the defaults."""
+    """The settings in RAM since boot. `stored`: their values in the configuration; empty: the defaults.
 
-    def __init__(self, board: Board, stored: bytes, spend_write: Callable[[], bool]) -> None:
+    Those of mission flight, which a build `has_flight` for, are not stored.
+    """
+
+    def __init__(self, board: Board, stored: bytes, spend_write: Callable[[], bool], *, has_flight: bool) -> None:
         self._board = board
         self._spend_write = spend_write
         self._held = [
             held._replace(value=held.setting.unpack(stored[4 * at :])) if stored else held
             for at, held in enumerate(SETTINGS)
         ]
+        self._held += FLIGHT_SETTINGS if has_flight else ()
 
     def encode(self) -> bytes:
         """The values for the configuration."""
-        return b"".join(held.setting.pack(held.value) for held in self.table)
+        return b"".join(held.setting.pack(held.value) for held in self.table[: len(SETTINGS)])
 
     def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
         """The reply's payload; None if it is another command."""

@@ -180,7 +180,7 @@ def test_write_fast_is_written_and_verified(shared: Bench, count: int) -> None:
     plan[0] = replace(plan[0], frame=Frame.GLOBAL_RELATIVE_ALT)
     planner.write_fast(plan)
     until(lambda: shared.board.records() == records_of(judge(plan)), "the list on the board")
-    planner.wait_for_text("Mission verified")
+    planner.wait_for_text(" stored: ")
     requested = [message.seq for message in planner.messages("MISSION_REQUEST")]
     assert max(requested) < count
     assert MissionResult.INVALID_SEQUENCE not in planner.acks()

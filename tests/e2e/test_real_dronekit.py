@@ -61,4 +61,4 @@ def test_an_upload_without_a_download_needs_a_timeout(shared: Bench, caplog: pyt
         vehicle.commands.add(command(Command.NAV_WAYPOINT, HOME[0] + 1e-3, HOME[1], 20))
         with pytest.raises(GaveUp):
             vehicle.commands.upload(timeout=5)
-        until(lambda: "must be a WAYPOINT" in caplog.text, "the reason")
+        until(lambda: "put home first" in caplog.text, "the reason")

@@ -177,7 +177,7 @@ def test_the_example_programs_work(fleet: Fleet, tmp_path: Path) -> None:
         [*upload, "kite", str(file), fleet.router.endpoint], capture_output=True, text=True, timeout=60, check=False
     )
     assert (uploaded.returncode, uploaded.stderr) == (0, ""), uploaded
-    assert "Mission verified: 6 records" in uploaded.stdout
+    assert "6 of 6 stored: " in uploaded.stdout
     output = tmp_path / "positions"
     with output.open("w") as log:
         positions = subprocess.Popen(

@@ -61,7 +61,7 @@ def test_filled_in_defaults_are_no_changes_but_keep_their_reasons() -> None:
     sent = [
         replace(HOME, p2=0.0),
         replace(HOME, seq=1, frame=3, p2=0.0, alt_m=20.0),
-        replace(HOME, seq=2, frame=3, p1=3.0),
+        replace(HOME, seq=2, frame=3, p1=3.0, alt_m=20.0),
     ]
     shown = checked_mission(sent, verdict_data(check_list(sent, RULES)))
     assert [row["kind"] for row in shown["rows"]] == ["same", "same", "changed"]
@@ -71,7 +71,7 @@ def test_filled_in_defaults_are_no_changes_but_keep_their_reasons() -> None:
 
 def test_a_finding_reads_as_in_the_messages_tab() -> None:
     """Also after it was stored as JSON."""
-    sent = [HOME, replace(HOME, seq=1, frame=3, alt_m=0.0), replace(HOME, seq=2, frame=3)]
+    sent = [HOME, replace(HOME, seq=1, frame=3, alt_m=0.0), replace(HOME, seq=2, frame=3, alt_m=9.0)]
     verdict = check_list(sent, RULES)
     stored = json.loads(to_json(verdict_data(verdict)))
     assert checked_mission(sent, stored)["findings"] == [finding.text() for finding in verdict.findings]

@@ -10,11 +10,12 @@ from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile
 from bridge.missions.list_check import check_list
-from bridge.missions.mission_texts import finding_lines, summary
+from bridge.missions.mission_texts import finding_lines, has_losses, summary
 from reports.finding import DROPPED, REJECTED, Finding, News
 from tests.support.rule_items import (
     HOME,
     LAND,
+    LON,
     ROI,
     ROI_LOCATION,
     RTL,
@@ -92,7 +93,7 @@ def test_no_value_is_reported_as_changed_to_itself() -> None:
         "WP 1: param3 changed from 0.5 to 0 (not used)",
     ]
     home = replace(HOME, lon_e7=0)
-    verdict = check_list([home, item(WAYPOINT)], HarakiriRules(), (home.lat_e7 or 0, 5))
+    verdict = check_list([home, item(WAYPOINT)], HarakiriRules(), (home.lat_e7 or 0, LON + 5))
     assert [each.text() for each in verdict.findings] == ["Home: no Lat/Long sent, GPS position used"]
 
 
@@ -100,15 +101,16 @@ def test_a_filled_in_default_is_not_reported() -> None:
     """Mission Planner sends no radius for home, and 0 for an empty field."""
     verdict = check_list([replace(HOME, p2=0.0), item(WAYPOINT, p2=0.0), item(TIME, p2=math.nan)], HarakiriRules())
     assert {each.news for each in verdict.findings} == {News.NONE}
-    assert summary(3, verdict) is None
+    assert not has_losses(verdict)
+    assert summary(3, verdict) == "3 of 3 stored: 0 m, highest 10 m, does not land"
     assert finding_lines(verdict.findings) == []
 
 
 def test_a_list_without_home_reports_its_first_item_as_home() -> None:
     """As sent by MAVSDK's `mission` plugin."""
     verdict = check_list([item(WAYPOINT, frame=6), item(WAYPOINT)], HarakiriRules())
-    assert [each.text() for each in verdict.findings] == ["Home: first item became home, not flown to"]
-    assert summary(2, verdict) == "2 of 2 stored: check home"
+    assert [each.text() for each in verdict.findings] == ["Home: item 0 became home, not flown to"]
+    assert summary(2, verdict) == "2 of 2 stored: check home, 0 m, no landing"
 
 
 def test_a_leg_below_home_is_not_counted_as_raised() -> None:
@@ -122,4 +124,4 @@ def test_an_altitude_below_one_metre_is_raised_with_that_reason() -> None:
         (News.WARNING, "WP 1: Alt raised from 0.5 to 2 m (less than 1)"),
         (News.WARNING, "WP 2: Alt raised from 0 to 2 m (0 not allowed)"),
     ]
-    assert summary(3, verdict) == "3 of 3 stored: 2 Alt raised"
+    assert summary(3, verdict) == "3 of 3 stored: 2 Alt raised, 0 m, no landing"

@@ -20,7 +20,7 @@ from simulator.commands.fc_kinds import make_board
 from simulator.inav.boxes import BOXES as INAV_BOXES
 from tests.bridge.controllers.inav.test_approaches import set_approaches
 from tests.bridge.controllers.inav.test_place_store import RALLY, RALLY_ITEMS
-from tests.support.conversations import Upload, clear_message, waypoints
+from tests.support.conversations import Upload, ack_message, clear_message, count_message, item_message, waypoints
 from tests.support.screens import Glance, Screens
 from tests.support.world import GroundStation, World
 
@@ -259,14 +259,14 @@ class TestWritingMissions:
         _, station, screens = on_the_ground()
         assert Upload(station, waypoints(9)).run() is MissionResult.ACCEPTED
         assert all(is_quiet(glance) for glance in screens.look())
-        assert screens.mission_planner.texts()[-1] == "Mission verified: 9 records"
+        assert screens.mission_planner.texts()[-1].startswith("9 of 9 stored: ")
 
     def test_the_summary_of_a_lossy_write_stays_and_is_spoken(self, indoors: Indoors) -> None:
         world, station, screens = indoors
         items = waypoints(9)
         items[3], items[4] = replace(items[3], command=178), replace(items[4], frame=Frame.GLOBAL)
         assert Upload(station, items).run() is MissionResult.ACCEPTED
-        began, summary = world.now, "8 of 9 stored: 1 dropped, 1 Alt now relative"
+        began, summary = world.now, "8 of 9 stored: 1 dropped, 1 Alt now relative, 7 m"
         first, ninth, last = screens.look()
         assert first.hud == ninth.hud == summary
         assert last.hud in ("Unhealthy GPS Signal", "")
@@ -296,12 +296,26 @@ class TestWritingMissions:
         assert [glance.hud for glance in screens.look(1, 9)] == ["Rejected, WP 4: latitude beyond 90 deg"] * 2
 
     def test_write_fast_does_not_warn_of_home(self) -> None:
-        """It sends home in frame 3."""
-        _, station, screens = on_the_ground()
+        """It sends home in frame 3, and ends with its own MISSION_ACK."""
+        world, station, screens = on_the_ground()
+        items = waypoints(9)
+        items[0] = replace(items[0], frame=Frame.GLOBAL_RELATIVE_ALT)
+        ask(station, count_message(len(items)))
+        for seq, item in enumerate(items):
+            station.send(item_message(seq, item))
+        ask(station, ack_message(MissionResult.ACCEPTED))
+        world.run(5)
+        assert any("9 of 9 stored: 7 m" in text for text in station.texts())
+        assert all(is_quiet(glance) for glance in screens.look())
+
+    def test_another_list_whose_home_is_a_waypoint_is_a_warning(self) -> None:
+        """A script that sends its first waypoint as item 0, in frame 3."""
+        _, station, _ = on_the_ground()
         items = waypoints(9)
         items[0] = replace(items[0], frame=Frame.GLOBAL_RELATIVE_ALT)
         assert Upload(station, items).run() is MissionResult.ACCEPTED
-        assert all(is_quiet(glance) for glance in screens.look())
+        assert "Home: item 0 became home, not flown to" in station.texts()
+        assert station.texts()[-1].startswith("9 of 9 stored: check home")
 
     @pytest.mark.parametrize("radius_cm", [3000.0, 199.949])
     def test_what_follows_a_write_raises_no_error(self, radius_cm: float) -> None:

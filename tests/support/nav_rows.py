@@ -153,7 +153,7 @@ def _cells(row: Row) -> tuple[str, str]:
 
 def _parts(verdict: Verdict[NavRecord]) -> list[str]:
     """The records, unless the list is rejected, and each message."""
-    texts = [f"{'**' * (f.news is News.WARNING)}{f.text()}{'**' * (f.news is News.WARNING)}"
+    texts = [f"{'**' * (f.is_warning)}{f.text()}{'**' * (f.is_warning)}"
             for f in verdict.findings if f.news is not News.NONE]  # fmt: skip
     if verdict.result is not Result.ACCEPTED:
         return texts

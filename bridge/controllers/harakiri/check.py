@@ -2,9 +2,11 @@
 """The rules for a Harakiri's mission list (docs/mission-rules.md)."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+from bridge.controllers.harakiri.flight import USUAL_FLIGHT, FlightLimits, fly, low_returns
 from bridge.controllers.harakiri.rules import (
     CRUISE,
     NO_ROI_KNOWN,
@@ -19,6 +21,7 @@ from bridge.controllers.harakiri.rules import (
 )
 from bridge.controllers.harakiri.single_precision import readable_e7
 from bridge.fc.profile import RuleSettings
+from bridge.missions.flown_legs import Departure, FlownPath, Judgement, Point, beyond_plain_limits
 from bridge.missions.list_check import (
     SEA_LEVEL_FRAMES,
     TERRAIN_FRAMES,
@@ -26,9 +29,11 @@ from bridge.missions.list_check import (
     ListCheck,
     given,
     missing_coordinate,
+    refuse_first,
     refuse_frame,
     refuse_position,
 )
+from protocols.mavlink.command import command_name
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.msp.mission import WpCommand, WpRecord
 from reports.finding import CLEARED, DROPPED, Finding, News, RejectingFinding, reject
@@ -42,7 +47,8 @@ class HarakiriRules:
     """The rules' inputs from the flight controller and the settings.
 
     capacity: records, home included. wp_radius_cm: its gps_wp_radius. takeoff_max_m: the highest take-off.
-    is_single_precision: the list is written over its MAVLink, which moves places a little.
+    is_single_precision: the list is written over its MAVLink, which moves places a little. flight: of a board that
+    flies the list; None: it only stores it.
     """
 
     has_home: ClassVar[bool] = True
@@ -50,6 +56,7 @@ class HarakiriRules:
     wp_radius_cm: int = USUAL_WP_RADIUS_CM
     takeoff_max_m: int = TAKEOFF_MAX_M
     is_single_precision: bool = False
+    flight: FlightLimits | None = USUAL_FLIGHT
 
     @property
     def max_items(self) -> int:
@@ -84,6 +91,9 @@ class HarakiriCheck(ListCheck):
         self._kept: list[tuple[MissionItem, CommandRule]] = []  # items as sent, home included
         self._records: list[WpRecord] = []
         self._roi_commands: dict[int, int] = {}
+        self._flight = rules.flight
+        self._path = FlownPath()
+        self._raised_returns: set[int] = set()
 
     def _judge(self, item: MissionItem) -> RejectingFinding | None:
         rule = self._rules.get(item.command)
@@ -97,7 +107,7 @@ class HarakiriCheck(ListCheck):
         return rejection
 
     def _conclude(self) -> Verdict[WpRecord]:
-        findings = tuple(self._findings)
+        findings = tuple(sorted(self._findings, key=lambda finding: finding.seq or 0))
         if len(self._records) == 1:
             cleared = Finding(None, "count", self._count, CLEARED, "no command left", news=News.WARNING)
             return Verdict(Result.CLEARED, MissionResult.ACCEPTED, findings=(*findings, cleared))
@@ -112,11 +122,12 @@ class HarakiriCheck(ListCheck):
             findings,
             self._roi_commands,
             tuple(item.seq for item, _ in self._kept),
+            self._path.facts(),
         )
 
     def _refuse(self, item: MissionItem, rule: CommandRule | None) -> RejectingFinding | None:
         if item.seq == 0 and item.command != Command.NAV_WAYPOINT:
-            return reject(MissionResult.INVALID, item, "command", "must be a WAYPOINT")
+            return refuse_first(item)
         if rule is None:
             self._leave_out(item)
             return None
@@ -130,12 +141,20 @@ class HarakiriCheck(ListCheck):
         is_last = seq == self._count - 1
         match rule.place:
             case InList.ITEM_1 if seq != 1:
-                return f"{rule.name} must be item 1"
+                return f"{rule.name} must be item 1{self._way_out(seq)}"
             case InList.LAST if not is_last:
                 return f"{rule.name} must be last"
             case InList.NOT_LAST if is_last:
                 return f"{rule.name} cannot be last"
         return None
+
+    def _way_out(self, seq: int) -> str:
+        """What to remove, if only items that are not stored anyway are before this one."""
+        dropped = [finding for finding in self._findings if finding.becomes == DROPPED]
+        if not dropped or len(self._kept) > 1:
+            return ""
+        names = ", ".join(f"WP {each.seq} {command_name(each.command or 0)}" for each in dropped[:2])
+        return f": remove {names}, which {'is' if seq == 2 else 'are'} not stored"
 
     def _refuse_home(self, home: MissionItem) -> RejectingFinding | None:
         if not math.isfinite(home.alt_m):
@@ -182,7 +201,7 @@ class HarakiriCheck(ListCheck):
             self._note_home(item)
         no_nose = rule.p4 is NOSE_ON_ROI and not self._roi_known
         lat_e7, lon_e7 = self._place(item) if rule.position else (0, 0)
-        height_news = self._height_news(item, rule)
+        is_raised = rule.height is CRUISE and (not math.isfinite(item.alt_m) or math.trunc(item.alt_m) == 0)
         p1 = self._fit(item, "p1", rule.p1)
         # Filled-in defaults are not reported, nor is the radius of home, which is not flown to.
         p2 = self._fit(item, "p2", rule.p2, News.NOTICE if item.seq and not math.isnan(item.p2) else News.NONE)
@@ -191,7 +210,10 @@ class HarakiriCheck(ListCheck):
         p4 = self._fit(item, "p4", NO_ROI_KNOWN if no_nose else rule.p4)
         if not rule.position:
             self._no_position(item)
-        height_m = self._fit(item, "alt_m", rule.height, height_news)
+        if is_raised and rule.record is WpCommand.RETURN_TO_LAUNCH:
+            height_m = self._raise_return(item)
+        else:
+            height_m = self._fit(item, "alt_m", rule.height, News.WARNING if item.seq and is_raised else News.NOTICE)
         has_turns = rule.record is WpCommand.LOITER_TURNS
         if rule.record is WpCommand.SETROI:
             self._roi_known = True
@@ -219,9 +241,14 @@ class HarakiriCheck(ListCheck):
         self._moved_e7 = max(self._moved_e7, abs(lat_e7 - sent[0]), abs(lon_e7 - sent[1]))
         return lat_e7, lon_e7
 
-    def _height_news(self, item: MissionItem, rule: CommandRule) -> News:
-        is_raised = rule.height is CRUISE and (not math.isfinite(item.alt_m) or math.trunc(item.alt_m) == 0)
-        return News.WARNING if item.seq and is_raised else News.NOTICE
+    def _raise_return(self, item: MissionItem) -> int:
+        """QGroundControl's Return item has no altitude at all."""
+        lowest_m = CRUISE.instead_of_zero
+        self._note(
+            item, "alt_m", given(item.alt_m), lowest_m, f"RTL flies home at {lowest_m} m, set its Alt", News.DANGER
+        )
+        self._raised_returns.add(len(self._records))
+        return lowest_m
 
     def _refuse_kept_list(self) -> RejectingFinding | None:
         """Apply the rules for `last` and `alone` to the kept list; dropping items does not change first and last."""
@@ -232,4 +259,18 @@ class HarakiriCheck(ListCheck):
         if len(commands) == 1 and not commands[0][1].alone:
             item, rule = commands[0]
             return reject(MissionResult.INVALID, item, "command", f"{rule.name} cannot be alone")
-        return None
+        return self._apply(self._flown(), [item for item, _ in self._kept])
+
+    def _flown(self) -> Iterator[Judgement]:
+        """What is flown differently than it reads, or not at all."""
+        craft = self._fallback_home
+        home = Point(self._records[0].lat_e7, self._records[0].lon_e7)
+        departure = Departure(Point(*craft) if craft else None, home)
+        self._path = path = fly(self._records, departure)
+        if self._flight is None:
+            yield from beyond_plain_limits(path, departure)
+        else:
+            yield from self._flight.judge(self._records, path, departure)
+        for low in low_returns(path):
+            if low.place not in self._raised_returns:
+                yield low

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from bridge.controllers.harakiri.check import harakiri_rules
+from bridge.controllers.harakiri.flight import USUAL_FLIGHT
 from bridge.controllers.harakiri.mission_store import HarakiriStore
 from bridge.controllers.harakiri.rules import MAV_COMMANDS, items_from_records
 from bridge.controllers.harakiri.single_precision import degrees_read_e7, degrees_to_send
@@ -61,7 +62,8 @@ class HarakiriMavlinkMissions(HarakiriStore):
         armed = self._vehicle.armed
         if armed is None:
             return None
-        rules = replace(harakiri_rules(self._settings), is_single_precision=True)
+        flight = None if self._vehicle.last_flight is None else USUAL_FLIGHT
+        rules = replace(harakiri_rules(self._settings), is_single_precision=True, flight=flight)
         return StoreReport(StoreState.ARMED if armed else StoreState.READY, rules, None)
 
     def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Conversation[PushResult]:

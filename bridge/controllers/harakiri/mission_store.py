@@ -8,7 +8,9 @@ from typing import TypeVar
 from zlib import crc32
 
 from bridge.controllers.harakiri.check import HarakiriRules
+from bridge.controllers.harakiri.flight import USUAL_FLIGHT, FlightLimits
 from bridge.controllers.harakiri.rules import items_from_records
+from bridge.controllers.harakiri.settings import read_by_name
 from bridge.fc.profile import FlightController, RuleSettings
 from bridge.line.conversation import (
     Conversation,
@@ -96,10 +98,13 @@ class HarakiriStore(FcMissionStore[WpRecord], ABC):
 class HarakiriMissions(HarakiriStore):
     """The mission store of one Harakiri with the mission extension."""
 
-    def __init__(self, board: FlightController, _vehicle: Vehicle, settings: RuleSettings) -> None:
+    def __init__(self, board: FlightController, vehicle: Vehicle, settings: RuleSettings) -> None:
         assert board.info is not None
         self.info = board.info
+        self._vehicle = vehicle
         self._settings = settings
+        #: The places of its settings, as far as they are known.
+        self._places: dict[str, int] = {}
         self._may_be_stored = False  # COMMIT was sent, and its result is still unknown
 
     @property
@@ -117,8 +122,16 @@ class HarakiriMissions(HarakiriStore):
             state = StoreState.BUSY
         else:
             state = StoreState.READY
-        rules = HarakiriRules(info.capacity, info.wp_radius_cm, self._settings.takeoff_max_m)
+        flight = None if state is StoreState.ARMED else (yield from self._read_flight())
+        rules = HarakiriRules(info.capacity, info.wp_radius_cm, self._settings.takeoff_max_m, flight=flight)
         return StoreReport(state, rules, info.stored)
+
+    def _read_flight(self) -> Conversation[FlightLimits | None]:
+        """The settings that decide about a list in flight; None for a board that does not fly it."""
+        if self._vehicle.last_flight is None:
+            return None
+        values = yield from read_by_name(self._places, "mission_first", "mission_height")
+        return USUAL_FLIGHT if values is None else FlightLimits(*map(int, values))
 
     def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Conversation[PushResult]:
         """Write the list: BEGIN, CHUNKs in a window, COMMIT; verified by the checksum over the flash."""

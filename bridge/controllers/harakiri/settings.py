@@ -152,6 +152,32 @@ class HarakiriFcSettings(FcSettings):
         return NO_ANSWER
 
 
+def read_by_name(places: dict[str, int], *names: str) -> Conversation[list[float] | None]:
+    """The values of these settings; None: it lacks one, does not answer, or is armed.
+
+    `places`: of the settings found so far, which this fills; new settings are at the table's end.
+    """
+    if not places:
+        whole = yield from _whole()
+        for first in range(whole.total - _EACH if whole else -_EACH, -_EACH, -_EACH):
+            start = max(first, 0)
+            reply = yield from _ask(encode_read_settings(start, _EACH), SettingCommand.SETTING, _EACH)
+            if reply is None or reply.status is not ReplyStatus.OK:
+                return None
+            places |= {held.setting.name: place for place, held in enumerate(reply.settings, reply.first)}
+            if places.keys() >= set(names):
+                break
+    values = []
+    for name in names:
+        if name not in places:
+            return None
+        reply = yield from _ask(encode_read_settings(places[name], 1), SettingCommand.SETTING, 1)
+        if reply is None or not reply.settings or reply.settings[0].setting.name != name:
+            return None
+        values.append(reply.settings[0].value)
+    return values
+
+
 def _whole() -> Conversation[TableReply | None]:
     """Number and checksum of all settings; None if it does not answer, or is armed."""
     reply = yield from ask(TABLE_REQUEST, SettingCommand.SETTING, _TABLE_SIZE)

@@ -12,14 +12,14 @@ from typing import Any
 
 from bridge.controllers.inav.approaches import approach_text
 from bridge.controllers.inav.zone_check import judge_zones
-from bridge.controllers.nav.judgement import Departure, Judgement
+from bridge.controllers.nav.flown_path import above_home_cm
+from bridge.missions.flown_legs import Departure, FlownPath, Judgement, beyond_plain_limits, first_of, in_metres
 from bridge.model.ground_track import Place, distance_m
 from protocols.inav_dump import SavedSettings
 from protocols.msp.inav_places import FwApproach, Geozone, Safehome
-from protocols.msp.nav import FLY_HOME, LEGS, NavAction, NavRecord
+from protocols.msp.nav import FLY_HOME, LEGS, TURNS, NavAction, NavRecord
+from protocols.msp.nav_items import leg_speed
 from reports.finding import News
-
-_ABOVE_SEA = 1
 
 
 class RthAltMode(IntEnum):
@@ -62,6 +62,7 @@ class InavLimits:
     nav_wp_max_safe_distance: int = 100
     nav_wp_radius: int = 100
     nav_wp_enforce_altitude: int = 0
+    nav_max_auto_speed: int = 1000
     nav_max_altitude: int = 0
     nav_rth_altitude: int = 1000
     nav_rth_alt_mode: int = RthAltMode.AT_LEAST
@@ -80,44 +81,82 @@ class InavLimits:
         """With these settings; ValueError for one that is neither a number nor one of its choices."""
         return replace(self, **{name: _number(name, values[name]) for name in SETTING_NAMES if name in values})
 
-    def judge(self, records: Sequence[NavRecord], departure: Departure) -> Iterable[Judgement]:
+    def return_cm(self, _rth: NavRecord, here_cm: int | None, highest_cm: int) -> int | None:
+        if self.nav_rth_alt_mode == RthAltMode.FIXED:
+            return self.nav_rth_altitude
+        if here_cm is None:
+            return None
+        match self.nav_rth_alt_mode:
+            case RthAltMode.CURRENT:
+                return here_cm
+            case RthAltMode.EXTRA:
+                return here_cm + self.nav_rth_altitude
+            case RthAltMode.MAX:
+                return max(highest_cm, self.nav_rth_altitude)
+        return max(here_cm, self.nav_rth_altitude)
+
+    def judge(self, records: Sequence[NavRecord], path: FlownPath, departure: Departure) -> Iterable[Judgement]:
         """Rejects a list only if INAV would not arm, or would not fly it as it is shown."""
         yield from self._first(records[0], departure)
-        before: NavRecord | None = None
-        highest_cm = 0
-        for place, record in enumerate(records):
-            if record.action == NavAction.RTH:
-                yield from self._return(place, record, highest_cm, departure)
-            if record.action == NavAction.LAND and self.is_aeroplane:
+        yield from self._heights(records, departure)
+        for leg in path.legs:
+            if leg.is_return:
+                yield from self._return(leg.target, records[leg.target], path.highest_cm, departure)
+            if records[leg.target].action == NavAction.LAND and self.is_aeroplane:
                 name = f"FW approach {self.approach.number} has no heading" if self.approach else _NO_APPROACHES
-                yield _landing(place, self.approach, "", "here", name)
-            if record.action not in LEGS:
-                continue
-            height_cm = _above_home_cm(record, departure)
-            highest_cm = max(highest_cm, height_cm or 0)
-            limit_cm = self.nav_max_altitude
-            if height_cm is not None and height_cm > limit_cm > 0 and not self.nav_wp_enforce_altitude:
-                why = f"nav_max_altitude is {limit_cm / 100:g} m, it would not climb to {height_cm / 100:g} m"
-                yield Judgement(place, "alt_m", why, None)
-            if before is not None and (metres := distance_m(before, record)) * 100 < self.nav_wp_radius:
-                within = f"within nav_wp_radius ({self.nav_wp_radius / 100:g} m)"
-                why = f"{metres:.1f} m from the waypoint before, {within}: it may count as reached at once"
-                yield Judgement(place, "lat_e7", why, News.NOTICE)
-            before = record
-        heights_cm = [_above_home_cm(record, departure) for record in records]
-        yield from judge_zones(self.zones, records, heights_cm, departure)
+                yield _landing(leg.target, self.approach, "", "here", name)
+        between = [leg for leg in path.legs if not (leg.is_first or leg.is_return)]
+        close = [leg for leg in between if leg.length_m * 100 < self.nav_wp_radius]
+        within = f"within nav_wp_radius ({self.nav_wp_radius / 100:g} m): it may count as reached at once"
+        whys = [(leg.cause, f"{leg.length_m:.1f} m from the waypoint before, {within}") for leg in close]
+        yield from first_of(whys, "lat_e7", News.NOTICE)
+        yield from self._ignored(records)
+        yield from judge_zones(self.zones, path, departure)
+        yield from beyond_plain_limits(path, departure, height=not self.nav_max_altitude)
         yield from self._of_the_board()
 
     def _first(self, first: NavRecord, departure: Departure) -> Iterable[Judgement]:
         """INAV measures the distance to the first record, whatever its action, from where it is armed."""
         limit_m = self.nav_wp_max_safe_distance
-        if not limit_m or first.flag == FLY_HOME or not (first.lat_e7 or first.lon_e7):
+        if not limit_m or first.flag == FLY_HOME or not (first.lat_e7 or first.lon_e7) or departure.place is None:
             return
-        distances = [distance_m(start, first) for start in departure.places]
-        if max(distances, default=0.0) > limit_m:
-            would = "it would not arm" if min(distances) > limit_m else "it arms only near the craft's place, not there"
-            why = f"{max(distances):.0f} m from home, nav_wp_max_safe_distance is {limit_m} m: {would}"
-            yield Judgement(0, "lat_e7", why, None if min(distances) > limit_m else News.WARNING)
+        if (metres := distance_m(departure.place, first)) > limit_m:
+            may_arm = departure.home is not None and distance_m(departure.home, first) <= limit_m
+            would = "it arms only near the list's home" if may_arm else "it would not arm"
+            why = f"{in_metres(metres)} from {departure.name}, nav_wp_max_safe_distance is {limit_m} m: {would}"
+            yield Judgement(0, "lat_e7", why, News.DANGER if may_arm else None)
+
+    def _heights(self, records: Sequence[NavRecord], departure: Departure) -> Iterable[Judgement]:
+        limit_cm = self.nav_max_altitude
+        if not limit_cm or self.nav_wp_enforce_altitude:
+            return
+        unknown = []
+        for place, record in enumerate(records):
+            if record.action not in LEGS:
+                continue
+            height_cm = above_home_cm(record, departure)
+            if height_cm is None:
+                unknown.append(
+                    (place, f"above sea, but home's Alt is not known: nav_max_altitude is {limit_cm / 100:g} m")
+                )
+            elif height_cm > limit_cm:
+                why = f"nav_max_altitude is {limit_cm / 100:g} m, it would not climb to {height_cm / 100:g} m"
+                yield Judgement(place, "alt_m", why, None)
+        yield from first_of(unknown, "alt_m")
+
+    def _ignored(self, records: Sequence[NavRecord]) -> Iterable[Judgement]:
+        """An aeroplane flies at its own speed, nose first (getActiveSpeed is for multirotors only)."""
+        speeds = [(place, leg_speed(record, 0)) for place, record in enumerate(records) if record.action in LEGS]
+        if self.is_aeroplane:
+            why = "no effect on an aeroplane"
+            turns = [(place, why) for place, record in enumerate(records) if record.action in TURNS and record.p1 >= 0]
+            yield from first_of([(place, f"its speed has {why}") for place, speed in speeds if speed], "command")
+            yield from first_of(turns, "command")
+            return
+        limit = self.nav_max_auto_speed
+        fast = [(place, speed) for place, speed in speeds if speed > limit]
+        whys = [(place, f"{speed / 100:g} m/s, nav_max_auto_speed is {limit / 100:g} m/s") for place, speed in fast]
+        yield from first_of(whys, "command")
 
     def _return(self, place: int, rth: NavRecord, highest_cm: int, departure: Departure) -> Iterable[Judgement]:
         if self.nav_rth_alt_mode == RthAltMode.FIXED and self.nav_rth_altitude < highest_cm:
@@ -128,7 +167,7 @@ class InavLimits:
             yield Judgement(place, "p1", why, News.NOTICE)
         if rth.p1 and self.nav_rth_allow_landing == RthAllowLanding.NEVER:
             yield Judgement(place, "p1", "lands, although nav_rth_allow_landing is NEVER", News.NOTICE)
-        for start in departure.places[:1]:
+        if (start := departure.place) is not None:
             near = self._near_safehome(start)
             returns_there = self.safehome_usage_mode == SafehomeUsageMode.RTH
             if near and returns_there:
@@ -177,12 +216,17 @@ _CHOICES: Mapping[str, type[IntEnum]] = {
     "safehome_usage_mode": SafehomeUsageMode,
 }
 _OTHER_FIELDS = ("safehomes", "zones", "cell_voltage", "selected", "is_aeroplane", "approach")
+#: Those that decide if a list is flown, and how high and fast.
+DECISIVE_NAMES = (
+    *("nav_wp_max_safe_distance", "nav_max_altitude", "nav_wp_enforce_altitude"),
+    *("nav_max_auto_speed", "nav_rth_altitude", "nav_rth_alt_mode"),
+)
 SETTING_NAMES = tuple(field.name for field in fields(InavLimits) if field.name not in _OTHER_FIELDS)
 
 
-def saved_limits(saved: SavedSettings | None) -> InavLimits | None:
+def saved_limits(saved: SavedSettings | None) -> InavLimits:
     """The settings in a file; those that it lacks, as `diff all` does, have INAV's defaults. ValueError."""
-    return None if saved is None else InavLimits(safehomes=saved.safehomes).with_settings(saved.values)
+    return InavLimits() if saved is None else InavLimits(safehomes=saved.safehomes).with_settings(saved.values)
 
 
 def _number(name: str, value: float | str) -> Any:
@@ -192,10 +236,3 @@ def _number(name: str, value: float | str) -> Any:
         return int(float(value))
     except ValueError:
         raise ValueError(f"{name} cannot be {value}") from None
-
-
-def _above_home_cm(record: NavRecord, departure: Departure) -> int | None:
-    """The leg's height; None if it is above sea level, and home's altitude is not known."""
-    if not record.p3 & _ABOVE_SEA:
-        return record.alt_cm
-    return None if departure.altitude_m is None else record.alt_cm - round(100 * departure.altitude_m)

@@ -13,7 +13,7 @@ from itertools import chain
 from bridge.controllers.inav.approaches import read_approaches, write_approaches
 from bridge.controllers.inav.fly_to import FLOWN_TO, fly_to
 from bridge.controllers.inav.geozones import has_zones, read_zones_in_force
-from bridge.controllers.inav.limits import SETTING_NAMES, InavLimits
+from bridge.controllers.inav.limits import DECISIVE_NAMES, SETTING_NAMES, InavLimits
 from bridge.controllers.inav.safehomes import read_safehomes, with_approaches
 from bridge.controllers.inav.settings import read_values
 from bridge.controllers.nav.check import NavRules
@@ -95,7 +95,10 @@ class InavMissions(NavMissions, FliesToItems):
 
     def report(self) -> Conversation[StoreReport | None]:
         """Also read the settings and approaches that the rules depend on, if they may have changed."""
-        yield from self._read_limits()
+        if self._are_limits_doubtful:
+            yield from self._read_limits()
+        else:
+            yield from self._read_decisive_limits()
         if self._approaches is None and not self._vehicle.armed:
             self._approaches = yield from read_approaches(range(APPROACHES))
         return (yield from super().report())
@@ -227,6 +230,12 @@ class InavMissions(NavMissions, FliesToItems):
         elif values:
             limits = InavLimits(safehomes=safehomes, zones=zones, is_aeroplane=self._is_aeroplane)
             self._limits = limits.with_settings(values)
+
+    def _read_decisive_limits(self) -> Conversation[None]:
+        """Another client may have changed them unnoticed: read again before each Write, a few requests."""
+        if self._limits is not None and not self._vehicle.armed:
+            values = yield from read_values(DECISIVE_NAMES)
+            self._limits = self._limits.with_settings(values or {})
 
     @property
     def _selected(self) -> int:

@@ -1,40 +1,41 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mission and INAV's geozones. In its waypoint mode INAV acts at no border, so a leg through a zone is flown."""
+"""A mission's way and INAV's geozones.
+
+In its waypoint mode INAV acts at a border only if the switch of ANGLE (HORIZON, COURSE HOLD, CRUISE) is on as well.
+"""
 
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
+from math import sqrt
 
-from bridge.controllers.nav.judgement import Departure, Judgement
-from bridge.model.ground_track import Place, distance_m, north_east_m, passing_distance_m
-from protocols.msp.inav_places import Geozone
-from protocols.msp.nav import LEGS, NavRecord
+from bridge.missions.flown_legs import Departure, FlownPath, Judgement, Leg, first_of
+from bridge.model.ground_track import Place, distance_m, north_east_m
+from protocols.msp.inav_places import Corner, Geozone
+from reports.finding import News
 
 #: Inclusive zones whose corners are further away are off (GEOZONE_INCLUSE_IGNORE_DISTANCE).
 _IGNORED_M = 2000
+#: docs/inav.md describes both cases.
+_BOTH = "flown, or a stop if ANGLE is on"
 
 
-def judge_zones(
-    zones: Sequence[Geozone], records: Sequence[NavRecord], heights_cm: Sequence[int | None], departure: Departure
-) -> Iterable[Judgement]:
-    """heights_cm: of each record above home; None if unknown."""
-    blocked = [why for place in departure.places if (why := _blocks_arming(zones, place))]
-    if blocked and len(blocked) == len(departure.places):
-        yield Judgement(None, "", f"Home is {blocked[0]}: INAV would not arm", None)
-        return
+def judge_zones(zones: Sequence[Geozone], path: FlownPath, departure: Departure) -> Iterable[Judgement]:
+    blocked = [_blocks_arming(zones, place) for place in departure.places if place is not None]
+    if blocked and blocked[0]:
+        yield Judgement(None, "", f"{departure.name.capitalize()} is {blocked[0]}: does not arm", _weight(blocked))
+    for zone in zones:
+        if not zone.is_inclusive:
+            through = [leg for leg in path.legs if _shares_height(zone, leg) and any(_insides([zone], leg))]
+            yield from first_of([(leg.cause, f"geozone {zone.number}: {_BOTH}") for leg in through], "lat_e7")
     inclusive = [zone for zone in zones if zone.is_inclusive]
-    starts_inside = any(_is_inside(zone, start) for zone in inclusive for start in departure.places[:1])
-    before: tuple[NavRecord, int | None] | None = None
-    for place, (record, height_cm) in enumerate(zip(records, heights_cm, strict=True)):
-        if record.action not in LEGS:
-            continue
-        start, start_cm = before or (record, height_cm)
-        for zone in zones:
-            is_through = not zone.is_inclusive and _crosses(zone, start, record)
-            if is_through and _shares_height(zone, start_cm, height_cm):
-                why = f"passes through geozone {zone.number} (exclusive): INAV does not stop a mission there"
-                yield Judgement(place, "lat_e7", why)
-        if starts_inside and not any(_is_inside(zone, record) for zone in inclusive):
-            yield Judgement(place, "lat_e7", "outside of the inclusive geozones: INAV does not stop a mission there")
-        before = record, height_cm
+    if departure.place is not None and any(_is_inside(zone, departure.place) for zone in inclusive):
+        leaving = [leg for leg in path.legs if not all(_insides(inclusive, leg))]
+        yield from first_of([(leg.cause, f"leaves zones: {_BOTH}") for leg in leaving], "lat_e7")
+
+
+def _weight(blocked: Sequence[str]) -> News | None:
+    """A list is rejected only if INAV would arm neither where the craft is nor at the list's home."""
+    return None if all(blocked) else News.DANGER
 
 
 def _blocks_arming(zones: Sequence[Geozone], place: Place) -> str:
@@ -47,12 +48,12 @@ def _blocks_arming(zones: Sequence[Geozone], place: Place) -> str:
     return "" if inside or not near else f"outside geozone {near[0].number} (inclusive)"
 
 
-def _shares_height(zone: Geozone, one_cm: int | None, other_cm: int | None) -> bool:
+def _shares_height(zone: Geozone, leg: Leg) -> bool:
     """True unless the whole leg is above or below the zone; a zone above sea level is taken as without limits."""
-    if one_cm is None or other_cm is None or zone.is_above_sea:
+    if leg.start_cm is None or leg.end_cm is None or zone.is_above_sea:
         return True
-    is_above = zone.highest_cm and min(one_cm, other_cm) > zone.highest_cm
-    return not (is_above or (zone.lowest_cm and max(one_cm, other_cm) < zone.lowest_cm))
+    is_above = zone.highest_cm and min(leg.start_cm, leg.end_cm) > zone.highest_cm
+    return not (is_above or (zone.lowest_cm and max(leg.start_cm, leg.end_cm) < zone.lowest_cm))
 
 
 def _distance_m(zone: Geozone, place: Place) -> float:
@@ -70,27 +71,37 @@ def _is_inside(zone: Geozone, place: Place) -> bool:
     return is_inside
 
 
-def _crosses(zone: Geozone, start: Place, end: Place) -> bool:
-    """True if the straight line from start to end touches the zone."""
+def _insides(zones: Sequence[Geozone], leg: Leg) -> Iterable[bool]:
+    """For each part of the leg between two borders: True if it is inside any of the zones."""
+    shares = sorted({0.0, 1.0, *(share for zone in zones for share in _borders(zone, leg) if 0 < share < 1)})
+    for one, other in pairwise(shares):
+        share = (one + other) / 2
+        lat_e7 = leg.start.lat_e7 + round(share * (leg.end.lat_e7 - leg.start.lat_e7))
+        middle = Corner(lat_e7, leg.start.lon_e7 + round(share * (leg.end.lon_e7 - leg.start.lon_e7)))
+        yield any(_is_inside(zone, middle) for zone in zones)
+
+
+def _borders(zone: Geozone, leg: Leg) -> Iterable[float]:
+    """Where the line of the leg meets the zone's border, in shares of its length."""
+    north, east = north_east_m(leg.start, leg.end)
+    if not (length2 := north * north + east * east):
+        return
     if zone.is_circle:
-        return passing_distance_m(start, end, zone.corners[0]) < zone.radius_cm / 100
-    if _is_inside(zone, start) or _is_inside(zone, end):
-        return True
-    leg = north_east_m(start, end)
-    for one, other in _sides(zone, start):
-        side = other[0] - one[0], other[1] - one[1]
-        to_end = leg[0] - one[0], leg[1] - one[1]
-        sides_apart = _cross(leg, one) * _cross(leg, other) < 0
-        if sides_apart and _cross(side, (-one[0], -one[1])) * _cross(side, to_end) < 0:
-            return True
-    return False
+        to_north, to_east = north_east_m(leg.start, zone.corners[0])
+        nearest = (north * to_north + east * to_east) / length2
+        inner2 = (zone.radius_cm / 100) ** 2 - (to_north - nearest * north) ** 2 - (to_east - nearest * east) ** 2
+        if inner2 > 0:
+            yield from (nearest - sqrt(inner2 / length2), nearest + sqrt(inner2 / length2))
+        return
+    for (north1, east1), (north2, east2) in _sides(zone, leg.start):
+        side_north, side_east = north2 - north1, east2 - east1
+        if area := north * side_east - east * side_north:
+            along_side = (north1 * -east + east1 * north) / -area
+            if 0 <= along_side <= 1:
+                yield (north1 * side_east - east1 * side_north) / area
 
 
 def _sides(zone: Geozone, origin: Place) -> Iterable[tuple[tuple[float, float], tuple[float, float]]]:
     """Both ends of each side, metres to the north and east of the origin."""
     corners = [north_east_m(origin, corner) for corner in zone.corners]
     return zip(corners, corners[1:] + corners[:1], strict=True)
-
-
-def _cross(one: tuple[float, float], other: tuple[float, float]) -> float:
-    return one[0] * other[1] - one[1] * other[0]

@@ -6,8 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
-from bridge.controllers.nav.flown_path import flown_size, jump_within_jump, lands_after_rth
-from bridge.controllers.nav.judgement import Departure, Judgement
+from bridge.controllers.nav.flown_path import flown_size, fly, jump_within_jump, lands_after_rth
 from bridge.controllers.nav.related_items import Jumps, LegSpeed, placed_landing
 from bridge.controllers.nav.rules import (
     HOLD,
@@ -21,6 +20,7 @@ from bridge.controllers.nav.rules import (
 )
 from bridge.controllers.nav.stored_missions import Mission, erased
 from bridge.controllers.nav.unshown import flies_home, keep_unshown
+from bridge.missions.flown_legs import Departure, FlownPath, Point, beyond_plain_limits
 from bridge.missions.list_check import (
     SEA_LEVEL_FRAMES,
     TERRAIN_FRAMES,
@@ -28,6 +28,7 @@ from bridge.missions.list_check import (
     ListCheck,
     given,
     missing_coordinate,
+    refuse_first,
     refuse_frame,
     refuse_position,
 )
@@ -41,8 +42,6 @@ from reports.verdict import Result, Verdict
 #: The greatest height at which single precision still resolves a centimetre.
 _MAX_HEIGHT_CM = 3_276_700
 _FULL_CIRCLE = 360
-#: A field's MISSION_ACK.
-_ACKS = {"lat_e7": MissionResult.INVALID_PARAM5_X, "alt_m": MissionResult.INVALID_PARAM7}
 #: DO_CHANGE_SPEED's param3 without a throttle: none, no change, as set.
 _NO_THROTTLE = (0, -1, -2)
 
@@ -80,6 +79,8 @@ class NavCheck(ListCheck):
         self._profile = profile = rules.profile
         self._fallback_home = fallback_home
         self._home = home_item(fallback_home)
+        self._has_home = False
+        self._path = FlownPath()
         self._records: list[NavRecord] = []
         #: The item of each record.
         self._sent: list[MissionItem] = []
@@ -112,13 +113,13 @@ class NavCheck(ListCheck):
 
     def _take_home(self, home: MissionItem) -> RejectingFinding | None:
         if home.command != Command.NAV_WAYPOINT:
-            return reject(MissionResult.INVALID, home, "command", "must be a WAYPOINT")
+            return refuse_first(home)
         if rejection := refuse_frame(home, needs_position=True):
             return rejection
         self._note_home(home)
         if home.lat_e7 and home.lon_e7 and refuse_position(home) is None:
             alt_m = home.alt_m if math.isfinite(home.alt_m) else 0.0
-            self._home = home_item((home.lat_e7, home.lon_e7), alt_m)
+            self._home, self._has_home = home_item((home.lat_e7, home.lon_e7), alt_m), True
         return None
 
     def _take(self, item: MissionItem, rule: NavRule) -> RejectingFinding | None:
@@ -256,11 +257,13 @@ class NavCheck(ListCheck):
         if self._profile.jumps_back_only and (place := jump_within_jump(self._records)) is not None:
             why = "a jump inside another jump's loop never ends"
             return reject(MissionResult.INVALID_PARAM1, self._sent[place], "p1", why)
-        limits = self._profile.limits
-        for judgement in limits.judge(self._records, self._departure()) if limits else ():
-            if rejection := self._apply(judgement):
-                return rejection
+        limits, departure = self._profile.limits, self._departure()
         lands = lands_after_rth(self._records)
+        self._path = path = fly(self._records, departure, limits, lands=lands)
+        plain = beyond_plain_limits(path, departure)
+        judgements = limits.judge(self._records, path, departure) if limits else plain
+        if rejection := self._apply(judgements, self._sent):
+            return rejection
         returns = () if self._profile.own_rth_landing else zip(self._sent, self._records, strict=True)
         for item, record in returns:
             if record.action == NavAction.RTH and (record.p1 > 0) != lands:
@@ -273,22 +276,9 @@ class NavCheck(ListCheck):
 
     def _departure(self) -> Departure:
         place = self._fallback_home
-        here = () if place is None else (home_item(place),)
-        home = (self._home,) if self._home.lat_e7 or self._home.lon_e7 else ()
-        return Departure((*home, *here), self._home.alt_m or None)
-
-    def _apply(self, judgement: Judgement) -> RejectingFinding | None:
-        place, field, why, news = judgement
-        if place is None and news is None:
-            return reject_list(MissionResult.INVALID, self._count, why)
-        if place is None:
-            self._findings.append(Finding(None, "count", None, None, why, news=news or News.WARNING))
-        elif news is None:
-            return reject(_ACKS.get(field, MissionResult.INVALID), self._sent[place], field, why)
-        else:
-            value = given(getattr(self._sent[place], field))
-            self._note(self._sent[place], field, value, value, why, news)
-        return None
+        craft = None if place is None else Point(*place)
+        home = Point(self._home.lat_e7 or 0, self._home.lon_e7 or 0) if self._has_home else None
+        return Departure(craft, home, self._home.alt_m or None)
 
     def _speed_differs(self, place: int, jump: MissionItem) -> bool:
         """True if a pilot expects another speed after a JUMP than its target's own."""
@@ -315,7 +305,8 @@ class NavCheck(ListCheck):
             self._findings.append(Finding(None, "count", len(mission), 0, why, news=News.WARNING))
         findings = tuple(sorted(self._findings, key=lambda finding: finding.seq or 0))
         seqs = sent_seqs(records, [item.seq for item in self._sent], self._speed.changed_at)
-        return Verdict(Result.ACCEPTED, MissionResult.ACCEPTED, records, items, findings, self._sent_as, seqs)
+        flight = self._path.facts()
+        return Verdict(Result.ACCEPTED, MissionResult.ACCEPTED, records, items, findings, self._sent_as, seqs, flight)
 
     def _keep(self, item: MissionItem, record: NavRecord) -> None:
         if record.action in LEGS:

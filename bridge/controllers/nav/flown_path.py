@@ -1,14 +1,78 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Effects of a whole list in flight on INAV and MultiWii that no single record shows (docs/inav.md).
+"""A list as INAV and MultiWii fly it (docs/inav.md).
 
 Records are given by their place, from 0; a JUMP's p1 is a number, from 1.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import Protocol
 
-from protocols.msp.nav import NavAction, NavRecord
+from bridge.missions.flown_legs import Departure, FlownPath, Judgement, Leg
+from bridge.model.ground_track import Place, distance_m
+from protocols.msp.nav import FLY_HOME, LEGS, TURNS, NavAction, NavRecord
 
 _ENDLESS = -1
+_ABOVE_SEA = 1
+
+
+class BoardLimits(Protocol):
+    """The settings of one board that decide about its missions."""
+
+    def return_cm(self, rth: NavRecord, here_cm: int | None, highest_cm: int) -> int | None:
+        """The height of a return that begins at `here_cm`; None if unknown."""
+
+    def judge(self, records: Sequence[NavRecord], path: FlownPath, departure: Departure) -> Iterable[Judgement]:
+        """Whether, and how differently, the board flies these records."""
+
+
+def fly(records: Sequence[NavRecord], departure: Departure, limits: BoardLimits | None, *, lands: bool) -> FlownPath:
+    """The way of the records, each JUMP taken once. lands: after an RTH."""
+    legs: dict[tuple[int, int, Place | None], Leg] = {}
+    taken: set[int] = set()
+    before = -1
+    here, here_cm, highest_cm = departure.place, None, 0
+    roi: Place | None = None
+    place, cause = 0, None
+    while place < len(records):
+        record = records[place]
+        if record.action == NavAction.JUMP and record.p2 and place not in taken:
+            taken.add(place)
+            place, cause = record.p1 - 1, place
+            continue
+        if (record.action, record.p2) == (NavAction.JUMP, _ENDLESS):
+            break
+        if record.action in TURNS:
+            roi = record if record.action == NavAction.SET_POI else None
+        is_return = record.action == NavAction.RTH
+        if is_return or record.action in LEGS:
+            end, end_cm = _end(record, departure), above_home_cm(record, departure)
+            if is_return:
+                end_cm = limits.return_cm(record, here_cm, highest_cm) if limits else None
+            if end is not None:
+                start = here or end
+                start_cm, blamed = end_cm if here_cm is None else here_cm, place if cause is None else cause
+                length_m = distance_m(start, end)
+                leg = Leg(place, blamed, start, end, length_m, start_cm, end_cm, not legs, is_return, roi)
+                legs.setdefault((before, place, roi), leg)
+                before, here, here_cm, highest_cm = place, end, end_cm, max(highest_cm, end_cm or 0)
+            cause = None
+        if is_return or record.action == NavAction.LAND:
+            lands = lands or record.action == NavAction.LAND
+            return FlownPath(tuple(legs.values()), lands=lands, has_loops=bool(taken))
+        place += 1
+    return FlownPath(tuple(legs.values()), has_loops=bool(taken))
+
+
+def _end(record: NavRecord, departure: Departure) -> Place | None:
+    flies_home = record.action == NavAction.RTH or record.flag == FLY_HOME or not (record.lat_e7 or record.lon_e7)
+    return departure.place if flies_home else record
+
+
+def above_home_cm(record: NavRecord, departure: Departure) -> int | None:
+    """The leg's height; None if it is above sea level, and home's altitude is not known."""
+    if not record.p3 & _ABOVE_SEA:
+        return record.alt_cm
+    return None if departure.altitude_m is None else record.alt_cm - round(100 * departure.altitude_m)
 
 
 def flown_size(records: Sequence[NavRecord]) -> int:

@@ -4,9 +4,9 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from bridge.controllers.nav.judgement import Departure, Judgement
-from bridge.model.ground_track import distance_m, passing_distance_m
-from protocols.msp.nav import LEGS, TURNS, NavAction, NavRecord
+from bridge.missions.flown_legs import Departure, FlownPath, Judgement, beyond_plain_limits, first_of
+from bridge.model.ground_track import passing_distance_m
+from protocols.msp.nav import NavRecord
 
 #: A craft may stray this far from its line.
 _STRAYS_M = 5
@@ -20,38 +20,24 @@ class LegLimits:
     stops_at_m: int
     highest_m: int
 
-    def judge(self, records: Sequence[NavRecord], departure: Departure) -> Iterable[Judgement]:
-        """Each such leg, once; a leg after a JUMP has the JUMP's place."""
-        return dict.fromkeys(_limited(records, self))
+    def return_cm(self, rth: NavRecord, _here_cm: int | None, _highest_cm: int) -> int | None:
+        """Its own RTH altitude is not known."""
+        return rth.alt_cm or None
 
-
-def _limited(records: Sequence[NavRecord], limits: LegLimits) -> Iterable[Judgement]:
-    before: NavRecord | None = None
-    roi: NavRecord | None = None
-    near_m = limits.radius_cm / 100 + _STRAYS_M
-    for place, target in _flown(records):
-        record = records[target]
-        if record.action not in TURNS and record.alt_cm > 100 * limits.highest_m:
-            yield Judgement(target, "alt_m", f"flown at {limits.highest_m} m, the board's nav_max_altitude")
-        if record.action in TURNS:
-            roi = record if record.action == NavAction.SET_POI else None
-        if record.action not in LEGS:
-            continue
-        if before is not None and distance_m(before, record) >= limits.stops_at_m:
-            why = f"{limits.stops_at_m} m or more from the waypoint before: the mission stops there"
-            yield Judgement(place, "lat_e7", why)
+    def judge(self, _records: Sequence[NavRecord], path: FlownPath, departure: Departure) -> Iterable[Judgement]:
+        legs = [leg for leg in path.legs if not leg.is_return]
+        high = f"flown at {self.highest_m} m, the board's nav_max_altitude"
+        too_high = [leg for leg in path.legs if (leg.end_cm or 0) > 100 * self.highest_m]
+        yield from first_of([(leg.target, high) for leg in too_high], "alt_m")
+        stop = f"leg of {self.stops_at_m} m or more: stops there"
+        yield from first_of([(leg.cause, stop) for leg in legs if leg.length_m >= self.stops_at_m], "lat_e7")
         # With a region of interest set, MultiWii compares its distance with wp_radius, not the waypoint's.
-        if roi is not None and passing_distance_m(before or record, record, roi) < near_m:
-            why = f"passes the ROI at less than {near_m:g} m: the board may end this leg there"
-            yield Judgement(place, "lat_e7", why)
-        before = record
+        near_m = self.radius_cm / 100 + _STRAYS_M
+        near = f"passes the ROI at less than {near_m:g} m: the board may end this leg there"
+        passing = [leg for leg in legs if leg.roi and passing_distance_m(leg.start, leg.end, leg.roi) < near_m]
+        yield from first_of([(leg.cause, near) for leg in passing], "lat_e7")
+        yield from beyond_plain_limits(path, departure, leg=False, height=False)
 
 
-def _flown(records: Sequence[NavRecord]) -> Iterable[tuple[int, int]]:
-    """The places of the records as flown, each JUMP back taken once, with the JUMP's place before its target."""
-    for place, record in enumerate(records):
-        yield place, place
-        if record.action == NavAction.JUMP and record.p2:
-            target = record.p1 - 1
-            yield place, target
-            yield from ((inner, inner) for inner in range(target + 1, place))
+#: MultiWii's defaults.
+USUAL_LEGS = LegLimits(radius_cm=100, stops_at_m=500, highest_m=100)

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from bridge.controllers.nav.judgement import BoardLimits
-from bridge.controllers.nav.leg_limits import LegLimits
+from bridge.controllers.nav.flown_path import BoardLimits
+from bridge.controllers.nav.leg_limits import USUAL_LEGS
 from bridge.missions.list_check import UNUSED, Range
 from protocols.mission_item import ROI_COMMANDS, Command
 from protocols.msp.nav import ENDLESS_S, NavAction
@@ -79,7 +79,7 @@ def multiwii_profile(capacity: int = MULTIWII_CAPACITY) -> NavProfile:
         ends_on_any_record=False,
         own_rth_landing=True,
         # Its defaults; a board reports its own (NAV_CONFIG).
-        limits=LegLimits(radius_cm=100, stops_at_m=500, highest_m=100),
+        limits=USUAL_LEGS,
     )
 
 

@@ -87,9 +87,10 @@ def test_home_must_be_a_waypoint(command: int) -> None:
 )
 def test_home_without_coordinates_gets_the_flight_controllers_position(home: MissionItem) -> None:
     items = [home, item(WAYPOINT)]
-    verdict = check_list(items, PROFILE, fallback_home=(11, 22))
-    assert (verdict.items[0].lat_e7, verdict.items[0].lon_e7) == (11, 22)
-    assert [(f.seq, f.field, f.becomes) for f in verdict.findings] == [(0, "lat_e7", 11), (0, "lon_e7", 22)]
+    lat, lon = LAT + 11, LON + 22
+    verdict = check_list(items, PROFILE, fallback_home=(lat, lon))
+    assert (verdict.items[0].lat_e7, verdict.items[0].lon_e7) == (lat, lon)
+    assert [(f.seq, f.field, f.becomes) for f in verdict.findings] == [(0, "lat_e7", lat), (0, "lon_e7", lon)]
     for no_fix in (None, (0, 0), (11, 0)):
         rejected = check_list(items, PROFILE, fallback_home=no_fix)
         assert (rejected.ack, rejected.findings[-1].seq) == (MissionResult.INVALID_PARAM5_X, 0)
@@ -103,7 +104,9 @@ def test_homes_own_coordinates_take_precedence() -> None:
 @pytest.mark.parametrize("frame", [0, 5, 10, 11])
 def test_homes_height_is_kept_whatever_its_frame(frame: int) -> None:
     verdict = check_list([replace(HOME, frame=frame, alt_m=584.0), item(WAYPOINT)], PROFILE)
-    assert (verdict.items[0].frame, verdict.items[0].alt_m, verdict.findings) == (0, 584.0, ())
+    assert (verdict.items[0].frame, verdict.items[0].alt_m) == (0, 584.0)
+    # Relative to the terrain: it is probably no home.
+    assert [finding.field for finding in verdict.findings] == ["frame"] * (frame >= 10)
 
 
 def test_homes_frame_must_have_a_position() -> None:

@@ -13,7 +13,7 @@ from tests.support.rule_items import SPEED, WAYPOINT, item, mission
 def test_equal_findings_are_one_line_and_warnings_come_first() -> None:
     items = [item(WAYPOINT, p1=3)] * 4 + [item(SPEED)] * 3 + [item(WAYPOINT, frame=0), item(WAYPOINT, p2=0)]
     verdict = check_list(mission(*items), HarakiriRules())
-    assert summary(10, verdict) == "7 of 10 stored: 3 dropped, 1 Alt now relative"
+    assert summary(10, verdict) == "7 of 10 stored: 3 dropped, 1 Alt now relative, 0 m"
     assert finding_lines(verdict.findings) == [
         (News.WARNING, "3 items: DO_CHANGE_SPEED dropped, not supported"),
         (News.WARNING, "WP 8: Alt flown above home, not above sea level"),

@@ -48,7 +48,7 @@ def plan_file(tmp_path: Path) -> Path:
 def test_push_pull_and_clear_work(board: Board, plan_file: Path, tmp_path: Path) -> None:
     pushed = run_naze_bridge("push", plan_file, "--fc", board.link)
     assert (pushed.returncode, pushed.stderr.strip()) == (0, "")
-    assert "ACCEPTED: Mission verified" in pushed.stdout
+    assert " stored: " in pushed.stdout
     pulled = run_naze_bridge("pull", tmp_path / "held", "--fc", board.link)
     assert (pulled.returncode, pulled.stderr) == (0, "")
     held = read_mission_file((tmp_path / "held").read_bytes(), "held")

@@ -53,7 +53,7 @@ def test_a_pushed_mission_is_pulled_unchanged(daemon: Daemon, tmp_path: Path) ->
     plan = plain_plan(7, start=20)
     pushed = ask(daemon, "push", write_plan(tmp_path / "plan", plan))
     assert pushed.returncode == 0
-    assert pushed.stdout.endswith("ACCEPTED: Mission verified: 7 records\n")
+    assert "ACCEPTED: 7 of 7 stored: " in pushed.stdout
     assert daemon.pull()["records"] == records_of(judge(plan))
     pulled = ask(daemon, "pull")
     assert pulled.stdout.endswith(f"7 records, checksum {daemon.pull()['checksum']}\n")

@@ -117,6 +117,6 @@ def test_actions_of_the_command_line_are_logged(start: Starter) -> None:
     daemon.push(plain_plan(5))
     event = until(lambda: daemon.has_logged("mission.push_ended"), "a log entry about the push")
     assert (event["source"], event["ack"], event["mission"]) == ("test", "ACCEPTED", 1)
-    assert event["detail"] == "Mission verified: 5 records"
+    assert event["detail"].startswith("5 of 5 stored: ")
     daemon.try_clear()
     until(lambda: len([one for one in daemon.events() if one["event"] == "mission.push_ended"]) == 2, "and the clear")

@@ -58,7 +58,8 @@ def test_an_earlier_mission_is_restored(web: WebBench) -> None:
     first = web.board.records()
     web.push_example()
     ended = web.restore(1)
-    assert (ended["ok"], ended["text"], ended["what"]) == (True, "Mission verified: 9 records", "mission 1")
+    assert (ended["ok"], ended["what"]) == (True, "mission 1")
+    assert ended["text"].startswith("9 of 9 stored: ")
     assert web.board.records() == first
     newest = web.daemon.missions()[0]
     assert (newest["number"], newest["source"], newest["outcome"]) == (3, "restore of mission 1", "VERIFIED")
@@ -129,7 +130,7 @@ def test_a_refused_list_is_shown_with_its_reason(start: Starter) -> None:
     mission = web.ask("/api/missions/1").data
     assert mission["source"] == "<b>mine</b>"
     assert [row["kind"] for row in mission["rows"]] == ["same", "same", "rejected"]
-    assert mission["rows"][2]["changes"]["command"] == "TAKEOFF must be item 1"
+    assert mission["rows"][2]["changes"]["command"].startswith("TAKEOFF must be item 1")
 
 
 def _item(seq: int, command: int) -> dict[str, float]:

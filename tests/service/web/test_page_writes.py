@@ -54,7 +54,7 @@ def test_a_stored_mission_is_written_with_the_token(browsers: Browsers, bench: W
         page.find("tr.detail input").clear()
         page.find("tr.detail input").send_keys(bench.token)
         page.press("tr.detail button.write")
-        page.wait_text(DETAIL, "Mission verified: 9 records")
+        page.wait_text(DETAIL, "9 of 9 stored: ")
         assert is_visible(page, DETAIL)
         assert bench.board.records() == first
         page.wait_text("#held-text", "9 records")

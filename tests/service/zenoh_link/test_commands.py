@@ -59,7 +59,7 @@ def test_an_upload_reports_its_progress_and_result(commanded: tuple[Bench, zenoh
 def test_by_default_a_caller_gets_only_the_result(commanded: tuple[Bench, zenoh.Session]) -> None:
     _, opened = commanded
     (answer,) = ask(opened, UPLOAD, mission_file(40, start=50))
-    assert answer["result"]["text"] == "Mission verified: 40 records"
+    assert answer["result"]["text"].startswith("40 of 40 stored: ")
 
 
 def test_a_check_changes_nothing(commanded: tuple[Bench, zenoh.Session]) -> None:

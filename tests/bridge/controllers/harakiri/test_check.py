@@ -52,12 +52,14 @@ def placed(tested: MissionItem) -> tuple[list[MissionItem], int]:
 
 
 def stored(tested: MissionItem, profile: HarakiriRules = PROFILE) -> tuple[MissionItem, dict[str, tuple[Any, Any]]]:
-    """The item as it reads back, and its findings: field to (was, becomes)."""
+    """The item as it reads back, and its changes: field to (was, becomes)."""
     items, seq = placed(tested)
     verdict = check_list(items, profile)
     assert verdict.result is Result.ACCEPTED
     assert len(verdict.items) == len(items)
-    return verdict.items[seq], {f.field: (f.was, f.becomes) for f in verdict.findings if f.seq == seq}
+    return verdict.items[seq], {
+        f.field: (f.was, f.becomes) for f in verdict.findings if f.seq == seq and f.was != f.becomes
+    }
 
 
 # ---------------------------------------------------------------- values
@@ -221,7 +223,7 @@ def test_a_last_loiter_without_coordinates_is_dropped() -> None:
 def test_a_return_without_a_finite_height_gets_the_minimum(height: float) -> None:
     verdict = verdict_on(item(WAYPOINT), item(RTL, alt_m=height))
     assert (verdict.items[2].command, verdict.items[2].alt_m) == (RTL, 2)
-    assert [(f.field, f.becomes, f.news) for f in verdict.findings] == [("alt_m", 2, News.WARNING)]
+    assert [(f.field, f.becomes, f.news) for f in verdict.findings] == [("alt_m", 2, News.DANGER)]
 
 
 @pytest.mark.parametrize("height", [NAN, INF, -INF])

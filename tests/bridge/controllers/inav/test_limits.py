@@ -17,7 +17,7 @@ from protocols.msp.inav_places import FW_APPROACH, MISSION_APPROACH, SET_FW_APPR
 from reports.finding import without_defaults
 from tests.bridge.controllers.inav.test_mission_store import ACCEPTED, board_with
 from tests.support.conversations import Upload
-from tests.support.nav_lists import HOME, LAT, LON, RTL, RTL_LANDS, WP, item
+from tests.support.nav_lists import HOME, LAT, LON, RTL, RTL_LANDS, WP, item, speed
 from tests.support.settings_client import SettingsClient
 
 #: 100 m to the north.
@@ -35,16 +35,39 @@ def texts(*items: MissionItem, here: tuple[int, int] | None = None, **limits: An
 
 
 def test_a_first_waypoint_at_which_inav_would_not_arm_rejects_the_list() -> None:
-    reason = "200 m from home, nav_wp_max_safe_distance is 100 m: it would not arm"
-    assert texts(FAR, NEAR) == [f"Rejected, WP 1: {reason}"]
-    assert texts(FAR, here=(LAT, LON + 1000)) == [f"Rejected, WP 1: {reason}"]
+    reason = "200 m from {}, nav_wp_max_safe_distance is 100 m: it would not arm"
+    assert texts(FAR, NEAR) == [f"Rejected, WP 1: {reason.format('home')}"]
+    assert texts(FAR, here=(LAT, LON + 1000)) == [f"Rejected, WP 1: {reason.format('the craft')}"]
     assert texts(NEAR, FAR) == texts(FAR, nav_wp_max_safe_distance=0) == texts(FAR, nav_wp_max_safe_distance=201) == []
 
 
-def test_a_first_waypoint_near_the_craft_but_not_near_the_plans_home_is_only_a_warning() -> None:
-    """Nobody knows yet where the craft will be armed."""
-    warning = "WP 1: 200 m from home, nav_wp_max_safe_distance is 100 m: it arms only near the craft's place, not there"
-    assert texts(FAR, here=(LAT + 2 * NORTH, LON)) == [warning]
+def test_the_first_waypoint_is_measured_from_the_craft() -> None:
+    """INAV's home is where it is armed, whatever the home of the list."""
+    assert texts(FAR, here=(LAT + 2 * NORTH, LON)) == []
+    warning = "WP 1: 200 m from the craft, nav_wp_max_safe_distance is 100 m: it arms only near the list's home"
+    assert texts(NEAR, here=(LAT + NORTH * 5 // 2, LON)) == [warning]
+
+
+def test_a_speed_that_a_multirotor_does_not_fly_is_named() -> None:
+    assert texts(NEAR, speed(12), WP, FAR) == ["WP 3: 12 m/s, nav_max_auto_speed is 10 m/s (+1)"]
+    assert texts(NEAR, speed(12), FAR, nav_max_auto_speed=1200) == []
+
+
+def test_what_an_aeroplane_ignores_is_named() -> None:
+    yaw = item(Command.CONDITION_YAW, at=False, p1=90.0)
+    assert texts(NEAR, speed(12), FAR, yaw, FAR, item(Command.NAV_ROI), FAR, is_aeroplane=True)[:2] == [
+        "WP 3: its speed has no effect on an aeroplane (+2)",
+        "WP 4: no effect on an aeroplane (+1)",
+    ]
+
+
+def test_a_far_or_high_flight_is_named_although_inav_has_no_limit() -> None:
+    far = replace(WP, lat_e7=LAT + 60 * NORTH, alt_m=200.0)
+    assert texts(NEAR, far, RTL_LANDS) == [
+        "WP 2: 5.9 km leg, over 2 km (+1)",
+        "WP 2: 6.0 km from home, over 5 km",
+        "WP 2: 200 m high",
+    ]
 
 
 def test_a_leg_that_inav_would_fly_lower_rejects_the_list() -> None:

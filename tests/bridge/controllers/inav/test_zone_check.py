@@ -12,7 +12,7 @@ from bridge.controllers.nav.rules import inav_profile
 from bridge.missions.list_check import check_list
 from protocols.mission_item import MissionItem
 from protocols.msp.inav_places import Corner, Geozone
-from tests.support.nav_lists import HOME, LAT, LON, WP
+from tests.support.nav_lists import HOME, LAT, LON, RTL_LANDS, WP, jump
 
 #: 100 m to the north.
 NORTH = 8983
@@ -42,7 +42,8 @@ def square(north: float, size: float, *, is_inclusive: bool = False) -> Geozone:
 
 
 LEGS = at(1), at(3)
-THROUGH = "WP 2: passes through geozone {} (exclusive): INAV does not stop a mission there"
+LEAVES = "leaves zones: flown, or a stop if ANGLE is on"
+THROUGH = "WP 2: geozone {}: flown, or a stop if ANGLE is on"
 
 
 @pytest.mark.parametrize(
@@ -61,24 +62,44 @@ THROUGH = "WP 2: passes through geozone {} (exclusive): INAV does not stop a mis
     ],
 )
 def test_a_leg_through_an_exclusive_zone_is_a_warning(zone: Geozone, is_through: bool) -> None:
-    """At 50 m; INAV flies it all the same."""
+    """At 50 m."""
     assert texts(zone, legs=LEGS) == ([THROUGH.format(zone.number)] if is_through else [])
 
 
-def test_a_waypoint_outside_of_the_inclusive_zones_is_a_warning() -> None:
+def test_a_leg_out_of_the_inclusive_zones_is_a_warning() -> None:
     field = square(0, 2, is_inclusive=True)
-    outside = "WP 2: outside of the inclusive geozones: INAV does not stop a mission there"
-    assert texts(field, legs=LEGS) == [outside]
-    assert texts(field, circle(3, is_inclusive=True), legs=LEGS) == []
+    assert texts(field, legs=LEGS) == ["WP 2: " + LEAVES]
+    assert texts(field, circle(2.5, radius_m=100, is_inclusive=True), legs=LEGS) == []
     # Armed outside of all of them, INAV turns them off.
     assert texts(circle(30, is_inclusive=True), legs=LEGS) == []
 
 
+def test_zones_are_judged_on_the_way_as_flown() -> None:
+    """From the craft, after a jump, around a corner, and back home."""
+    assert texts(circle(0.5, radius_m=20), legs=(at(1),)) == ["WP 1: geozone 0: flown, or a stop if ANGLE is on"]
+    corner = at(1), at(1, 2), at(3, 2), jump(1), at(3, 3)
+    assert texts(circle(2, 1, 40), legs=corner) == ["WP 4: geozone 0: flown, or a stop if ANGLE is on"]
+    back = at(1), at(1, 2), RTL_LANDS
+    assert texts(circle(0.5, 1, 30), legs=back) == ["WP 3: geozone 0: flown, or a stop if ANGLE is on"]
+    places = [(-1, -1), (3, -1), (3, 0), (0, 0.5), (3, 1), (3, 3), (-1, 3)]
+    corners = tuple(Corner(LAT + round(n * NORTH), LON + round(e * EAST)) for n, e in places)
+    concave = Geozone(1, True, corners)
+    assert texts(concave, legs=(at(2, -0.5), at(2, 2))) == ["WP 2: " + LEAVES]
+    assert texts(concave, legs=(at(0, -0.5), at(-0.5, 2))) == []
+
+
+def test_several_legs_through_a_zone_are_one_warning() -> None:
+    assert texts(circle(2), legs=(at(1), at(3), at(1), at(3))) == [THROUGH.format(0) + " (+2)"]
+
+
 def test_a_list_is_rejected_if_inav_would_not_arm_at_home() -> None:
-    inside = "Mission rejected: Home is inside geozone 0 (exclusive): INAV would not arm"
+    inside = "Mission rejected: Home is inside geozone 0 (exclusive): does not arm"
     assert texts(circle(0), legs=LEGS) == [inside]
-    assert texts(circle(0, lowest_cm=2000), legs=LEGS) == []
-    outside = "Mission rejected: Home is outside geozone 0 (inclusive): INAV would not arm"
+    assert texts(circle(0, lowest_cm=6000), legs=LEGS) == []
+    outside = "Mission rejected: Home is outside geozone 0 (inclusive): does not arm"
     assert texts(circle(10, is_inclusive=True), legs=LEGS) == [outside]
     # The craft is elsewhere, where it arms.
-    assert texts(circle(0), legs=LEGS, here=(LAT - 2 * NORTH, LON)) == []
+    assert texts(circle(0), legs=LEGS, here=(LAT - 2 * NORTH, LON))[0].startswith("WP 1: geozone 0")
+    # The craft does not arm where it is, but at the home of the list.
+    warning = "The craft is inside geozone 0 (exclusive): does not arm"
+    assert texts(circle(-3), legs=LEGS, here=(LAT - 3 * NORTH, LON))[0] == warning

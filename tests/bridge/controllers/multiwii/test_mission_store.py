@@ -41,10 +41,8 @@ def test_a_multiwiis_own_limits_are_warned_of_and_read_for_each_list() -> None:
     multiwii.answers = {**multiwii.answers, 122: nav_config(60, 100, 25, wp_radius=900)}
     assert Upload(station, sent).run() is ACCEPTED
     texts = " ".join(station.texts())
-    assert "WP 9: flown at 25 m" in texts
-    assert "WP 4: flown" not in texts
-    assert "WP 5: 100 m or more from the waypoint before: the mission stops there" in texts
-    assert "WP 4: 100 m" not in texts
+    assert "flown at 25 m, the board's nav_max_altitude" in texts
+    assert "WP 5: leg of 100 m or more: stops there (+1)" in texts
     assert "WP 7: passes the ROI at less than 14 m: the board may end this leg there" in texts
 
 

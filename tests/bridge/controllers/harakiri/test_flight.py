@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Harakiri's flight core refuses in the air is said at Write: the compiled core itself confirms each verdict."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bridge.controllers.harakiri.check import HarakiriRules
+from bridge.controllers.harakiri.flight import MAX_LEG_M, USUAL_FLIGHT, FlightLimits
+from bridge.missions.list_check import check_list
+from protocols.mission_item import MissionItem
+from reports.finding import News
+from tests.support.flight_core import FlightCore
+from tests.support.rule_items import HOME, LAT, LON, RTL, TAKEOFF, WAYPOINT, item
+
+FIRMWARE = Path(__file__).parents[4] / "firmware"
+#: 100 m to the north.
+NORTH = 8983
+
+
+def north(hundreds: float, **fields: Any) -> MissionItem:
+    return item(WAYPOINT, lat_e7=LAT + round(hundreds * NORTH), **fields)
+
+
+def warnings(
+    *items: MissionItem, here: tuple[int, int] | None = None, limits: FlightLimits | None = USUAL_FLIGHT
+) -> list[str]:
+    verdict = check_list([HOME, *items], HarakiriRules(flight=limits), here)
+    return [finding.text() for finding in verdict.findings if finding.news is not News.NONE]
+
+
+SWAPPED = replace(north(1), lat_e7=LON, lon_e7=LAT)
+CASES = [
+    ((north(1.9), north(3)), None, []),
+    ((north(2.5),), None, ["WP 1: not flown: 250 m away, mission_first 200 m"]),
+    ((north(1), north(30), north(60)), None, ["WP 2: not flown: 2.9 km leg, at most 2 km (+1)"]),
+    ((north(1), north(20.9)), None, []),
+    ((north(1), north(21.1)), None, ["WP 2: not flown: 2.0 km leg, at most 2 km"]),
+    ((north(1), SWAPPED), None, ["WP 2: not flown: 5,779 km leg, at most 2 km"]),
+    ((north(1, alt_m=101.0), north(2, alt_m=120.0)), None, ["WP 1: not flown: 101 m, mission_height 100 m (+1)"]),
+    ((north(1, alt_m=100.0), north(2, alt_m=-100.0)), None, []),
+    ((item(TAKEOFF), north(2.5)), None, ["WP 2: not flown: 250 m away, mission_first 200 m"]),
+    ((north(1), north(20), north(39), item(RTL)), None, ["WP 4: not flown: 3.9 km leg, at most 2 km"]),
+    ((north(1), item(RTL, alt_m=120.0)), None, ["WP 2: not flown: 120 m, mission_height 100 m"]),
+    ((north(1),), (LAT + 5 * NORTH, LON), ["WP 1: starts only at the list's home, 400 m off"]),
+    ((north(6),), (LAT + 5 * NORTH, LON), []),
+]
+
+
+@pytest.fixture(scope="module")
+def flight_core(tmp_path_factory: pytest.TempPathFactory) -> FlightCore:
+    return FlightCore(tmp_path_factory.mktemp("core"))
+
+
+@pytest.mark.parametrize(("items", "here", "told"), CASES)
+def test_the_core_refuses_exactly_what_is_told(
+    flight_core: FlightCore, items: tuple[MissionItem, ...], here: tuple[int, int] | None, told: list[str]
+) -> None:
+    assert warnings(*items, here=here) == told
+    records = check_list([HOME, *items], HarakiriRules()).records
+    refused = flight_core.refusal(records, here or (LAT, LON), USUAL_FLIGHT)
+    assert (refused is not None) == bool(told), refused
+
+
+def test_the_settings_of_the_board_count() -> None:
+    assert warnings(north(2.4), limits=FlightLimits(mission_first=250)) == []
+    assert warnings(north(1, alt_m=60.0), limits=FlightLimits(mission_height=50)) == [
+        "WP 1: not flown: 60 m, mission_height 50 m"
+    ]
+
+
+def test_a_board_that_does_not_fly_missions_has_plain_limits() -> None:
+    assert warnings(north(3), north(30), limits=None) == ["WP 2: 2.7 km leg, over 2 km"]
+    assert warnings(north(3, alt_m=121.0), limits=None) == ["WP 1: 121 m high"]
+
+
+@pytest.mark.parametrize(
+    ("rtl_m", "told"),
+    [
+        (0.0, ["WP 2: RTL flies home at 2 m, set its Alt"]),
+        (5.0, ["WP 2: RTL flies home at 5 m, below the 20 m"]),
+        (20.0, []),
+    ],
+)
+def test_a_return_below_the_way_out_is_told(rtl_m: float, told: list[str]) -> None:
+    assert warnings(north(1, alt_m=20.0), item(RTL, alt_m=rtl_m)) == told
+
+
+def test_the_constants_are_those_of_the_firmware() -> None:
+    header = (FIRMWARE / "naze_flight.h").read_text()
+    defaults = (FIRMWARE / "harakiri_flight.c").read_text()
+    found = re.search(r"#define NF_MAX_LEG_M (\d+)u", header)
+    assert found is not None
+    assert int(found[1]) == MAX_LEG_M
+    for name in ("mission_first", "mission_height"):
+        usual = re.search(rf"set_default\(&cfg\.{name}, \d+, \d+, (\d+)\)", defaults)
+        assert usual is not None
+        assert int(usual[1]) == getattr(USUAL_FLIGHT, name)
