@@ -12,6 +12,8 @@ from protocols.param_file import is_setting_name
 
 #: A text only where the setting is one.
 Value = float | str
+#: Of single precision.
+_LARGEST = 3.4e38
 
 
 class ValueKind(Enum):
@@ -73,12 +75,13 @@ class SettingTable:
     """All settings of a board, in its own order.
 
     is_complete: False if some could not be read; their names are missing. left_out: how many have a name that no ground
-    station or file could take.
+    station or file could take. is_remembered: True if only the values are known, from the last time.
     """
 
     settings: Mapping[str, BoardSetting] = field(default_factory=dict)
     is_complete: bool = True
     left_out: int = 0
+    is_remembered: bool = False
 
     def __iter__(self) -> Iterator[BoardSetting]:
         return iter(self.settings.values())
@@ -112,6 +115,12 @@ def table_of(*settings: BoardSetting, is_complete: bool = True) -> SettingTable:
     possible = {setting.name: setting for setting in settings if is_setting_name(setting.name)}
     left_out = sum(not is_setting_name(setting.name) for setting in settings)
     return SettingTable(possible, is_complete, left_out)
+
+
+def remembered_table(values: Mapping[str, Value]) -> SettingTable:
+    kinds = {name: ValueKind.TEXT if isinstance(value, str) else ValueKind.FLOAT for name, value in values.items()}
+    settings = (BoardSetting(name, kinds[name], -_LARGEST, _LARGEST, value) for name, value in values.items())
+    return replace(table_of(*settings, is_complete=False), is_remembered=True)
 
 
 def shown(value: Value) -> str:

@@ -83,7 +83,7 @@ class BoardSettings:
         #: The text for ground stations that connect later.
         self._told = ""
         #: Called when the table has changed.
-        self.on_table: Callable[[SettingTable, float], None] = lambda _table, _now: None
+        self.on_table: Callable[[SettingTable], None] = lambda _table: None
         self.due = inf
 
     @property
@@ -127,14 +127,15 @@ class BoardSettings:
     def may_have_changed(self, now: float) -> None:
         """The bridge, or a program through it, may have changed settings."""
         self.known.may_have_changed()
+        self._stop_reading()
         self._missions.settings_changed()
         self._read_again(now + _AFTER_CHANGE_S)
 
     def saved_with_mission(self, now: float) -> None:
         """The board has written its whole configuration, to store a setting of the mission's."""
-        self.known.saved()
-        self._missions.settings_changed()
-        self._read_again(now + _AFTER_CHANGE_S)
+        self.known.unsaved.clear()
+        self.may_have_changed(now)
+        self.known.is_saved = True
 
     # For clients.
 
@@ -255,7 +256,7 @@ class BoardSettings:
                 self.known.unsaved[before.name] = work.value
             return result
         if table := self.known.changed(result):
-            self.on_table(table, now)
+            self.on_table(table)
         after = next((each for each in result if each.name == before.name), before)
         if not after.holds(work.value):
             text = f"{before.name} stays {shown(after.value)}: the flight controller refused it"
@@ -305,7 +306,9 @@ class BoardSettings:
     def _whole(self, fc_settings: FcSettings) -> Conversation[SettingTable | None]:
         controller, known = self._controller, self.known
         if known.board is None and controller is not None and controller.profile.spoken is Spoken.MSP:
-            known.identified((yield from _identify(controller)))
+            remembered = known.identified((yield from _identify(controller)))
+            if remembered is not None:
+                self.on_table(remembered)
         is_doubtful = known.freshness <= Freshness.DOUBTFUL
         return (yield from fc_settings.read(known.table, TableReading(self._pace, is_doubtful)))
 
@@ -321,12 +324,12 @@ class BoardSettings:
             return
         self._retry_s, self._read_at = _RETRY_S, inf
         self._read_again(now + _INTERVAL_S)
-        is_first = self.known.table is None
+        is_first = self.known.table is None or self.known.table.is_remembered
         reading = self.known.read(table, now)
         if is_first or reading.changed:
             names = ", ".join(reading.changed[:_MOST_NAMED])
             self._emit(SettingsRead(settings=len(table), changed=names, left_out=table.left_out))
-            self.on_table(table, now)
+            self.on_table(table)
         if reading.elsewhere is not None:
             self._report(reading.elsewhere)
         if reading.backup is not None:

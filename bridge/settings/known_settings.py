@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from zlib import crc32
 
-from bridge.model.board_setting import BoardSetting, SettingTable, Value
+from bridge.model.board_setting import BoardSetting, SettingTable, Value, remembered_table
 from bridge.model.settings import BoardId, Occasion, SettingsChange, SettingsMemory, SettingsState, TakenBackup
 
 
@@ -63,10 +63,16 @@ class KnownSettings:
         self.freshness, self.board = Freshness.UNREAD, None
         self._occasion, self._backed_up = Occasion.CONNECTED, None
 
-    def identified(self, board: BoardId) -> None:
+    def identified(self, board: BoardId) -> SettingTable | None:
+        """Returns the table as last read, if the board is known by its chip's number: an INAV takes 20 s to read."""
         self.board = board
         if self._is_ours:
             self._memory.keep(board, {})
+        values = self._memory.recall(board)
+        if not (board.uid and values) or (self.state is not None and self.state.board == board):
+            return None
+        self.table = remembered_table(values)
+        return self.table
 
     def may_have_changed(self, freshness: Freshness = Freshness.DOUBTFUL) -> None:
         """The bridge, or a program through it, may have changed settings: the differences found next are no news."""

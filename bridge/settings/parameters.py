@@ -151,7 +151,7 @@ class Parameters:
         dialogue = self._dialogue(station)
         if dialogue is None:
             return
-        self._files.show(self._values(), self._named)
+        self._files.show(self._values(), self._described())
         if is_opening(payload):
             # Changes that were not made through the bridge follow as PARAM_VALUE.
             self._settings.current(lambda _table, _at: None, now, _LIST_WITHIN_S)
@@ -164,9 +164,9 @@ class Parameters:
 
     def metadata(self, uptime_ms: int) -> Message | None:
         """COMPONENT_METADATA, which names the file with the descriptions; None before the settings are known."""
-        if not self._named:
+        if not self._described():
             return None
-        self._files.show(self._values(), self._named)
+        self._files.show(self._values(), self._described())
         crc = file_crc32(self._files.general())
         return pack_component_metadata(uptime_ms, crc, GENERAL_URI)
 
@@ -207,7 +207,7 @@ class Parameters:
             self._dialogues[ground_station] = _Dialogue(station, FtpSession(self._files.find))
         return self._dialogues[ground_station]
 
-    def _take(self, table: SettingTable, now: float) -> None:
+    def _take(self, table: SettingTable) -> None:
         """The settings were read, or some have changed."""
         numbers = {setting.name: setting for setting in table if setting.kind is not ValueKind.TEXT}
         if numbers.keys() != {*self._names.values()}:
@@ -218,7 +218,12 @@ class Parameters:
         for dialogue in self._dialogues.values():
             if 0 < dialogue.count != count and dialogue.next is None:
                 dialogue.next = 0
-                self.due = min(self.due, now)
+                self.due = -inf
+
+    def _described(self) -> Mapping[str, BoardSetting]:
+        """The settings for the files; none while only their values are known."""
+        table = self._settings.known.table
+        return {} if table is None or table.is_remembered else self._named
 
     def _values(self) -> dict[str, float]:
         """Every parameter. The bridge's own keep their indexes on every board."""

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 
+import pytest
+
 from bridge.settings.parameter_names import LONGEST, parameter_names
 from simulator.inav.setting_table import SETTINGS as INAV_SETTINGS
 from simulator.naze.setting_table import SETTINGS as NAZE_SETTINGS
+from tests.support.settings_client import BOARDS, ready
 
 HARAKIRI = [held.setting.name for held in NAZE_SETTINGS]
 INAV = [setting.name for setting in INAV_SETTINGS]
@@ -13,6 +16,17 @@ def test_all_names_are_short_and_distinct() -> None:
         names = parameter_names(settings)
         assert [*names.values()] == settings
         assert all(len(name) <= LONGEST and name == name.upper() for name in names)
+
+
+@pytest.mark.parametrize("name", BOARDS)
+def test_no_two_settings_of_a_board_are_one_parameter(name: str) -> None:
+    world, client = ready(BOARDS[name])
+    settings = [setting.name for setting in client.wait_read()]
+    own = world.inside.parameters._own.values()
+    parameters = parameter_names(settings, own)
+    assert (len(parameters), len({setting.upper() for setting in settings})) == (len(settings), len(settings))
+    assert not parameters.keys() & own.keys()
+    assert all(client.wait_read().find(setting.swapcase()) for setting in settings)
 
 
 def test_a_name_that_fits_is_kept() -> None:

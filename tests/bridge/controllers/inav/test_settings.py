@@ -1,8 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
+from bridge.model.settings import MemoryOfThisRun
 from protocols.mission_item import MissionResult
+from protocols.msp.frame import request
+from protocols.msp.inav_settings import COMMON_SET_SETTING, encode_about_name
 from protocols.param_file import read_param_file, write_param_file
+from simulator.board.msp_options import MspOptions
 from simulator.commands.fc_kinds import make_board
 from simulator.inav.setting_table import SETTINGS as INAV_SETTINGS
 from tests.support.conversations import Upload, waypoints
@@ -38,3 +43,32 @@ def test_a_setting_with_an_impossible_name_is_left_out_and_reported_once(monkeyp
     assert [event.facts["left_out"] for event in world.events("settings.read")] == [2]
     text = write_param_file({setting.name: setting.value for setting in table})
     assert read_param_file(text.encode(), "backup").values.keys() == table.settings.keys()
+
+
+def test_a_list_is_complete_right_after_a_start_if_the_board_is_known() -> None:
+    """Reading all takes 20 s; the values are those of the last time, and a change since then follows."""
+    memory = MemoryOfThisRun()
+    options = MspOptions(baud=19200)  # as slow as the 800 settings of a whole INAV
+    first = World(speeds=(19200,), peer=make_board("inav", options), memory=memory)
+    count = len(SettingsClient(first).wait_read(60))
+    board = make_board("inav", options)
+    world = World(speeds=(19200,), peer=board, memory=memory)
+    board.receive(request(COMMON_SET_SETTING, encode_about_name("nav_rth_altitude") + b"\x14\5"), 0.0)
+    world.wait_until(lambda world: world.is_found, 20)
+    station = GroundStation(world)
+    station.stay_connected()
+    station.send(m.MAVLink_param_request_list_message(1, 1))
+    world.run(8)
+    listed = {each.param_id: each.param_value for each in station.messages("PARAM_VALUE")}
+    assert len(listed) == station.messages("PARAM_VALUE")[-1].param_count > count - 60
+    assert listed["NAV_RTH_ALTITUDE"] == 1000
+    assert asked(world) < count
+    station.send(m.MAVLink_param_set_message(1, 1, b"NAV_RTH_ALTITUDE", 1200, 9))
+    world.run(1)
+    assert len(station.messages("PARAM_ERROR")) == 1
+    world.run(30)
+    (follows,) = [each for each in station.messages("PARAM_VALUE")[len(listed) :] if each.param_value == 1300]
+    assert follows.param_id == "NAV_RTH_ALTITUDE"
+    assert (
+        world.events("settings.changed_on_board")[0].facts["detail"] == "Settings changed elsewhere: nav_rth_altitude"
+    )
