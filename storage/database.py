@@ -41,19 +41,18 @@ _LOG_MAGIC = {0x377F0682: "<6I", 0x377F0683: ">6I"}
 _READER_TIMEOUT_S = 2.0
 #: Bytes; 65,535 items are 10 MB of text.
 _LARGEST_VALUE = 64 << 20
-#: Damaged files kept, the newest: each may be as large as the store.
+#: Damaged and newer files kept, the latest: each may be as large as the store.
 _MOST_KEPT = 3
-_ASIDE = re.compile(r"\.corrupt-[0-9]{8}-[0-9]{6}(-[0-9]+)?\Z")
+_ASIDE = re.compile(r"\.(corrupt|newer)-[0-9]{8}-[0-9]{6}(-[0-9]+)?\Z")
 # SQLITE_ERROR is "table already exists" and such: the file does not have its claimed schema.
 _DAMAGE = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR)
 
 
 def open_database(path: Path, now: float) -> tuple[sqlite3.Connection, Path | None]:
-    """Open or create the database; also returns the new path of a damaged one, if there was one.
+    """Open or create the database; also returns the new path of one that is damaged or of a newer release.
 
-    `now`: unix seconds, for the name of a damaged file. The caller holds the directory's state_lock: no other
-    process may have a file open that is renamed. StoreError if the file cannot be opened, created or written,
-    or is of a newer release.
+    `now`: unix seconds, for the name of such a file. The caller holds the directory's state_lock: no other process
+    may have a file open that is renamed. StoreError if the file cannot be opened, created or written.
     """
     failure = f"cannot open the mission store {path}"
     try:
@@ -64,13 +63,13 @@ def open_database(path: Path, now: float) -> tuple[sqlite3.Connection, Path | No
         connection = _connect(path)
         undo.callback(connection.close)
         aside = None
-        if not _make_ready(connection, path):
+        if unfit := _make_ready(connection, path):
             # Moved before it is closed: closing would write the log into the damaged file and delete it.
-            aside = _keep_aside(path, now)
+            aside = _keep_aside(path, now, unfit)
             connection.close()
             connection = _connect(path)
             undo.callback(connection.close)
-            _prepare(connection, path)
+            _prepare(connection)
         undo.pop_all()
         return connection, aside
 
@@ -152,20 +151,26 @@ def configured(connection: sqlite3.Connection) -> sqlite3.Connection:
     return connection
 
 
-def _make_ready(connection: sqlite3.Connection, path: Path) -> bool:
-    """Prepare the connection if the log, every page and the schema are sound; False if not."""
+def _make_ready(connection: sqlite3.Connection, path: Path) -> str:
+    """Prepare the connection; returns why it cannot be used, or "" if the log, every page and the schema are sound.
+
+    A newer file is of a release from which the pilot went back to this one.
+    """
     if _log_was_lost(path):
-        return False
+        return "corrupt"
     try:
         # Reads every page. integrity_check would also look up every row in every index: slow, for little use.
         (finding,) = connection.execute("PRAGMA quick_check(1)").fetchone()
         if finding != "ok":
-            return False
-        _prepare(connection, path)
-        return _has_our_schema(connection)
+            return "corrupt"
+        (version,) = connection.execute("PRAGMA user_version").fetchone()
+        if version > len(_schema_steps()):
+            return "newer"
+        _prepare(connection)
+        return "" if _has_our_schema(connection) else "corrupt"
     except FAILURES as error:
         if primary_code(error) in _DAMAGE:
-            return False
+            return "corrupt"
         raise
 
 
@@ -201,17 +206,17 @@ def _log_checksum(words: tuple[int, ...]) -> tuple[int, int]:
     return first, second
 
 
-def _keep_aside(path: Path, now: float) -> Path:
+def _keep_aside(path: Path, now: float, why: str) -> Path:
     """Rename the file and its auxiliary files, and delete the oldest such files; returns the new name.
 
     The main file goes last: if it went first, a power cut here would leave a log that SQLite deletes.
     """
     stamp = datetime.fromtimestamp(now, UTC).strftime("%Y%m%d-%H%M%S")
-    aside = path.with_name(f"{path.name}.corrupt-{stamp}")
+    aside = path.with_name(f"{path.name}.{why}-{stamp}")
     attempt = 1
     while aside.exists():
         attempt += 1
-        aside = path.with_name(f"{path.name}.corrupt-{stamp}-{attempt}")
+        aside = path.with_name(f"{path.name}.{why}-{stamp}-{attempt}")
     try:
         for suffix in _COMPANIONS:
             companion = path.with_name(path.name + suffix)
@@ -221,18 +226,18 @@ def _keep_aside(path: Path, now: float) -> Path:
         _forget_oldest(path, aside)
     except OSError as error:
         raise StoreError(
-            f"the mission store {path} is damaged and cannot be renamed ({reason(error)}); move it away"
+            f"the mission store {path} is {why} and cannot be renamed ({reason(error)}); move it away"
         ) from error
     return aside
 
 
 def kept_aside(path: Path) -> list[Path]:
-    """The damaged files that were renamed, in the order of their names."""
-    return sorted(file for file in path.parent.glob(f"{path.name}.corrupt-*") if _ASIDE.search(file.name))
+    """The damaged and newer files that were renamed, in the order of their names."""
+    return sorted(file for file in path.parent.glob(f"{path.name}.*") if _ASIDE.search(file.name))
 
 
 def _forget_oldest(path: Path, newest: Path) -> None:
-    """Delete the oldest damaged files. Their missions that could be read are in the store."""
+    """Delete the oldest such files. Their missions that could be read are in the store."""
     kept = [file for file in kept_aside(path) if file != newest]
     kept.sort(key=lambda file: (file.stat().st_ctime_ns, file.name))
     for file in kept[: -(_MOST_KEPT - 1)]:
@@ -240,7 +245,7 @@ def _forget_oldest(path: Path, newest: Path) -> None:
             file.with_name(file.name + suffix).unlink(missing_ok=True)
 
 
-def _prepare(connection: sqlite3.Connection, path: Path) -> None:
+def _prepare(connection: sqlite3.Connection) -> None:
     """Make commits durable and migrate the file to this release's schema."""
     connection.execute("PRAGMA journal_mode = WAL")
     connection.execute("PRAGMA synchronous = FULL")  # NORMAL would lose the last commits in a power cut
@@ -249,22 +254,23 @@ def _prepare(connection: sqlite3.Connection, path: Path) -> None:
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     # Finds a read-only file now, not when a mission arrives. Rolled back, it takes no space.
     connection.executescript(f"BEGIN; PRAGMA user_version = {version}; ROLLBACK")
-    latest = len(_schema_steps())
-    if version > latest:
-        raise StoreError(
-            f"the mission store {path} is from a newer naze-bridge (schema {version}, this one knows "
-            f"{latest}); install that release, or move the file away"
-        )
     migrate(connection)
 
 
 def _schema_steps() -> list[str]:
     """The schema files' texts in the order of their numbers; step n migrates version n-1 to n."""
-    return [file.read_text() for file in sorted(Path(__file__).with_name("schema").iterdir())]
+    return _schema_files("0*.sql")
+
+
+def _schema_files(pattern: str) -> list[str]:
+    return [file.read_text() for file in sorted(Path(__file__).with_name("schema").glob(pattern))]
 
 
 def migrate(connection: sqlite3.Connection) -> None:
-    """Apply the steps that are missing, each in its own transaction."""
+    """Apply the steps that are missing, each in its own transaction, and make the added tables.
+
+    Added tables have no step: an older release, to which the pilot may go back, leaves them alone.
+    """
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     for number, sql in enumerate(_schema_steps()[version:], start=version + 1):
         try:
@@ -273,6 +279,8 @@ def migrate(connection: sqlite3.Connection) -> None:
             if connection.in_transaction:
                 connection.execute("ROLLBACK")
             raise
+    for sql in _schema_files("added_*.sql"):
+        connection.executescript(f"BEGIN IMMEDIATE;\n{sql}\nCOMMIT;")
 
 
 def _has_our_schema(connection: sqlite3.Connection) -> bool:

@@ -283,11 +283,19 @@ class MissionStore:
 
 @dataclass(frozen=True, slots=True)
 class OpenedStore:
-    """A store ready for use. `set_aside`: the path of a damaged one; `salvaged`: the missions recovered from it."""
+    """A store ready for use.
+
+    `set_aside`: the path of a damaged one, or of a newer release; `salvaged`: the missions recovered from it.
+    """
 
     store: MissionStore
     set_aside: Path | None
     salvaged: int
+
+    @property
+    def is_of_newer_release(self) -> bool:
+        """True if the store that was set aside is not damaged."""
+        return self.set_aside is not None and ".newer-" in self.set_aside.name
 
 
 def open_store(path: Path, now: float, budget: int = BUDGET) -> OpenedStore:
@@ -295,7 +303,7 @@ def open_store(path: Path, now: float, budget: int = BUDGET) -> OpenedStore:
 
     `now`: unix seconds, for the name of a damaged file. `budget`: size limit, bytes. The caller holds
     the directory's state_lock.
-    StoreError if it cannot be opened or written, or is of a newer release.
+    StoreError if it cannot be opened or written.
     """
     connection, set_aside = open_database(path, now)
     salvaged = 0 if set_aside is None else salvage(set_aside, connection)

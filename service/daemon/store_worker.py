@@ -100,7 +100,11 @@ class StoreWorker:
         self._store, self._path = opened.store, directory / DATABASE_NAME
         if opened.set_aside is not None:
             what = f"a new mission store was created with the {opened.salvaged} missions that could be read"
-            _log.error("store.damaged", kept_as=str(opened.set_aside), what=what)
+            _log.error(
+                "store.newer" if opened.is_of_newer_release else "store.damaged",
+                kept_as=str(opened.set_aside),
+                what=what,
+            )
 
     def _close(self) -> None:
         if self._store is None:

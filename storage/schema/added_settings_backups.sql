@@ -1,5 +1,5 @@
 -- Tables of a flight controller's settings, one for each change. Times are unix seconds.
-CREATE TABLE settings_backups (
+CREATE TABLE IF NOT EXISTS settings_backups (
     number        INTEGER PRIMARY KEY AUTOINCREMENT,  -- a number is never given twice
     board         TEXT    NOT NULL,                   -- distinguishes boards of one kind
     kind          TEXT    NOT NULL,                   -- the firmware and its version
@@ -10,4 +10,4 @@ CREATE TABLE settings_backups (
     contents      TEXT    NOT NULL,                   -- JSON: the values by name
     crc32         INTEGER NOT NULL                    -- over the columns above, in their order
 ) STRICT;
-CREATE INDEX settings_backups_of_board ON settings_backups (board, kind);
+CREATE INDEX IF NOT EXISTS settings_backups_of_board ON settings_backups (board, kind);
