@@ -245,7 +245,7 @@ class Ground:
         if self._heartbeat is None or station in self._outgoing:
             return
         ids, heartbeat = self._heartbeat
-        writer = station.writer if ids == self._ids else FrameWriter(*ids, station.access.signer)
+        writer = station.writer if ids == self._ids else FrameWriter(*ids, station.sign)
         self._outgoing[station].append(writer.frame(heartbeat, 2))
         if (question := path.question()) is not None:
             self._outgoing[station].append(writer.frame(pack(question), 2))
@@ -338,7 +338,7 @@ class Ground:
 
     def to_as(self, ids: tuple[int, int], receiver: GroundStation, message: Message) -> None:
         """Send a message to one ground station under the ids that it addressed."""
-        self._send(receiver, FrameWriter(*ids, receiver.access.signer), [message])
+        self._send(receiver, FrameWriter(*ids, receiver.sign), [message])
 
     def _send(self, receiver: GroundStation, writer: FrameWriter, together: Iterable[Message]) -> None:
         version, frames = receiver.frame_version, []

@@ -111,7 +111,10 @@ class GroundStation:
         self.has_key = False
         self._settle_rights()
         self.splitter = MavlinkSplitter()
-        self.writer = FrameWriter(sysid, compid, access.signer)
+        self.signed = access.signed_peer(peer)
+        #: Returns the signature of a MAVLink 2 frame.
+        self.sign = None if self.signed is None else self.signed.sign
+        self.writer = FrameWriter(sysid, compid, self.sign)
         self.is_heard = False
         #: The highest MAVLink version that it has sent, and the version of replies: everything signed is MAVLink 2.
         self.version = 0
@@ -137,9 +140,10 @@ class GroundStation:
     def refusal(self, frame: MavlinkFrame, effect: Effect) -> FrameRefusal | None:
         """The reason for refusing a frame with this effect; None if it is accepted. Every frame passes here first."""
         # Read requests are also checked: each valid one invalidates older recordings.
-        signing = self.access.signing
-        check = Check.VALID if signing is None else signing.check(frame)
-        if signing is not None and check is Check.VALID:
+        check = Check.VALID if self.signed is None else self.signed.check(frame)
+        if check is Check.EARLY and self.has_key:
+            return FrameRefusal(str(check.value), effect in (*_ROUTINE, Effect.READ, Effect.DIALOGUE))
+        if self.signed is not None and check is Check.VALID:
             if not self.has_key:
                 self.has_key = True
                 self._settle_rights()

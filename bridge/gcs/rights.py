@@ -4,15 +4,11 @@
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from enum import Enum
-from functools import partial
 from typing import NamedTuple
 
 from bridge.gcs.station import Peer
-from protocols.mavlink.signing import Signing
+from protocols.mavlink.signing import SignedPeer, Signing
 from protocols.rights.effect import Effect
-
-#: Returns the signature of a MAVLink 2 frame.
-Signer = Callable[[bytes], bytes]
 
 
 class Standing(Enum):
@@ -69,9 +65,9 @@ class LinkAccess:
     may_write: Callable[[Peer], bool] | None = None
     passes_everything: bool = False
 
-    @property
-    def signer(self) -> Signer | None:
-        return None if self.signing is None else partial(self.signing.signature, link_id=self.link_id)
+    def signed_peer(self, peer: Peer) -> SignedPeer | None:
+        """The signatures of a peer; None if the link requires none."""
+        return None if self.signing is None else SignedPeer(self.signing, self.link_id, peer.host)
 
     def standing(self, peer: Peer, *, has_key: bool) -> Standing:
         """The standing of a station; `has_key`: it has sent a valid signature."""

@@ -26,6 +26,7 @@ _COMMANDS = {
     "pull": LazyCommand("service.cli.mission_commands:pull", "Read the mission from the flight controller."),
     "clear": LazyCommand("service.cli.mission_commands:clear", "Clear the mission on the flight controller."),
     "missions": LazyCommand("service.cli.stored_missions:missions", "List, show and restore missions."),
+    "signing": LazyCommand("service.cli.signing:signing", "Accept ground stations again after a wrong clock."),
     "settings": LazyCommand("service.cli.settings_commands:settings", "The flight controller's settings and backups."),
     "firmware": LazyCommand("service.cli.firmware_commands:firmware", "Build and flash a Harakiri with the patch."),
     "fleet": LazyCommand("service.cli.fleet_command:fleet", "Manage many vehicles over Eclipse zenoh."),

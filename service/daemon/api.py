@@ -25,6 +25,7 @@ from storage.mission_store import MissionStore, MissionSummary, ReceivedMission,
 _MAX_SOURCE = 100
 #: Missions in one reply: a thousand are 300 kB.
 _MOST_LISTED = 1000
+SIGNING_RESET = "Signing times forgotten: the next ground station with the key sets the time"
 T = TypeVar("T")
 
 
@@ -51,6 +52,9 @@ class DaemonApi:
                 return await self.pull()
             case "status":
                 return self.status()
+            case "reset-signing":
+                self._daemon.reset_signing()
+                return {"text": SIGNING_RESET}
             case "missions":
                 return await self.list_missions(whole_number(request, "limit", 1, MOST))
             case "mission":

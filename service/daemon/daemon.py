@@ -162,6 +162,10 @@ class Daemon:
     def followers_status(self) -> Json:
         return {key: value for follower in self._followers for key, value in follower.status().items()}
 
+    def reset_signing(self) -> None:
+        """Forget the times of all ground stations: one with a wrong clock, or our own, may have shut others out."""
+        self._signing.reset()
+
     def change_links(self, gcs: Sequence[GcsAddress]) -> None:
         """Serve ground stations over these links; those that stay are not interrupted."""
         # A link that cannot be opened is left out, so that the next reload tries it again.

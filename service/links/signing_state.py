@@ -20,8 +20,8 @@ from service.settings.addresses import GcsAddress
 from service.settings.write_access import WriteAccess
 
 FILE_NAME = "signing.json"
-#: The timestamp in the file, the streams' by link, and the timestamp up to which frames are refused.
-_Kept = tuple[int, Mapping[str, list[list[int]]], int]
+#: The timestamp in the file, the streams' by link, the timestamp up to which frames are refused, the newest of a peer.
+_Kept = tuple[int, Mapping[str, list[list[int]]], int, int | None]
 #: The file's lead, and so how long signatures are refused after a power cut.
 _AHEAD = 10 * TICKS_PER_S
 _LOOK_S = 1.0
@@ -43,8 +43,9 @@ class SigningState:
         if keys and state_dir is not None:
             self._file = StateFile(state_dir, FILE_NAME, "timestamps restart from the clock")
             kept = self._file.load(_read)
-        self._stored, streams, self._refused_until = kept or (0, {}, -1)
-        self._timestamps = Timestamps(clock, self._stored)
+        self._stored, streams, self._refused_until, newest = kept or (0, {}, -1, 0)
+        self._stored_newest = newest or 0
+        self._timestamps = Timestamps(clock, self._stored, newest)
         by_key = {key: Signing(key, self._timestamps, self._refused_until) for key in keys.values()}
         self._signings = {name: by_key[key] for name, key in keys.items()}
         for name, signing in self._signings.items():
@@ -67,6 +68,16 @@ class SigningState:
         if self._file is not None:
             self._look(asyncio.get_running_loop(), self._file)
 
+    def reset(self) -> None:
+        """Forget the timestamps of all ground stations; the next one with the key is believed."""
+        self._timestamps.forget()
+        for signing in self._signings.values():
+            signing.forget()
+        self._stored = self._stored_newest = 0
+        self._refused_until = -1
+        if self._file is not None:
+            self._file.save(self._state(self._timestamps.now(), self._refused_until))
+
     def close(self) -> None:
         """Write the true timestamp."""
         if self._file is None:
@@ -77,20 +88,30 @@ class SigningState:
         self._file.close()
 
     def _look(self, loop: asyncio.AbstractEventLoop, file: StateFile) -> None:
-        """Write once the stored time is reached, by our clock or by a peer's that is far ahead."""
-        if self._timestamps.last >= self._stored:
-            self._stored = self._timestamps.now() + _AHEAD
-            file.save(self._state(self._stored, self._stored + int(_LOOK_S * TICKS_PER_S)))
+        """Write once the stored time is reached, by our clock or by a peer's that is ahead."""
+        newest = self._timestamps.newest or 0
+        if self._timestamps.last >= self._stored or newest > self._stored_newest:
+            self._stored, self._stored_newest = self._timestamps.now() + _AHEAD, newest + _AHEAD
+            lead = _AHEAD + int(_LOOK_S * TICKS_PER_S)
+            file.save(self._state(self._stored, self._stored + lead - _AHEAD, lead))
         self._timer = loop.call_later(_LOOK_S, self._look, loop, file)
 
-    def _state(self, timestamp: int, refused_until: int) -> dict[str, object]:
-        """The contents for the next run. Streams that it would reject as too old anyway are left out."""
+    def _state(self, timestamp: int, refused_until: int, lead: int = 0) -> dict[str, object]:
+        """The contents for the next run. Streams that it would reject as too old anyway are left out.
+
+        `lead`: the file runs ahead of the streams of clocks that are ahead of ours, like the timestamp.
+        """
         late = timestamp - TOLERANCE
         streams = {
-            name: [[*stream, last] for stream, last in signing.streams.items() if last >= late]
+            name: [
+                [*stream, last if last <= refused_until else last + lead]
+                for stream, last in signing.streams.items()
+                if last >= late
+            ]
             for name, signing in self._signings.items()
         }
-        return {"timestamp": timestamp, "refused_until": refused_until, "streams": streams}
+        newest = self._timestamps.newest
+        return {"timestamp": timestamp, "refused_until": refused_until, "streams": streams, "newest": newest}
 
 
 def _read(state: Any) -> _Kept:
@@ -98,4 +119,6 @@ def _read(state: Any) -> _Kept:
         str(name): [[int(number) for number in (sysid, compid, link_id, last)] for sysid, compid, link_id, last in all_]
         for name, all_ in state["streams"].items()
     }
-    return int(state["timestamp"]), streams, int(state.get("refused_until", -1))
+    newest = state.get("newest", 0)
+    refused_until = int(state.get("refused_until", -1))
+    return int(state["timestamp"]), streams, refused_until, None if newest is None else int(newest)

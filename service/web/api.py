@@ -83,6 +83,7 @@ class Api:
             route("GET", "/api/missions", self._missions),
             route("GET", "/api/missions/{number}", self._mission),
             route("POST", "/api/missions/{number}/restore", self._restore, check_token),
+            route("POST", "/api/signing/reset", self._reset_signing, check_token),
             route("GET", "/api/logs", self._list_logs, check_token),
             route("GET", "/api/logs/{name}", self._read_log, check_token),
             route("GET", "/metrics", self._render_metrics),
@@ -163,6 +164,9 @@ class Api:
     async def _restore(self, request: Request) -> Response:
         number = path_number(request, "number")
         return begun(self._writer.begin(f"mission {number}", partial(self._api.restore, number)))
+
+    async def _reset_signing(self, _request: Request) -> Response:
+        return json_reply(await self._api.do({"do": "reset-signing"}, lambda _: None))
 
     async def _list_logs(self, _request: Request) -> Response:
         with _refusing_logs():

@@ -148,3 +148,13 @@ def test_an_open_link_is_reported_once(start: Starter) -> None:
     daemon.wait()
     opened = [event for event in daemon.events() if event["event"] == "gcs.open"]
     assert [(event["link"], event["level"]) for event in opened] == [(f"udpin:127.0.0.1:{daemon.port}", "warning")]
+
+
+def test_a_reset_accepts_stations_again_after_a_wrong_clock(keyed: SignedBench) -> None:
+    """The laptop was two days ahead; the Pi's clock has stood still meanwhile."""
+    pilot = keyed.station(KEY)
+    pilot._codec.signing.timestamp += 2 * 86400 * 100_000
+    assert pilot.upload(plain_plan(5)) is MissionResult.DENIED
+    assert pilot.wait_for("STATUSTEXT").text == "Refused: signed over a day ahead: set the clocks"
+    keyed.daemon.ask({"do": "reset-signing"})
+    assert pilot.upload(plain_plan(5)) is MissionResult.ACCEPTED

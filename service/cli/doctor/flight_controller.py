@@ -106,6 +106,9 @@ def _refused(status: Json) -> Iterator[Checked]:
                 "sudo naze-bridge setup --new-key makes a new one and shows it"
             )
             yield note("key", f"{count} requests on {link} were refused: {why}", remedy)
+        elif why in (Check.LATE.value, Check.EARLY.value):
+            remedy = "set the clocks of the ground station and of the Pi; then: naze-bridge signing reset"
+            yield note("key", f"{count} requests on {link} were refused: {why}", remedy)
 
 
 def check_daemons(host: Host) -> Checked | None:

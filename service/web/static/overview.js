@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The current values of /api/state, as words.
-import { byId, make, setClass, setList, setText } from "./dom.js";
+import { post } from "./daemon.js";
+import { byId, form, make, say, setClass, setList, setText } from "./dom.js";
 import { STALE_S, age } from "./state_bar.js";
+import { currentToken, tokenField } from "./token.js";
 
 const known = (value, unit = "", digits = 0) => (value === null || value === undefined ? "–" : `${value.toFixed(digits)}${unit}`);
 let before = null; // the byte counts of the previous state, and the time of its request
@@ -40,9 +42,21 @@ export function showOverview(state) {
   ]);
   const refused = state.refused.map((text) => `refused: ${text}`);
   const links = [...rates].filter(([name]) => name !== "fc").map(([name, rate]) => `${name}: ${rate}`);
+  byId("signing").hidden = !state.refused.some((text) => /behind our clock|a day ahead/.test(text));
   list("ground", [...state.link.ground_stations, ...refused], "None connected.");
   list("links", links, "Nothing sent yet.");
   list("recording", state.recording, "Off.");
+}
+
+const result = make("p", { class: "result", role: "status" });
+byId("signing").append(form({ class: "row" }, resetSigning, tokenField(), make("button", {}, "Forget wrong clocks"), result));
+
+async function resetSigning() {
+  try {
+    say(result, "good", (await post("/api/signing/reset", currentToken())).text);
+  } catch (error) {
+    say(result, "bad", error.message);
+  }
 }
 
 function mission(held) {

@@ -234,6 +234,28 @@ def test_a_refusal_is_logged_once_for_each_peer_and_counted_each_time() -> None:
         assert station.texts() == ["Refused: not signed"]
 
 
+@pytest.mark.parametrize("was_right", [False, True])
+def test_a_station_is_told_that_its_clock_is_wrong(*, was_right: bool) -> None:
+    world = keyed()
+    station, right = signing_station(world), signing_station(world, "right clock", sysid=254)
+    if was_right:
+        station.send(clear_message())
+        world.run(1)
+        assert [ack.type for ack in station.take("MISSION_ACK")] == [MissionResult.ACCEPTED]
+    station.sign(KEY, ticks(NOON) + 2 * 86400 * 100_000)
+    for _ in range(3):
+        station.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+        world.run(1)
+    assert station.texts() == []
+    station.send(clear_message())
+    world.run(0.1)
+    assert [ack.type for ack in station.messages("MISSION_ACK")] == [MissionResult.DENIED]
+    assert station.texts() == ["Refused: signed over a day ahead: set the clocks"]
+    right.send(clear_message())
+    world.run(1)
+    assert [ack.type for ack in right.messages("MISSION_ACK")] == [MissionResult.ACCEPTED]
+
+
 def test_each_refused_attempt_is_answered_with_a_text() -> None:
     """Its repetitions, and the requests for rates that a ground station sends by itself, get none."""
     world = keyed()

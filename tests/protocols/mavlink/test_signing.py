@@ -11,12 +11,22 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from protocols.mavlink.codec import FrameWriter
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
-from protocols.mavlink.signing import TICKS_PER_S, TOLERANCE, Check, Signing, Timestamps, key_from_passphrase, ticks
+from protocols.mavlink.signing import (
+    TICKS_PER_S,
+    TOLERANCE,
+    Check,
+    SignedPeer,
+    Signing,
+    Timestamps,
+    key_from_passphrase,
+    ticks,
+)
 from tests.support.packing import pack
 
 KEY = key_from_passphrase("a passphrase")
 #: A moment in 2026, in seconds since the Unix epoch.
 NOON = 1_795_262_400.0
+DAY = 86400 * TICKS_PER_S
 HEARTBEAT = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
 
 
@@ -52,7 +62,7 @@ def test_timestamps_count_10_us_since_2015() -> None:
 @pytest.mark.parametrize("link_id", [0, 3, 255])
 def test_pymavlink_accepts_our_signatures(link_id: int) -> None:
     signing = our_side()
-    writer = FrameWriter(1, 1, lambda frame: signing.signature(frame, link_id))
+    writer = FrameWriter(1, 1, SignedPeer(signing, link_id, "gcs").sign)
     receiver = pymavlink_side()
     for count in range(300):
         sent = mavlink.MAVLink_statustext_message(6, b"x" * (count % 50))
@@ -68,7 +78,7 @@ def test_pymavlink_accepts_our_signatures(link_id: int) -> None:
 
 def test_a_mavlink_1_frame_is_never_signed() -> None:
     signing = our_side()
-    signed = FrameWriter(1, 1, lambda frame: signing.signature(frame, 0))
+    signed = FrameWriter(1, 1, SignedPeer(signing, 0, "gcs").sign)
     assert signed.frame(pack(HEARTBEAT), 1) == FrameWriter(1, 1).frame(pack(HEARTBEAT), 1)
 
 
@@ -117,7 +127,7 @@ def test_each_stream_has_its_own_timestamps() -> None:
 
 @pytest.mark.parametrize(
     ("lag", "expected"),
-    [(0, Check.VALID), (TOLERANCE, Check.VALID), (TOLERANCE + 1, Check.LATE), (-(10**9), Check.VALID)],
+    [(0, Check.VALID), (TOLERANCE, Check.VALID), (TOLERANCE + 1, Check.LATE), (-DAY, Check.VALID)],
 )
 def test_a_new_stream_is_at_most_a_minute_behind_us(lag: int, expected: Check) -> None:
     assert our_side().check(frame_of(pymavlink_side(timestamp=ticks(NOON) - lag))) is expected
@@ -139,13 +149,65 @@ def test_our_timestamps_never_repeat() -> None:
     assert taken == [start, start + 1, start + 2, start + 3, start + TICKS_PER_S, start + TICKS_PER_S + 1]
 
 
-def test_without_a_clock_timestamps_continue_and_follow_a_peers() -> None:
+def signed_at(signing: Signing, timestamp: int, host: str, link_id: int = 0) -> Check:
+    return signing.check(frame_of(pymavlink_side(timestamp=timestamp, link_id=link_id)), host)
+
+
+def sent_at(peer: SignedPeer) -> int:
+    return int.from_bytes(peer.sign(bytes(10))[1:7], "little")
+
+
+def test_without_a_clock_timestamps_continue() -> None:
     stored = ticks(NOON)
     signing = our_side(unix_s=0.0, at_least=stored)
-    assert signing.check(frame_of(pymavlink_side(timestamp=stored - TOLERANCE - 1))) is Check.LATE
-    later = stored + 3600 * TICKS_PER_S
-    assert signing.check(frame_of(pymavlink_side(timestamp=later))) is Check.VALID
-    assert signing.signature(bytes(10), 0)[1:7] == (later + 1).to_bytes(6, "little")
+    assert signed_at(signing, stored - TOLERANCE - 1, "late") is Check.LATE
+    assert sent_at(SignedPeer(signing, 0, "gcs")) == stored + 1
+
+
+@pytest.mark.parametrize("timestamp", [ticks(NOON) + DAY + 1, (1 << 48) - 1])
+def test_a_time_over_a_day_ahead_of_every_clock_is_refused(timestamp: int) -> None:
+    signing = our_side()
+    assert signed_at(signing, timestamp, "wrong clock") is Check.EARLY
+    assert signed_at(signing, ticks(NOON), "right clock") is Check.VALID
+    # The clocks of stations count.
+    assert signed_at(signing, ticks(NOON) + DAY, "another", 1) is Check.VALID
+    assert signed_at(signing, ticks(NOON) + 2 * DAY, "another", 1) is Check.VALID
+
+
+def test_our_time_follows_two_hosts_that_agree_but_no_single_one() -> None:
+    signing = our_side()
+    later = ticks(NOON) + 3600 * TICKS_PER_S
+    for link_id in range(3):  # several programs of one laptop
+        assert signed_at(signing, later, "one", link_id) is Check.VALID
+    assert sent_at(SignedPeer(signing, 9, "gcs")) < ticks(NOON) + TICKS_PER_S
+    assert signed_at(signing, ticks(NOON), "right clock", 3) is Check.VALID
+    assert signed_at(signing, later + TOLERANCE, "two", 4) is Check.VALID
+    assert later < sent_at(SignedPeer(signing, 9, "gcs")) < later + TICKS_PER_S
+    assert signed_at(signing, ticks(NOON), "late", 5) is Check.LATE
+
+
+@pytest.mark.parametrize("lead", [3600 * TICKS_PER_S, 2 * DAY])
+def test_a_peer_gets_frames_of_its_own_time(lead: int) -> None:
+    """Even if its frames are refused: it would not accept the reason otherwise."""
+    signing = our_side()
+    ahead, other = SignedPeer(signing, 0, "ahead"), SignedPeer(signing, 0, "other")
+    ahead.check(frame_of(pymavlink_side(timestamp=ticks(NOON) + lead)))
+    sent = [sent_at(ahead) for _ in range(3)]
+    assert sent == sorted(set(sent))
+    assert sent[0] > ticks(NOON) + lead
+    assert sent_at(other) < ticks(NOON) + TICKS_PER_S
+
+
+def test_after_a_reset_the_next_peer_is_believed() -> None:
+    timestamps = Timestamps(lambda: NOON, ticks(NOON) + 50 * DAY)
+    signing = Signing(KEY, timestamps)
+    ours = MavlinkFrame(FrameWriter(1, 1, SignedPeer(signing, 0, "gcs").sign).frame(pack(HEARTBEAT), 2))
+    assert signed_at(signing, ticks(NOON), "right clock") is Check.LATE
+    timestamps.forget()
+    signing.forget()
+    assert signed_at(signing, ticks(NOON), "right clock") is Check.VALID
+    assert signed_at(signing, ticks(NOON) + 2 * DAY, "too early", 1) is Check.EARLY
+    assert signing.check(ours) is Check.REPLAYED
 
 
 def test_frames_received_in_an_earlier_run_are_replays() -> None:
@@ -163,5 +225,6 @@ def test_frames_received_in_an_earlier_run_are_replays() -> None:
 
 def test_the_largest_timestamp_raises_nothing() -> None:
     signing = our_side()
-    assert signing.check(frame_of(pymavlink_side(timestamp=(1 << 48) - 1))) is Check.VALID
-    assert len(signing.signature(bytes(10), 0)) == 13
+    peer = SignedPeer(signing, 0, "gcs")
+    assert peer.check(frame_of(pymavlink_side(timestamp=(1 << 48) - 1))) is Check.EARLY
+    assert len(peer.sign(bytes(10))) == 13

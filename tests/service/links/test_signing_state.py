@@ -12,7 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from structlog.testing import capture_logs
 
 from protocols.mavlink.frame import MavlinkFrame
-from protocols.mavlink.signing import TICKS_PER_S, TOLERANCE, Check, Signing, key_from_passphrase, ticks
+from protocols.mavlink.signing import TICKS_PER_S, TOLERANCE, Check, SignedPeer, Signing, key_from_passphrase, ticks
 from service.links.signing_state import FILE_NAME, SigningState
 from service.settings.addresses import GcsAddress
 from service.settings.write_access import WriteAccess
@@ -60,7 +60,7 @@ def frame(timestamp: int, link_id: int = 7) -> MavlinkFrame:
 
 
 def our_timestamp(state: SigningState) -> int:
-    return int.from_bytes(signing(state).signature(bytes(10), 0)[1:7], "little")
+    return int.from_bytes(SignedPeer(signing(state), 0, "gcs").sign(bytes(10))[1:7], "little")
 
 
 async def until_written(pi: Pi, least: int) -> None:
@@ -79,7 +79,7 @@ async def test_timestamps_continue_after_a_restart_without_a_clock(tmp_path: Pat
     state = pi.boot()
     assert our_timestamp(state) == last + 1
     assert signing(state).check(received) is Check.REPLAYED
-    assert signing(state).check(frame(last + 1)) is Check.VALID
+    assert signing(state).check(frame(ticks(NOON) + 6)) is Check.VALID
     state.close()
 
 
@@ -116,15 +116,32 @@ async def test_frames_from_before_a_power_cut_are_replays_after_it(tmp_path: Pat
     state.close()
 
 
-async def test_a_ground_station_far_ahead_is_followed_and_remembered(tmp_path: Path) -> None:
+async def test_a_laptop_whose_clock_is_ahead_locks_nobody_out_after_a_power_cut(tmp_path: Path) -> None:
     pi = Pi(tmp_path)
-    pi.unix_s = 0.0
     state = pi.boot()
-    tomorrow = ticks(NOON) + 86400 * TICKS_PER_S
-    assert signing(state).check(frame(tomorrow)) is Check.VALID
-    await until_written(pi, tomorrow + AHEAD)
+    ahead = frame(ticks(NOON) + 80_000 * TICKS_PER_S, link_id=1)
+    assert signing(state).check(ahead) is Check.VALID
+    await until_async(lambda: pi.path.exists() and (pi.stored()["newest"] or 0) > ticks(NOON), "the file")
+    pi.unix_s += 20.0
     state = pi.boot()
-    assert our_timestamp(state) > tomorrow
+    assert signing(state).check(frame(ticks(pi.unix_s))) is Check.VALID
+    assert signing(state).check(ahead) is Check.REPLAYED
+    state.close()
+
+
+async def test_a_reset_believes_the_next_ground_station_also_after_a_restart(tmp_path: Path) -> None:
+    pi = Pi(tmp_path)
+    pi.unix_s = NOON - 30 * 86400
+    state = pi.boot()
+    assert signing(state).check(frame(ticks(NOON))) is Check.EARLY
+    state.reset()
+    state.close()
+    state = pi.boot()
+    assert signing(state).check(frame(ticks(NOON))) is Check.VALID
+    assert signing(state).check(frame(ticks(NOON) + 2 * 86400 * TICKS_PER_S, link_id=1)) is Check.EARLY
+    state.close()
+    state = pi.boot()
+    assert signing(state).check(frame(ticks(NOON) + 1)) is Check.VALID
     state.close()
 
 

@@ -139,3 +139,9 @@ def _item(seq: int, command: int) -> dict[str, float]:
 
 
 REFUSED = [_item(0, 16), _item(1, 16), _item(2, 22)]
+
+
+def test_signing_times_are_forgotten_with_the_token_only(shared_web: WebBench) -> None:
+    assert shared_web.ask("/api/signing/reset", "POST").status in (401, 403)
+    done = shared_web.ask("/api/signing/reset", "POST", Authorization=f"Bearer {shared_web.token}")
+    assert done.data == {"text": "Signing times forgotten: the next ground station with the key sets the time"}
