@@ -14,6 +14,7 @@ from protocols.msp.frame import MspParser
 from protocols.msp.mission_flight import FlightPhase, FlightProgress, FlightReason
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from tests.support.conversations import Download, Upload, waypoints
+from tests.support.settings_client import SettingsClient
 from tests.support.world import GroundStation, World
 
 MSP, MAVLINK, MAVLINK_57600 = TelemetryProtocol.MSP, TelemetryProtocol.MAVLINK, TelemetryProtocol.MAVLINK_57600
@@ -286,3 +287,19 @@ def test_a_board_without_mission_flight_says_so(message: Message) -> None:
 @pytest.mark.parametrize("message", refused(LOITER)[2:], ids=lambda it: it.get_type())
 def test_other_modes_are_set_by_other_switches(message: Message) -> None:
     assert replies(Flight().world, message)[0] == ["Modes are set with the transmitter switches"]
+
+
+def test_the_limits_of_the_flight_are_read_from_the_board_by_name() -> None:
+    faults = Faults(flight=FlightProgress())
+    world = World(SimOptions(), faults)
+    world.wait_ready()
+    station = GroundStation(world)
+    world.run(6)
+    low = [replace(item, alt_m=20.0) for item in waypoints(5)]
+    assert Upload(station, low).run() is MissionResult.ACCEPTED
+    assert not [text for text in station.texts() if "not flown" in text]
+    client = SettingsClient(world)
+    client.wait_read()
+    client.change("mission_height", 10)
+    assert Upload(station, low).run() is MissionResult.ACCEPTED
+    assert "WP 1: not flown: 20 m, mission_height 10 (+3)" in station.texts()

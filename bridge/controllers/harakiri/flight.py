@@ -26,7 +26,7 @@ class FlightLimits:
         long, high = [], []
         for leg in path.legs:
             if leg.is_first and int(leg.length_m) > self.mission_first:
-                why = f"not flown: {in_metres(leg.length_m)} away, mission_first {self.mission_first} m"
+                why = f"not flown: {in_metres(leg.length_m)} off, mission_first {self.mission_first} m"
                 if departure.home is not None and int(distance_m(departure.home, leg.end)) <= self.mission_first:
                     why = f"starts only at the list's home, {in_metres(leg.length_m)} off"
                 yield Judgement(leg.target, "lat_e7", why)
@@ -34,7 +34,7 @@ class FlightLimits:
                 long.append((leg.target, f"not flown: {in_metres(leg.length_m)} leg, at most 2 km"))
         for place, record in enumerate(records):
             if place and record.command not in _WITHOUT_HEIGHT and abs(record.height_m) > self.mission_height:
-                high.append((place, f"not flown: {record.height_m} m, mission_height {self.mission_height} m"))
+                high.append((place, f"not flown: {record.height_m} m, mission_height {self.mission_height}"))
         yield from first_of(long, "lat_e7")
         yield from first_of(high, "alt_m")
 

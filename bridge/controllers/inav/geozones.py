@@ -42,6 +42,8 @@ from reports.verdict import CLEARED_LIST, Result, Verdict
 _FIRST_VERSION = (8, 0, 0)
 _MAX_TRIES = 3
 _LEAST_CORNERS = 3
+#: North and east.
+_Metres = tuple[float, float]
 #: Centimetres in 31 bits.
 _MAX_RADIUS_M = 20_000_000
 _CIRCLES = {Command.FENCE_CIRCLE_INCLUSION: True, Command.FENCE_CIRCLE_EXCLUSION: False}
@@ -198,6 +200,8 @@ class FenceCheck(ListCheck):
         if len(self._corners) < item.p1:
             return None
         corners, self._corners, self._first = _anticlockwise(self._corners), [], None
+        if _crosses_itself(corners):
+            return reject(MissionResult.INVALID, first, "command", "the sides of this polygon cross: move a corner")
         return self._add(first, Geozone(0, _POLYGONS[Command(item.command)], corners))
 
     def _add(self, item: MissionItem, zone: Geozone) -> RejectingFinding | None:
@@ -269,6 +273,24 @@ def hidden_values(zone: Geozone) -> str:
 
 def _shape(zone: Geozone) -> tuple[object, ...]:
     return zone.is_inclusive, zone.corners, zone.radius_cm
+
+
+def _crosses_itself(corners: Sequence[Corner]) -> bool:
+    """True if two sides cross."""
+    places = [north_east_m(corners[0], each) for each in corners]
+    sides = list(zip(places, places[1:] + places[:1], strict=True))
+    return any(
+        _divides(*one, *other) and _divides(*other, *one)
+        for at, one in enumerate(sides)
+        for other in sides[at + 2 : len(sides) - (at == 0)]
+    )
+
+
+def _divides(one: _Metres, other: _Metres, start: _Metres, end: _Metres) -> bool:
+    """True if the straight line through two places has `start` and `end` on different sides."""
+    (north, east), (to_north, to_east) = one, (other[0] - one[0], other[1] - one[1])
+    sides = [to_north * (place[1] - east) - to_east * (place[0] - north) for place in (start, end)]
+    return sides[0] * sides[1] < 0
 
 
 def _anticlockwise(corners: Sequence[Corner]) -> tuple[Corner, ...]:

@@ -120,11 +120,14 @@ class InavLimits:
         limit_m = self.nav_wp_max_safe_distance
         if not limit_m or first.flag == FLY_HOME or not (first.lat_e7 or first.lon_e7) or departure.place is None:
             return
-        if (metres := distance_m(departure.place, first)) > limit_m:
-            may_arm = departure.home is not None and distance_m(departure.home, first) <= limit_m
-            would = "it arms only near the list's home" if may_arm else "it would not arm"
-            why = f"{in_metres(metres)} from {departure.name}, nav_wp_max_safe_distance is {limit_m} m: {would}"
-            yield Judgement(0, "lat_e7", why, News.DANGER if may_arm else None)
+        metres = distance_m(departure.place, first)
+        if metres <= limit_m:
+            return
+        if departure.home is not None and distance_m(departure.home, first) <= limit_m:
+            yield Judgement(0, "lat_e7", f"arms only near the list's home, {in_metres(metres)} off")
+            return
+        limit = f"nav_wp_max_safe_distance is {limit_m} m"
+        yield Judgement(0, "lat_e7", f"{in_metres(metres)} from {departure.name}, {limit}: it would not arm", None)
 
     def _heights(self, records: Sequence[NavRecord], departure: Departure) -> Iterable[Judgement]:
         limit_cm = self.nav_max_altitude
@@ -136,9 +139,7 @@ class InavLimits:
                 continue
             height_cm = above_home_cm(record, departure)
             if height_cm is None:
-                unknown.append(
-                    (place, f"above sea, but home's Alt is not known: nav_max_altitude is {limit_cm / 100:g} m")
-                )
+                unknown.append((place, "too high? home's Alt is unknown"))
             elif height_cm > limit_cm:
                 why = f"nav_max_altitude is {limit_cm / 100:g} m, it would not climb to {height_cm / 100:g} m"
                 yield Judgement(place, "alt_m", why, None)
@@ -150,18 +151,19 @@ class InavLimits:
         if self.is_aeroplane:
             why = "no effect on an aeroplane"
             turns = [(place, why) for place, record in enumerate(records) if record.action in TURNS and record.p1 >= 0]
-            yield from first_of([(place, f"its speed has {why}") for place, speed in speeds if speed], "command")
-            yield from first_of(turns, "command")
+            slowed = [(place, f"its speed: {why}") for place, speed in speeds if speed]
+            yield from first_of(slowed, "command", News.WARNING)
+            yield from first_of(turns, "command", News.WARNING)
             return
         limit = self.nav_max_auto_speed
         fast = [(place, speed) for place, speed in speeds if speed > limit]
         whys = [(place, f"{speed / 100:g} m/s, nav_max_auto_speed is {limit / 100:g} m/s") for place, speed in fast]
-        yield from first_of(whys, "command")
+        yield from first_of(whys, "command", News.WARNING)
 
     def _return(self, place: int, rth: NavRecord, highest_cm: int, departure: Departure) -> Iterable[Judgement]:
         if self.nav_rth_alt_mode == RthAltMode.FIXED and self.nav_rth_altitude < highest_cm:
-            why = f"returns at nav_rth_altitude ({self.nav_rth_altitude / 100:g} m, FIXED), below the mission's"
-            yield Judgement(place, "alt_m", f"{why} {highest_cm / 100:g} m")
+            why = f"RTH at nav_rth_altitude {self.nav_rth_altitude / 100:g} m, below {highest_cm / 100:g} m"
+            yield Judgement(place, "alt_m", why)
         if not rth.p1 and self.nav_rth_allow_landing == RthAllowLanding.ALWAYS:
             why = "hovers above home: nav_rth_allow_landing (ALWAYS) is for the pilot's RTH only, param1 1 lands"
             yield Judgement(place, "p1", why, News.NOTICE)
@@ -173,7 +175,8 @@ class InavLimits:
             if near and returns_there:
                 limit = f"safehome_max_distance is {self.safehome_max_distance / 100:g} m"
                 metres = distance_m(start, near)
-                yield Judgement(place, "p1", f"returns to safehome {near.number}, {metres:.0f} m from home ({limit})")
+                why = f"returns to safehome {near.number}, {metres:.0f} m from home ({limit})"
+                yield Judgement(place, "p1", why, News.WARNING)
             if rth.p1 and self.is_aeroplane:
                 yield self._landing_after_return(place, near, returns_there=returns_there)
 
@@ -198,15 +201,16 @@ class InavLimits:
             why = f"nav_wp_multi_mission_index changes from {self.selected} to 1: the new mission is stored first"
             yield Judgement(None, "", why, News.NOTICE)
         if self.cell_voltage is not None and self.cell_voltage * 100 < self.vbat_warning_cell_voltage:
-            warns = f"vbat_warning_cell_voltage is {self.vbat_warning_cell_voltage / 100:.2f} V"
-            yield Judgement(None, "", f"Battery at {self.cell_voltage:.2f} V per cell, {warns}")
+            warns = f"INAV warns at {self.vbat_warning_cell_voltage / 100:.2f} V"
+            yield Judgement(None, "", f"Battery {self.cell_voltage:.2f} V a cell, {warns}")
 
 
 def _landing(place: int, approach: FwApproach | None, where: str, otherwise: str, without: str) -> Judgement:
     """Items have no place for an approach: a second height, two headings, a circuit (docs/inav.md)."""
     if approach and approach.directions():
         return Judgement(place, "command", f"lands {where}by {approach_text(approach)}", News.NOTICE)
-    return Judgement(place, "command", f"circles down {otherwise} and lands in any direction ({without})")
+    why = f"circles down {otherwise} and lands in any direction ({without})"
+    return Judgement(place, "command", why, News.WARNING)
 
 
 _NO_APPROACHES = "no FW approach before INAV 7.1"

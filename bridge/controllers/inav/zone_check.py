@@ -22,7 +22,7 @@ _BOTH = "flown, or a stop if ANGLE is on"
 def judge_zones(zones: Sequence[Geozone], path: FlownPath, departure: Departure) -> Iterable[Judgement]:
     blocked = [_blocks_arming(zones, place) for place in departure.places if place is not None]
     if blocked and blocked[0]:
-        yield Judgement(None, "", f"{departure.name.capitalize()} is {blocked[0]}: does not arm", _weight(blocked))
+        yield Judgement(None, "", f"{departure.name.capitalize()} is {blocked[0]}: it does not arm", _weight(blocked))
     for zone in zones:
         if not zone.is_inclusive:
             through = [leg for leg in path.legs if _shares_height(zone, leg) and any(_insides([zone], leg))]
@@ -43,9 +43,9 @@ def _blocks_arming(zones: Sequence[Geozone], place: Place) -> str:
     inside = [zone for zone in zones if zone.lowest_cm <= 0 and _is_inside(zone, place)]
     for zone in inside:
         if not zone.is_inclusive:
-            return f"inside geozone {zone.number} (exclusive)"
+            return f"in geozone {zone.number}"
     near = [zone for zone in zones if zone.is_inclusive and _distance_m(zone, place) <= _IGNORED_M]
-    return "" if inside or not near else f"outside geozone {near[0].number} (inclusive)"
+    return "" if inside or not near else f"outside geozone {near[0].number}"
 
 
 def _shares_height(zone: Geozone, leg: Leg) -> bool:

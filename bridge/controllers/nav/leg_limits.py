@@ -26,14 +26,14 @@ class LegLimits:
 
     def judge(self, _records: Sequence[NavRecord], path: FlownPath, departure: Departure) -> Iterable[Judgement]:
         legs = [leg for leg in path.legs if not leg.is_return]
-        high = f"flown at {self.highest_m} m, the board's nav_max_altitude"
+        high = f"flown at {self.highest_m} m, its nav_max_altitude"
         too_high = [leg for leg in path.legs if (leg.end_cm or 0) > 100 * self.highest_m]
         yield from first_of([(leg.target, high) for leg in too_high], "alt_m")
         stop = f"leg of {self.stops_at_m} m or more: stops there"
         yield from first_of([(leg.cause, stop) for leg in legs if leg.length_m >= self.stops_at_m], "lat_e7")
         # With a region of interest set, MultiWii compares its distance with wp_radius, not the waypoint's.
         near_m = self.radius_cm / 100 + _STRAYS_M
-        near = f"passes the ROI at less than {near_m:g} m: the board may end this leg there"
+        near = f"passes the ROI within {near_m:g} m: may end there"
         passing = [leg for leg in legs if leg.roi and passing_distance_m(leg.start, leg.end, leg.roi) < near_m]
         yield from first_of([(leg.cause, near) for leg in passing], "lat_e7")
         yield from beyond_plain_limits(path, departure, leg=False, height=False)

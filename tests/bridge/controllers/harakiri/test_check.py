@@ -331,6 +331,18 @@ def test_a_take_off_after_a_dropped_item_rejects_the_list() -> None:
     assert_rejected(verdict, MissionResult.INVALID, 2, "command")
 
 
+def test_a_take_off_after_items_that_are_not_stored_names_what_to_remove() -> None:
+    verdict = verdict_on(item(SPEED), item(TAKEOFF), item(WAYPOINT))
+    why = "TAKEOFF must be item 1: remove WP 1 DO_CHANGE_SPEED, which is not stored"
+    assert verdict.findings[-1].text() == f"Rejected, WP 2: {why}"
+
+
+def test_a_list_without_home_says_so() -> None:
+    verdict = check_list([item(TAKEOFF), item(WAYPOINT)], PROFILE)
+    why = "the list has no home, its item 0 is TAKEOFF: put home first"
+    assert verdict.findings[-1].text() == f"Rejected, Home: {why}"
+
+
 @pytest.mark.parametrize("roi", [ROI, ROI_LOCATION, SET_ROI])
 def test_a_roi_cannot_be_last_as_received(roi: int) -> None:
     assert_rejected(verdict_on(item(WAYPOINT), item(roi)), MissionResult.INVALID, 2, "command")

@@ -29,22 +29,23 @@ def warnings(
     *items: MissionItem, here: tuple[int, int] | None = None, limits: FlightLimits | None = USUAL_FLIGHT
 ) -> list[str]:
     verdict = check_list([HOME, *items], HarakiriRules(flight=limits), here)
+    assert all(len(finding.text()) <= 50 for finding in verdict.findings if finding.news is News.DANGER)
     return [finding.text() for finding in verdict.findings if finding.news is not News.NONE]
 
 
 SWAPPED = replace(north(1), lat_e7=LON, lon_e7=LAT)
 CASES = [
     ((north(1.9), north(3)), None, []),
-    ((north(2.5),), None, ["WP 1: not flown: 250 m away, mission_first 200 m"]),
+    ((north(2.5),), None, ["WP 1: not flown: 250 m off, mission_first 200 m"]),
     ((north(1), north(30), north(60)), None, ["WP 2: not flown: 2.9 km leg, at most 2 km (+1)"]),
     ((north(1), north(20.9)), None, []),
     ((north(1), north(21.1)), None, ["WP 2: not flown: 2.0 km leg, at most 2 km"]),
     ((north(1), SWAPPED), None, ["WP 2: not flown: 5,779 km leg, at most 2 km"]),
-    ((north(1, alt_m=101.0), north(2, alt_m=120.0)), None, ["WP 1: not flown: 101 m, mission_height 100 m (+1)"]),
+    ((north(1, alt_m=101.0), north(2, alt_m=120.0)), None, ["WP 1: not flown: 101 m, mission_height 100 (+1)"]),
     ((north(1, alt_m=100.0), north(2, alt_m=-100.0)), None, []),
-    ((item(TAKEOFF), north(2.5)), None, ["WP 2: not flown: 250 m away, mission_first 200 m"]),
+    ((item(TAKEOFF), north(2.5)), None, ["WP 2: not flown: 250 m off, mission_first 200 m"]),
     ((north(1), north(20), north(39), item(RTL)), None, ["WP 4: not flown: 3.9 km leg, at most 2 km"]),
-    ((north(1), item(RTL, alt_m=120.0)), None, ["WP 2: not flown: 120 m, mission_height 100 m"]),
+    ((north(1), item(RTL, alt_m=120.0)), None, ["WP 2: not flown: 120 m, mission_height 100"]),
     ((north(1),), (LAT + 5 * NORTH, LON), ["WP 1: starts only at the list's home, 400 m off"]),
     ((north(6),), (LAT + 5 * NORTH, LON), []),
 ]
@@ -68,7 +69,7 @@ def test_the_core_refuses_exactly_what_is_told(
 def test_the_settings_of_the_board_count() -> None:
     assert warnings(north(2.4), limits=FlightLimits(mission_first=250)) == []
     assert warnings(north(1, alt_m=60.0), limits=FlightLimits(mission_height=50)) == [
-        "WP 1: not flown: 60 m, mission_height 50 m"
+        "WP 1: not flown: 60 m, mission_height 50"
     ]
 
 

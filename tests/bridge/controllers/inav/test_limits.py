@@ -14,7 +14,7 @@ from bridge.missions.list_check import check_list
 from protocols.inav_dump import read_inav_settings
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.msp.inav_places import FW_APPROACH, MISSION_APPROACH, SET_FW_APPROACH, FwApproach, Safehome
-from reports.finding import without_defaults
+from reports.finding import News, without_defaults
 from tests.bridge.controllers.inav.test_mission_store import ACCEPTED, board_with
 from tests.support.conversations import Upload
 from tests.support.nav_lists import HOME, LAT, LON, RTL, RTL_LANDS, WP, item, speed
@@ -31,7 +31,9 @@ NEAR, FAR = replace(WP, lat_e7=LAT + NORTH // 2), replace(WP, lat_e7=LAT + 2 * N
 
 def texts(*items: MissionItem, here: tuple[int, int] | None = None, **limits: Any) -> list[str]:
     rules = NavRules(inav_profile(limits=InavLimits(**limits)))
-    return [finding.text() for finding in without_defaults(check_list((HOME, *items), rules, here).findings)]
+    findings = without_defaults(check_list((HOME, *items), rules, here).findings)
+    assert all(len(finding.text()) <= 50 for finding in findings if finding.news is News.DANGER)
+    return [finding.text() for finding in findings]
 
 
 def test_a_first_waypoint_at_which_inav_would_not_arm_rejects_the_list() -> None:
@@ -44,7 +46,7 @@ def test_a_first_waypoint_at_which_inav_would_not_arm_rejects_the_list() -> None
 def test_the_first_waypoint_is_measured_from_the_craft() -> None:
     """INAV's home is where it is armed, whatever the home of the list."""
     assert texts(FAR, here=(LAT + 2 * NORTH, LON)) == []
-    warning = "WP 1: 200 m from the craft, nav_wp_max_safe_distance is 100 m: it arms only near the list's home"
+    warning = "WP 1: arms only near the list's home, 200 m off"
     assert texts(NEAR, here=(LAT + NORTH * 5 // 2, LON)) == [warning]
 
 
@@ -56,7 +58,7 @@ def test_a_speed_that_a_multirotor_does_not_fly_is_named() -> None:
 def test_what_an_aeroplane_ignores_is_named() -> None:
     yaw = item(Command.CONDITION_YAW, at=False, p1=90.0)
     assert texts(NEAR, speed(12), FAR, yaw, FAR, item(Command.NAV_ROI), FAR, is_aeroplane=True)[:2] == [
-        "WP 3: its speed has no effect on an aeroplane (+2)",
+        "WP 3: its speed: no effect on an aeroplane (+2)",
         "WP 4: no effect on an aeroplane (+1)",
     ]
 
@@ -101,7 +103,7 @@ def test_waypoints_within_the_radius_are_named() -> None:
         (
             RTL_LANDS,
             {"nav_rth_alt_mode": RthAltMode.FIXED},
-            ["returns at nav_rth_altitude (10 m, FIXED), below the mission's 50 m"],
+            ["RTH at nav_rth_altitude 10 m, below 50 m"],
         ),
         (RTL_LANDS, {"nav_rth_alt_mode": RthAltMode.FIXED, "nav_rth_altitude": 5000}, []),
         (
@@ -126,7 +128,7 @@ def test_a_return_home_that_differs_from_what_is_shown_is_named(
 def test_a_low_battery_and_another_selected_mission_are_named() -> None:
     assert texts(WP, cell_voltage=3.42, selected=2) == [
         "nav_wp_multi_mission_index changes from 2 to 1: the new mission is stored first",
-        "Battery at 3.42 V per cell, vbat_warning_cell_voltage is 3.50 V",
+        "Battery 3.42 V a cell, INAV warns at 3.50 V",
     ]
 
 
@@ -240,6 +242,14 @@ def test_the_boards_settings_are_read_by_name_and_again_after_a_change() -> None
     assert "Rejected, WP 2: nav_max_altitude is 50 m, it would not climb to 60 m" in " ".join(station.texts())
     client.change("nav_max_altitude", 6000)
     assert Upload(station, legs).run() is ACCEPTED
+
+
+def test_a_change_by_another_client_counts_at_the_next_write() -> None:
+    board, _, station = board_with()
+    legs = [HOME, replace(NEAR, alt_m=20.0), replace(FAR, alt_m=60.0)]
+    assert Upload(station, legs).run() is ACCEPTED
+    board._firmware._settings["nav_max_altitude"] = 5000  # type: ignore[union-attr]
+    assert Upload(station, legs).run() is MissionResult.INVALID_PARAM7
 
 
 DUMP = f"""# INAV/SITL 9.1.0

@@ -93,13 +93,13 @@ def test_several_legs_through_a_zone_are_one_warning() -> None:
 
 
 def test_a_list_is_rejected_if_inav_would_not_arm_at_home() -> None:
-    inside = "Mission rejected: Home is inside geozone 0 (exclusive): does not arm"
+    inside = "Mission rejected: Home is in geozone 0: it does not arm"
     assert texts(circle(0), legs=LEGS) == [inside]
     assert texts(circle(0, lowest_cm=6000), legs=LEGS) == []
-    outside = "Mission rejected: Home is outside geozone 0 (inclusive): does not arm"
+    outside = "Mission rejected: Home is outside geozone 0: it does not arm"
     assert texts(circle(10, is_inclusive=True), legs=LEGS) == [outside]
     # The craft is elsewhere, where it arms.
     assert texts(circle(0), legs=LEGS, here=(LAT - 2 * NORTH, LON))[0].startswith("WP 1: geozone 0")
     # The craft does not arm where it is, but at the home of the list.
-    warning = "The craft is inside geozone 0 (exclusive): does not arm"
+    warning = "The craft is in geozone 0: it does not arm"
     assert texts(circle(-3), legs=LEGS, here=(LAT - 3 * NORTH, LON))[0] == warning
