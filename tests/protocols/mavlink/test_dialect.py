@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The formats of all messages, compared with pymavlink's dialects and with frames packed by pymavlink."""
 
+import subprocess
+import sys
 from importlib import import_module
 
 import pytest
@@ -79,3 +81,14 @@ def test_our_frames_of_all_messages_are_those_of_pymavlink(msgid: int, fill: int
     if (older := mavlink_1.mavlink_map.get(msgid)) is not None:
         without_extensions = message_of(older, fill).pack(mavlink_1.MAVLink(None, srcSystem=7, srcComponent=8))
         assert FrameWriter(7, 8).frame(pack(message), 1) == without_extensions
+
+
+def test_the_import_of_pymavlink_has_no_side_effects() -> None:
+    """mavutil would set environment variables, and load numpy and a second dialect."""
+    program = "import os, sys; before = {**os.environ}; import protocols.mavlink.codec; print(*sys.modules)"
+    program += "; assert before == {**os.environ}"
+    printed = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
+    imported = {*printed.split()}
+    dialects = {name for name in imported if name.startswith("pymavlink.")}
+    assert dialects == {"pymavlink.dialects", "pymavlink.dialects.v20", "pymavlink.dialects.v20.all"}
+    assert not {"lxml", "numpy"} & imported
