@@ -2,6 +2,7 @@
 /* See harakiri_flight.h. */
 #include "harakiri_flight.h"
 
+#include <math.h>
 #include <stddef.h>
 #include <string.h>
 
@@ -16,13 +17,15 @@ typedef char settings_fill_gaps[offsetof(config_t, gps_ins_vel) == offsetof(conf
                                     ? 1
                                     : -1];
 
-enum { FLIGHT = 179, REPLY_SIZE = 24, SETTLED_CM_S = 50 };
+enum { FLIGHT = 179, REPLY_SIZE = 26, GYRO_LOOPS = 4 };
 
 extern uint16_t batteryWarningVoltage;
 
 static nf_t flight;
 static nf_output_t out;
-static bool failsafe, launched, grounded, nosed, own_gains;
+static bool failsafe, launched, grounded, nosed;
+static float felt[2];         /* since the last FlightRun(), cm/s */
+static uint8_t gyro_loops;    /* since the accelerometer last corrected the attitude */
 static uint16_t announced = NF_NO_RECORD;
 
 static bool read_record(void *self, uint16_t number, uint8_t *record)
@@ -47,8 +50,7 @@ void FlightDefaults(void)
     set_default(&cfg.mission_first, 10, 250, 200);
     set_default(&cfg.mission_height, 5, 250, 100);
     set_default(&cfg.mission_climb, 20, 250, 100);
-    set_default(&cfg.mission_nav_p, 5, 200, 70);
-    set_default(&cfg.mission_nav_i, 1, 200, 60);
+    set_default(&cfg.mission_fix, 5, 120, 20);
 }
 
 void FlightFailsafe(void)
@@ -71,6 +73,27 @@ static void get_settings(nf_settings_t *settings)
     settings->launch_cm_s = cfg.as_clmbr;
     settings->landing_cm_s = cfg.al_barolr;
     settings->speed_cm_s = cfg.nav_speed_max;
+    settings->fix_s = cfg.mission_fix;
+    settings->home_m = cfg.rtl_mnh;
+    settings->lean_cd = (uint16_t)(cfg.gps_maxangle * 100);
+    settings->failsafe_lands = cfg.fs_jstph != 0;
+}
+
+static void get_motion(nf_input_t *in)
+{
+    static uint8_t fix;
+    const float course = (float)GPS_ground_course * (RADX * 0.1f);
+    /* Harakiri's angles are in 1/10 degree; forward and right are positive. */
+    const float ahead = angle[PITCH] * 10.0f, right = angle[ROLL] * 10.0f;
+    in->velocity.n = (float)GPS_speed * cosf(course);
+    in->velocity.e = (float)GPS_speed * sinf(course);
+    in->new_fix = GPS_update != fix;
+    fix = GPS_update;
+    in->lean_cd.n = ahead * cos_yaw_x - right * sin_yaw_y;
+    in->lean_cd.e = ahead * sin_yaw_y + right * cos_yaw_x;
+    in->felt.n = felt[LAT];
+    in->felt.e = felt[LON];
+    felt[LAT] = felt[LON] = 0.0f;
 }
 
 static void get_input(nf_input_t *in, bool rtl, bool flying)
@@ -84,6 +107,7 @@ static void get_input(nf_input_t *in, bool rtl, bool flying)
     in->height_cm = (int32_t)EstAlt;
     in->climb_cm_s = (int32_t)vario;
     in->heading_cd = (int32_t)(heading * 100.0f);
+    get_motion(in);
     in->list = MissionStored();
     in->switch_on = rcOptions[BOXGPSAUTO] != 0;
     in->armed = f.ARMED != 0;
@@ -96,30 +120,7 @@ static void get_input(nf_input_t *in, bool rtl, bool flying)
     in->stick = abs(rcCommand[ROLL]) > cfg.rc_dbgps || abs(rcCommand[PITCH]) > cfg.rc_dbgps;
     in->yaw_stick = abs(rcCommand[YAW]) >= 70; /* from there on Harakiri turns instead of holding the heading */
     in->throttle_middle = abs(rcData[THROTTLE] - cfg.rc_mid) <= cfg.rc_dbah;
-    in->arrived = f.GPS_AUTO_MODE && nav_mode == NAV_MODE_POSHOLD;
-    in->settled = in->arrived && GPS_speed < SETTLED_CM_S;
     in->battery_low = battery_low();
-}
-
-/*
- * Fly to the target. GPS_AUTO_MODE must be set before nav_mode, or this loop's navigation drops it. A target that follows a
- * fast corner keeps the speed, which GPS_set_next_wp() would restart from the lowest.
- */
-static void go(void)
-{
-    if (out.issue || !f.GPS_AUTO_MODE || nav_mode == NAV_MODE_NONE) {
-        const float speed = waypoint_speed_gov;
-        const bool fast = WP_Fastcorner && f.GPS_AUTO_MODE && nav_mode == NAV_MODE_WP;
-        f.GPS_AUTO_MODE = 1;
-        nav_mode = NAV_MODE_WP;
-        wp_status = WP_STATUS_NAVIGATING;
-        GPS_set_next_wp(&out.target.lat, &out.target.lon);
-        if (fast)
-            waypoint_speed_gov = speed;
-        GPS_set_nav_gains(cfg.mission_nav_p, cfg.mission_nav_i);
-        own_gains = true;
-    }
-    WP_Fastcorner = !out.brake; /* which GPS_reset_nav() clears */
 }
 
 /* The throttle stick for a climb rate, as GetClimbrateTorcDataTHROTTLE() in mw.c makes it; altitude hold scales a descent. */
@@ -133,16 +134,6 @@ static void climb(int16_t rate_cm_s)
     rcData[THROTTLE] = (int16_t)constrain(stick, cfg.rc_minchk + 1, cfg.rc_maxchk);
 }
 
-/* A return home that has ended the flight keeps its gains: with the firmware's own it may not arrive against the wind. */
-static void leave(bool returns)
-{
-    f.GPS_AUTO_MODE = 0; /* which a lost fix has cleared before */
-    if (own_gains && !returns) {
-        GPS_set_pids();
-        own_gains = false;
-    }
-}
-
 static void act(void)
 {
     rcOptions[BOXBARO] = 1;
@@ -152,11 +143,11 @@ static void act(void)
     rcOptions[BOXPASSTHRU] = 0;
     rcOptions[BOXHEADFREE] = 0;
     rcOptions[BOXGPSHOME] = 0;
+    /* For the boxes that telemetry reports; what Harakiri's navigation makes of them is replaced by FlightLean(). */
     rcOptions[BOXGPSHOLD] = out.mode == NF_GROUND || out.mode == NF_HOLD;
-    if (out.mode == NF_GO || out.mode == NF_TAKEOFF || out.mode == NF_LAND)
-        go();
-    else
-        leave(false);
+    f.GPS_AUTO_MODE = out.mode == NF_GO || out.mode == NF_TAKEOFF || out.mode == NF_LAND;
+    if (f.GPS_AUTO_MODE)
+        nav_mode = NAV_MODE_NONE;
     if (out.mode == NF_LAND)
         rcData[THROTTLE] = (int16_t)(cfg.rc_minchk - 10); /* starts and continues Autoland */
     else if (!out.pilots_throttle)
@@ -178,10 +169,39 @@ bool FlightRun(bool rtl, bool flying)
         magHold = heading;
     nosed = out.nose;
     if (out.mode == NF_PASS)
-        leave(rtl && in.armed);
+        f.GPS_AUTO_MODE = 0;
     else
         act();
     return out.mode != NF_PASS;
+}
+
+/* The compass's correction is true until the craft is disarmed, whoever flies; before the first flight it is not used. */
+float FlightHeading(float measured)
+{
+    return flight.used ? wrap_180(measured + (float)out.correction_cd * 0.01f) : measured;
+}
+
+void FlightFeels(const float *change)
+{
+    felt[LAT] -= change[LAT];
+    felt[LON] -= change[LON];
+}
+
+bool FlightTrustsGyro(void)
+{
+    if (out.steer == ST_NONE || gyro_loops >= GYRO_LOOPS)
+        gyro_loops = 0;
+    else
+        gyro_loops++;
+    return gyro_loops != 0;
+}
+
+void FlightLean(float *lean)
+{
+    if (out.steer == ST_NONE)
+        return;
+    lean[ROLL] = (out.lean_cd.e * cos_yaw_x - out.lean_cd.n * sin_yaw_y) * 0.1f;
+    lean[PITCH] = (out.lean_cd.e * sin_yaw_y + out.lean_cd.n * cos_yaw_x) * 0.1f;
 }
 
 bool FlightIdles(void)
@@ -226,7 +246,7 @@ static int16_t short_cm(int32_t value)
 static uint8_t flags(void)
 {
     return (uint8_t)((cfg.mission_fly ? 1 : 0) | (flight.switch_on ? 2 : 0) | (out.mode != NF_PASS ? 4 : 0) |
-                     (flight.battery_low ? 8 : 0));
+                     (flight.battery_low ? 8 : 0) | (flight.steer.compass_known ? 16 : 0));
 }
 
 int FlightRequest(uint8_t command, uint8_t *buffer, uint8_t size)
@@ -250,6 +270,7 @@ int FlightRequest(uint8_t command, uint8_t *buffer, uint8_t size)
     ns_put16(buffer + 16, (uint16_t)flight.bearing_cd);
     ns_put16(buffer + 18, (uint16_t)short_cm(flight.height_error_cm));
     ns_put32(buffer + 20, flight.state == NF_OFF ? 0 : currentTimeMS - flight.entered_ms);
+    ns_put16(buffer + 24, (uint16_t)-flight.steer.correction_cd);
     return REPLY_SIZE;
 }
 

@@ -3,7 +3,7 @@
  * Experimental: flown in simulation only. First flights: propellers off, then on a tether, then with height.
  *
  * Harakiri's interface to the flight core (naze_flight.h), for the tree TestCode3. patches/TestCode3-flight.patch inserts
- * these calls. The flight uses Harakiri's own navigation, position hold, altitude hold, Autostart and Autoland.
+ * these calls. The flight leans the craft itself, and uses Harakiri's own attitude and altitude hold, Autostart and Autoland.
  *
  * All functions are called from the main loop. Stack below FlightRun(): see README.md.
  */
@@ -24,6 +24,22 @@ void FlightFailsafe(void);
  * and the navigation's target.
  */
 bool FlightRun(bool rtl, bool flying);
+
+/* In getEstimatedAttitude(): the heading, with the compass's correction. */
+float FlightHeading(float measured);
+
+/* In getEstimatedAttitude(): the change of ACC_speed in this loop, with Harakiri's sign. */
+void FlightFeels(const float *change);
+
+/*
+ * In getEstimatedAttitude(): true if the accelerometer must not correct the attitude in this loop. While the flight leans the
+ * craft to speed it up, the accelerometer shows it level; four of five corrections are left out, so that it takes 10 s
+ * instead of 2 to believe that.
+ */
+bool FlightTrustsGyro(void);
+
+/* Before GPS_angle is used: replaces it with the flight's lean, 1/10 degree. */
+void FlightLean(float *lean);
 
 /*
  * The next three are asked in the barometer's part of the 50 Hz loop, in this order. The motors must idle: reset altitude hold,

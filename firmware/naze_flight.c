@@ -9,14 +9,21 @@
 enum { WAYPOINT, LOITER_UNLIM, LOITER_TURNS, LOITER_TIME, RETURN_TO_LAUNCH, LAND, TAKEOFF, SETROI, COMMANDS };
 
 enum {
+    CLOSE_CM = 1000,       /* nearer than this, an approach may be slow */
     NEAR_CM = 300,         /* nearer to a place than this, the bearing to it is noise: the nose stays */
     LIFTED_CM = 30,        /* off the ground */
     CLIMBED_CM = 50,       /* a climb's end: below the height by this */
     DEAD_ZONE_CM = 40,     /* a height is corrected if it is off by more, ... */
     LEVEL_CM = 20,         /* ... until it is off by less */
     SLOWEST_CM_S = 15,     /* climb rate near the height */
-    TURNED_CD = 700,       /* a turn's end: short of it by this */
-    REISSUE_MS = 1000,
+    TURNED_CD = 300,       /* a turn's end: short of it by this, */
+    ABOUT_TURNED_CD = 900, /* ... or by this for TURNED_MS */
+    TURNED_MS = 2000,
+    STANDS_CM_S = 60,      /* a craft that brakes has come to a stop */
+    SETTLED_CM_S = 50,
+    GROWS_CM = 50,         /* the distance grows: by this ... */
+    JUMP_CM = 600,         /* between two fixes, and what the craft flies in a second */
+    GROWS_MS = 1000,       /* ... within this time */
     WINDOW_MS = 4000,
     WINDOWS = NF_SLOW_MS / WINDOW_MS
 };
@@ -32,7 +39,7 @@ const nf_row_t nf_states[NF_STATES] = {
     [NF_LIFT] = {"lift", NF_TAKEOFF, NF_FIXED, 15000, NF_HELD, NF_NO_LIFT},
     [NF_RISE] = {"rise", NF_TAKEOFF, NF_PER_CLIMB, 10000, NF_HELD, NF_CLIMB_SLOW},
     [NF_CLIMB] = {"climb", NF_HOLD, NF_PER_CLIMB, 5000, NF_HELD, NF_CLIMB_SLOW},
-    [NF_LEG] = {"leg", NF_GO, NF_PER_METRE, 30000, NF_HELD, NF_STALLED},
+    [NF_LEG] = {"leg", NF_GO, NF_PER_METRE, 60000, NF_HELD, NF_STALLED},
     [NF_LOITER] = {"loiter", NF_GO, NF_PER_RECORD, 0, NF_NEXT, NF_OK},
     [NF_TURN] = {"turn", NF_GO, NF_PER_TURN, 20000, NF_HELD, NF_TURN_SLOW},
     [NF_STAY] = {"stay", NF_GO, NF_FOREVER, 0, NF_STAY, NF_OK},
@@ -41,8 +48,8 @@ const nf_row_t nf_states[NF_STATES] = {
     [NF_SINK] = {"sink", NF_LAND, NF_FOREVER, 0, NF_SINK, NF_OK},
     [NF_DONE] = {"done", NF_GO, NF_FOREVER, 0, NF_DONE, NF_OK},
     [NF_HELD] = {"held", NF_HOLD, NF_FOREVER, 0, NF_HELD, NF_OK},
-    [NF_NO_FIX] = {"no fix", NF_LEVEL, NF_FIXED, 10000, NF_HANDS, NF_FIX_LOST},
-    [NF_HANDS] = {"hands", NF_LEVEL, NF_FOREVER, 0, NF_HANDS, NF_OK},
+    [NF_NO_FIX] = {"no fix", NF_LEVEL, NF_NO_FIX_TIME, 0, NF_SINK, NF_BLIND},
+    [NF_HOME] = {"home", NF_GO, NF_PER_METRE, 60000, NF_SETTLE, NF_OK},
 };
 
 /* ---- numbers ---------------------------------------------------------------------------------------------------------- */
@@ -98,6 +105,12 @@ static void decode(nf_record_t *record, const uint8_t *bytes)
     record->radius_m = bytes[13];
     record->turns = (int8_t)bytes[14];
     record->command = bytes[15];
+    if (record->turns < -127)
+        record->turns = -127;
+    if (record->command == TAKEOFF)
+        record->height_m = (int16_t)within(record->height_m, NF_TAKEOFF_LEAST_M, NF_TAKEOFF_MOST_M);
+    else if (record->height_m < NF_TAKEOFF_LEAST_M)
+        record->height_m = NF_TAKEOFF_LEAST_M;
 }
 
 static bool read_record(const nf_t *f, uint16_t number, nf_record_t *record)
@@ -150,6 +163,8 @@ static uint32_t allowance(const nf_t *f, const nf_row_t *row)
         more = (uint32_t)magnitude(f->now.turns) * 72000u;
     else if (row->rule == NF_PER_RECORD)
         more = f->now.seconds * 1000u;
+    else if (row->rule == NF_NO_FIX_TIME)
+        more = f->settings.fix_s * 1000u;
     return row->base_ms + more;
 }
 
@@ -159,14 +174,43 @@ static void enter(nf_t *f, const nf_input_t *in, nf_state_t state)
     f->entered_ms = f->mark_ms = in->now_ms;
     f->mark_cm = f->distance_cm;
     f->slow = 0;
+    f->near_turn_ms = in->now_ms;
     f->allowed_ms = allowance(f, &nf_states[state]);
+}
+
+/* The place to fly to, or to stay at, is new: the guard looks anew. */
+static void set_target(nf_t *f, const nf_input_t *in, const nf_place_t *place)
+{
+    f->target = *place;
+    f->holding = true;
+    f->distance_cm = nf_distance(&in->place, &f->target, &f->bearing_cd);
+    f->nearest_cm = f->far_cm = f->distance_cm;
+    f->nearer_ms = f->grown_ms = f->calm_ms = in->now_ms;
+}
+
+/* Brake, and then stay. */
+static void brake(nf_t *f, const nf_input_t *in)
+{
+    f->holding = false;
+    f->braking_ms = f->nearer_ms = f->calm_ms = in->now_ms;
 }
 
 static void stop(nf_t *f, const nf_input_t *in, nf_reason_t reason)
 {
-    enter(f, in, NF_HELD);
+    enter(f, in, in->fix || !in->flying || f->grounded ? NF_HELD : NF_NO_FIX);
     f->reason = reason;
     f->height_error_cm = 0;
+    f->unsteered = false;
+    brake(f, in);
+}
+
+/* Land where the craft is. */
+static void land(nf_t *f, const nf_input_t *in, nf_reason_t reason)
+{
+    f->reason = reason;
+    f->height_error_cm = -in->height_cm;
+    brake(f, in);
+    enter(f, in, NF_SINK);
 }
 
 static void end(nf_t *f, const nf_input_t *in, nf_reason_t reason)
@@ -176,14 +220,6 @@ static void end(nf_t *f, const nf_input_t *in, nf_reason_t reason)
     f->grounded = false;
     f->distance_cm = 0;
     f->height_error_cm = 0;
-}
-
-static void set_target(nf_t *f, const nf_input_t *in, const nf_place_t *place)
-{
-    f->target = *place;
-    f->issue = true;
-    f->issued_ms = in->now_ms;
-    f->distance_cm = nf_distance(&in->place, &f->target, &f->bearing_cd);
 }
 
 static void set_height(nf_t *f, const nf_input_t *in, int32_t height_cm)
@@ -205,7 +241,7 @@ static void begin_leg(nf_t *f, const nf_input_t *in, const nf_place_t *place)
 static void begin_landing(nf_t *f, const nf_input_t *in)
 {
     if (nf_distance(&in->place, &f->target, NULL) > f->settings.radius_cm)
-        set_target(f, in, &in->place);
+        brake(f, in);
     enter(f, in, NF_SETTLE);
 }
 
@@ -232,6 +268,7 @@ static void begin_takeoff(nf_t *f, const nf_input_t *in)
         enter(f, in, NF_WAIT);
     } else if (in->height_cm < f->now.height_m * 100 - CLIMBED_CM) {
         set_height(f, in, f->now.height_m * 100);
+        brake(f, in);
         enter(f, in, NF_CLIMB);
     } else
         leave_climb(f, in);
@@ -312,6 +349,10 @@ static void start(nf_t *f, const nf_input_t *in)
         return;
     }
     f->reason = NF_OK;
+    f->used = true;
+    f->unsteered = false;
+    st_begin(&f->steer, in->lean_cd);
+    brake(f, in);
     f->throttle_works = false;
     f->nose_is_pilots = true; /* until a leg begins */
     f->nose_cd = as_bearing(in->heading_cd);
@@ -441,13 +482,9 @@ static void fly_leg(nf_t *f, const nf_input_t *in)
         reach_place(f, in);
         return;
     }
-    if (in->arrived && in->now_ms - f->issued_ms >= REISSUE_MS) {
-        f->issue = true;
-        f->issued_ms = in->now_ms;
-    }
     if (in->now_ms - f->mark_ms < WINDOW_MS)
         return;
-    f->slow = f->mark_cm >= f->distance_cm + NF_SLOW_CM_S * WINDOW_MS / 1000 ? 0 : (uint8_t)(f->slow + 1);
+    f->slow = f->distance_cm < CLOSE_CM || f->mark_cm >= f->distance_cm + NF_SLOW_CM_S * WINDOW_MS / 1000 ? 0 : (uint8_t)(f->slow + 1);
     f->mark_ms = in->now_ms;
     f->mark_cm = f->distance_cm;
     if (f->slow >= WINDOWS)
@@ -456,8 +493,10 @@ static void fly_leg(nf_t *f, const nf_input_t *in)
 
 static void turn(nf_t *f, const nf_input_t *in)
 {
-    f->to_turn_cd -= wrapped(in->heading_cd - f->heading_cd);
-    if (magnitude(f->to_turn_cd) <= TURNED_CD)
+    f->to_turn_cd -= wrapped(in->heading_cd - f->heading_cd) - f->corrected_cd;
+    if (magnitude(f->to_turn_cd) > ABOUT_TURNED_CD)
+        f->near_turn_ms = in->now_ms;
+    if (magnitude(f->to_turn_cd) <= TURNED_CD || in->now_ms - f->near_turn_ms >= TURNED_MS)
         next_record(f, in);
 }
 
@@ -480,25 +519,122 @@ static void use_throttle(nf_t *f, const nf_input_t *in)
     }
 }
 
+static bool lands(const nf_t *f)
+{
+    return f->state == NF_DESCENT || f->state == NF_SINK;
+}
+
+/* On the way home, or landing there, for failsafe or return-to-launch. */
+static bool homing(const nf_t *f)
+{
+    return f->state != NF_HELD && (f->reason == NF_FAILSAFE || f->reason == NF_RTL);
+}
+
+/* Failsafe and return-to-launch: home, or down if that is impossible. True if it has changed the state. */
+static bool called_home(nf_t *f, const nf_input_t *in)
+{
+    const nf_reason_t why = in->failsafe ? NF_FAILSAFE : in->rtl ? NF_RTL : NF_OK;
+    if (why == NF_OK && homing(f) && in->fix) {
+        stop(f, in, f->reason);
+        return true;
+    }
+    if (why == NF_OK || homing(f) || lands(f) || (in->stick && !in->failsafe))
+        return false;
+    if (f->grounded || !in->flying) {
+        end(f, in, why);
+        return true;
+    }
+    if (!in->fix || !in->home_known || (in->failsafe && f->settings.failsafe_lands)) {
+        land(f, in, why);
+        return true;
+    }
+    set_height(f, in, in->height_cm > f->settings.home_m * 100 ? in->height_cm : f->settings.home_m * 100);
+    f->climbs_first = f->height_error_cm > CLIMBED_CM;
+    f->nose_is_pilots = true;
+    if (f->climbs_first) {
+        f->distance_cm = nf_distance(&in->place, &in->home, &f->bearing_cd);
+        brake(f, in);
+    } else
+        set_target(f, in, &in->home);
+    enter(f, in, NF_HOME);
+    f->reason = why;
+    return true;
+}
+
+/* The craft is too fast, or leans too much. */
+static bool is_wild(nf_t *f, const nf_input_t *in)
+{
+    const float lean = sqrtf(in->lean_cd.n * in->lean_cd.n + in->lean_cd.e * in->lean_cd.e);
+    const bool wild = lean > (float)(f->settings.lean_cd + NF_LEAN_CD) ||
+                      (f->holding && st_speed(&f->steer) > (float)(f->settings.speed_cm_s + NF_FAST_CM_S));
+    if (!wild)
+        f->calm_ms = in->now_ms;
+    return in->now_ms - f->calm_ms >= NF_WILD_MS;
+}
+
+/* The place gets farther away, or the craft does not come to a stop. */
+static bool is_lost(nf_t *f, const nf_input_t *in)
+{
+    if (!f->holding)
+        return in->now_ms - f->braking_ms >= NF_STOP_MS;
+    if (f->distance_cm < f->nearest_cm)
+        f->nearest_cm = f->distance_cm;
+    if (f->distance_cm < f->far_cm + GROWS_CM) {
+        if (f->distance_cm < f->far_cm)
+            f->far_cm = f->distance_cm;
+        if (in->now_ms - f->nearer_ms >= GROWS_MS) {
+            f->far_cm = f->distance_cm;
+            f->nearer_ms = in->now_ms;
+            f->grown_ms = in->now_ms;
+        }
+        return f->state != NF_LEG && f->state != NF_HOME && f->distance_cm > f->nearest_cm + NF_LOST_CM;
+    }
+    f->far_cm = f->distance_cm;
+    f->nearer_ms = in->now_ms;
+    return in->now_ms - f->grown_ms >= NF_AWAY_MS && f->distance_cm > f->nearest_cm + NF_AWAY_CM;
+}
+
 /* What ends or interrupts a flight, whatever its state. True if it has changed the state. */
 static bool interrupted(nf_t *f, const nf_input_t *in)
 {
     const nf_state_t state = f->state;
-    const bool waits = state == NF_HELD || state == NF_NO_FIX || state == NF_HANDS;
-    if (!in->fix && state != NF_NO_FIX && state != NF_HANDS) {
+    const bool steered = f->steering >= ST_STOP && in->fix;
+    if (called_home(f, in))
+        return true;
+    if (!in->fix && state != NF_NO_FIX && !lands(f)) {
         if (in->flying && !f->grounded) {
+            if (!homing(f))
+                f->reason = NF_FIX_LOST;
             enter(f, in, NF_NO_FIX);
-            f->reason = NF_FIX_LOST;
         } else if (state != NF_HELD)
             stop(f, in, NF_FIX_LOST);
-    } else if (waits)
+    } else if (state == NF_NO_FIX)
+        return false;
+    else if (steered && is_wild(f, in) && (lands(f) || state == NF_HELD)) {
+        if (state == NF_HELD)
+            land(f, in, NF_HOLD_LOST);
+        f->unsteered = true;
+    } else if (steered && (is_wild(f, in) || is_lost(f, in))) {
+        if (lands(f))
+            brake(f, in);
+        else if (state == NF_HOME || state == NF_HELD)
+            land(f, in, state == NF_HELD ? NF_HOLD_LOST : f->reason);
+        else
+            stop(f, in, NF_AWAY);
+    } else if (state == NF_HELD)
+        return false;
+    else if (in->stick)
+        stop(f, in, NF_STICKS);
+    else if (homing(f))
+        return false;
+    else if (f->throttle_works && !in->throttle_middle)
+        use_throttle(f, in);
+    else if (lands(f))
         return false;
     else if (in->list.count != f->list.count || in->list.checksum != f->list.checksum)
         stop(f, in, NF_LIST_CHANGED);
-    else if (in->stick)
-        stop(f, in, NF_STICKS);
-    else if (f->throttle_works && !in->throttle_middle)
-        use_throttle(f, in);
+    else if (in->now_ms - f->compass_ms >= NF_COMPASS_MS)
+        stop(f, in, NF_COMPASS);
     return f->state != state;
 }
 
@@ -511,6 +647,12 @@ static bool too_late(nf_t *f, const nf_input_t *in)
         next_record(f, in);
     else if (row->then == NF_HELD)
         stop(f, in, row->reason);
+    else if (f->state == NF_NO_FIX)
+        land(f, in, row->reason);
+    else if (f->state == NF_HOME) { /* too slow against the wind: land here */
+        brake(f, in);
+        enter(f, in, NF_SETTLE);
+    }
     else {
         if (row->reason != NF_OK)
             f->reason = row->reason;
@@ -559,14 +701,24 @@ static void fly(nf_t *f, const nf_input_t *in)
         turn(f, in);
         break;
     case NF_SETTLE:
-        if (in->settled && f->distance_cm <= f->settings.radius_cm) {
+        if (f->holding && st_speed(&f->steer) < (float)SETTLED_CM_S && f->distance_cm <= f->settings.radius_cm) {
             f->height_error_cm = -in->height_cm;
             enter(f, in, NF_DESCENT);
         }
         break;
     case NF_NO_FIX:
         if (in->fix)
-            stop(f, in, NF_FIX_LOST);
+            stop(f, in, f->reason);
+        else if (in->stick)
+            f->entered_ms = in->now_ms;
+        break;
+    case NF_HOME:
+        if (f->climbs_first && f->height_error_cm <= CLIMBED_CM) {
+            f->climbs_first = false;
+            set_target(f, in, &in->home);
+            enter(f, in, NF_HOME);
+        } else if (!f->climbs_first && f->holding && f->distance_cm <= f->settings.radius_cm)
+            enter(f, in, NF_SETTLE);
         break;
     default:
         break;
@@ -581,10 +733,23 @@ static nf_mode_t mode_of(const nf_t *f, const nf_input_t *in)
     return mode == NF_HOLD && (!in->flying || f->grounded) ? NF_GROUND : mode;
 }
 
-/* These modes fly to f->target, or hold it. */
-static bool steers(nf_mode_t mode)
+/* How the craft is steered in this state. */
+static st_mode_t steering(const nf_t *f, const nf_input_t *in, nf_mode_t mode)
 {
-    return mode == NF_GO || mode == NF_TAKEOFF || mode == NF_LAND;
+    if (mode == NF_PASS || mode == NF_GROUND || f->grounded || f->unsteered)
+        return ST_NONE;
+    if (in->stick)
+        return ST_LEAN;
+    if (!in->fix || !f->holding)
+        return ST_STOP;
+    return f->state == NF_LEG && f->now.command == WAYPOINT && f->now.seconds == 0 ? ST_PASS : ST_STAY;
+}
+
+/* These modes have a place, f->target. */
+static bool has_target(const nf_t *f)
+{
+    const nf_mode_t mode = nf_states[f->state].mode;
+    return f->holding && (mode == NF_GO || mode == NF_TAKEOFF || mode == NF_LAND || mode == NF_HOLD);
 }
 
 /* In these states f->height_cm is flown to. */
@@ -597,6 +762,7 @@ static bool has_height(const nf_t *f)
     case NF_TURN:
     case NF_STAY:
     case NF_DONE:
+    case NF_HOME:
         return true;
     default:
         return false;
@@ -647,6 +813,24 @@ static void point_nose(nf_t *f, const nf_input_t *in, nf_output_t *out)
     out->heading_cd = as_bearing(in->heading_cd + within(wrapped(f->nose_cd - in->heading_cd), -NF_LEAD_CD, NF_LEAD_CD));
 }
 
+static void steer(nf_t *f, const nf_input_t *in, nf_output_t *out)
+{
+    const st_vector_t way = {(float)f->distance_cm * cosf((float)f->bearing_cd * (PI_F / 18000.0f)),
+                             (float)f->distance_cm * sinf((float)f->bearing_cd * (PI_F / 18000.0f))};
+    st_order_t order;
+    order.mode = steering(f, in, out->mode);
+    order.way = way;
+    order.cruise_cm_s = f->settings.speed_cm_s;
+    order.most_cd = f->settings.lean_cd;
+    f->steering = order.mode;
+    if (order.mode == ST_LEAN || (order.mode == ST_STOP && !in->fix))
+        brake(f, in);
+    else if (order.mode == ST_STOP && st_speed(&f->steer) < (float)STANDS_CM_S)
+        set_target(f, in, &in->place);
+    out->steer = order.mode;
+    out->lean_cd = st_steer(&f->steer, &order);
+}
+
 static void command(nf_t *f, const nf_input_t *in, nf_output_t *out)
 {
     memset(out, 0, sizeof *out);
@@ -656,35 +840,54 @@ static void command(nf_t *f, const nf_input_t *in, nf_output_t *out)
         out->climb_cm_s = climb_rate(f, in);
     if (out->mode == NF_TAKEOFF)
         out->takeoff_cm = f->now.height_m * 100;
-    if (steers(out->mode)) {
+    if (has_target(f))
         out->target = f->target;
-        out->issue = f->issue;
-        out->brake = f->state != NF_LEG || f->now.command > WAYPOINT || f->now.seconds != 0;
-        f->issue = false;
-    }
+    steer(f, in, out);
     if (out->mode == NF_GO || out->mode == NF_TAKEOFF)
         point_nose(f, in, out);
 }
 
 static void measure(nf_t *f, const nf_input_t *in)
 {
-    if (steers(nf_states[f->state].mode))
+    if (has_target(f))
         f->distance_cm = nf_distance(&in->place, &f->target, &f->bearing_cd);
     else
         f->distance_cm = 0;
     if (has_height(f))
         f->height_error_cm = f->height_cm - in->height_cm;
+    if (!in->new_fix)
+        return;
+    if (nf_distance(&f->place, &in->place, NULL) > JUMP_CM + (uint32_t)st_speed(&f->steer))
+        f->nearest_cm = f->far_cm = f->distance_cm; /* the GPS has jumped, not the craft */
+    f->place = in->place;
 }
 
 static nf_reason_t ending(const nf_input_t *in)
 {
     if (!in->armed)
         return NF_DISARMED;
-    if (!in->switch_on)
-        return NF_SWITCHED_OFF;
-    if (in->failsafe)
-        return NF_FAILSAFE;
-    return in->rtl ? NF_RTL : NF_OK;
+    return in->switch_on ? NF_OK : NF_SWITCHED_OFF;
+}
+
+/* Measure velocity and compass. A correction of the compass turns the heading from the next call on. */
+static void sense(nf_t *f, const nf_input_t *in)
+{
+    st_sense_t sense;
+    const int32_t before_cd = f->steer.correction_cd;
+    sense.now_ms = in->now_ms;
+    sense.felt = in->felt;
+    sense.velocity = in->velocity;
+    sense.new_fix = in->new_fix && in->fix;
+    sense.flying = in->flying && in->armed;
+    sense.compares = f->used;
+    f->corrected_cd = f->correct_cd;
+    if (!in->armed)
+        st_start(&f->steer, in->now_ms);
+    else
+        st_sense(&f->steer, &sense);
+    f->correct_cd = wrapped(f->steer.correction_cd - before_cd);
+    if (magnitude(f->steer.correction_cd) <= NF_MAX_COMPASS_CD)
+        f->compass_ms = in->now_ms;
 }
 
 void nf_start(nf_t *f, nf_read_t read, void *self)
@@ -703,16 +906,19 @@ void nf_step(nf_t *f, const nf_settings_t *settings, const nf_input_t *in, nf_ou
         f->settings = *settings;
         f->list = in->list;
         f->count = in->list.count;
-        f->begun = false;
+        f->begun = f->used = false;
     }
     f->battery_low = in->battery_low;
+    sense(f, in);
     measure(f, in);
     if (ends != NF_OK) {
         if (f->state != NF_OFF)
             end(f, in, ends);
         if (switched_on)
             f->reason = in->armed ? ends : NF_NOT_ARMED;
-    } else if (switched_on)
+    } else if (switched_on && (in->failsafe || in->rtl))
+        f->reason = in->failsafe ? NF_FAILSAFE : NF_RTL;
+    else if (switched_on)
         start(f, in);
     else if (f->state != NF_OFF) {
         if (in->throttle_middle)
@@ -721,6 +927,7 @@ void nf_step(nf_t *f, const nf_settings_t *settings, const nf_input_t *in, nf_ou
             fly(f, in);
     }
     command(f, in, out);
+    out->correction_cd = f->steer.correction_cd;
     f->armed = in->armed;
     f->switch_on = in->switch_on;
     f->heading_cd = in->heading_cd;

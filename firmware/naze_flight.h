@@ -5,19 +5,26 @@
  * Mission flight: flies a stored mission list (naze_mission.h), as docs/mission-flight.md describes it. This header is the
  * manual of the core; the firmware around it flies.
  *
- * The core decides, it does not steer. Once every control loop (50 Hz) the firmware passes position, height, heading, sticks
- * and switches to nf_step() and gets back one of seven modes with its details: a place to fly to, a climb rate, a heading.
+ * Once every control loop (50 Hz) the firmware passes position, velocity, height, heading, sticks and switches to nf_step()
+ * and gets back one of seven modes with its details: a lean (naze_steer.h), a climb rate, a heading.
  * No heap, no I/O, no globals: the caller owns all state, one nf_t. Its only time is a millisecond counter that may wrap.
- * Floats are used for distances and bearings only (sqrtf, cosf, atan2f).
  *
  * SAFETY
  *   One switch starts a flight: the pilot's, going from off to on while armed, with fix, home, compass and barometer. Switched off, the
- *   next call commands nothing. Failsafe and return-to-launch end the flight too; it starts again only after the switch was
- *   off. Nothing else starts, stops, skips or moves a flight.
+ *   next call commands nothing. Failsafe and return-to-launch make the flight itself fly home and land (NF_HOME); the mission
+ *   goes on only after the switch was off. Nothing else starts, stops, skips or moves a flight.
  *
  *   The list is flown only if its CRC-32 is right and it is still the list that was there at arming; if all commands, places,
  *   distances and heights are within their limits. That is checked record by record before the first of them is flown.
- *   A flight that cannot go on holds its place; nf_t.reason says why.
+ *   A flight that cannot go on brakes and holds its place; nf_t.reason says why. Sensors may be wrong: a state that steers
+ *   ends in that hold as soon as its place gets farther away for NF_AWAY_MS, or the craft is too fast or leans too much. If
+ *   the hold does not hold, the craft lands, steered no longer. A compass that is off by more than NF_MAX_COMPASS_CD is held,
+ *   a smaller error is corrected.
+ *
+ *   Without a fix the craft keeps its height and its lean into the wind; the pilot's sticks steer. A fix that returns is held.
+ *   Without a fix for `fix_s`, sticks untouched, it lands; a landing that has begun goes on without a fix.
+ *
+ *   A slot of the list can be written by any client: heights, take-off heights and turns are limited as they are read.
  *
  *   Sticks: roll or pitch gives the craft to the pilot (position hold, in the same call) until the switch was off. Yaw turns
  *   the nose, which then stays there until the next leg. The throttle works once it has been in its middle zone since the
@@ -35,13 +42,25 @@
 #define NAZE_FLIGHT_H
 
 #include "naze_mission.h"
+#include "naze_steer.h"
 
-#define NF_VERSION 1u
+#define NF_VERSION 2u
 #define NF_READS_PER_STEP 8u /* records checked, and regions of interest passed */
 #define NF_MAX_READS 20u
 #define NF_NO_RECORD 0xFFFFu
 #define NF_MAX_LEG_M 2000u  /* the longest leg that is flown */
 #define NF_MIN_HEIGHT_CM 100 /* a craft whose throttle was high may still be on the ground below this */
+#define NF_TAKEOFF_LEAST_M 2 /* take-off heights, and the lowest height of a leg */
+#define NF_TAKEOFF_MOST_M 15
+#define NF_MAX_COMPASS_CD 7500 /* a compass that is off by more for NF_COMPASS_MS is not trusted */
+#define NF_COMPASS_MS 5000u
+#define NF_AWAY_MS 3000u    /* a place that gets farther away for so long ... */
+#define NF_AWAY_CM 1500u    /* ... and by this, or a hold by NF_LOST_CM altogether, is lost */
+#define NF_LOST_CM 2000u
+#define NF_FAST_CM_S 500    /* above the cruise speed by this, or ... */
+#define NF_LEAN_CD 1500     /* ... leaning more than the greatest lean by this, for NF_WILD_MS: out of control */
+#define NF_WILD_MS 1000u
+#define NF_STOP_MS 8000u    /* the longest time to brake to a standstill */
 #define NF_SLOW_CM_S 50     /* a leg that closes in more slowly ... */
 #define NF_SLOW_MS 20000u   /* ... for so long is stalled */
 #define NF_LEAD_CD 4500     /* the heading asked for is at most this far from the present one, 1/100 degree */
@@ -57,10 +76,10 @@ typedef enum {
     NF_PASS,     /* nothing is commanded: the pilot flies */
     NF_GROUND,   /* standing on the ground, armed: motors idle, whatever the throttle stick says */
     NF_TAKEOFF,  /* take off to `takeoff_cm` above the ground, holding the place `target` */
-    NF_GO,       /* fly to `target` and stay there: `brake`, `issue` */
-    NF_HOLD,     /* the firmware's own position hold, at the place where the craft comes to a stop */
-    NF_LEVEL,    /* no fix: level, height held; the sticks steer */
-    NF_LAND      /* land at the place `target`, then disarm */
+    NF_GO,       /* fly to `target` */
+    NF_HOLD,     /* brake, and stay where the craft comes to a stop */
+    NF_LEVEL,    /* no fix: lean into the wind as before, height held; the sticks steer */
+    NF_LAND      /* land, then disarm */
 } nf_mode_t;
 
 typedef enum {
@@ -81,7 +100,7 @@ typedef enum {
     NF_DONE,
     NF_HELD,
     NF_NO_FIX,
-    NF_HANDS,
+    NF_HOME,
     NF_STATES
 } nf_state_t;
 
@@ -116,6 +135,10 @@ typedef enum {
     NF_SWITCHED_OFF,  /* ... the pilot's switch */
     NF_DISARMED,      /* ... */
     NF_FLOWN,         /* the whole list was flown */
+    NF_AWAY,          /* stopped: the place got farther away, the craft too fast, or it leant too much */
+    NF_COMPASS,       /* ... the compass is off by more than NF_MAX_COMPASS_CD */
+    NF_HOLD_LOST,     /* landing: the hold did not hold */
+    NF_BLIND,         /* landing: no fix for too long */
     NF_REASONS
 } nf_reason_t;
 
@@ -126,7 +149,8 @@ typedef enum {
     NF_PER_CLIMB,  /* four times the height to go at the climb or landing rate */
     NF_PER_METRE,  /* 2 s for each metre to go, which is NF_SLOW_CM_S */
     NF_PER_TURN,   /* 72 s for each turn, which is 5 degrees a second */
-    NF_PER_RECORD  /* the record's seconds */
+    NF_PER_RECORD, /* the record's seconds */
+    NF_NO_FIX_TIME /* the setting `fix_s` */
 } nf_allowance_t;
 
 typedef struct {
@@ -149,7 +173,11 @@ typedef struct {
     uint16_t climb_cm_s;      /* climb and descent between records */
     uint16_t launch_cm_s;     /* climb of the firmware's take-off */
     uint16_t landing_cm_s;
-    uint16_t speed_cm_s;      /* cruise speed: heights are changed over the estimated time of a leg */
+    uint16_t speed_cm_s;      /* cruise speed; heights are changed over the estimated time of a leg */
+    uint16_t fix_s;           /* without a fix for so long, land */
+    uint16_t home_m;          /* least height of the way home */
+    uint16_t lean_cd;         /* greatest lean, 1/100 degree */
+    bool failsafe_lands;      /* failsafe lands at once instead of flying home */
 } nf_settings_t;
 
 /* The state of the craft at one call. */
@@ -159,7 +187,11 @@ typedef struct {
     nf_place_t home;          /* the launch place */
     int32_t height_cm;        /* above the launch place */
     int32_t climb_cm_s;
-    int32_t heading_cd;       /* 1/100 degree, clockwise from north, any range */
+    int32_t heading_cd;       /* 1/100 degree, clockwise from north, any range; with the correction of the last call */
+    st_vector_t velocity;     /* over ground, by the GPS, cm/s */
+    st_vector_t felt;         /* change of velocity since the last call, by the accelerometer, cm/s */
+    st_vector_t lean_cd;      /* the craft's lean towards north and east, 1/100 degree */
+    bool new_fix;             /* place and velocity are new */
     nm_list_t list;           /* the list that is stored now */
     bool switch_on;
     bool armed;
@@ -172,16 +204,15 @@ typedef struct {
     bool stick;               /* roll or pitch beyond the deadband */
     bool yaw_stick;
     bool throttle_middle;     /* throttle stick in its middle zone */
-    bool arrived;             /* NF_GO: the firmware takes the target as reached */
-    bool settled;             /* NF_GO: ... and the craft is at rest */
     bool battery_low;
 } nf_input_t;
 
 typedef struct {
     nf_mode_t mode;
-    nf_place_t target;        /* NF_GO, NF_TAKEOFF, NF_LAND */
-    bool issue;               /* with a target: give the target to the navigation (again) */
-    bool brake;               /* with a target: slow down towards the target */
+    nf_place_t target;        /* for display: NF_GO, NF_TAKEOFF, NF_LAND */
+    st_mode_t steer;          /* ST_NONE: no lean is commanded */
+    st_vector_t lean_cd;      /* towards north and east, 1/100 degree */
+    int32_t correction_cd;    /* to add to the compass's heading from now on, in every mode */
     bool pilots_throttle;     /* NF_HOLD, NF_LEVEL: the stick climbs and descends; else climb_cm_s holds the height */
     bool nose;                /* turn to heading_cd; else the yaw stick turns it, or the firmware holds the heading */
     int16_t climb_cm_s;       /* 0: hold the height */
@@ -220,23 +251,31 @@ typedef struct {
     nf_settings_t settings;
     nm_list_t list;           /* at arming */
     bool armed, switch_on;    /* at the last call */
+    bool used;                /* a flight has begun since arming: the compass's correction is used */
     bool begun;               /* `record` is where a flight was left */
     bool grounded;            /* a take-off from the ground has not left it yet */
     bool throttle_works;      /* the throttle was in its middle zone since the start */
     bool nose_is_pilots;      /* turned by the yaw stick since the leg began */
     bool roi_known;
     bool adjusting;           /* climbing or descending */
-    bool issue;               /* of `target`, at the next call */
+    bool holding;             /* `target` is the place of a hold, or was flown to; else the craft brakes */
+    bool unsteered;           /* a landing without a place */
+    bool climbs_first;        /* NF_HOME: at `target`, before it flies home */
     uint8_t slow;             /* windows without progress */
     nf_record_t now;          /* the record in flight */
     nf_place_t target, roi, last;
-    uint32_t entered_ms, allowed_ms, mark_ms, issued_ms;
-    uint32_t mark_cm;
+    nf_place_t place;         /* at the last fix */
+    st_t steer;
+    uint32_t entered_ms, allowed_ms, mark_ms, braking_ms, nearer_ms, grown_ms, calm_ms, near_turn_ms, compass_ms;
+    uint32_t mark_cm, far_cm, nearest_cm;
     int32_t ground_cm;        /* height at take-off */
     int32_t height_cm;        /* target height */
     int32_t nose_cd;
     int32_t to_turn_cd;
     int32_t heading_cd;       /* at the last call */
+    int32_t correct_cd;       /* the compass's correction at this call, ... */
+    int32_t corrected_cd;     /* ... which the heading of the next one has */
+    st_mode_t steering;       /* at the last call */
     uint32_t checksum;        /* NF_CHECK: over the records so far */
     uint16_t next;            /* NF_CHECK: the next record */
     bool first;               /* NF_CHECK: no place was checked yet, and no flight was left */

@@ -20,7 +20,9 @@ from reports.vehicle_groups import Progress
 
 #: A build without mission flight refuses it, and is not asked again.
 FLIGHT_POLL = Poll(Msp.FLIGHT, FLIGHT_REQUEST, FLIGHT_SIZE, 0.5)
-_PAUSED = frozenset((FlightPhase.HELD, FlightPhase.NO_FIX, FlightPhase.HANDS))
+#: The craft does something else than its list: flies home, or lands where it is.
+_EMERGENCIES = frozenset((FlightReason.RTL, FlightReason.FAILSAFE, FlightReason.HOLD_LOST, FlightReason.BLIND))
+_PAUSED = frozenset((FlightPhase.HELD, FlightPhase.NO_FIX))
 #: In the other phases the height decides.
 _STAGES: Mapping[FlightPhase, Stage] = {
     FlightPhase.WAIT: Stage.ON_GROUND,
@@ -35,8 +37,10 @@ _STAGES: Mapping[FlightPhase, Stage] = {
     FlightPhase.DESCENT: Stage.LANDING,
     FlightPhase.SINK: Stage.LANDING,
     FlightPhase.DONE: Stage.IN_AIR,
+    FlightPhase.HOME: Stage.IN_AIR,
 }
 _FLOWN = "Mission flown"
+_COMPASS_OFF_DEG = 20
 _LOW_BATTERY = "Battery low: land, or switch GPS HOME on"
 #: Nothing is said about the pilot's own switch and disarming.
 _WHY: Mapping[FlightReason, str] = {
@@ -66,6 +70,10 @@ _WHY: Mapping[FlightReason, str] = {
     FlightReason.RTL: "Mission ended: return to launch",
     FlightReason.FAILSAFE: "Mission ended: failsafe",
     FlightReason.FLOWN: _FLOWN,
+    FlightReason.AWAY: "Mission stopped: off course, compass or GPS wrong",
+    FlightReason.COMPASS: "Mission stopped: the compass is wrong",
+    FlightReason.HOLD_LOST: "Landing: it cannot hold its place",
+    FlightReason.BLIND: "Landing: no GPS fix for too long",
 }
 
 
@@ -86,13 +94,24 @@ def flight_report(progress: FlightProgress, before: FlightReport | None) -> Flig
             return FlightReport(record, record, Progress.COMPLETE, is_flown=False, why=_FLOWN)
         why = _WHY.get(progress.reason, "") if progress.switch_on else ""
         return FlightReport(0, reached, Progress.NOT_STARTED, is_flown=False, why=why)
-    why = _WHY.get(progress.reason) or (_LOW_BATTERY if progress.battery_low else "")
+    why = _WHY.get(progress.reason) or (_LOW_BATTERY if progress.battery_low else _compass(progress))
     if progress.state in _PAUSED:
         return FlightReport(record, reached, Progress.PAUSED, is_flown=False, why=why)
     way = Way(progress.distance, progress.bearing if progress.distance else 0.0, progress.height_error)
     state = Progress.COMPLETE if progress.state is FlightPhase.DONE else Progress.ACTIVE
+    if progress.reason in _EMERGENCIES:
+        state = Progress.PAUSED
     return FlightReport(record, reached, state, is_flown=True, way=way, stage=_STAGES.get(progress.state), why=why)
 
 
+def _compass(progress: FlightProgress) -> str:
+    """Rounded, so that it is said once."""
+    error = round((progress.compass or 0) / 10) * 10
+    return f"Compass about {abs(error)} deg off: check mag_dec" if abs(error) >= _COMPASS_OFF_DEG else ""
+
+
 def _has_landed(before: FlightReport) -> bool:
-    return before.stage is Stage.LANDING or (before.progress is Progress.COMPLETE and not before.is_flown)
+    """At the end of its list."""
+    return (before.stage is Stage.LANDING and before.progress is Progress.ACTIVE) or (
+        before.progress is Progress.COMPLETE and not before.is_flown
+    )

@@ -4,6 +4,7 @@
 #include "harakiri_flight.h"
 #include "harakiri_mission.h"
 
+#include <math.h>
 #include <stdio.h>
 
 config_t cfg;
@@ -13,17 +14,16 @@ uint8_t rcOptions[CHECKBOXITEMS], vbat;
 int32_t Real_GPS_coord[2], GPS_home[2];
 volatile uint8_t GPS_numSat;
 volatile bool GPS_FIX;
-bool GroundAltInitialized, WP_Fastcorner;
-float EstAlt, vario, heading, magHold, waypoint_speed_gov;
-int8_t nav_mode, wp_status;
-uint16_t GPS_speed;
+bool GroundAltInitialized;
+float EstAlt, vario, heading, magHold, angle[2], cos_yaw_x = 1.0f, sin_yaw_y;
+int8_t nav_mode;
+uint16_t GPS_speed, GPS_ground_course;
+uint8_t GPS_update;
 uint32_t currentTimeMS;
 uint16_t batteryWarningVoltage;
 
 static uint8_t list[4][16];
-static int32_t target_lat;
-static unsigned targets, checks;
-static bool own_gains, auto_first;
+static unsigned checks;
 
 #define CHECK(condition) check((condition), #condition, __LINE__)
 
@@ -67,25 +67,6 @@ float wrap_180(float angle)
     return angle > 180.0f ? angle - 360.0f : angle;
 }
 
-void GPS_set_next_wp(int32_t *lat, int32_t *lon)
-{
-    (void)lon;
-    target_lat = *lat;
-    targets++;
-    waypoint_speed_gov = 100.0f;
-    auto_first = f.GPS_AUTO_MODE && nav_mode == NAV_MODE_WP;
-}
-
-void GPS_set_nav_gains(uint8_t p, uint8_t i)
-{
-    own_gains = p == cfg.mission_nav_p && i == cfg.mission_nav_i;
-}
-
-void GPS_set_pids(void)
-{
-    own_gains = false;
-}
-
 static void make_list(void)
 {
     static const uint8_t commands[4] = {0, 0, 0, 5}; /* home, fast corner, braked corner, LAND */
@@ -106,6 +87,7 @@ static bool returns_home;
 static bool loop_once(bool switch_on)
 {
     currentTimeMS += 20;
+    GPS_update = !GPS_update;
     memset(rcOptions, 0, sizeof rcOptions);
     rcOptions[BOXGPSAUTO] = switch_on;
     rcData[THROTTLE] = 1510;
@@ -131,6 +113,7 @@ static void take_off_by_hand(void)
     cfg.rc_dbah = 50;
     cfg.rc_dbgps = 5;
     cfg.bar_dscl = 0.7f;
+    cfg.gps_maxangle = 35;
     cfg.al_barolr = cfg.as_clmbr = 50;
     cfg.mag_calibrated = 1;
     make_list();
@@ -146,10 +129,18 @@ static void take_off_by_hand(void)
     (void)loop_once(false);
 }
 
+/* The flight's lean, 1/10 degree: forward and right. */
+static float lean(int axis)
+{
+    float angles[2] = {99.0f, 99.0f};
+    FlightLean(angles);
+    return angles[axis];
+}
+
 static uint8_t asked(int at)
 {
     uint8_t reply[NM_BUFFER_SIZE];
-    CHECK(FlightRequest(179, reply, 0) == 24);
+    CHECK(FlightRequest(179, reply, 0) == 26);
     return reply[at];
 }
 
@@ -158,7 +149,7 @@ static void test_settings(void)
     memset(&cfg, 0xFF, sizeof cfg);
     FlightDefaults();
     CHECK(cfg.mission_fly == 0 && cfg.mission_first == 200 && cfg.mission_height == 100 && cfg.mission_climb == 100);
-    CHECK(cfg.mission_nav_p == 70 && cfg.mission_nav_i == 60);
+    CHECK(cfg.mission_fix == 20);
     cfg.mission_first = 150;
     FlightDefaults();
     CHECK(cfg.mission_first == 150);
@@ -180,10 +171,17 @@ static void test_it_is_off_until_it_is_set(void)
 static void test_a_leg_and_its_end(void)
 {
     take_off_by_hand();
-    targets = 0;
-    loops(3);
-    CHECK(f.GPS_AUTO_MODE && auto_first && targets == 1 && target_lat == 450003000 && own_gains && WP_Fastcorner);
+    CHECK(lean(PITCH) == 99.0f && !FlightTrustsGyro() && FlightHeading(10.0f) == 10.0f);
+    loops(20);
+    CHECK(f.GPS_AUTO_MODE && nav_mode == NAV_MODE_NONE && asked(3) == NF_LEG);
+    CHECK(lean(PITCH) > 1.0f && lean(ROLL) < 1.0f && lean(ROLL) > -1.0f); /* the place is ahead, in the north */
+    CHECK(FlightTrustsGyro() && FlightTrustsGyro() && FlightTrustsGyro() && FlightTrustsGyro() && !FlightTrustsGyro());
     CHECK(rcOptions[BOXBARO] && rcOptions[BOXMAG] && rcOptions[BOXANGLE] && !rcOptions[BOXGPSHOLD] && rcData[THROTTLE] == 1500);
+    cos_yaw_x = 0.0f; /* the nose to the east: the place is on the left */
+    sin_yaw_y = 1.0f;
+    CHECK(lean(ROLL) < -1.0f && lean(PITCH) < 1.0f);
+    cos_yaw_x = 1.0f;
+    sin_yaw_y = 0.0f;
     heading = 10.0f;
     loops(1);
     FlightNose();
@@ -195,14 +193,30 @@ static void test_a_leg_and_its_end(void)
     loops(1);
     CHECK(rcData[THROTTLE] < 1450 && rcData[THROTTLE] > 1330);
     EstAlt = 1000.0f;
-    nav_mode = NAV_MODE_NONE; /* dropped by the firmware */
+    Real_GPS_coord[LAT] = 450002990; /* there */
     loops(1);
-    CHECK(targets == 2);
-    waypoint_speed_gov = 333.0f;
-    Real_GPS_coord[LAT] = 450002990; /* there: the next one keeps the speed, and brakes */
-    loops(1);
-    CHECK(targets == 3 && target_lat == 450006000 && !WP_Fastcorner && waypoint_speed_gov == 333.0f && asked(8) == 1);
-    CHECK(!loop_once(false) && !f.GPS_AUTO_MODE && !own_gains && rcData[THROTTLE] == 1510 && !rcOptions[BOXBARO]);
+    CHECK(asked(3) == NF_LEG && asked(8) == 1 && asked(6) == 2);
+    CHECK(!loop_once(false) && !f.GPS_AUTO_MODE && rcData[THROTTLE] == 1510 && !rcOptions[BOXBARO] && lean(PITCH) == 99.0f);
+}
+
+/* What the accelerometer feels while the GPS says another direction turns the heading. */
+static void test_the_compass_is_corrected(void)
+{
+    take_off_by_hand();
+    for (int i = 0; i < 200; i++) {
+        GPS_speed = (uint16_t)(i * 4);
+        GPS_ground_course = 0; /* north */
+        const float bearing = (FlightHeading(100.0f) - 10.0f) * RADX; /* a compass that is 90 degrees off */
+        const float felt[2] = {-4.0f * cosf(bearing), -4.0f * sinf(bearing)}; /* ACC_speed's sign */
+        FlightFeels(felt);
+        (void)loop_once(true);
+    }
+    CHECK(FlightHeading(100.0f) < 25.0f && FlightHeading(100.0f) > -5.0f);
+    CHECK((asked(2) & 16) != 0);
+    f.ARMED = 0;
+    (void)loop_once(false);
+    CHECK(FlightHeading(100.0f) == 100.0f);
+    GPS_speed = 0;
 }
 
 static void test_sticks_and_a_lost_fix(void)
@@ -212,7 +226,7 @@ static void test_sticks_and_a_lost_fix(void)
     GPS_FIX = false;
     f.GPS_AUTO_MODE = 0; /* as GPS_alltime() does */
     loops(1);
-    CHECK(!own_gains && rcOptions[BOXBARO] && !rcOptions[BOXGPSHOLD] && asked(3) == NF_NO_FIX);
+    CHECK(rcOptions[BOXBARO] && !rcOptions[BOXGPSHOLD] && asked(3) == NF_NO_FIX && lean(PITCH) < 99.0f);
     GPS_FIX = true;
     loops(1);
     CHECK(rcOptions[BOXGPSHOLD] && asked(3) == NF_HELD && asked(4) == NF_FIX_LOST);
@@ -244,15 +258,11 @@ static void test_landing_and_announcements(void)
     Real_GPS_coord[LAT] = 450006000;
     loops(2);
     CHECK(FlightReached(&record) && record == 2 && !FlightReached(&record));
-    targets = 0;
-    nav_mode = NAV_MODE_POSHOLD; /* there */
-    GPS_speed = 80;
     loops(2);
-    CHECK(asked(3) == NF_SETTLE && f.GPS_AUTO_MODE && own_gains);
-    GPS_speed = 20;
+    CHECK((asked(3) == NF_SETTLE || asked(3) == NF_DESCENT) && f.GPS_AUTO_MODE);
     loops(2);
     CHECK(asked(3) == NF_DESCENT && rcData[THROTTLE] < cfg.rc_minchk);
-    CHECK(f.GPS_AUTO_MODE && !rcOptions[BOXGPSHOLD] && targets == 0); /* goes on holding the last place */
+    CHECK(f.GPS_AUTO_MODE && !rcOptions[BOXGPSHOLD]);
     f.ARMED = 0;
     CHECK(!loop_once(true) && !FlightCurrent(&record));
 }
@@ -262,14 +272,17 @@ static void test_failsafe_and_the_port(void)
     uint8_t buffer[NM_BUFFER_SIZE];
     take_off_by_hand();
     loops(3);
-    CHECK(FlightRequest(178, buffer, 0) == -1 && FlightRequest(179, buffer, 1) == 24 && buffer[0] == NM_BAD_REQUEST);
+    CHECK(FlightRequest(178, buffer, 0) == -1 && FlightRequest(179, buffer, 1) == 26 && buffer[0] == NM_BAD_REQUEST);
     FlightFailsafe();
     returns_home = true;
-    CHECK(!loop_once(true) && !f.GPS_AUTO_MODE && asked(4) == NF_FAILSAFE);
-    loops(10);
-    CHECK(asked(3) == NF_OFF && own_gains); /* on the way home */
-    returns_home = false;
-    CHECK(!loop_once(true) && !own_gains && asked(3) == NF_OFF);
+    CHECK(loop_once(true) && f.GPS_AUTO_MODE && asked(3) == NF_HOME && asked(4) == NF_FAILSAFE);
+    FlightFailsafe();
+    loops(1);
+    CHECK(asked(3) == NF_HOME);
+    returns_home = false; /* the signal is back */
+    loops(2);
+    CHECK(asked(3) == NF_HELD && asked(4) == NF_FAILSAFE);
+    CHECK(!loop_once(false) && asked(3) == NF_OFF);
 }
 
 int main(void)
@@ -277,6 +290,7 @@ int main(void)
     test_settings();
     test_it_is_off_until_it_is_set();
     test_a_leg_and_its_end();
+    test_the_compass_is_corrected();
     test_sticks_and_a_lost_fix();
     test_landing_and_announcements();
     test_failsafe_and_the_port();

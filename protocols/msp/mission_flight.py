@@ -10,14 +10,14 @@ from protocols.msp.frame import request
 
 FLIGHT = Msp.FLIGHT
 FLIGHT_REQUEST = request(FLIGHT)
-_VERSION = 1
+_VERSION = 2
 _NO_RECORD = 0xFFFF
-_REPLY = struct.Struct("<6B3HIHhI")
+_REPLY = struct.Struct("<6B3HIHhIh")
 FLIGHT_SIZE = _REPLY.size
 #: The name of a NAMED_VALUE_INT in Harakiri's own MAVLink, with state, reason, flags and record in its four bytes.
 SUMMARY = "flight"
 _SIGNED, _NO_SHORT_RECORD = struct.Struct("<i"), 0xFF
-_IN_COMMAND, _BATTERY_LOW, _SWITCH_ON, _ENABLED = 4, 8, 2, 1
+_IN_COMMAND, _BATTERY_LOW, _SWITCH_ON, _ENABLED, _COMPASS_KNOWN = 4, 8, 2, 1, 16
 
 
 class FlightPhase(IntEnum):
@@ -40,7 +40,7 @@ class FlightPhase(IntEnum):
     DONE = 14
     HELD = 15
     NO_FIX = 16
-    HANDS = 17
+    HOME = 17
 
 
 class FlightReason(IntEnum):
@@ -75,6 +75,10 @@ class FlightReason(IntEnum):
     SWITCHED_OFF = 26
     DISARMED = 27
     FLOWN = 28
+    AWAY = 29
+    COMPASS = 30
+    HOLD_LOST = 31
+    BLIND = 32
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +98,8 @@ class FlightProgress:
     bearing: float = 0.0
     height_error: float = 0.0
     state_s: float = 0.0
+    #: How far the compass points too far clockwise, degrees; None: not measured yet, or not told.
+    compass: float | None = None
 
     @property
     def _flags(self) -> int:
@@ -102,6 +108,7 @@ class FlightProgress:
             | self.switch_on * _SWITCH_ON
             | self.in_command * _IN_COMMAND
             | self.battery_low * _BATTERY_LOW
+            | (self.compass is not None) * _COMPASS_KNOWN
         )
 
     @property
@@ -115,9 +122,9 @@ class FlightProgress:
         """The reply's payload."""
         records = (_NO_RECORD if record is None else record for record in (self.record, self.reached))
         target = (round(self.distance * 100), round(self.bearing * 100), round(self.height_error * 100))
-        state_ms = round(self.state_s * 1000)
+        state_ms, compass = round(self.state_s * 1000), round((self.compass or 0) * 100)
         return _REPLY.pack(
-            0, _VERSION, self._flags, self.state, self.reason, 0, *records, self.count, *target, state_ms
+            0, _VERSION, self._flags, self.state, self.reason, 0, *records, self.count, *target, state_ms, compass
         )
 
 
@@ -125,9 +132,8 @@ def decode_flight(payload: bytes) -> FlightProgress | None:
     """Read a reply; None if it is truncated, an error, or of another version."""
     if len(payload) < _REPLY.size:
         return None
-    status, version, flags, state, reason, _, record, reached, count, distance, bearing, height_error, state_ms = (
-        _REPLY.unpack_from(payload)
-    )
+    status, version, flags, state, reason, _, record, reached, count, *motion = _REPLY.unpack_from(payload)
+    distance, bearing, height_error, state_ms, compass = motion
     progress = None if status or version != _VERSION else _progress(state, reason, flags)
     if progress is None:
         return None
@@ -140,6 +146,7 @@ def decode_flight(payload: bytes) -> FlightProgress | None:
         bearing=bearing / 100,
         height_error=height_error / 100,
         state_s=state_ms / 1000,
+        compass=compass / 100 if flags & _COMPASS_KNOWN else None,
     )
 
 

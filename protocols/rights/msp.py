@@ -122,7 +122,7 @@ _HARAKIRI: Rights = {
 #: The extension takes a request only with its own length, and leaves its reply in the receive buffer.
 _HARAKIRI_MISSIONS: Rights = {
     **_HARAKIRI,
-    **_reads(MISSION_INFO=(190, 24), MISSION_READ=(195, 243, 5), SETTING=(197, 218, 5), FLIGHT=(179, 24)),
+    **_reads(MISSION_INFO=(190, 24), MISSION_READ=(195, 243, 5), SETTING=(197, 218, 5), FLIGHT=(179, 26)),
     **_changes(
         _EXTENDED_BUFFER,
         MISSION_BEGIN=(191, 7), MISSION_CHUNK=(192, *range(19, _EXTENDED_BUFFER + 1, 16)), MISSION_COMMIT=(193, 7),

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`naze-bridge fly`: a mission file flown by a real firmware image in the simulated sky, and judged."""
 
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from enum import IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
@@ -19,7 +19,9 @@ from protocols.msp.mission import WpRecord
 from reports.verdict import Result
 from service.settings import SettingsError, takeoff_limit_m
 from simulator.commands.image import read_image
+from simulator.sky.body import Airframe
 from simulator.sky.earth import Place
+from simulator.sky.lies import Lies
 from simulator.sky.sky import Weather
 from terminal.files import read_file, shown_path, write_file
 from terminal.mission_source import load_mission
@@ -28,12 +30,32 @@ from terminal.printing import print_json, print_table
 from terminal.sentences import fail, say
 
 if TYPE_CHECKING:
+    from protocols.msp.mission_flight import FlightProgress
     from simulator.flights.judgement import ItemResult
     from simulator.flights.mission_run import MissionRun
+    from simulator.flights.pilot import Pilot
 
 #: The only firmware that flies such a list.
 _KIND = "harakiri"
 _SETTINGS = ("set mission_fly=1",)
+#: The GPS jumps, or loses its fix for gps-outage seconds, this long after the flight began.
+_EVENT_S = 20.0
+_OUTAGE = "gps-outage"
+_LIES = {name.name.replace("_", "-"): name.name for name in fields(Lies)}
+
+
+def _parse_lies(_: click.Context, __: click.Parameter, values: tuple[str, ...]) -> dict[str, float]:
+    """NAME=VALUE each. click.BadParameter."""
+    lies = {}
+    for value in values:
+        name, _equals, number = value.partition("=")
+        if name not in (*_LIES, _OUTAGE):
+            raise click.BadParameter(f"{name!r} is none of {', '.join((*_LIES, _OUTAGE))}")
+        try:
+            lies[name] = float(number)
+        except ValueError:
+            raise click.BadParameter(f"{number!r} is no number: write --lie {name}=5") from None
+    return lies
 
 
 class FlyStatus(IntEnum):
@@ -57,6 +79,15 @@ class FlyStatus(IntEnum):
 @click.option("--wind", type=click.FloatRange(0, 20), default=0.0, help="Wind with gusts, m/s.")
 @click.option("--wind-from", type=click.FloatRange(0, 360), default=270.0, show_default=True, help="Its direction.")
 @click.option("--seed", type=int, default=0, help="Seed of gusts and noise.")
+@click.option("--mass", type=click.FloatRange(0.3, 4), default=1.0, show_default=True, help="The craft's weight, kg.")
+@click.option(
+    "--lie",
+    "lies",
+    metavar="NAME=VALUE",
+    multiple=True,
+    callback=_parse_lies,
+    help=f"What is wrong with the craft: {', '.join((*_LIES, _OUTAGE))}. May be repeated.",
+)
 @click.option("--svg", type=PATH, help="Draw the track into this file.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
 @click.pass_context
@@ -68,6 +99,8 @@ def fly(
     wind: float,
     wind_from: float,
     seed: int,
+    mass: float,
+    lies: dict[str, float],
     svg: Path | None,
     as_json: bool,
 ) -> None:
@@ -75,7 +108,7 @@ def fly(
 
     Needs a TestCode3 with mission flight (docs/howto/try-a-mission.md). Nothing is sent to a real craft.
 
-    Exit code 1: the mission was not flown as in the file.
+    Exit code 1: the mission was not flown as in the file, or the craft crashed or went out of bounds.
     """
     records = _records(file)
     try:
@@ -85,22 +118,36 @@ def fly(
     weather = Weather(wind=wind, wind_from=wind_from, seed=seed)
     place = Place(lat=records[0].lat_e7 / 1e7, lon=records[0].lon_e7 / 1e7)
     try:
-        run, results = _fly(firmware, image.name, flash, records, weather, place, quiet=as_json)
+        run, results = _fly(firmware, image.name, flash, records, weather, place, mass, lies, quiet=as_json)
     except _unfit() as error:
         _refuse(str(error))
-    from simulator.flights.judgement import is_flown
+    from simulator.flights.judgement import extremes, is_flown
     from simulator.flights.track_picture import track_svg
 
-    flown = is_flown(results)
+    found = extremes(run, place)
+    flown = is_flown(results) and not found.problem
     if as_json:
         items = [asdict(result) for result in results]
         ending = run.reason.name.lower()
         print_json(
-            {"file": shown_path(file), "flown": flown, "reason": ending, "seconds": _seconds(run), "items": items}
+            {
+                "file": shown_path(file),
+                "flown": flown,
+                "reason": ending,
+                "seconds": _seconds(run),
+                **asdict(found),
+                "problem": found.problem,
+                "items": items,
+            }
         )
     else:
         print_table(_table(results))
-        say(f"{'Flown' if flown else 'Not flown'} in {_seconds(run):.0f} s.")
+        say(
+            f"At most {found.farthest_m:.0f} m from home and {found.off_legs_m:.0f} m from the mission's legs, "
+            f"{found.fastest:.1f} m/s, leaning {found.steepest_deg:.0f} degrees{_compass(run)}."
+        )
+        ending = f"Not flown: {found.problem}" if found.problem else "Flown" if flown else "Not flown"
+        say(f"{ending}, in {_seconds(run):.0f} s.")
     if svg:
         try:
             title = f"{shown_path(file)}, wind {wind:g} m/s, seed {seed}"
@@ -156,6 +203,8 @@ def _fly(
     records: tuple[WpRecord, ...],
     weather: Weather,
     place: Place,
+    mass: float,
+    lies: dict[str, float],
     *,
     quiet: bool,
 ) -> "tuple[MissionRun, list[ItemResult]]":
@@ -171,15 +220,33 @@ def _fly(
             say(text)
 
     contents = _flash(flash_file) if flash_file else prepared_flash(firmware, say_progress, _SETTINGS)
-    naze = FlyingNaze(firmware, memoryview(bytearray(contents)), weather=weather, place=place)
+    naze = FlyingNaze(
+        firmware, memoryview(bytearray(contents)), weather=weather, frame=Airframe().scaled(mass), place=place
+    )
+    told = naze.sky.lies
+    for lie, value in lies.items():
+        if lie not in ("gps-jump", _OUTAGE):
+            setattr(told, _LIES[lie], value)
     pilot = Pilot(naze)
     say_progress(f"{name} boots.")
     pilot.power_on()
     require_mission_flight(pilot.console, name)
     upload(pilot.console, records)
     say_progress(f"{len(records) - 1} commands are on the board. It flies, in wind of {weather.wind:g} m/s.")
-    run = fly_mission(pilot, records)
+    begun = pilot.now
+
+    def happen(pilot: "Pilot", _: "FlightProgress") -> None:
+        since = pilot.now - begun
+        told.gps_jump = lies.get("gps-jump", 0.0) if since > _EVENT_S else 0.0
+        naze.faults.gps_fix = not _EVENT_S < since < _EVENT_S + lies.get(_OUTAGE, 0.0)
+
+    run = fly_mission(pilot, records, happen)
     return run, judge(run, place)
+
+
+def _compass(run: "MissionRun") -> str:
+    found = [report.progress.compass for report in run.reports if report.progress.compass is not None]
+    return f"; the compass was found {found[-1]:.0f} degrees off" if found and abs(found[-1]) >= 1 else ""
 
 
 def _seconds(run: "MissionRun") -> float:

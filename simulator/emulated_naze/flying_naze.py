@@ -16,6 +16,7 @@ from simulator.emulated_naze.switches import EmulatedFaults
 from simulator.sky.body import Airframe
 from simulator.sky.earth import Place
 from simulator.sky.gps_module import GpsModule
+from simulator.sky.lies import Lies
 from simulator.sky.sky import Sky, Weather
 from simulator.sky.vectors import heading_of, to_body
 
@@ -56,12 +57,13 @@ class FlyingNaze(EmulatedNaze):
         frame: Airframe | None = None,
         heading: float = 0.0,
         place: Place | None = None,
+        lies: Lies | None = None,
         longest_step_s: float = inf,
         tempo: float = 1.0,
     ) -> None:
         self._weather = weather or Weather()
-        self.sky = Sky(self._weather, lambda: self._chip.motors_us(), frame, heading, place)
-        self.gps = GpsModule(self.sky.place, self._weather.seed)
+        self.sky = Sky(self._weather, lambda: self._chip.motors_us(), frame, heading, place, lies)
+        self.gps = GpsModule(self.sky.place, self._weather.seed, self.sky.lies)
         super().__init__(
             image, FlyingSwitches(), flash, seed=self._weather.seed, longest_step_s=longest_step_s, tempo=tempo
         )

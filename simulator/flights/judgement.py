@@ -4,9 +4,12 @@
 The limits: a place within its radius + 2 m, 3 m of overshoot where it brakes, 1.5 s of a time, 15 degrees of a turn, a
 place that is held within its radius + 4 m and its height within 1.5 m, a landing within 6 m of where the descent began.
 They include the GPS module's error of 1 m.
+
+A flight is out of bounds, however it ends, 40 m from all legs of its list, at 12 m/s or leaning 50 degrees.
 """
 
 from dataclasses import dataclass, field
+from itertools import pairwise, starmap
 from math import hypot
 
 from protocols.msp.mission import WpCommand, WpRecord
@@ -18,6 +21,7 @@ from simulator.sky.earth import Place
 _PLACE_M, _OVERSHOOT_M, _HELD_M, _LANDED_M = 2.0, 3.0, 4.0, 6.0
 _SECONDS, _TURN_DEG, _TAKEOFF_M, _HOLD_HEIGHT_M = 1.5, 15.0, 1.0, 1.5
 _OVERSHOOT_S = 10.0
+_FLYAWAY_M, _FASTEST, _STEEPEST_DEG = 40.0, 12.0, 50.0
 #: The board is asked this often, so a turn began up to this long before it was seen.
 _REPORT_S = 0.3
 _MOVING = {*WpCommand} - {WpCommand.LAND, WpCommand.TAKEOFF, WpCommand.SETROI}
@@ -59,6 +63,38 @@ def judge(run: MissionRun, place: Place) -> list[ItemResult]:
     if results and (problem := _ending(run)):
         results[-1].problems.append(problem)
     return results
+
+
+@dataclass(frozen=True, slots=True)
+class Extremes:
+    """Of the true track: m from home, m from the nearest leg of the list, m/s over ground, degrees."""
+
+    farthest_m: float
+    off_legs_m: float
+    fastest: float
+    steepest_deg: float
+    has_crashed: bool
+
+    @property
+    def problem(self) -> str:
+        """What no flight may do, whatever its sensors say; "" if it did not."""
+        if self.has_crashed:
+            return "crashed"
+        if self.off_legs_m > _FLYAWAY_M or self.fastest > _FASTEST or self.steepest_deg > _STEEPEST_DEG:
+            return "out of bounds"
+        return ""
+
+
+def extremes(run: MissionRun, place: Place) -> Extremes:
+    corners = [place.position(r.lat_e7 / 1e7, r.lon_e7 / 1e7) if r.lat_e7 else (0.0, 0.0) for r in run.records]
+    legs = list(pairwise(corners))
+    return Extremes(
+        max(sample.distance_to((0.0, 0.0)) for sample in run.track),
+        max(min(starmap(sample.distance_to_leg, legs)) for sample in run.track),
+        max(sample.speed for sample in run.track),
+        max(sample.tilt for sample in run.track),
+        run.has_crashed,
+    )
 
 
 def is_flown(results: list[ItemResult]) -> bool:

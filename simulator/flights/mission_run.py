@@ -12,13 +12,13 @@ from simulator.flights.track import Track
 
 _EVERY_S = 0.2
 #: The time to keep watching after an end without landing, and after a stop.
-_WATCH_S, _WATCH_STOPPED_S = 15.0, 5.0
+_WATCH_S, _WATCH_STOPPED_S = 8.0, 5.0
 #: The slowest flight that is waited for: m/s, and s for each record.
 _SLOWEST, _FOR_RECORD_S = 0.4, 60.0
 _START_HEIGHT = 8.0
 #: The board looks at the switch within this time.
 _SWITCH_S = 3.0
-_STOPPED = {FlightPhase.HELD, FlightPhase.HANDS, FlightPhase.NO_FIX, FlightPhase.OFF}
+_STOPPED = {FlightPhase.HELD, FlightPhase.OFF}
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +40,7 @@ class MissionRun:
     #: False if the flight was still going on at the deadline.
     has_ended: bool = False
     has_landed: bool = False
+    has_crashed: bool = False
 
     @property
     def last(self) -> FlightProgress:
@@ -97,6 +98,7 @@ def fly_mission(pilot: Pilot, records: Sequence[WpRecord], intervene: Interventi
             run.has_ended = watch_s is not None
             end_s = None if watch_s is None else pilot.now + watch_s
     run.track = pilot.track.since(run.begun_s)
+    run.has_crashed = pilot.naze.sky.body.has_crashed
     return run
 
 

@@ -2,15 +2,18 @@
 """A quadcopter as a rigid body with four lagging motors, linear drag and a ground it can stand on."""
 
 from dataclasses import dataclass
-from math import exp, sqrt
+from math import exp, hypot, sqrt
 
-from simulator.sky.vectors import ZERO, Quaternion, Vector, facing, to_body, to_world, turned
+from simulator.sky.vectors import ZERO, Quaternion, Vector, facing, tilt_of, to_body, to_world, turned
 
 GRAVITY = 9.80665
 #: Without a pulse, or below this, a speed controller stops its motor.
 _STOPPED_US, _FULL_US = 1000, 2000
 # How quickly the body levels on the ground, 1/s.
 _SETTLING = 10.0
+_FRONT_RIGHT = 1
+#: Beyond these a touch-down is a crash: m/s down and along the ground, degrees.
+_CRASH_DOWN, _CRASH_ALONG, _CRASH_TILT_DEG = 2.5, 3.0, 35.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,18 +67,23 @@ class Body:
         self.thrusts = [0.0] * 4
         #: The downward speed of the last touch-down, m/s.
         self.touch_down_speed = 0.0
+        #: It has touched the ground too fast or too much tilted.
+        self.has_crashed = False
 
     @property
     def is_on_ground(self) -> bool:
         return self.position[2] <= 0.0
 
-    def step(self, dt: float, pulses_us: tuple[int, ...], wind: Vector) -> None:
-        """Advance by `dt` (about a millisecond) with these motor pulses and this wind (m/s)."""
+    def step(self, dt: float, pulses_us: tuple[int, ...], wind: Vector, weak: float = 1.0) -> None:
+        """Advance by `dt` (about a millisecond) with these motor pulses and this wind (m/s).
+
+        weak: a factor of the front right motor's thrust.
+        """
         frame = self.frame
         follow = 1 - exp(-dt / frame.motor_lag_s)
         thrusts = self.thrusts
         for index, pulse in enumerate(pulses_us):
-            thrusts[index] += (frame.thrust(pulse) - thrusts[index]) * follow
+            thrusts[index] += (frame.thrust(pulse) * (weak if index == _FRONT_RIGHT else 1.0) - thrusts[index]) * follow
         rear_right, front_right, rear_left, front_left = thrusts
         q, (vx, vy, vz) = self.attitude, self.velocity
         ax, ay, az = to_world(q, (0.0, 0.0, sum(thrusts) / frame.mass))
@@ -100,6 +108,8 @@ class Body:
         self.position = x + vx * dt, y + vy * dt, z + vz * dt
         if self.position[2] <= 0.0 and vz < 0.0:
             self.touch_down_speed = -vz
+            if -vz > _CRASH_DOWN or hypot(vx, vy) > _CRASH_ALONG or tilt_of(self.attitude) > _CRASH_TILT_DEG:
+                self.has_crashed = True
             self.position = self.position[0], self.position[1], 0.0
 
     def _turn(self, dt: float, roll: float, pitch: float, yaw: float) -> Vector:

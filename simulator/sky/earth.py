@@ -38,8 +38,7 @@ class Place:
         """Pa, by the standard atmosphere (ICAO), at a height above the launch place."""
         return float(101_325.0 * (1 - 2.25577e-5 * (self.alt_m + height_m)) ** 5.25588)
 
-    @property
-    def field(self) -> Vector:
-        """Gauss, world axes."""
-        angle = radians(self.declination_deg)
+    def field(self, compass_error_deg: float = 0.0) -> Vector:
+        """Gauss, world axes. A compass in it points this much too far clockwise."""
+        angle = radians(self.declination_deg - compass_error_deg)
         return self.horizontal_gauss * cos(angle), -self.horizontal_gauss * sin(angle), -self.down_gauss

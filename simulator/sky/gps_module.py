@@ -12,11 +12,12 @@ from dataclasses import dataclass
 from math import atan2, degrees, hypot
 
 from simulator.sky.earth import Place
+from simulator.sky.lies import Lies
 from simulator.sky.noise import Wander
 from simulator.sky.vectors import Vector
 
-#: The time between two measurements, and the age of one when it is sent.
-_PERIOD_S, _LAG_S = 0.2, 0.2
+#: The time between two measurements.
+_PERIOD_S = 0.2
 #: Standard deviations: metres, correlated over a minute; metres and m/s of one measurement.
 _WANDER_M, _WANDER_S, _POSITION_NOISE, _SPEED_NOISE = 0.7, 60.0, 0.02, 0.05
 _SATELLITES, _SATELLITES_LOST = 9, 3
@@ -54,7 +55,9 @@ class GpsModule:
     Until the board configures it, it speaks NMEA at the board's speed, as set by its owner.
     """
 
-    def __init__(self, place: Place, seed: int = 0) -> None:
+    def __init__(self, place: Place, seed: int = 0, lies: Lies | None = None) -> None:
+        self._lies = lies or Lies()
+        self._drifted_m = 0.0
         self.has_fix = True
         self.is_silent = False
         self._place = place
@@ -69,7 +72,7 @@ class GpsModule:
     @property
     def next_s(self) -> float:
         """When it measures or sends next."""
-        due = self._pending[0].at_s + _LAG_S if self._pending else self._next_s
+        due = self._pending[0].at_s + self._lies.gps_lag if self._pending else self._next_s
         return min(due, self._next_s)
 
     def hear(self, data: bytes, baud: int) -> None:
@@ -99,7 +102,7 @@ class GpsModule:
     def take(self, now_s: float, board_baud: int) -> bytes:
         """The bytes it sends now; b"" if there is nothing new, or the board listens at another speed."""
         sent = b""
-        while self._pending and self._pending[0].at_s + _LAG_S <= now_s:
+        while self._pending and self._pending[0].at_s + self._lies.gps_lag <= now_s:
             measurement = self._pending.popleft()
             sent += _ubx(measurement) if self._speaks_ubx else _nmea(measurement)
         if self.is_silent or self._baud not in (None, board_baud):
@@ -112,9 +115,10 @@ class GpsModule:
             true + wander.step(_PERIOD_S) + gauss(0, _POSITION_NOISE)
             for true, wander in zip(position, self._wander, strict=True)
         )
-        lat, lon = self._place.coordinates((north, west, up))
+        self._drifted_m += self._lies.gps_drift * _PERIOD_S
+        lat, lon = self._place.coordinates((north + self._lies.gps_jump + self._drifted_m, west, up))
         ned = (
-            velocity[0] + gauss(0, _SPEED_NOISE),
+            velocity[0] + self._lies.gps_drift + gauss(0, _SPEED_NOISE),
             -velocity[1] + gauss(0, _SPEED_NOISE),
             -velocity[2] + gauss(0, _SPEED_NOISE),
         )

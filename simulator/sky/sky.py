@@ -3,12 +3,13 @@
 
 import random
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from math import pi, sin
 
 from simulator.sky.battery import Battery
 from simulator.sky.body import GRAVITY, Airframe, Body
 from simulator.sky.earth import Place
+from simulator.sky.lies import Lies
 from simulator.sky.noise import Wander
 from simulator.sky.vectors import Vector, to_body, turned
 from simulator.sky.wind import Wind
@@ -50,7 +51,9 @@ class Sky:
         frame: Airframe | None = None,
         heading: float = 0.0,
         place: Place | None = None,
+        lies: Lies | None = None,
     ) -> None:
+        self.lies = lies or Lies()
         self.body = Body(frame, heading)
         self.wind = Wind(weather.wind, weather.wind_from, weather.seed, gusts=weather.gusts)
         self.place = place or Place()
@@ -62,19 +65,28 @@ class Sky:
         self._noise = random.Random(f"sensors {weather.seed}")
         self._pressure_drift = Wander(self._noise, 0.6, 120.0)
         self._motion = Motion()
+        self._baro_error = 0.0
+
+    def set_out(self, weather: Weather, frame: Airframe, lies: Lies) -> None:
+        """Put another craft at the launch place, in other weather, while the board keeps running."""
+        self.body = Body(frame)
+        self.wind = Wind(weather.wind, weather.wind_from, weather.seed, gusts=weather.gusts)
+        for name in fields(Lies):
+            setattr(self.lies, name.name, getattr(lies, name.name))
+        self._baro_error = 0.0
 
     def advance(self, now_s: float) -> None:
         """Let time pass."""
         if now_s < self.now_s + _STEP_S:
             return
-        pulses, body, motion = self._pulses(), self.body, self._motion
+        pulses, body, motion, weak = self._pulses(), self.body, self._motion, self.lies.weak_motor
         begun_s = self.now_s
         while self.now_s + _STEP_S <= now_s:
             self.now_s += _STEP_S
             if self.is_held:
                 self._hold()
             else:
-                body.step(_STEP_S, pulses, self.wind.at(self.now_s))
+                body.step(_STEP_S, pulses, self.wind.at(self.now_s), weak)
             a, b = motion.acceleration, body.felt
             motion.acceleration = (
                 a[0] + _FILTER * (b[0] - a[0]),
@@ -87,6 +99,7 @@ class Sky:
                 a[1] + _FILTER * (b[1] - a[1]),
                 a[2] + _FILTER * (b[2] - a[2]),
             )
+        self._baro_error += self.lies.baro_drift * (self.now_s - begun_s)
         self.battery.step(self.now_s - begun_s, sum(body.thrusts))
 
     def _hold(self) -> None:
@@ -101,7 +114,7 @@ class Sky:
     def motion(self) -> Motion:
         """A measurement of the IMU, with noise and vibration."""
         gauss = self._noise.gauss
-        shake = _VIBRATION * min(sum(self.body.thrusts) / (GRAVITY * self.body.frame.mass), 2.0)
+        shake = self.lies.vibration * _VIBRATION * min(self._hovers, 2.0)
         phase = 2 * pi * _VIBRATION_HZ * self.now_s
         shakes = shake * sin(phase), shake * sin(phase + 2.0), shake * sin(phase + 4.0)
         a, r = self._motion.acceleration, self._motion.rates
@@ -114,13 +127,23 @@ class Sky:
             (r[0] + gauss(0, _RATE_NOISE), r[1] + gauss(0, _RATE_NOISE), r[2] + gauss(0, _RATE_NOISE)),
         )
 
+    @property
+    def _hovers(self) -> float:
+        """The thrust as a part of the weight."""
+        return sum(self.body.thrusts) / (GRAVITY * self.body.frame.mass)
+
     def magnetic_field(self) -> Vector:
         """Gauss, body axes."""
-        x, y, z = to_body(self.body.attitude, self.place.field)
+        x, y, z = to_body(self.body.attitude, self.place.field(self.lies.compass))
+        y += self.lies.motor_field * self._hovers
         gauss = self._noise.gauss
         return x + gauss(0, _FIELD_NOISE), y + gauss(0, _FIELD_NOISE), z + gauss(0, _FIELD_NOISE)
 
     def pressure(self) -> float:
         """Pa."""
         drift = self._pressure_drift.step(0.01)
-        return self.place.pressure(self.body.position[2]) + drift + self._noise.gauss(0, _PRESSURE_NOISE)
+        return (
+            self.place.pressure(self.body.position[2] + self._baro_error)
+            + drift
+            + self._noise.gauss(0, _PRESSURE_NOISE)
+        )

@@ -37,7 +37,14 @@ CORE = (
     "harakiri_settings.h",
     "harakiri_settings.c",
 )
-FLIGHT_CORE = ("naze_flight.h", "naze_flight.c", "harakiri_flight.h", "harakiri_flight.c")
+FLIGHT_CORE = (
+    "naze_steer.h",
+    "naze_steer.c",
+    "naze_flight.h",
+    "naze_flight.c",
+    "harakiri_flight.h",
+    "harakiri_flight.c",
+)
 
 PATCH = """\
 The mission extension for a tree of our own, commit 0123abc, for tests.
@@ -455,7 +462,7 @@ def test_shipped_patches_have_only_our_own_lines(path: Path) -> None:
     """No context, no removed line, no function name of Harakiri after a hunk header."""
     header, _, body = path.read_text().partition("diff --git")
     bases = re.findall(r"^base [0-9a-f]{64} \S+$", header, re.MULTILINE)
-    assert len(bases) == (4 if path.stem.endswith("-flight") else 13)
+    assert len(bases) == (2 if path.stem.endswith("-flight") else 13)
     for line in body.splitlines()[1:]:
         assert re.match(r"\+|--- a/|diff --git a/|index [0-9a-f]+\.\.[0-9a-f]+ 100644$|@@ -\d+,0 \+[\d,]+ @@$", line), (
             line

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whole missions of all commands, flown by the real image with mission flight in the simulated sky.
+"""Missions flown by the real image with mission flight in a sky that lies, whole and interrupted.
 
-make real-board IMAGE=X.elf FLY=1 (MISSIONS=6: fewer in each wind). The image must be built with apply --flight.
+make real-board IMAGE=X.elf FLY=1. The image must be built with apply --flight. It boots once; between two flights
+another craft is set out at the launch place.
 """
 
 import os
-import random
-from collections.abc import Callable, Iterator
-from itertools import count, pairwise, starmap
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
 
 import pytest
 
@@ -16,38 +17,21 @@ from protocols.msp.mission import WpCommand, WpRecord
 from protocols.msp.mission_flight import FlightPhase, FlightProgress, FlightReason
 from simulator.emulated_naze.flying_naze import FlyingNaze
 from simulator.emulated_naze.prepared_flash import prepared_flash
-from simulator.flights.judgement import ItemResult, is_flown, judge
+from simulator.flights.judgement import extremes, is_flown, judge
 from simulator.flights.mission_run import MissionRun, fly_mission
 from simulator.flights.mission_upload import UnfitImageError, require_mission_flight, upload
-from simulator.flights.pilot import MIDDLE, Pilot
+from simulator.flights.pilot import LOW, MIDDLE, Pilot
+from simulator.flights.track import Track
 from simulator.sky.body import Airframe
 from simulator.sky.earth import Place
+from simulator.sky.lies import Lies
 from simulator.sky.sky import Weather
 from tests.support.real_bench import Figure
 
 pytestmark = pytest.mark.skipif(not os.environ.get("NAZE_FLY"), reason="NOT RUN: takes an hour: make real-board FLY=1")
 PLACE = Place()
-MISSIONS = int(os.environ.get("NAZE_MISSIONS") or 14)
-#: Nothing may be farther from all legs of its list.
-FLYAWAY_M = 40.0
-
-
-def ready(image: Image, wind: float, seed: int, records: list[WpRecord]) -> Pilot:
-    """The craft weighs 1 kg with even seeds, 2 kg with odd ones."""
-    flash = memoryview(bytearray(prepared_flash(image, lines=("set mission_fly=1",))))
-    weather, frame = Weather(wind=wind, seed=seed), Airframe().scaled(kilograms(seed))
-    pilot = Pilot(FlyingNaze(image, flash, weather=weather, frame=frame, place=PLACE))
-    pilot.power_on()
-    try:
-        require_mission_flight(pilot.console, "the image")
-    except UnfitImageError as error:
-        pytest.skip(f"NOT RUN: {error}")
-    upload(pilot.console, records)
-    return pilot
-
-
-def kilograms(seed: int) -> int:
-    return 1 + seed % 2
+#: The attitude and the heights recover from being moved.
+SETTLE_S = 6.0
 
 
 def record(command: WpCommand, place: tuple[float, float] | None, height: int = 0, **fields: int) -> WpRecord:
@@ -55,103 +39,83 @@ def record(command: WpCommand, place: tuple[float, float] | None, height: int = 
     return WpRecord(round(lat * 1e7), round(lon * 1e7), height, 0, 0, 2, 0, command)._replace(**fields)
 
 
-def random_mission(seed: int) -> list[WpRecord]:
-    """A legal list of 3 to 8 records behind the home point, legs up to 70 m."""
-    chance = random.Random(f"missions {seed}")
-    places = [(0.0, 0.0)]
-
-    def somewhere() -> tuple[float, float]:
-        north, west = places[-1]
-        places.append((chance.uniform(-25, 25), chance.uniform(-25, 25)))
-        return places[-1] if abs(places[-1][0] - north) + abs(places[-1][1] - west) > 15 else somewhere()
-
-    records = [record(WpCommand.WAYPOINT, (0.0, 0.0))]
-    if chance.random() < 0.6:
-        records.append(record(WpCommand.TAKEOFF, None, chance.randint(4, 10)))
-    has_roi = False
-    for _ in range(chance.randint(2, 3)):
-        if chance.random() < 0.25:
-            records.append(record(WpCommand.SETROI, somewhere()))
-            has_roi = True
-        nose, height = int(has_roi and chance.random() < 0.5), chance.randint(5, 14)
-        match chance.choice((WpCommand.WAYPOINT, WpCommand.LOITER_TIME, WpCommand.LOITER_TURNS)):
-            case WpCommand.WAYPOINT:
-                brake = chance.randint(0, 1)
-                records.append(record(WpCommand.WAYPOINT, somewhere(), height, time=brake, roi_heading=nose))
-            case WpCommand.LOITER_TIME:
-                seconds = chance.randint(3, 15)
-                records.append(record(WpCommand.LOITER_TIME, somewhere(), height, time=seconds, roi_heading=nose))
-            case _:
-                turns = chance.choice((-1, 1))
-                records.append(record(WpCommand.LOITER_TURNS, somewhere(), height, turns=turns))
-    match chance.randrange(4):
-        case 0:
-            records.append(record(WpCommand.LOITER_UNLIM, somewhere(), 8))
-        case 1:
-            records.append(record(WpCommand.RETURN_TO_LAUNCH, None, 8))
-        case 2:
-            records.append(record(WpCommand.LAND, None))
-        case _:
-            records += [record(WpCommand.RETURN_TO_LAUNCH, None, 8), record(WpCommand.LAND, None)]
-    return records
+HOME, TAKEOFF = record(WpCommand.WAYPOINT, (0.0, 0.0)), record(WpCommand.TAKEOFF, None, 4)
+CORNER, PAUSE = record(WpCommand.WAYPOINT, (20.0, 0.0), 6), record(WpCommand.LOITER_TIME, (8.0, -15.0), 6, time=3)
+TURN = record(WpCommand.LOITER_TURNS, (20.0, 0.0), 6, turns=1)
+LISTS = (
+    [HOME, TAKEOFF, CORNER, record(WpCommand.WAYPOINT, (20.0, -15.0), 6, time=1), PAUSE],
+    [HOME, TAKEOFF, TURN, record(WpCommand.LOITER_UNLIM, (8.0, -12.0), 5)],
+    [HOME, TAKEOFF, CORNER, record(WpCommand.RETURN_TO_LAUNCH, None, 5), record(WpCommand.LAND, None)],
+)
 
 
-def farthest(run: MissionRun) -> float:
-    """From the nearest leg of its list, m."""
-    places = [PLACE.position(r.lat_e7 / 1e7, r.lon_e7 / 1e7) if r.lat_e7 else (0.0, 0.0) for r in run.records]
-    return max(min(starmap(sample.distance_to_leg, pairwise(places))) for sample in run.track)
+@pytest.fixture(scope="module")
+def pilot(image: Image) -> Pilot:
+    flash = memoryview(bytearray(prepared_flash(image, lines=("set mission_fly=1",))))
+    pilot = Pilot(FlyingNaze(image, flash, place=PLACE))
+    pilot.power_on()
+    try:
+        require_mission_flight(pilot.console, "the image")
+    except UnfitImageError as error:
+        pytest.skip(f"NOT RUN: {error}")
+    return pilot
 
 
-def errors(results: list[ItemResult]) -> Iterator[str]:
-    """The largest of each kind."""
-    stays = [r for r in results if r.farthest_m is not None]
-    kinds: dict[str, list[float | None]] = {
-        "reached at": [r.distance_m for r in results if r.command != "LAND"],
-        "overshoot": [r.overshoot_m for r in results],
-        "stayed within": [r.farthest_m for r in stays],
-        "height off by": [abs((r.height_m or 0) - (r.planned_height_m or 0)) for r in stays],
-        "landed off by": [r.distance_m for r in results if r.command == "LAND"],
-    }
-    for name, values in kinds.items():
-        if known := [value for value in values if value is not None]:
-            yield f"{name} {max(known):.1f} m"
+def set_out(pilot: Pilot, records: list[WpRecord], wind: float, kilograms: float, seed: int, lies: Lies) -> None:
+    """The craft on the ground at the launch place, disarmed, with a list."""
+    faults, naze = pilot.naze.faults, pilot.naze
+    faults.roll = MIDDLE
+    faults.throttle = faults.aux2 = faults.aux3 = faults.aux4 = LOW
+    faults.radio = faults.gps_fix = True
+    faults.armed = False
+    naze.sky.set_out(Weather(wind=wind, seed=seed), Airframe().scaled(kilograms), lies)
+    pilot.wait_until(lambda: not naze.armed, "disarming")
+    naze.sky.set_out(Weather(wind=wind, seed=seed), Airframe().scaled(kilograms), lies)
+    pilot.wait(SETTLE_S)
+    pilot.track = Track()
+    upload(pilot.console, records)
 
 
-@pytest.mark.parametrize("wind", [0.0, 5.0, 8.0])
-@pytest.mark.parametrize("seed", range(MISSIONS))
-def test_a_mission_is_flown(image: Image, figure: Figure, wind: float, seed: int) -> None:
-    records = random_mission(seed)
-    pilot = ready(image, wind, seed, records)
+def story(pilot: Pilot, run: MissionRun) -> str:
+    found = extremes(run, PLACE)
+    ending = run.last.state.name.lower() if pilot.naze.armed else "disarmed"
+    limits = f"{found.off_legs_m:.1f} m off, {found.fastest:.1f} m/s, {found.steepest_deg:.0f} degrees"
+    compass = "" if run.last.compass is None else f", compass {run.last.compass:.0f} off"
+    return f"{ending}, {run.reason.name.lower()}; {limits}{compass}"
+
+
+@pytest.mark.parametrize(
+    ("number", "compass", "wind", "kilograms"),
+    [(n, *each) for n, each in enumerate(product((0, 15, 30, 45), (0.0, 5.0, 8.0), (0.5, 1.0, 2.0)))],
+)
+def test_a_mission_is_flown(
+    pilot: Pilot, figure: Figure, number: int, compass: int, wind: float, kilograms: float
+) -> None:
+    records = LISTS[(number + number // 3) % 3]
+    set_out(
+        pilot,
+        records,
+        wind,
+        kilograms,
+        number,
+        Lies(compass=compass * (-1) ** number, gps_lag=0.2 + 0.1 * (number % 3)),
+    )
     run = fly_mission(pilot, records)
     results = judge(run, PLACE)
     problems = [f"{result.number} {result.command}: {text}" for result in results for text in result.problems]
-    names = " ".join(WpCommand(each.command).name for each in records[1:])
-    found = "; ".join([*errors(results), *problems])
-    figure(f"{wind:.0f} m/s, {kilograms(seed)} kg, mission {seed}", f"{names}: {found}")
+    figure(
+        f"compass {compass}, {wind:.0f} m/s, {kilograms:g} kg, {len(records)} records",
+        f"{'flown' if is_flown(results) else 'NOT FLOWN'}: {story(pilot, run)}; {'; '.join(problems)}",
+    )
     assert run.has_ended
-    assert farthest(run) < FLYAWAY_M
+    assert not extremes(run, PLACE).problem
     assert is_flown(results), problems
-
-
-def in_the_second_leg() -> Callable[[FlightProgress], bool]:
-    """True once, a while after the second leg began."""
-    calls = count()
-    return lambda progress: progress.state is FlightPhase.LEG and (progress.record or 0) > 1 and next(calls) == 15
-
-
-LINE = [
-    record(WpCommand.WAYPOINT, (0.0, 0.0)),
-    record(WpCommand.WAYPOINT, (30.0, 0.0), 10, time=1),
-    record(WpCommand.WAYPOINT, (30.0, -60.0), 10, time=1),
-]
 
 
 def move_the_roll_stick(pilot: Pilot) -> None:
     pilot.naze.faults.roll = 1700
-
-
-def switch_off(pilot: Pilot) -> None:
-    pilot.fly_mission(False)
+    pilot.wait(2.0)
+    pilot.naze.faults.roll = MIDDLE
 
 
 def switch_off_and_on(pilot: Pilot) -> None:
@@ -166,7 +130,7 @@ def hide_the_sky(pilot: Pilot) -> None:
 
 def hide_the_sky_for_a_moment(pilot: Pilot) -> None:
     hide_the_sky(pilot)
-    pilot.wait(4.0)
+    pilot.wait(6.0)
     pilot.naze.faults.gps_fix = True
 
 
@@ -178,44 +142,96 @@ def call_it_home(pilot: Pilot) -> None:
     pilot.return_home()
 
 
-@pytest.mark.parametrize("wind", [0.0, 5.0, 8.0])
+def move_the_place(pilot: Pilot) -> None:
+    pilot.naze.sky.lies.gps_jump = 15.0
+
+
+@dataclass(frozen=True)
+class Ending:
+    """What an act leads to: a state, or disarmed; its reason; at most so far from home, m."""
+
+    state: FlightPhase | None
+    reason: FlightReason
+    home_m: float | None = None
+
+
+HELD_BY_STICKS = Ending(FlightPhase.HELD, FlightReason.STICKS)
+HELD_WITHOUT_FIX = Ending(FlightPhase.HELD, FlightReason.FIX_LOST)
+BLIND = Ending(None, FlightReason.BLIND)
+FAILSAFE, RTL = Ending(None, FlightReason.FAILSAFE, 5.0), Ending(None, FlightReason.RTL, 5.0)
+LANDED = Ending(None, FlightReason.DISARMED)
+DONE = Ending(FlightPhase.DONE, FlightReason.FLOWN)
+LEG, LOITER, WHILE_TURNING, DESCENT = FlightPhase.LEG, FlightPhase.LOITER, FlightPhase.TURN, FlightPhase.DESCENT
+
+
 @pytest.mark.parametrize(
-    ("seed", "act", "state", "reason"),
+    ("number", "act", "state", "which", "ending"),
     [
-        (1, move_the_roll_stick, FlightPhase.HELD, FlightReason.STICKS),
-        (2, switch_off, FlightPhase.OFF, FlightReason.SWITCHED_OFF),
-        (3, switch_off_and_on, FlightPhase.DONE, FlightReason.FLOWN),
-        (4, hide_the_sky, FlightPhase.NO_FIX, FlightReason.FIX_LOST),
-        (5, hide_the_sky_for_a_moment, FlightPhase.HELD, FlightReason.FIX_LOST),
-        (6, switch_the_transmitter_off, FlightPhase.OFF, FlightReason.FAILSAFE),
-        (7, switch_the_transmitter_off, FlightPhase.OFF, FlightReason.FAILSAFE),
-        (8, call_it_home, FlightPhase.OFF, FlightReason.RTL),
-        (9, call_it_home, FlightPhase.OFF, FlightReason.RTL),
+        (number, *each)
+        for number, each in enumerate(
+            [
+                (move_the_roll_stick, LEG, 0, HELD_BY_STICKS),
+                (move_the_roll_stick, LOITER, 0, HELD_BY_STICKS),
+                (move_the_roll_stick, DESCENT, 2, HELD_BY_STICKS),
+                (switch_off_and_on, LEG, 0, DONE),
+                (hide_the_sky_for_a_moment, LEG, 0, HELD_WITHOUT_FIX),
+                (hide_the_sky_for_a_moment, WHILE_TURNING, 1, HELD_WITHOUT_FIX),
+                (hide_the_sky_for_a_moment, DESCENT, 2, LANDED),
+                (hide_the_sky, LEG, 0, BLIND),
+                (hide_the_sky, LOITER, 0, BLIND),
+                (hide_the_sky, DESCENT, 2, LANDED),
+                (switch_the_transmitter_off, LEG, 0, FAILSAFE),
+                (switch_the_transmitter_off, WHILE_TURNING, 1, FAILSAFE),
+                (switch_the_transmitter_off, DESCENT, 2, LANDED),
+                (call_it_home, LEG, 0, RTL),
+                (call_it_home, LOITER, 0, RTL),
+                (move_the_place, LEG, 0, DONE),
+                (move_the_place, LOITER, 0, DONE),
+                (move_the_roll_stick, LEG, 1, HELD_BY_STICKS),
+                (hide_the_sky_for_a_moment, LOITER, 0, HELD_WITHOUT_FIX),
+                (hide_the_sky, WHILE_TURNING, 1, BLIND),
+                (switch_the_transmitter_off, LOITER, 0, FAILSAFE),
+                (call_it_home, WHILE_TURNING, 1, RTL),
+                (switch_the_transmitter_off, LEG, 1, FAILSAFE),
+                (call_it_home, LEG, 2, RTL),
+            ]
+        )
     ],
 )
 def test_a_flight_is_interrupted(
-    image: Image,
+    pilot: Pilot,
     figure: Figure,
-    wind: float,
-    seed: int,
+    number: int,
     act: Callable[[Pilot], None],
     state: FlightPhase,
-    reason: FlightReason,
+    which: int,
+    ending: Ending,
 ) -> None:
-    pilot = ready(image, wind, seed, LINE)
-    is_time = in_the_second_leg()
+    wind, kilograms, compass = (
+        (0.0, 5.0, 8.0)[number % 3],
+        (1.0, 2.0, 0.5)[number // 3 % 3],
+        (0, 20, -30)[number // 2 % 3],
+    )
+    set_out(pilot, LISTS[which], wind, kilograms, number, Lies(compass=compass))
+    has_acted: list[float] = []
 
     def intervene(pilot: Pilot, progress: FlightProgress) -> None:
-        if is_time(progress):
+        begun = progress.state is state and progress.state_s > 1.5 and (state is not LEG or (progress.record or 0) > 1)
+        if begun and not has_acted:
+            has_acted.append(pilot.now)
             act(pilot)
-            pilot.naze.faults.throttle = MIDDLE
 
-    run = fly_mission(pilot, LINE, intervene)
-    found = f"{run.last.state.name}, {run.reason.name}, {farthest(run):.1f} m from its list"
-    if reason in (FlightReason.FAILSAFE, FlightReason.RTL):
-        took_s = pilot.wait_until(lambda: not pilot.naze.armed, "the way home", 240.0)
-        found += f", disarmed {took_s:.0f} s later, {pilot.track.last.distance_to((0.0, 0.0)):.1f} m from home"
-    figure(f"{wind:.0f} m/s, {kilograms(seed)} kg, {act.__name__.replace('_', ' ')}", found)
-    assert run.last.state is state
-    assert run.reason is reason
-    assert farthest(run) < FLYAWAY_M
+    run = fly_mission(pilot, LISTS[which], intervene)
+    away = pilot.track.last.distance_to((0.0, 0.0))
+    what = f"{act.__name__.replace('_', ' ')} in {state.name.lower()}"
+    figure(
+        f"{what}, {wind:.0f} m/s, {kilograms:g} kg, compass {compass}",
+        f"{story(pilot, run)}, {away:.1f} m from home",
+    )
+    assert has_acted
+    assert not extremes(run, PLACE).problem
+    assert pilot.naze.armed is (ending.state is not None)
+    assert ending.state in (None, run.last.state)
+    reasons = {report.progress.reason for report in run.reports if report.at_s > has_acted[0]}
+    assert ending.reason in reasons
+    assert ending.home_m is None or away < ending.home_m

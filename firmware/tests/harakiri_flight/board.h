@@ -16,9 +16,9 @@ typedef struct {
     uint8_t gps_type, mission_fly, mission_first, mission_height;
     float gps_ins_vel, bar_dscl;
     uint16_t gps_wp_radius, nav_speed_max, rc_mid, rc_minchk, rc_maxchk;
-    uint8_t as_clmbr, al_barolr, rc_dbah, rc_dbgps, mag_calibrated, vbatmincellvoltage;
+    uint8_t as_clmbr, al_barolr, fs_jstph, gps_maxangle, rtl_mnh, rc_dbah, rc_dbgps, mag_calibrated, vbatmincellvoltage;
     uint32_t aligned;
-    uint8_t one, nav_tiltcomp, mission_nav_p, mission_nav_i; /* in the gaps of Harakiri's own struct */
+    uint8_t one, nav_tiltcomp, mission_fix; /* in the gaps of Harakiri's own struct */
     float nav_ctrkgain;
     uint8_t another, rtl_cr, mission_climb;
     uint32_t serial_baudrate;
@@ -32,11 +32,10 @@ enum { ROLL, PITCH, YAW, THROTTLE };
 enum { LAT, LON };
 enum { BOXANGLE, BOXHORIZON, BOXBARO, BOXMAG, BOXGPSHOME, BOXGPSHOLD, BOXGPSAUTO, BOXPASSTHRU, BOXHEADFREE, CHECKBOXITEMS };
 enum { NAV_MODE_NONE, NAV_MODE_POSHOLD, NAV_MODE_RTL, NAV_MODE_WP };
-enum { WP_STATUS_NONE, WP_STATUS_NAVIGATING, WP_STATUS_DONE };
-enum { PH_STATUS_NONE, PH_STATUS_WORKING, PH_STATUS_DONE };
 enum { FEATURE_VBAT = 1 };
 enum { SENSOR_BARO = 1, SENSOR_MAG = 2, SENSOR_GPS = 4 };
 
+#define RADX 0.0174532925f
 #define constrain(value, low, high) ((value) < (low) ? (low) : (value) > (high) ? (high) : (value))
 
 extern config_t cfg;
@@ -46,18 +45,16 @@ extern uint8_t rcOptions[CHECKBOXITEMS], vbat;
 extern int32_t Real_GPS_coord[2], GPS_home[2];
 extern volatile uint8_t GPS_numSat;
 extern volatile bool GPS_FIX;
-extern bool GroundAltInitialized, WP_Fastcorner;
-extern float EstAlt, vario, heading, magHold, waypoint_speed_gov;
-extern int8_t nav_mode, wp_status;
-extern uint16_t GPS_speed;
+extern bool GroundAltInitialized;
+extern float EstAlt, vario, heading, magHold, angle[2], cos_yaw_x, sin_yaw_y;
+extern int8_t nav_mode;
+extern uint16_t GPS_speed, GPS_ground_course;
+extern uint8_t GPS_update;
 extern uint32_t currentTimeMS;
 
 bool feature(uint32_t mask);
 bool sensors(uint32_t mask);
 bool FloppyReadWP(uint16_t *number, wp_t *record);
 float wrap_180(float angle);
-void GPS_set_next_wp(int32_t *lat, int32_t *lon);
-void GPS_set_nav_gains(uint8_t p, uint8_t i);
-void GPS_set_pids(void);
 
 #endif

@@ -15,7 +15,7 @@ from protocols.msp.frame import Direction, MspFrame
 from protocols.msp.mission_flight import FLIGHT, FlightPhase, FlightProgress, FlightReason
 from reports.vehicle_groups import Progress
 
-PAUSED = (FlightPhase.HELD, FlightPhase.NO_FIX, FlightPhase.HANDS)
+PAUSED = (FlightPhase.HELD, FlightPhase.NO_FIX)
 FLYING = FlightProgress(
     FlightPhase.LEG, switch_on=True, in_command=True, record=2, reached=1, distance=3.0, bearing=9.0
 )
@@ -62,7 +62,26 @@ def test_a_landing_that_ends_with_disarming_completes_the_list() -> None:
     assert flight_report(FlightProgress(), landed).progress is Progress.NOT_STARTED
 
 
-@pytest.mark.parametrize("payload", [b"", b"\x0b" + bytes(23), b"\0\x09" + bytes(22), FLYING.encode()[:-1]])
+@pytest.mark.parametrize(
+    "reason", [FlightReason.RTL, FlightReason.FAILSAFE, FlightReason.HOLD_LOST, FlightReason.BLIND]
+)
+def test_an_emergency_landing_does_not_complete_the_list(reason: FlightReason) -> None:
+    landing = flight_report(replace(FLYING, state=FlightPhase.SINK, reason=reason), None)
+    assert (landing.progress, landing.stage) == (Progress.PAUSED, Stage.LANDING)
+    disarmed = FlightProgress(record=2, reached=1, reason=FlightReason.DISARMED)
+    assert flight_report(disarmed, landing).progress is Progress.NOT_STARTED
+
+
+@pytest.mark.parametrize(
+    ("compass", "why"), [(None, ""), (-12.0, ""), (28.0, "30 deg"), (31.0, "30 deg"), (-44.0, "40 deg")]
+)
+def test_a_compass_error_is_said_once(compass: float | None, why: str) -> None:
+    said = flight_report(replace(FLYING, compass=compass), None).why
+    assert why in said
+    assert (said == "") is (why == "")
+
+
+@pytest.mark.parametrize("payload", [b"", b"\x0b" + bytes(25), b"\0\x09" + bytes(24), FLYING.encode()[:-1]])
 def test_other_replies_change_nothing(payload: bytes) -> None:
     vehicle = Vehicle()
     hear_msp(vehicle, MspFrame(Direction.REPLY, FLIGHT, payload), FlightController(PATCHED, PATCHED.name), 0.0)

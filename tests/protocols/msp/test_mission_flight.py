@@ -21,7 +21,7 @@ from protocols.msp.mission_flight import (
 from tests.support.programs import REPOSITORY
 
 _HEADER = (REPOSITORY / "firmware" / "naze_flight.h").read_text()
-REPLY = struct.pack("<6B3HIHhI", 0, 1, 0b1111, 7, 18, 3, 4, 3, 9, 1250, 27000, -150, 61500)
+REPLY = struct.pack("<6B3HIHhIh", 0, 2, 0b11111, 7, 18, 3, 4, 3, 9, 1250, 27000, -150, 61500, -2830)
 
 
 def test_a_reply_is_read() -> None:
@@ -34,6 +34,7 @@ def test_a_reply_is_read() -> None:
     assert progress.battery_low
     assert (progress.record, progress.reached, progress.count) == (4, 3, 9)
     assert (progress.distance, progress.bearing, progress.height_error, progress.state_s) == (12.5, 270, -1.5, 61.5)
+    assert progress.compass == -28.3
 
 
 def test_a_reply_is_written_as_it_was_read() -> None:

@@ -57,5 +57,14 @@ def test_a_mission_that_would_be_rejected_is_refused(tmp_path: Path, image: str)
     assert "home.waypoints" in output
 
 
+@pytest.mark.parametrize(
+    ("lie", "said"), [("compas=3", "'compas' is none of compass"), ("compass=x", "'x' is no number")]
+)
+def test_an_unknown_lie_is_refused(image: str, lie: str, said: str) -> None:
+    code, output = run(FIELD, "--image", image, "--lie", lie)
+    assert code == FlyStatus.UNUSABLE
+    assert said in output
+
+
 def test_a_missing_mission_is_refused(image: str) -> None:
     assert run("nowhere.waypoints", "--image", image)[0] == FlyStatus.UNUSABLE

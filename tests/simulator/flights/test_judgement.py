@@ -8,7 +8,7 @@ import pytest
 
 from protocols.msp.mission import WpCommand, WpRecord
 from protocols.msp.mission_flight import FlightPhase, FlightProgress, FlightReason
-from simulator.flights.judgement import ItemResult, is_flown, judge
+from simulator.flights.judgement import ItemResult, extremes, is_flown, judge
 from simulator.flights.mission_run import MissionRun, Report
 from simulator.flights.track import Sample, Track
 from simulator.flights.track_picture import track_svg
@@ -150,6 +150,18 @@ def test_a_landing_far_from_its_descent_is_a_fault() -> None:
     assert "landed 8.9 m" in descent.judged(record(WpCommand.LAND), landed=True)[0].problems[0]
     calm = Flight().go(5).say(state=FlightPhase.DESCENT, record=1).go(20, north=2, up=-10)
     assert is_flown(calm.judged(record(WpCommand.LAND), landed=True))
+
+
+@pytest.mark.parametrize(
+    ("north", "crashed", "problem"), [(30.0, False, ""), (75.0, False, "out of bounds"), (10.0, True, "crashed")]
+)
+def test_a_flyaway_and_a_crash_are_found_whatever_the_board_says(north: float, crashed: bool, problem: str) -> None:
+    flight = Flight().go(5, north=north)
+    run = MissionRun([HOME, record(WpCommand.WAYPOINT, 30.0)], 0.0, flight.track, flight.reports, has_crashed=crashed)
+    found = extremes(run, PLACE)
+    assert found.problem == problem
+    assert found.farthest_m == pytest.approx(north)
+    assert found.off_legs_m == pytest.approx(max(north - 30.0, 0.0), abs=0.1)
 
 
 def test_the_picture_shows_track_places_and_height() -> None:

@@ -72,7 +72,7 @@ def test_pressure_falls_by_about_an_eighth_of_a_hectopascal_a_metre() -> None:
 
 
 def test_the_field_points_north_and_down() -> None:
-    north, west, up = Place().field
+    north, west, up = Place().field()
     assert north > 0.2
     assert west < 0, "a positive declination is to the east"
     assert up < 0

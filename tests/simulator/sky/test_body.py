@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from simulator.sky.body import GRAVITY, Airframe, Body
-from simulator.sky.vectors import ZERO, facing, heading_of, to_body, to_world
+from simulator.sky.vectors import ZERO, facing, heading_of, tilt_of, to_body, to_world
 
 DT = 0.001
 OFF = (1000,) * 4
@@ -115,6 +115,7 @@ def test_it_falls_and_lands() -> None:
     assert body.is_on_ground
     assert body.velocity == ZERO
     assert 5.0 < body.touch_down_speed < 6.3
+    assert body.has_crashed
 
 
 @pytest.mark.parametrize(
@@ -149,3 +150,16 @@ def test_rotating_there_and_back(heading: float, x: float, y: float, z: float) -
     assert to_body(q, to_world(q, (x, y, z))) == pytest.approx((x, y, z), abs=1e-9)
     assert heading_of(q) == pytest.approx(heading, abs=1e-6) or heading_of(q) == pytest.approx(heading - 360, abs=1e-6)
     assert to_world(facing(90.0), (1.0, 0.0, 0.0)) == pytest.approx((0.0, -1.0, 0.0), abs=1e-9)
+
+
+def test_a_soft_touch_down_is_no_crash_and_a_weak_motor_tilts_it() -> None:
+    body = Body()
+    body.position = (0.0, 0.0, 0.1)
+    for _ in range(500):
+        body.step(0.001, (1000,) * 4, ZERO)
+    assert body.is_on_ground
+    assert not body.has_crashed
+    body.position = (0.0, 0.0, 50.0)
+    for _ in range(200):
+        body.step(0.001, (1700,) * 4, ZERO, weak=0.8)
+    assert tilt_of(body.attitude) > 3.0

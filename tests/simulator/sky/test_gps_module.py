@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from simulator.sky.earth import Place
 from simulator.sky.gps_module import GpsModule
+from simulator.sky.lies import Lies
 from simulator.sky.vectors import ZERO, Vector
 
 BAUD = 115_200
@@ -111,3 +112,15 @@ def test_a_hidden_sky_is_no_fix_and_a_broken_wire_is_silence() -> None:
     assert solution[47] == 3
     gps.is_silent = True
     assert run(gps, 1.0, begin=1.0) == b""
+
+
+def test_a_lying_module_jumps_drifts_and_reports_the_drift_as_speed() -> None:
+    lies = Lies(gps_jump=20.0, gps_drift=0.5)
+    gps = GpsModule(Place(), lies=lies)
+    gps.hear(RATE_5_HZ, BAUD)
+    sent = frames(run(gps, 20.0))
+    north = [struct.unpack_from("<i", payload, 8)[0] / 1e7 - Place().lat for kind, payload in sent if kind == 0x02]
+    speed = [struct.unpack_from("<i", payload, 4)[0] / 100 for kind, payload in sent if kind == 0x12]
+    assert north[0] * 111_319.5 == pytest.approx(20, abs=3)
+    assert (north[-1] - north[0]) * 111_319.5 == pytest.approx(10, abs=3)
+    assert sum(speed) / len(speed) == pytest.approx(0.5, abs=0.05)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the sensors measure of a body at rest and in flight."""
 
+from math import atan2, degrees
 from statistics import fmean, stdev
 
 import pytest
@@ -43,6 +44,25 @@ def test_the_compass_follows_the_nose(heading: float, axis: int, sign: int) -> N
     field = [fmean(values) for values in zip(*(sky.magnetic_field() for _ in range(200)), strict=True)]
     assert sign * field[axis] == pytest.approx(0.21, abs=0.01)
     assert field[2] == pytest.approx(-0.43, abs=0.01)
+
+
+def test_a_lying_compass_points_too_far_clockwise_and_follows_the_motors() -> None:
+    sky = still()
+    sky.lies.compass = 30.0
+    forward, left, _ = (fmean(values) for values in zip(*(sky.magnetic_field() for _ in range(200)), strict=True))
+    # A compass reads the angle from its north to the nose, clockwise: 30 degrees less the declination.
+    assert degrees(atan2(left, forward)) == pytest.approx(30 - sky.place.declination_deg, abs=1)
+    sky.lies.motor_field = 0.1
+    sky.body.thrusts = [GRAVITY / 4] * 4
+    assert fmean(sky.magnetic_field()[1] for _ in range(200)) == pytest.approx(left + 0.1, abs=0.01)
+
+
+def test_a_drifting_barometer_rises_on_the_ground() -> None:
+    sky = still()
+    before = fmean(sky.pressure() for _ in range(300))
+    sky.lies.baro_drift = 1.0
+    sky.advance(10.1)
+    assert before - fmean(sky.pressure() for _ in range(300)) == pytest.approx(113, abs=5)
 
 
 def test_pressure_falls_with_height() -> None:
