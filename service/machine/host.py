@@ -121,10 +121,13 @@ class Host:
         """
         return any(process.name in LOGIN_PROGRAMS and terminal in process.arguments[1:] for process in self.processes())
 
+    def wifi_cards(self) -> list[str]:
+        return [name for name in self.names("/sys/class/net") if self.path(f"/sys/class/net/{name}/wireless").exists()]
+
     def ipv4_addresses(self) -> list[str]:
         """The machine's IPv4 addresses except the loopback's, Wi-Fi first."""
-        cards = [name for name in self.names("/sys/class/net") if name != "lo"]
-        cards.sort(key=lambda name: not self.path(f"/sys/class/net/{name}/wireless").exists())
+        wifi = self.wifi_cards()
+        cards = [*wifi, *(name for name in self.names("/sys/class/net") if name != "lo" and name not in wifi)]
         return [address for name in cards if (address := self.address(name)) is not None]
 
     def address(self, interface: str) -> str | None:

@@ -33,6 +33,7 @@ class Pi:
 
     def is_running(self) -> None:
         (self.root / "run/systemd/system").mkdir(parents=True)
+        (self.root / "sys/class/net/wlan0/wireless").mkdir(parents=True)
         (self.root / _WANTED_BY).mkdir(parents=True)
         (self.root / _WANTED_BY / "naze-bridge.service").symlink_to("x")
 

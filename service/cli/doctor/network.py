@@ -29,7 +29,7 @@ def check_wifi(host: Host, gcs: Sequence[GcsAddress]) -> list[Checked]:
     if blocked:
         remedy = "set the country (sudo raspi-config nonint do_wifi_country DE), then: sudo rfkill unblock wlan"
         return [problem("Wi-Fi", "is switched off (rfkill)", remedy, UNBLOCK_WIFI)]
-    cards = [name for name in host.names("/sys/class/net") if host.path(f"/sys/class/net/{name}/wireless").exists()]
+    cards = host.wifi_cards()
     if not cards:
         return [note("Wi-Fi", "there is no Wi-Fi card", "connect ground stations by cable, or plug a card in")]
     return [_card(host, card, gcs) for card in cards]

@@ -94,6 +94,9 @@ def setup(
     click.echo(f"This is a {model.name}." if (model := pi_model(host)) else "This is not a known Raspberry Pi model.")
     password = None if password_file is None else secret_line(password_file)
     key = None if key_file is None else secret_line(key_file)
+    check_answers(hotspot, password, country, name)  # before its questions
+    if hotspot is not None and host.path("/run/systemd/system").exists() and not host.wifi_cards():
+        raise click.UsageError("this machine has no Wi-Fi card for a hotspot")
     if key is not None and new_key:
         raise click.UsageError("give either --key-file or --new-key")
     earlier = earlier_choices(host)

@@ -156,6 +156,19 @@ def test_everything_is_printed_before_the_wifi_changes(pi: Pi, tmp_path: Path) -
     assert not [command for command in pi.ran if "connection up" in command]
 
 
+def test_wrong_options_are_refused_before_the_questions(pi: Pi, tmp_path: Path) -> None:
+    done = pi.setup("--country", "Germany", answers="y\n" * 9)
+    assert done.exit_code == 2
+    assert "'Germany' is not a country code" in done.output
+    assert "?" not in done.output.partition("Error")[0].partition("Usage")[0]
+    pi.is_running()
+    (pi.root / "sys/class/net/wlan0/wireless").rmdir()
+    (tmp_path / "password").write_text("long-enough\n")
+    done = pi.setup("--yes", "--hotspot", "kite", "--password-file", str(tmp_path / "password"))
+    assert "no Wi-Fi card" in done.output
+    assert pi.files().keys() & {"etc/naze-bridge/setup.toml"} == set()
+
+
 def test_doctors_verdict_does_not_keep_the_hotspot_closed(
     pi: Pi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
