@@ -146,7 +146,7 @@ class Bridge:
             session, missions, ground, announcer, types.capabilities, config.unix_time_s, now
         )
         self._reporter = VehicleReporter(session, missions, ground, settings, own.also_want, own.progress)
-        own_parameters = OwnParameters(missions, settings, ground, owner.sysid)
+        own_parameters = OwnParameters(port.vehicle, owner.sysid)
         parameters = self._parameters = Parameters(own_parameters, settings, ground)
         calibration = self._calibration = Calibration(ground, session, missions, announcer, settings)
         waypoint = SetWaypoint(missions, own, ground)

@@ -44,13 +44,12 @@ class SettingRefusal:
     text: str
 
 
+#: At most 50 characters: of a longer text Mission Planner's HUD shows the end.
 ARMED = SettingRefusal(Cause.ARMED, "Armed: disarm to change settings")
-NO_ANSWER = SettingRefusal(Cause.NO_ANSWER, "The flight controller does not answer: read the settings again")
-WRITES_SPENT = SettingRefusal(
-    Cause.LIMIT, "The flight controller limits flash wear: one save in 5 minutes now, no limit after a restart"
-)
-BUSY = SettingRefusal(Cause.OCCUPIED, "The flight controller is busy writing its configuration: try again")
-NOT_SAVED = SettingRefusal(Cause.REFUSED, "The flight controller could not save: read the settings again")
+NO_ANSWER = SettingRefusal(Cause.NO_ANSWER, "No answer from the board: read the settings again")
+WRITES_SPENT = SettingRefusal(Cause.LIMIT, "The board limits flash wear: one save in 5 minutes")
+BUSY = SettingRefusal(Cause.OCCUPIED, "The board writes its configuration: try again")
+NOT_SAVED = SettingRefusal(Cause.REFUSED, "The board could not save: read the settings again")
 NOT_TAKEN = SettingRefusal(Cause.REFUSED, "The flight controller did not take the value")
 
 

@@ -105,11 +105,6 @@ class FcMissionStore(ABC, Generic[RecordT]):
     #: Further missions in its store, as last read. Only one mission at a time is loaded and flown.
     others: tuple[tuple[RecordT, ...], ...] = ()
 
-    @property
-    def wp_radius_cm(self) -> int | None:
-        """The minimum waypoint radius as last heard, cm; None if it cannot be read or set."""
-        return None
-
     @abstractmethod
     def report(self) -> Conversation[StoreReport | None]:
         """Ask the flight controller; None if it does not answer."""
@@ -129,11 +124,6 @@ class FcMissionStore(ABC, Generic[RecordT]):
     @abstractmethod
     def seq_of(self, records: Sequence[RecordT], number: int) -> int:
         """The seq of the item for record `number` (as NAV_STATUS counts, from 1); 0: none."""
-
-    def set_wp_radius(self, wp_radius_cm: int) -> Conversation[PushFailure | None]:
-        """Set gps_wp_radius, 0..2000 cm; None if it is in force now."""
-        yield from ()
-        return PushFailure.REFUSED
 
     def refreshed(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
         """Items read earlier, brought up to date: home may move on boards that do not store it in the list."""

@@ -36,17 +36,17 @@ _MOST_NAMED = 20
 _CHANGE_SIZE = 200
 #: Items that wait: of one client, which repeats them, and of all.
 _MOST_OF_ONE, _MOST_WAITING = 8, 64
-#: Two chunks of STATUSTEXT.
-_MOST_TEXT = 99
+#: Of a longer text Mission Planner's HUD shows the end.
+_MOST_TEXT = 50
 _UID_SIZE = 12
 #: A client waits this long for a table: INAV's takes 20 s, a Harakiri's over MAVLink 24 s, and again for a lost value.
 READ_WITHIN_S = 60.0
 
 _NO_BOARD = SettingRefusal(Cause.NO_LINK, "No flight controller whose settings can be read")
-_OCCUPIED = SettingRefusal(Cause.OCCUPIED, "A mission is being transferred: try again when it has ended")
-_UNREAD = SettingRefusal(Cause.OCCUPIED, "The settings have not been read yet: try again in a few seconds")
+_OCCUPIED = SettingRefusal(Cause.OCCUPIED, "A mission is being transferred: try again later")
+_UNREAD = SettingRefusal(Cause.OCCUPIED, "The settings are still being read: try again")
 _TOO_MANY = SettingRefusal(Cause.OCCUPIED, "Too many changes at once: try again")
-_NO_ARM_FLAG = SettingRefusal(Cause.REFUSED, "Nothing is changed: this board does not report whether it is armed")
+_NO_ARM_FLAG = SettingRefusal(Cause.REFUSED, "Not changed: the board does not report arming")
 
 OnTable = Callable[[SettingTable | SettingRefusal, float], None]
 
@@ -130,12 +130,6 @@ class BoardSettings:
         self._stop_reading()
         self._missions.settings_changed()
         self._read_again(now + _AFTER_CHANGE_S)
-
-    def saved_with_mission(self, now: float) -> None:
-        """The board has written its whole configuration, to store a setting of the mission's."""
-        self.known.unsaved.clear()
-        self.may_have_changed(now)
-        self.known.is_saved = True
 
     # For clients.
 

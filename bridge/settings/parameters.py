@@ -10,9 +10,9 @@ is sent again to the stations that had got a shorter one.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
-from math import inf, isfinite
+from math import inf, isclose, isfinite
 from weakref import WeakKeyDictionary
 
 from bridge.fc.fc_settings import Cause, SettingRefusal
@@ -22,7 +22,7 @@ from bridge.gcs.ground_station import GroundStation
 from bridge.gcs.station import Severity, Station
 from bridge.model.board_setting import BoardSetting, SettingTable, ValueKind, shown
 from bridge.settings.board_settings import BoardSettings
-from bridge.settings.own_parameters import WP_RADIUS, OwnParameters
+from bridge.settings.own_parameters import OwnParameters
 from bridge.settings.parameter_files import GENERAL_URI, ParameterFiles
 from bridge.settings.parameter_names import parameter_names
 from bridge.settings.setting_work import Answer
@@ -32,6 +32,8 @@ from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.ftp import FtpSession, file_crc32, is_opening
 
 _REAL32 = 9
+#: Mission Planner's name for the radius in its plan screen, in cm; and a Harakiri's setting.
+WP_RADIUS, _RADIUS = "WPNAV_RADIUS", "GPS_WP_RADIUS"
 #: 500 parameters a second for all lists together: a radio at 57600 baud carries as many.
 _EACH, _INTERVAL_S = 10, 0.02
 #: QGroundControl repeats its request after 5 s, Mission Planner after 4 s.
@@ -108,24 +110,25 @@ class Parameters:
 
     def set(self, station: Station, name: str, value: float, now: float) -> None:
         """PARAM_SET: answered once, with the value that is then in force, as the protocol requires."""
-        name = name.upper()
-        self.was_refused = name not in self._values()
-        setting = self._named.get(name)
+        name, values = name.upper(), self._values()
+        self.was_refused = name not in values
+        setting = self._named.get(_RADIUS if name == WP_RADIUS else name)
+        if name == WP_RADIUS and isfinite(value):
+            value = float(round(value))  # Mission Planner keeps metres as text: 2.10 m arrives as 209.99998 cm
 
-        def done(result: Answer | None, _at: float) -> None:
+        setting_name = name if setting is None else setting.name
+
+        def done(result: Answer, _at: float) -> None:
             if isinstance(result, SettingRefusal):
-                self.refuse(station, name, result)
+                self.refuse(station, name, replace(result, text=result.text.replace(setting_name, name, 1)))
             elif not self._told:
                 self._ground.broadcast(self._message(name))
-            elif setting is None:
-                self.follow()
 
-        if setting is None:
-            if not self._own.set(station, name, value, now, done):
-                self._send(station, name)
-        elif value == single(float(setting.value)):
+        if setting is None and not isclose(value, values.get(name, value), rel_tol=1e-6):
+            self.refuse(station, name, SettingRefusal(Cause.FIXED, f"{name} is read-only"))
+        elif setting is None or value == single(float(setting.value)):
             self._send(station, name)
-        elif setting.kind is ValueKind.INTEGER and isfinite(value) and abs(value) >= _MOST_EXACT:
+        elif setting.kind is ValueKind.INTEGER and setting.accepts(value) and abs(value) >= _MOST_EXACT:
             above = f"{name} stays {shown(setting.value)}: only up to {_MOST_EXACT - 1} over MAVLink"
             self.refuse(station, name, SettingRefusal(Cause.OUT_OF_RANGE, above))
         else:
@@ -211,7 +214,7 @@ class Parameters:
         """The settings were read, or some have changed."""
         numbers = {setting.name: setting for setting in table if setting.kind is not ValueKind.TEXT}
         if numbers.keys() != {*self._names.values()}:
-            self._names = parameter_names(numbers, self._own.values())
+            self._names = parameter_names(numbers, (*self._own.values(), WP_RADIUS))
         self._named = {parameter: numbers[name] for parameter, name in self._names.items()}
         self.follow()
         count = len(self._values())
@@ -228,6 +231,8 @@ class Parameters:
     def _values(self) -> dict[str, float]:
         """Every parameter. The bridge's own keep their indexes on every board."""
         values = self._own.values()
+        if (radius := self._named.get(_RADIUS)) is not None and not radius.fixed:
+            values[WP_RADIUS] = float(radius.value)
         for name, setting in self._named.items():
             values[name] = float(setting.value)
         return values

@@ -107,10 +107,6 @@ class HarakiriMissions(HarakiriStore):
         self._places: dict[str, int] = {}
         self._may_be_stored = False  # COMMIT was sent, and its result is still unknown
 
-    @property
-    def wp_radius_cm(self) -> int:
-        return self.info.wp_radius_cm
-
     def report(self) -> Conversation[StoreReport | None]:
         info = yield from self._read_info()
         if info is None:
@@ -181,23 +177,6 @@ class HarakiriMissions(HarakiriStore):
             if records is not None and identify(records) == info.stored:
                 return records
         return None
-
-    def set_wp_radius(self, wp_radius_cm: int) -> Conversation[PushFailure | None]:
-        """Set gps_wp_radius, 0..2000 cm; INFO gives the result, as a reply may belong to an earlier value."""
-        answer = yield from self._ask_until_free(
-            ext.encode_radius(wp_radius_cm), MissionCommand.RADIUS, 3, ext.decode_radius
-        )
-        if answer is None:
-            return PushFailure.NO_ANSWER
-        info = yield from self._read_info()
-        if info is None:
-            return PushFailure.NO_ANSWER
-        self.info = info
-        if info.wp_radius_cm == wp_radius_cm:
-            return None
-        if answer.status is ReplyStatus.BUSY and InfoFlag.WRITES_SPENT in info.flags:
-            return PushFailure.WRITES_SPENT
-        return _FAILURES.get(answer.status, PushFailure.BUSY)
 
     def _read_info(self) -> Conversation[Info | None]:
         # Every waypoint's radius depends on the one in INFO, and its checksum identifies the stored list.

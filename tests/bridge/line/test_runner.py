@@ -6,12 +6,12 @@ from collections.abc import Iterator
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
-from bridge.controllers.harakiri.mission_store import HarakiriMissions
 from bridge.model.mission_log import Outcome
 from bridge.model.refusal import Refusal
 from protocols.mission_item import MissionResult
 from simulator.board.options import SimOptions
 from tests.support.conversations import Download, Upload, records_of, waypoints
+from tests.support.settings_client import SettingsClient
 from tests.support.world import GroundStation, World, flash_holding
 
 ITEMS = waypoints(5)
@@ -76,16 +76,18 @@ def test_a_local_push_is_answered_and_works_again(world: World) -> None:
     world.wait_until(lambda w: w.store.outcomes()[-1] is Outcome.VERIFIED, 30)
 
 
-def test_a_parameter_can_be_set_again(world: World) -> None:
+def test_a_parameter_can_be_set_again(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
     station = GroundStation(world)
     wanted = m.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", 300.0, 9)
-    break_store(world, "set_wp_radius")
+    fc_settings = world.inside.board_settings._fc_settings
+    assert fc_settings is not None
+    monkeypatch.setattr(fc_settings, "write", bug)
     station.send(wanted)
     recover(world)
+    client = SettingsClient(world)
+    client.current()
     station.send(wanted)
-    fc_store = world.inside.missions.fc_store
-    assert isinstance(fc_store, HarakiriMissions)
-    world.wait_until(lambda _: fc_store.wp_radius_cm == 300, 10)
+    world.wait_until(lambda _: client.value("gps_wp_radius") == 300, 20)
 
 
 def test_the_list_is_watched_again(world: World) -> None:

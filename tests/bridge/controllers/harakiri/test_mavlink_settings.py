@@ -189,7 +189,7 @@ def test_a_change_is_refused_with_the_reason_and_nothing_is_sent() -> None:
     (error,) = station.messages("PARAM_ERROR")
     assert error.error == m.MAV_PARAM_ERROR_READ_ONLY
     assert [value.param_value for value in station.messages("PARAM_VALUE")] == [35]
-    assert "p_roll stays 35: a change over its own MAVLink" in station.texts()[0]
+    assert "P_ROLL stays 35: a change over its own MAVLink" in station.texts()[0]
     station.send(m.MAVLink_param_set_message(1, 1, b"p_roll", 35, 9))
     world.run(1)
     assert not is_sent((data for _, _, data in world.written[before:]), m.MAVLINK_MSG_ID_PARAM_SET)
