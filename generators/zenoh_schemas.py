@@ -185,6 +185,7 @@ def _reply(upload: Json, items: Json, findings: Json) -> Json:
             "count": {"type": "integer", "minimum": 0, "description": "of the records"},
             "checksum": _CHECKSUM,
             "findings": findings,
+            "flight": {"type": "string", "description": "its length, heights and end in words"},
         }
     )
     status = {"type": "object", "required": ["state"], "description": "as `naze-bridge status --json`"}

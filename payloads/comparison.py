@@ -59,6 +59,7 @@ def checked_mission(items: Sequence[MissionItem], verdict: Json) -> Json:
     stored = mission_items(verdict["items"])
     return {
         "verdict": verdict["result"],
+        "flight": verdict["flight"],
         "findings": correction_texts(findings),
         "rows": [row.to_json() for row in sent_and_stored(items, stored, findings, verdict["sent_seqs"])],
         "rows_left_out": 0,

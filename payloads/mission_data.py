@@ -118,6 +118,7 @@ def verdict_data(verdict: Verdict[Any]) -> Json:
         "count": identity.count,
         "checksum": f"{identity.checksum:08x}",
         "findings": [asdict(finding) for finding in verdict.findings],
+        "flight": ", ".join(verdict.flight),
     }
 
 

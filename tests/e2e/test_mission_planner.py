@@ -128,7 +128,8 @@ def test_a_write_is_stored_with_the_rules_applied(shared: Bench, count: int, use
     assert all(line in planner.joined_texts() for _, line in lines)
     # The summary stays on the HUD, even after the radius and a Read.
     assert planner.read_hud() == summary(count, verdict)
-    assert planner.screen.heard()[0] == summary(count, verdict)
+    # The voice says the first danger: the return is lower than the way out.
+    assert planner.screen.heard()[0] == lines[0][1]
 
 
 def test_a_read_of_float_items_shows_the_same_list(shared: Bench) -> None:
@@ -257,7 +258,7 @@ BAD_LISTS = {
     "take-off alone": ([HOME, PlanRow(Command.NAV_TAKEOFF, alt=10.0)], MissionResult.INVALID, "alone"),
     "an unsupported frame": ([HOME, waypoint(1), waypoint(2, frame=7)], MissionResult.UNSUPPORTED_FRAME, "frame 7"),
     "beyond the pole": ([HOME, waypoint(1), waypoint(2, lat=91.0)], MissionResult.INVALID_PARAM5_X, "90 deg"),
-    "home nowhere": ([PlanRow(80), waypoint(1), waypoint(2)], MissionResult.INVALID, "WAYPOINT"),
+    "home nowhere": ([PlanRow(80), waypoint(1), waypoint(2)], MissionResult.INVALID, "put home first"),
 }
 
 

@@ -204,7 +204,9 @@ class HarakiriCheck(ListCheck):
         is_raised = rule.height is CRUISE and (not math.isfinite(item.alt_m) or math.trunc(item.alt_m) == 0)
         p1 = self._fit(item, "p1", rule.p1)
         # Filled-in defaults are not reported, nor is the radius of home, which is not flown to.
-        p2 = self._fit(item, "p2", rule.p2, News.NOTICE if item.seq and not math.isnan(item.p2) else News.NONE)
+        p2 = self._fit(
+            item, "p2", rule.p2, News.NOTICE if item.seq and item.p2 and not math.isnan(item.p2) else News.NONE
+        )
         if item.p3:
             self._fit(item, "p3", UNUSED)
         p4 = self._fit(item, "p4", NO_ROI_KNOWN if no_nose else rule.p4)

@@ -61,9 +61,9 @@ async function checked(file) {
   }
 }
 
-function verdictText(name, { verdict, rows }) {
+function verdictText(name, { verdict, rows, flight }) {
   const count = (kind) => rows.filter((row) => row.kind === kind).length;
   if (verdict === "REJECTED") return `${name} would be rejected: see the marked item.`;
   const changes = [["changed", count("changed")], ["dropped", count("dropped")]].filter(([, number]) => number).map(([kind, number]) => `${number} ${kind}`);
-  return `${name}: ${rows.length} items, ${changes.join(", ") || "no changes"}.`;
+  return `${name}: ${rows.length} items, ${changes.join(", ") || "no changes"}. The flight: ${flight || "none"}.`;
 }

@@ -79,7 +79,7 @@ def test_strict_treats_changes_as_rejection(files: dict[str, Path]) -> None:
 def test_json_has_one_object_per_file_with_the_documented_keys(files: dict[str, Path]) -> None:
     result = run("--json", FIELD, files["rejected"], files["cleared"], files["missing"])
     accepted, rejected, cleared, missing = objects(result)
-    keys = ["file", "result", "ack", "items", "sent_seqs", "records", "count", "checksum", "findings"]
+    keys = ["file", "result", "ack", "items", "sent_seqs", "records", "count", "checksum", "findings", "flight"]
     assert list(accepted) == list(rejected) == list(cleared) == keys
     assert (accepted["file"], accepted["result"], accepted["ack"]) == (str(FIELD), "ACCEPTED", "MAV_MISSION_ACCEPTED")
     assert (rejected["result"], rejected["ack"]) == ("REJECTED", "MAV_MISSION_INVALID")

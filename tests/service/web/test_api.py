@@ -49,7 +49,7 @@ def test_every_change_is_explained(shared_web: WebBench) -> None:
         10: {"p1": "seconds 1..255"},
     }
     assert [row["kind"] for row in mission["rows"]].count("dropped") == 1
-    assert len(mission["findings"]) == 7
+    assert len(mission["findings"]) == 8
 
 
 def test_an_earlier_mission_is_restored(web: WebBench) -> None:

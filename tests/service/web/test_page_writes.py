@@ -82,7 +82,7 @@ def test_a_file_is_checked_drawn_and_written(browsers: Browsers, bench: WebBench
         assert bench.board.records() == before
         page.find("#checked input.token").send_keys(bench.token)
         page.press("#checked button.write")
-        page.wait_text(FILE_RESULT, "13 of 14 stored: 1 dropped")
+        page.wait_text(FILE_RESULT, "13 of 14 stored: 1 danger, 1 dropped")
         assert bench.board.records() != before
         page.wait_text("#upload", "naze-field.waypoints, from the page")
         assert page.errors() == []

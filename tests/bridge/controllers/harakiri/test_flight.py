@@ -7,14 +7,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.controllers.harakiri.flight import MAX_LEG_M, USUAL_FLIGHT, FlightLimits
 from bridge.missions.list_check import check_list
 from protocols.mission_item import MissionItem
 from reports.finding import News
+from reports.verdict import Result
 from tests.support.flight_core import FlightCore
-from tests.support.rule_items import HOME, LAT, LON, RTL, TAKEOFF, WAYPOINT, item
+from tests.support.rule_items import HOME, LAND, LAT, LON, ROI, RTL, TAKEOFF, TIME, TURNS, WAYPOINT, item
 
 FIRMWARE = Path(__file__).parents[4] / "firmware"
 #: 100 m to the north.
@@ -64,6 +67,31 @@ def test_the_core_refuses_exactly_what_is_told(
     records = check_list([HOME, *items], HarakiriRules()).records
     refused = flight_core.refusal(records, here or (LAT, LON), USUAL_FLIGHT)
     assert (refused is not None) == bool(told), refused
+
+
+steps = st.tuples(st.floats(-1500, 1500), st.floats(-1500, 1500), st.integers(-130, 130))
+MIDDLE = st.sampled_from([WAYPOINT, WAYPOINT, WAYPOINT, TIME, TURNS, RTL, ROI])
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.booleans(), st.lists(st.tuples(MIDDLE, steps), min_size=1, max_size=8), st.sampled_from([None, LAND, RTL]))
+def test_every_refusal_of_the_core_is_told_and_no_other(
+    flight_core: FlightCore, takes_off: bool, legs: list[tuple[int, tuple[float, float, int]]], last: int | None
+) -> None:
+    items = [item(TAKEOFF)] if takes_off else []
+    north_m = east_m = 0.0
+    for command, (to_north, to_east, alt_m) in legs:
+        # Mostly short ways.
+        north_m, east_m = north_m + to_north / (1 + abs(alt_m) % 9), east_m + to_east / (1 + abs(alt_m) % 9)
+        place = {"lat_e7": LAT + round(north_m * 89.83), "lon_e7": LON + round(east_m * 127.9)}
+        items.append(item(command, alt_m=float(alt_m or 1), **({} if command == RTL else place)))
+    items += [item(WAYPOINT)] if last is None else [item(last)]
+    verdict = check_list([HOME, *items], HarakiriRules())
+    if verdict.result is not Result.ACCEPTED:
+        return
+    told = any(finding.why.startswith(("not flown", "starts only")) for finding in verdict.findings)
+    refused = flight_core.refusal(verdict.records, (LAT, LON), USUAL_FLIGHT)
+    assert (refused is not None) == told, (refused, [finding.text() for finding in verdict.findings])
 
 
 def test_the_settings_of_the_board_count() -> None:
