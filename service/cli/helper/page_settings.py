@@ -29,7 +29,8 @@ _KEYS: Mapping[str, Key] = {key.name: key for key in KEYS if key.name in _NAMES}
 
 def page_settings(host: Host) -> list[Json]:
     """Each setting with its choices, the value in force (None: the default), and the other file that decides it."""
-    return [_page_setting(key, *_given(host).get(key.name, (None, _FILE))) for key in _KEYS.values()]
+    given = _given(host)
+    return [_page_setting(key, *given.get(key.name, (None, _FILE))) for key in _KEYS.values()]
 
 
 def _page_setting(key: Key, value: object, where: str) -> Json:

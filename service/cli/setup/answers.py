@@ -13,8 +13,6 @@ from service.settings.load import SERVICE_CONFIG
 from storage.small_files import read_bounded
 
 SETTINGS_FILE = "/etc/naze-bridge/setup.toml"
-#: Where releases up to 0.2.0 kept the answers; there they overrode config.toml.
-FORMER_SETTINGS_FILE = "/etc/naze-bridge/conf.d/setup.toml"
 KEY_FILE = "/etc/naze-bridge/gcs.key"
 PAGE_PORT = 8080
 GCS_PORT = 14550
@@ -41,7 +39,7 @@ class SetupChoices:
 
 def earlier_choices(host: Host) -> SetupChoices | None:
     """The answers of the last setup that have no other file; None on a machine that was never set up."""
-    text = host.read(SETTINGS_FILE) or host.read(FORMER_SETTINGS_FILE)
+    text = host.read(SETTINGS_FILE)
     if not text:
         return None
     try:
@@ -79,7 +77,7 @@ def shadowed(host: Host, answers: SetupChoices) -> Iterator[str]:
     for name in ("fc", "key_file", "web.listen", "web"):
         where = given[name].where if name in given else ""
         file = "/" + str(Path(where).relative_to(host.root)) if where else ""
-        if not file or file.startswith((SETTINGS_FILE, FORMER_SETTINGS_FILE)):
+        if not file or file.startswith(SETTINGS_FILE):
             continue
         table, _, _ = name.partition(".")
         # The table alone turns the page on.

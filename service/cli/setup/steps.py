@@ -7,7 +7,6 @@ from pathlib import Path
 from xml.sax.saxutils import escape
 
 from service.cli.setup.answers import (
-    FORMER_SETTINGS_FILE,
     GCS_PORT,
     KEY_FILE,
     PAGE_PORT,
@@ -16,7 +15,7 @@ from service.cli.setup.answers import (
     current_key,
     settings_text,
 )
-from service.cli.setup.change import Change, RemoveFile, Run, Step, WriteFile
+from service.cli.setup.change import Change, Run, Step, WriteFile
 from service.cli.setup.hotspot import captive_steps, hotspot_steps
 from service.cli.setup.state_folder import other_devices
 from service.machine.host import Host
@@ -134,11 +133,8 @@ def _key(host: Host, answers: SetupChoices) -> Iterator[Step]:
 
 def settings_steps(host: Host, answers: SetupChoices) -> Iterator[Step]:
     text = settings_text(host, answers)
-    changes: list[Change] = [] if host.read(SETTINGS_FILE) == text else [WriteFile(SETTINGS_FILE, text)]
-    if host.path(FORMER_SETTINGS_FILE).exists():
-        changes.append(RemoveFile(FORMER_SETTINGS_FILE))
-    if changes:
-        yield Step("save the settings", [*changes, *restart_changes(host)])
+    if host.read(SETTINGS_FILE) != text:
+        yield Step("save the settings", [WriteFile(SETTINGS_FILE, text), *restart_changes(host)])
 
 
 def _others(host: Host, answers: SetupChoices) -> Iterator[Step]:

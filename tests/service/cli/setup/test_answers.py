@@ -20,15 +20,6 @@ def test_earlier_answers_are_kept_and_an_option_changes_one(pi: Pi) -> None:
     assert pi.settings() == {"web": {"listen": "0.0.0.0:8080"}}
 
 
-def test_the_answers_of_an_older_release_move_to_where_config_toml_overrides_them(pi: Pi) -> None:
-    former = pi.root / "etc/naze-bridge/conf.d/setup.toml"
-    former.parent.mkdir(parents=True)
-    former.write_text('fc = "/dev/ttyS4"\n')
-    assert pi.setup("--yes").exit_code == 0
-    assert pi.settings() == {"fc": "/dev/ttyS4"}
-    assert not former.exists()
-
-
 def test_a_key_leaves_the_configured_links_as_they_are(pi: Pi, tmp_path: Path) -> None:
     config = pi.root / "etc/naze-bridge/config.toml"
     config.parent.mkdir(parents=True)
