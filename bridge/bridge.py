@@ -208,8 +208,9 @@ class Bridge:
         event = self._session.state.receive(data, now)
         if event is not None:
             self._session.handle(event, now)
-        self._follow_line(now)
         self._has_only_passed_on = self.is_passing_through
+        if not self.is_passing_through or self.vehicle.news or self._reporter.watched:
+            self._follow_line(now)
         return not self._session.state.is_mid_frame
 
     @property
