@@ -163,8 +163,8 @@ class Bridge:
         if self._effects:
             effects += self._effects
             self._effects.clear()
-        if datagrams := self._ground.take_datagrams():
-            effects.append(datagrams)
+        if self._ground.outgoing:
+            effects.append(self._ground.take_datagrams())
         if recorded := self._ground.recorded:
             effects.append(RecordFrames(tuple(recorded)))
             recorded.clear()

@@ -74,7 +74,7 @@ class Ground:
         self._default_peers: dict[Peer, bool] = {}
         self._budgets = Budgets()
         #: Frames to be sent.
-        self._outgoing: defaultdict[GroundStation, list[bytes]] = defaultdict(list)
+        self.outgoing: defaultdict[GroundStation, list[bytes]] = defaultdict(list)
         self._text_id = 0
         self.due = inf
         #: Texts for each newcomer, about problems that began before it connected.
@@ -242,15 +242,15 @@ class Ground:
 
     def _ask(self, station: GroundStation, path: ReturnPath) -> None:
         """Reply to a datagram with the vehicle's heartbeat and a question that only its address gets."""
-        if self._heartbeat is None or station in self._outgoing:
+        if self._heartbeat is None or station in self.outgoing:
             return
         ids, heartbeat = self._heartbeat
         writer = station.writer if ids == self._ids else FrameWriter(*ids, station.sign)
-        self._outgoing[station].append(writer.frame(heartbeat, 2))
+        self.outgoing[station].append(writer.frame(heartbeat, 2))
         if (question := path.question()) is not None:
-            self._outgoing[station].append(writer.frame(pack(question), 2))
+            self.outgoing[station].append(writer.frame(pack(question), 2))
         elif path.is_near and not station.reads_v2_only:
-            self._outgoing[station].append(writer.frame(heartbeat, 1))
+            self.outgoing[station].append(writer.frame(heartbeat, 1))
 
     def record(self, station: GroundStation, frame: MavlinkFrame) -> None:
         if self.recorded is not None and not station.is_listener and station.allows(Cost.RECORDED):
@@ -311,7 +311,7 @@ class Ground:
     def take_datagrams(self) -> Datagrams:
         """The datagrams to send; those of one station are in order."""
         datagrams = Datagrams()
-        for station, frames in self._outgoing.items():
+        for station, frames in self.outgoing.items():
             if station.return_path is not None:
                 frames = [*filter(station.return_path.allows, frames)]
             together = b"".join(frames)
@@ -319,7 +319,7 @@ class Ground:
                 datagrams.append((station.peer, together))
             else:
                 datagrams += ((station.peer, datagram) for datagram in _in_datagrams(frames, together))
-        self._outgoing.clear()
+        self.outgoing.clear()
         return datagrams
 
     def to(self, station: Station, *together: Message) -> None:
@@ -344,7 +344,7 @@ class Ground:
         version, frames = receiver.frame_version, []
         for message in together:  # a loop: a comprehension is a call
             frames.append(writer.frame(pack(message), version))  # noqa: PERF401
-        self._outgoing[receiver] += frames
+        self.outgoing[receiver] += frames
         if self.recorded is not None and not receiver.is_listener:
             self.recorded += frames
 
@@ -363,7 +363,7 @@ class Ground:
             if station.peer is RECORDER:
                 is_logged = True
             else:
-                self._outgoing[station].append(frame)
+                self.outgoing[station].append(frame)
         if self.recorded is not None and frame is not None and is_logged:
             self.recorded.append(frame)
 
@@ -380,7 +380,7 @@ class Ground:
             frames = [station.writer.frame(packed, version) for version in ((2,) if station.reads_v2_only else (2, 1))]
             logged = logged or frames[0]
             if station.peer is not RECORDER:
-                self._outgoing[station] += frames
+                self.outgoing[station] += frames
         if self.recorded is not None and logged is not None:
             self.recorded.append(logged)
 
@@ -403,13 +403,19 @@ class Ground:
     def _say(self, severity: Severity, text: str, stations: Sequence[GroundStation]) -> None:
         """Send a text in pieces that fit STATUSTEXT."""
         self._emit(GcsText(text=text))
-        recorder = self.station(RECORDER)
+        recorder = None if self.recorded is None else self.station(RECORDER)
         if stations and recorder is not None and recorder not in stations:
             stations = [*stations, recorder]  # the log also has the texts for one station
         self._text_id = self._text_id % _MAX_TEXT_ID + 1
-        # MAVSDK joins the pieces without a separator, and shows padding as a gap.
-        self._send_pieces(severity, cut_text(text), [station for station in stations if station.is_like_mavsdk])
-        self._send_pieces(severity, split_text(text), [station for station in stations if not station.is_like_mavsdk])
+        others: list[GroundStation] = []
+        joining: list[GroundStation] = []
+        for station in stations:
+            (joining if station.is_like_mavsdk else others).append(station)
+        if joining:
+            # MAVSDK joins the pieces without a separator, and shows padding as a gap.
+            self._send_pieces(severity, cut_text(text), joining)
+        if others:
+            self._send_pieces(severity, split_text(text), others)
 
     def _send_pieces(self, severity: Severity, pieces: Sequence[str], stations: Sequence[GroundStation]) -> None:
         for chunk, piece in enumerate(pieces):
@@ -424,7 +430,7 @@ class Ground:
     def forward(self, frames: Sequence[bytes], stations: Iterable[GroundStation]) -> None:
         """Send whole frames unchanged."""
         for station in stations:
-            self._outgoing[station] += frames
+            self.outgoing[station] += frames
 
 
 def _in_datagrams(frames: Sequence[bytes], together: bytes) -> list[bytes]:

@@ -30,7 +30,6 @@ from bridge.line.conversation import (
 from bridge.line.msp_link import MspLink
 from protocols.mavlink.codec import Packed
 from protocols.mavlink.frame import MavlinkFrame
-from protocols.msp.frame import MspFrame
 
 #: A failing SD card may hang forever, and the flight controller's conversations wait behind it.
 _STORE_TIMEOUT_S = 3.0
@@ -68,7 +67,7 @@ class Runner:
 
     def __init__(self, do: Callable[[StoreEffect], object]) -> None:
         self._do = do
-        #: The commands whose replies the running conversation waits for.
+        #: The commands whose replies the running conversation waits for: the next one is passed to `advance`.
         self.awaited_replies: frozenset[int] = frozenset()
         self._link: MspLink | None = None
         self._transmit: Callable[[Packed], bool] | None = None
@@ -106,7 +105,7 @@ class Runner:
     def reset(self, now: float) -> None:
         """End the running conversation as if the line were gone."""
         if self._current is not None and not self._busy:
-            self._advance(LinkLost("internal error"), now)
+            self.advance(LinkLost("internal error"), now)
 
     def link_up(self, link: MspLink) -> None:
         self._link = link
@@ -120,22 +119,17 @@ class Runner:
         self._link = None
         self._transmit = None
         if self._interruptible is not None:
-            self._advance(LinkLost("the flight controller's port is gone"), now)
+            self.advance(LinkLost("the flight controller's port is gone"), now)
 
     def stop(self, now: float) -> None:
         """Raise Stopped in the running conversation, which may still use the line to clean up."""
         if self._interruptible is not None:
-            self._advance(Stopped("the bridge is stopping"), now)
-
-    def received(self, frame: MspFrame, now: float) -> None:
-        """Pass on an MSP reply if the running conversation waits for it."""
-        if frame.command in self.awaited_replies:
-            self._advance(frame, now)
+            self.advance(Stopped("the bridge is stopping"), now)
 
     def received_mavlink(self, frame: MavlinkFrame, now: float) -> None:
         """Pass on a MAVLink frame if the running conversation waits for it."""
         if isinstance(self._awaited, Await) and frame.msgid in self._awaited.msgids:
-            self._advance(frame, now)
+            self.advance(frame, now)
 
     def store_answered(self, effect: StoreEffect, answer: object, now: float) -> None:
         """Pass on the store's reply to an effect; a reply after its timeout is ignored."""
@@ -145,7 +139,7 @@ class Runner:
         else:
             is_awaited = effect is self._awaited
         if is_awaited:
-            self._advance(answer, now)
+            self.advance(answer, now)
 
     def tick(self, now: float) -> None:
         """End a wait that has timed out."""
@@ -154,7 +148,7 @@ class Runner:
         task = self._interruptible
         if task is not None and now >= task.ends_at:
             task.ends_at = inf
-            self._advance(OutOfTime("the limit has passed"), now)
+            self.advance(OutOfTime("the limit has passed"), now)
             return
         if task is not None and isinstance(self._awaited, Receive) and self._link is not None:
             # The link may have delayed the request, or received other replies first.
@@ -162,7 +156,7 @@ class Runner:
             if now < deadline:
                 self.due = min(deadline, task.ends_at)
                 return
-        self._advance(None, now)
+        self.advance(None, now)
 
     @property
     def _interruptible(self) -> Task[Any] | None:
@@ -176,8 +170,8 @@ class Runner:
             self._current.began_at = now
             self._run(None, now)
 
-    def _advance(self, answer: object, now: float) -> None:
-        """Resume the current conversation, and start the next ones when it ends."""
+    def advance(self, answer: object, now: float) -> None:
+        """Resume the current conversation with the answer that it waits for; start the next ones when it ends."""
         try:
             self._run(answer, now)
         finally:

@@ -21,7 +21,7 @@ from bridge.gcs.rights import LinkAccess
 from bridge.gcs.station import Datagrams
 from bridge.line.conversation import Conclude, FindPending, NoteReader, Recall, Save, StoreEffect
 from bridge.missions.mission_service import DeliveryResult, MissionEnded
-from bridge.model.events import Armed, BridgeEvent, Disarmed
+from bridge.model.events import Armed, BridgeEvent, Disarmed, FcFound, FcInCommandLine, FcLost, PortLost
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.settings import TakenBackup
 from payloads.mission_data import Json
@@ -235,7 +235,8 @@ class Daemon:
         getattr(_log, event.level)(event.name_in_log, **event.facts())
         if self._tlog is not None and isinstance(event, Armed | Disarmed):
             self._tlog.flies(is_flying=isinstance(event, Armed))
-        self.fc.happened(event)
+        if isinstance(event, FcFound | FcLost | PortLost | FcInCommandLine):
+            self.fc.happened(event)
         for follower in self._followers:
             follower.happened(event)
 

@@ -11,7 +11,7 @@ import structlog
 
 from bridge.bridge import Bridge
 from bridge.effects import SendToBoard
-from bridge.model.events import BridgeEvent, FcFound, FcInCommandLine, FcLost, PortLost
+from bridge.model.events import FcFound, FcInCommandLine, FcLost, PortLost
 from protocols.uart_capture import UartAction
 from service.links.fc_device import PortError, device_opener, open_serial
 from service.links.fc_port import MOVED_ON, STOPPED, FcPort
@@ -139,12 +139,12 @@ class FcConnection:
             self._is_held = output.complete_at > -inf
             self._port.hold(output.complete_at)
 
-    def happened(self, event: BridgeEvent) -> None:
+    def happened(self, event: FcFound | FcLost | PortLost | FcInCommandLine) -> None:
         if self._finder is not None:
             self._finder.happened(event)
         if isinstance(event, FcFound):
             self.found_at, self.lost_at = self._loop.time(), None
-        elif isinstance(event, FcLost | PortLost | FcInCommandLine) and self.found_at is not None:
+        elif self.found_at is not None:
             self.found_at, self.lost_at = None, self._loop.time()
 
     def _opened(self) -> None:

@@ -17,6 +17,7 @@ from bridge.line.runner import Runner
 from bridge.missions.fc_mission_store import PushResult
 from bridge.model.vehicle import Vehicle
 from protocols.mission_record import pack_records
+from protocols.msp.frame import MspFrame
 from protocols.msp.mission import MissionCommand, WpRecord, decode_info
 from tests.support.c_core import CCore, PowerCut
 
@@ -122,7 +123,7 @@ class Line:
             _, _, deliver, data = self._wire.pop(0)
             deliver(data)
         for reply in self._link.tick(self.now):
-            self._runner.received(reply, self.now)
+            self._take(reply)
         self._runner.tick(self.now)
 
     def _tell_the_board_the_time(self) -> None:
@@ -152,7 +153,11 @@ class Line:
 
     def _link_receives(self, data: bytes) -> None:
         for reply in self._link.receive(data, self.now):
-            self._runner.received(reply, self.now)
+            self._take(reply)
+
+    def _take(self, reply: MspFrame) -> None:
+        if reply.command in self._runner.awaited_replies:
+            self._runner.advance(reply, self.now)
 
 
 def assert_whole(line: Line) -> None:

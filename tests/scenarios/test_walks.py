@@ -27,10 +27,10 @@ from tests.support.walks import TracedDaemon, WakeUp, Walk, measure, run_traced
 #: saves a fifth of the wake-ups. That to the ack again, by ten calls: the list is judged as it is flown.
 CEILINGS = {
     "attitude": Walk(calls=41, returns=13, files=19),
-    "item": Walk(calls=61, returns=25, files=16),
-    "ack": Walk(calls=471, returns=244, files=42),
+    "item": Walk(calls=60, returns=25, files=16),
+    "ack": Walk(calls=427, returns=209, files=42),
     "setting": Walk(calls=279, returns=116, files=53),
-    "arming": Walk(calls=70, returns=22, files=26),
+    "arming": Walk(calls=69, returns=21, files=26),
 }
 #: A walk may be this much shorter than its ceiling.
 _SLACK = 0.05

@@ -78,7 +78,7 @@ class MspLine(State):
     def _take(self, frame: MspFrame, now: float) -> None:
         """Replies belong to a conversation, to a poll, or to both."""
         if frame.command in self.port.runner.awaited_replies:
-            self.port.runner.received(frame, now)
+            self.port.runner.advance(frame, now)
         if self.controller is not None and frame.command in self.port.polls.commands:
             self.port.polls.answered(frame)
             hear_msp(self.port.vehicle, frame, self.controller, now)
