@@ -4,13 +4,10 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from payloads.mission_data import Json, correction_texts, mission_findings, mission_items
+from payloads.mission_data import MAX_ITEMS, Json, correction_texts, mission_findings, mission_items
 from protocols.mavlink.command import command_name
 from protocols.mission_item import MissionItem
 from reports.finding import DROPPED, REJECTED, Finding, value_label, without_defaults
-
-#: No flight controller holds more: a longer list was rejected.
-MAX_ROWS = 500
 
 _VALUES = ("command", "frame", "p1", "p2", "p3", "p4", "lat_e7", "lon_e7", "alt_m")
 
@@ -46,10 +43,10 @@ def stored_mission(mission: Json) -> Json:
         "outcome": mission["outcome"],
         "detail": mission["detail"],
         "checksum": received["checksum"],
-        "findings": correction_texts(findings)[:MAX_ROWS],
-        "rows": [row.to_json() for row in sent_and_stored(sent[:MAX_ROWS], stored, findings, received["sent_seqs"])],
-        "rows_left_out": max(len(sent) - MAX_ROWS, 0),
-        "items": [shown(item) for item in (stored or sent)[:MAX_ROWS]],
+        "findings": correction_texts(findings)[:MAX_ITEMS],
+        "rows": [row.to_json() for row in sent_and_stored(sent[:MAX_ITEMS], stored, findings, received["sent_seqs"])],
+        "rows_left_out": max(len(sent) - MAX_ITEMS, 0),
+        "items": [shown(item) for item in (stored or sent)[:MAX_ITEMS]],
     }
 
 

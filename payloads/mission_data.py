@@ -4,7 +4,7 @@
 import json
 import math
 from collections.abc import Callable, Hashable, Iterable
-from dataclasses import asdict, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from functools import cache
 from operator import attrgetter
 from typing import Any, TypeGuard
@@ -19,6 +19,8 @@ Json = dict[str, Any]
 
 #: The value of "ack" for a mission that was accepted.
 ACCEPTED = "MAV_MISSION_ACCEPTED"
+#: Items in one request: no flight controller stores more, and the rules check them on a daemon's event loop.
+MAX_ITEMS = 500
 #: The greatest number allowed in a request.
 MOST = 2**31 - 1
 
@@ -112,12 +114,12 @@ def verdict_data(verdict: Verdict[Any]) -> Json:
     return {
         "result": verdict.result.name,
         "ack": f"MAV_MISSION_{verdict.ack.name}",
-        "items": [asdict(item) for item in verdict.items],
+        "items": list(map(plain, verdict.items)),
         "sent_seqs": list(verdict.sent_seqs),
         "records": [record.pack().hex() for record in verdict.records],
         "count": identity.count,
         "checksum": f"{identity.checksum:08x}",
-        "findings": [asdict(finding) for finding in verdict.findings],
+        "findings": list(map(plain, verdict.findings)),
         "flight": ", ".join(verdict.flight),
     }
 

@@ -26,8 +26,8 @@ _MISSION = "QGC WPL"
 #: Digits that show any single-precision number exactly.
 _MOST_DIGITS = 9
 _MOST_WHOLE = 2**32
-#: Twice as many as the largest board has, an INAV with all its mode ranges. A daemon compares them on its event loop.
-MOST_SETTINGS = 2000
+#: The largest board has 981, an INAV with all its mode ranges. A daemon compares them on its event loop.
+MOST_SETTINGS = 1500
 
 
 class ParamFileError(FileError):

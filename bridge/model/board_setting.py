@@ -113,8 +113,7 @@ class SettingTable:
 
 def table_of(*settings: BoardSetting, is_complete: bool = True) -> SettingTable:
     possible = {setting.name: setting for setting in settings if is_setting_name(setting.name)}
-    left_out = sum(not is_setting_name(setting.name) for setting in settings)
-    return SettingTable(possible, is_complete, left_out)
+    return SettingTable(possible, is_complete, len(settings) - len(possible))
 
 
 def remembered_table(values: Mapping[str, Value]) -> SettingTable:

@@ -219,10 +219,7 @@ class MissionChangedOnBoard(BridgeEvent):
 
 
 class SettingsRead(BridgeEvent):
-    """All settings of the flight controller were read, for the first time or with other values, named by `changed`.
-
-    `left_out`: how many have names that no ground station or file could take.
-    """
+    """All settings were read, for the first time or with `changed` values; `left_out`: those with impossible names."""
 
     name_in_log = "settings.read"
     settings: int

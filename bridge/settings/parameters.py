@@ -67,6 +67,7 @@ class Parameters:
         self._ground = ground
         #: The settings that are numbers, and their names, by parameter.
         self._named: Mapping[str, BoardSetting] = {}
+        self._held: dict[str, float] = {}
         self._names: Mapping[str, str] = {}
         #: The values that stations know, once one has read them.
         self._told: dict[str, float] = {}
@@ -216,6 +217,9 @@ class Parameters:
         if numbers.keys() != {*self._names.values()}:
             self._names = parameter_names(numbers, (*self._own.values(), WP_RADIUS))
         self._named = {parameter: numbers[name] for parameter, name in self._names.items()}
+        radius = self._named.get(_RADIUS)
+        alias = {} if radius is None or radius.fixed else {WP_RADIUS: radius}
+        self._held = {parameter: float(setting.value) for parameter, setting in (alias | self._named).items()}
         self.follow()
         count = len(self._values())
         for dialogue in self._dialogues.values():
@@ -230,12 +234,7 @@ class Parameters:
 
     def _values(self) -> dict[str, float]:
         """Every parameter. The bridge's own keep their indexes on every board."""
-        values = self._own.values()
-        if (radius := self._named.get(_RADIUS)) is not None and not radius.fixed:
-            values[WP_RADIUS] = float(radius.value)
-        for name, setting in self._named.items():
-            values[name] = float(setting.value)
-        return values
+        return self._own.values() | self._held
 
     def _send(self, station: Station, name: str) -> None:
         """Send PARAM_VALUE, or PARAM_ERROR without such a parameter."""

@@ -10,14 +10,13 @@ from typing import TypeVar
 from bridge.missions.mission_service import DeliveryResult, HeldMission
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.refusal import Refusal
-from payloads.mission_data import MOST, Json, mission_items, verdict_data, whole_number
+from payloads.mission_data import MAX_ITEMS, MOST, Json, mission_items, plain, verdict_data, whole_number
 from protocols.mission_item import MissionItem
 from protocols.mission_record import pack_records
 from service.daemon.client import FIRMWARE_REQUESTS, ControlError
 from service.daemon.daemon import Daemon
 from service.daemon.firmware_api import FirmwareApi
 from service.daemon.settings_api import SETTINGS_REQUESTS, SettingsApi
-from service.daemon.store_worker import as_dicts
 from service.machine.package import version
 from storage.mission_store import MissionStore, MissionSummary, ReceivedMission, StoredMission
 
@@ -47,7 +46,10 @@ class DaemonApi:
             case "push":
                 source = str(request.get("source"))[:_MAX_SOURCE]
                 may_erase = request.get("may_erase") is not False
-                return await self.push(mission_items(request.get("items")), source, progress, may_erase=may_erase)
+                items = request.get("items")
+                if isinstance(items, list) and len(items) > MAX_ITEMS:
+                    raise ControlError(f"no flight controller stores such a long mission: {len(items)} items")
+                return await self.push(mission_items(items), source, progress, may_erase=may_erase)
             case "pull":
                 return await self.pull()
             case "status":
@@ -66,7 +68,7 @@ class DaemonApi:
             case str(name) if name in FIRMWARE_REQUESTS:
                 return await self.firmware.do(request, progress)
             case other:
-                raise ControlError(f"{other!r} is not a request")
+                raise ControlError(f"{str(other)[:_MAX_SOURCE]!r} is not a request")
 
     async def push(
         self, items: list[MissionItem], source: str, progress: Callable[[Json], None], *, may_erase: bool = True
@@ -165,10 +167,10 @@ def delivery_data(outcome: DeliveryResult | Refusal, arrived: ArrivedMission | N
     if arrived is not None:
         answer |= {
             "verdict": arrived.verdict.result.name,
-            "sent": as_dicts(arrived.items),
-            "stored": as_dicts(arrived.verdict.items),
+            "sent": list(map(plain, arrived.items)),
+            "stored": list(map(plain, arrived.verdict.items)),
             "sent_seqs": list(arrived.verdict.sent_seqs),
-            "findings": as_dicts(arrived.verdict.findings),
+            "findings": list(map(plain, arrived.verdict.findings)),
             "mission": outcome.number if isinstance(outcome, DeliveryResult) else None,
         }
     return answer
@@ -201,7 +203,7 @@ def _held(held: HeldMission) -> Json:
     return {
         "count": held.identity.count,
         "checksum": _hex(held.identity.checksum),
-        "items": as_dicts(held.items),
+        "items": list(map(plain, held.items)),
         "records": [pack_records([record]).hex() for record in held.records],
     }
 

@@ -5,16 +5,16 @@ import asyncio
 import os
 import time
 from collections.abc import Callable
-from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import structlog
 
 from bridge.line.conversation import Conclude, FindPending, NoteReader, Recall, Save, StoreEffect
 from bridge.model.mission_log import ArrivedMission, PendingMission, RecalledMission
 from bridge.model.settings import Occasion, TakenBackup
+from payloads.mission_data import plain
 from protocols.mission_record import ListIdentity, identify, pack_records
 from service.machine.threads import BackgroundThread, post
 from storage.mission_store import MissionStore, ReceivedMission, open_store, store_in_memory
@@ -157,18 +157,14 @@ def _received(mission: ArrivedMission) -> ReceivedMission:
     return ReceivedMission(
         received_at=time.time(),
         source=mission.source,
-        items=as_dicts(mission.items),
+        items=list(map(plain, mission.items)),
         verdict=verdict.result.name,
         ack=f"MAV_MISSION_{verdict.ack.name}",
-        findings=as_dicts(verdict.findings),
-        stored_items=as_dicts(verdict.items),
+        findings=list(map(plain, verdict.findings)),
+        stored_items=list(map(plain, verdict.items)),
         records=pack_records(verdict.records),
         record_count=identity.count,
         checksum=identity.checksum,
         roi_commands=dict(verdict.sent_as),
         sent_seqs=list(verdict.sent_seqs),
     )
-
-
-def as_dicts(things: tuple[Any, ...]) -> list[dict[str, Any]]:
-    return [asdict(thing) for thing in things]

@@ -22,8 +22,9 @@ from service.settings.addresses import UNKNOWN_HOST_HINT, GcsAddress, bindable, 
 from storage.os_error import reason
 
 _DATAGRAM_SIZE = 2048
-#: Datagrams taken in one wake-up, so that a flood cannot starve the flight controller's port.
-_DATAGRAMS_AT_ONCE = 64
+#: Bytes taken in one wake-up, so that a flood cannot starve the flight controller's port; a datagram counts as at least
+#: `_LEAST`.
+_AT_ONCE, _LEAST = 2048, 32
 #: Bytes of datagrams waiting to be read; the kernel may allow less. A flood drops the pilot's when it is full.
 _KERNEL_BUFFER = 1 << 20
 #: How often a host name is resolved again.
@@ -130,11 +131,13 @@ class UdpLink:
             await asyncio.sleep(_LOOK_UP_S)
 
     def _readable(self) -> None:
-        for _ in range(_DATAGRAMS_AT_ONCE):
+        left = _AT_ONCE
+        while left > 0:
             try:
                 data, ancillary, _, sender = self._socket.recvmsg(_DATAGRAM_SIZE, _ANCILLARY_SIZE)
             except OSError:
                 return  # none is left
+            left -= max(len(data), _LEAST)
             peer = Peer(self.name, sender)
             self._events.gcs_data(peer, data, datagram=True)
             if ancillary and peer not in self._own and self._events.is_connected(peer):
@@ -186,12 +189,14 @@ class _StationSocket:
         self._socket.close()
 
     def _readable(self) -> None:
-        for _ in range(_DATAGRAMS_AT_ONCE):
+        left = _AT_ONCE
+        while left > 0:
             try:
                 # Before the socket was connected, datagrams of others may have arrived.
                 data, sender = self._socket.recvfrom(_DATAGRAM_SIZE)
             except OSError:
                 return
+            left -= max(len(data), _LEAST)
             self._received(sender, data)
 
 

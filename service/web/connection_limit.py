@@ -9,7 +9,6 @@ another one.
 import asyncio
 from collections import deque
 from ipaddress import ip_network
-from typing import Protocol
 
 import h11
 from uvicorn.config import Config
@@ -29,30 +28,21 @@ MAX_AT_ONCE = 30
 _TURN_S = 1 / MAX_IN_A_SECOND
 
 
-class Connection(Protocol):
-    """A connection as the limit sees it."""
-
-    def begin(self) -> None:
-        """Serve the request."""
-
-    def abort(self) -> None: ...
-
-
 class ConnectionLimit:
     """The open connections by host, and those that wait for their turn. Times are seconds."""
 
     def __init__(self) -> None:
         #: The oldest first.
-        self._open: dict[str, list[Connection]] = {}
+        self._open: dict[str, list[BoundedConnection]] = {}
         #: The host whose turn is next comes first.
-        self._waiting: dict[str, deque[Connection]] = {}
+        self._waiting: dict[str, deque[BoundedConnection]] = {}
         #: When the turns taken so far are used up, at the highest rate.
         self._used_until = 0.0
         self._timer: asyncio.TimerHandle | None = None
         self._malformed = 0
         self._warned: set[str] = set()
 
-    def enter(self, address: str, connection: Connection) -> None:
+    def enter(self, address: str, connection: "BoundedConnection") -> None:
         """Take a connection; if there are too many, the oldest one of the host with the most is closed."""
         host = _host(address)
         if sum(map(len, self._open.values())) >= MAX_CONNECTIONS:
@@ -87,7 +77,7 @@ class ConnectionLimit:
         self._timer = None
         self.serve_in_time(loop)
 
-    def leave(self, address: str, connection: Connection) -> None:
+    def leave(self, address: str, connection: "BoundedConnection") -> None:
         self._remove(_host(address), connection)
 
     def count_malformed(self, address: str) -> None:
@@ -100,7 +90,7 @@ class ConnectionLimit:
         for connection in [each for connections in self._open.values() for each in connections]:
             connection.abort()
 
-    def _remove(self, host: str, connection: Connection) -> None:
+    def _remove(self, host: str, connection: "BoundedConnection") -> None:
         for kept in (self._open, self._waiting):
             if connection in kept.get(host, ()):
                 kept[host].remove(connection)

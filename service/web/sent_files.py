@@ -17,8 +17,8 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
-from payloads.comparison import MAX_ROWS, checked_mission
-from payloads.mission_data import ACCEPTED, Json, to_json
+from payloads.comparison import checked_mission
+from payloads.mission_data import ACCEPTED, MAX_ITEMS, Json, to_json
 from protocols.firmware_image import ImageError, check_patched, parse_image
 from protocols.mission_file import read_mission_file
 from protocols.mission_item import MissionItem
@@ -142,8 +142,10 @@ async def _received(request: Request) -> tuple[str, bytes]:
 
 async def _parsed(name: str, body: bytes) -> list[MissionItem]:
     items = await asyncio.to_thread(read_mission_file, body, name)
-    if len(items) > MAX_ROWS:
-        raise HTTPException(HTTPStatus.UNPROCESSABLE_ENTITY, f"{name} has {len(items)} items; the limit is {MAX_ROWS}.")
+    if len(items) > MAX_ITEMS:
+        raise HTTPException(
+            HTTPStatus.UNPROCESSABLE_ENTITY, f"{name} has {len(items)} items; the limit is {MAX_ITEMS}."
+        )
     if not items:
         raise HTTPException(HTTPStatus.UNPROCESSABLE_ENTITY, f"{name} has no items: choose another file.")
     return items

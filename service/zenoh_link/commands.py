@@ -9,7 +9,7 @@ from collections.abc import Callable, Set
 from typing import TypeVar
 
 from payloads import keys
-from payloads.mission_data import ACCEPTED, MOST, Json, whole_number
+from payloads.mission_data import ACCEPTED, MAX_ITEMS, MOST, Json, whole_number
 from protocols.file_error import FileError
 from protocols.mission_file import read_mission_file
 from protocols.mission_item import MissionItem
@@ -23,7 +23,6 @@ _PAYLOAD = "the query's payload"
 #: Larger files are read by the command line only, not alongside a running link. A mission that fits has about 20 KB,
 #: and so have the 650 settings of an INAV.
 _MAX_BYTES = 1 << 18
-_MAX_ITEMS = 1000
 #: Parsed on the event loop. A text this short cannot be nested too deeply either.
 _MAX_LOG_REQUEST = 256
 _LOG_FORM = 'the payload must be {"name": "2026-05-01 10-00-00.tlog", "start": 0}'
@@ -117,7 +116,7 @@ class CommandQueries:
             raise QueryRefused(_LOG_FORM) from error
         piece = await self._logs.read(str(name), start)
         # MAVLink halves; its base64 form is a third longer.
-        data = base64.b64encode(zlib.compress(piece, 9)).decode()
+        data = base64.b64encode(await asyncio.to_thread(zlib.compress, piece, 9)).decode()
         return {"result": {"start": start, "size": len(piece), "data": data}}
 
     async def _items(self, question: Question) -> list[MissionItem]:
@@ -125,7 +124,7 @@ class CommandQueries:
         items = await self._read(read_mission_file, question, "mission")
         if not items:
             raise QueryRefused(f"{_PAYLOAD} holds no mission; mission/clear clears the one on the craft")
-        if len(items) > _MAX_ITEMS:
+        if len(items) > MAX_ITEMS:
             held = f"{_PAYLOAD} holds {len(items)} items"
             raise QueryRefused(f"{held}, more than any flight controller stores: shorten it")
         return items

@@ -56,7 +56,7 @@ def test_a_value_that_is_no_number_is_left_out() -> None:
     [
         (b"A,1\nB,1,5\n", "line 2", "decimal point"),
         (b"A,1\nB\n", "line 2", "NAME,VALUE"),
-        (b"".join(b"A%d,1\n" % number for number in range(9999)), "line 2001", "over 2000 settings"),
+        (b"".join(b"A%d,1\n" % number for number in range(9999)), "line 1501", "over 1500 settings"),
         (b"A,1\n\n# x\nB,high\n", "line 4", "not a number"),
         (b"A,nan\n", "line 1", "not a number"),
         (b"A,1e999\n", "line 1", "not a number"),

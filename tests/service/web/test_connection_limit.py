@@ -18,7 +18,6 @@ from service.web.connection_limit import (
     MAX_CONNECTIONS,
     MAX_IN_A_SECOND,
     BoundedConnection,
-    Connection,
     ConnectionLimit,
 )
 from tests.support.programs import TIMEOUT_S
@@ -41,7 +40,7 @@ class Visitor:
         self.is_aborted = True
 
     def visit(self) -> "Visitor":
-        self.limit.enter(self.address, self)
+        self.limit.enter(self.address, self)  # type: ignore[arg-type]
         self.limit.serve(self.now)
         return self
 
@@ -91,7 +90,7 @@ def test_the_limits_are_never_exceeded(steps: list[tuple[str, float, bool]]) -> 
         pass_time(limit, wait_s)
         inside = [each for each in visitors if each.address == address and not each.is_aborted]
         if leaves and inside:
-            limit.leave(address, inside[0])
+            limit.leave(address, inside[0])  # type: ignore[arg-type]
             inside[0].is_aborted = True
         else:
             visitors.append(Visitor(address, limit).visit())
@@ -148,7 +147,7 @@ class _NoticedLimit(ConnectionLimit):
         self.emptied = asyncio.Event()
         self._left = 0
 
-    def leave(self, address: str, connection: Connection) -> None:
+    def leave(self, address: str, connection: BoundedConnection) -> None:
         super().leave(address, connection)
         self._left += 1
         if self._left == _VISITORS:

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""No request over any door holds the event loop for longer than its budget: the worst of each door, counted as work."""
+
+import json
+import struct
+from collections.abc import Awaitable, Callable
+from dataclasses import asdict
+from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
+
+from payloads import keys
+from payloads.mission_data import MAX_ITEMS
+from protocols.mission_file import write_mission_file
+from protocols.msp.frame import request
+from protocols.param_file import MOST_SETTINGS
+from service.daemon.api import DaemonApi
+from service.daemon.telemetry_logs import PIECE, TelemetryLogs
+from service.zenoh_link.commands import CommandQueries
+from service.zenoh_link.queries import Question
+from storage.mission_store import MissionStore, ReceivedMission
+from tests.protocols.test_hostile_bytes import PATTERNS
+from tests.support.conversations import waypoints
+from tests.support.doors import Doors, work_of
+from tests.support.work import LOOP_BUDGET
+
+LIST = waypoints(MAX_ITEMS)
+PLAN = write_mission_file(LIST, "x.plan").encode()
+#: Names that the board has, in the other case, and names that no board has.
+SETTINGS = {f"nav_setting_{number}".upper(): 1.0 for number in range(MOST_SETTINGS)}
+PARAMS = "".join(f"{name},1\n" for name in SETTINGS).encode()
+LARGEST = 1 << 18
+_ADDED_AT_ONCE = 50
+
+
+async def _fill(doors: Doors, missions: int) -> None:
+    """A store with this many missions, one of them with the longest list."""
+    items = [asdict(item) for item in LIST]
+    received = ReceivedMission(1.0, "x" * 100, items, "REJECTED", "x", [], items, bytes(8000), 500, 1, {}, [])
+
+    def fill(store: MissionStore) -> None:
+        for _ in range(_ADDED_AT_ONCE):
+            store.add(received)
+
+    for _ in range(missions // _ADDED_AT_ONCE):
+        await doors.daemon.store.ask(fill)
+
+
+async def control_socket(doors: Doors) -> None:
+    items = [asdict(item) for item in LIST]
+    await _fill(doors, 1000)
+    for each in (
+        {"do": "push", "items": items, "source": "x" * 1000},
+        {"do": "push", "items": [*items[:100]], "source": "x"},
+        {"do": "push", "items": [{"seq": 0}] * 20_000},
+        {"do": "plan-settings", "values": SETTINGS},
+        {"do": "plan-settings", "values": {f"a{number}": 1 for number in range(36_000)}},
+        {"do": "restore-settings", "values": SETTINGS},
+        {"do": "missions", "limit": 2**31 - 1},
+        {"do": "backups", "limit": 2**31 - 1},
+        *({"do": name, "number": 1} for name in ("mission", "backup", "restore")),
+        *({"do": name} for name in ("settings", "status", "pull", "save-settings")),
+        b"[" * (LARGEST - 2),
+        b'{"do": ' + b"1" * (LARGEST - 100) + b"}",
+        json.dumps({"do": "x" * (LARGEST - 100)}).encode(),
+    ):
+        await doors.ask(each)
+
+
+async def page(doors: Doors) -> None:
+    await _fill(doors, 1000)
+    paths = ("state", "held", "track", "connect", "missions", "missions/1", "settings", "settings/1", "settings/1/file")
+    for path in (*(f"/api/{each}" for each in paths), "/metrics", "/", "/map.js"):
+        assert b"HTTP/1.1 200" in await doors.http("GET", path), path
+    lines = "".join(f"{number},51.5,0.1,20\n" for number in range(LARGEST // 20))
+    files = (PLAN, b"[" * LARGEST, b"{" + b'"a":{' * 50_000, b"QGC WPL 110\n" + b"0 " * 100_000, lines.encode())
+    for body in files:
+        assert b"HTTP/1.1 " in await doors.http("POST", "/api/check?name=x", body[:LARGEST])
+    assert b"HTTP/1.1 " in await doors.http("GET", f"/{'a' * 60_000}")
+
+
+def _messages() -> list[m.MAVLink_message]:
+    path = b"@PARAM/param.pck".ljust(239, b"\0")
+    return [
+        m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3),
+        m.MAVLink_param_request_list_message(1, 1),
+        m.MAVLink_param_request_read_message(1, 1, b"nav_wp_radius", -1),
+        m.MAVLink_param_set_message(1, 1, b"nav_wp_radius", 300.0, 9),
+        m.MAVLink_mission_request_list_message(1, 1),
+        m.MAVLink_mission_request_int_message(1, 1, 3),
+        m.MAVLink_mission_count_message(1, 1, 100),
+        m.MAVLink_mission_item_int_message(1, 1, 0, 0, 16, 0, 1, 0, 0, 0, 0, 0, 0, 0),
+        m.MAVLink_mission_clear_all_message(1, 1),
+        m.MAVLink_mission_write_partial_list_message(1, 1, 0, 5),
+        *(m.MAVLink_command_long_message(1, 1, command, 0, first, 10, 0, 0, 0, 0, 0)
+          for command, first in ((512, 148), (511, 30), (520, 1), (300, 0), (246, 0), (241, 1), (401, 0))),
+        m.MAVLink_request_data_stream_message(1, 1, 0, 50, 1),
+        m.MAVLink_ping_message(1, 1, 0, 0),
+        m.MAVLink_timesync_message(0, 1),
+        *(m.MAVLink_file_transfer_protocol_message(0, 1, 1, [0, 0, 0, code, 239, 0, 0, 0, 0, 0, 0, 0, *path])
+          for code in (4, 14, 15)),
+    ]  # fmt: skip
+
+
+def _datagrams() -> list[bytes]:
+    """As many of each message as a datagram holds, and the bytes that cost the parsers most."""
+    sender = m.MAVLink(None, srcSystem=255, srcComponent=190)
+    frames = [bytes(message.pack(sender)) for message in _messages()]
+    return [(data * 2048)[:2048] for data in (*frames, *PATTERNS.values())]
+
+
+async def udp(doors: Doors) -> None:
+    for datagram in _datagrams():
+        await doors.udp_sends([datagram] * 8)
+        await doors.udp_sends([datagram[:size] for size in range(1, 65)])
+
+
+async def tcp(doors: Doors) -> None:
+    for datagram in _datagrams():
+        await doors.tcp_sends(doors.tcp, datagram * 32)
+
+
+async def share(doors: Doors) -> None:
+    commands = (request(code, b"") for code in (101, 118, 116, 119, 200, 209, 0x1007))
+    for data in (*commands, request(118, b"\1"), *PATTERNS.values()):
+        await doors.tcp_sends(doors.share, (data * LARGEST)[:LARGEST])
+
+
+async def zenoh(doors: Doors) -> None:
+    logs = TelemetryLogs(doors.daemon.settings.state_dir)
+    name = "2026-05-01 10-00-00.tlog"
+    assert doors.daemon.settings.state_dir is not None
+    (doors.daemon.settings.state_dir / name).write_bytes(struct.pack("<Q", 7) * (PIECE // 8))
+    answerers = CommandQueries(DaemonApi(doors.daemon), set(), logs).answerers
+    log = json.dumps({"name": name, "start": 0}).encode()
+    comments, refused = b"#\n" * (LARGEST // 2), list[str]()
+    for key, payload in (
+        *((key, PARAMS) for key in (keys.SETTINGS_PLAN, keys.SETTINGS_RESTORE)),
+        (keys.SETTINGS_PLAN, comments),
+        *((key, PLAN) for key in (keys.CHECK, keys.UPLOAD)),
+        (keys.CHECK, b"[" * LARGEST),
+        (keys.SETTINGS_LIST, b""),
+        (keys.STATUS, b""),
+        (keys.LOG_LIST, b""),
+        (keys.LOG_READ, log),
+    ):
+        question = SimpleNamespace(
+            size=len(payload), payload=lambda payload=payload: payload, send=lambda _: None, parameter=lambda _: None
+        )
+        try:
+            await answerers[key](cast("Question", question))
+        except Exception as error:  # refusals are fine
+            refused.append(str(error))
+    logs.close()
+    assert all(refused)
+
+
+@pytest.mark.parametrize("door", [control_socket, page, udp, tcp, share, zenoh])
+def test_the_worst_requests_of_a_door_stay_within_the_loops_budget(
+    door: Callable[[Doors], Awaitable[None]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    work = work_of(door, tmp_path, monkeypatch)
+    over = {name: count for name, count in work.worst.items() if count > LOOP_BUDGET}
+    assert over == {}
+    assert work.most > 10_000, "the requests did not reach the daemon"
