@@ -13,6 +13,8 @@ from reports.finding import News
 
 #: Limits of our own, for boards that have none.
 PLAIN_LEG_M, PLAIN_AWAY_M, PLAIN_HEIGHT_M = 2000, 5000, 120
+#: The same in latitude; longitude is shorter.
+_PLAIN_LEG_E7 = 179_000
 
 
 class Point(NamedTuple):
@@ -34,14 +36,35 @@ class Judgement(NamedTuple):
 class Departure:
     """Where the flight begins, `place`: that of the craft if known, else the home of the list.
 
-    altitude_m: of the list's home above sea level; None if not given.
+    A craft that is kilometres away from `first`, the first place of the list, is taken to be carried to the list's home
+    if that is nearer. altitude_m: of the list's home above sea level; None if not given.
     """
 
-    def __init__(self, craft: Place | None = None, home: Place | None = None, altitude_m: float | None = None) -> None:
+    def __init__(
+        self,
+        craft: Place | None = None,
+        home: Place | None = None,
+        altitude_m: float | None = None,
+        first: Place | None = None,
+    ) -> None:
         self.home, self.altitude_m = home, altitude_m
-        self.place = home if craft is None else craft
-        self.name = "home" if craft is None else "the craft"
+        self.carried_m = 0.0
+        if craft is not None and home is not None and first is not None:
+            # Without arithmetic for most.
+            is_near = (
+                abs(craft.lat_e7 - first.lat_e7) < _PLAIN_LEG_E7 and abs(craft.lon_e7 - first.lon_e7) < _PLAIN_LEG_E7
+            )
+            metres = 0.0 if is_near else distance_m(craft, first)
+            if metres > PLAIN_LEG_M and metres > distance_m(home, first):
+                self.carried_m = distance_m(craft, home)
+        is_craft = craft is not None and not self.carried_m
+        self.place = craft if is_craft else home
+        self.name = "the craft" if is_craft else "home"
         self.places = (craft, home)
+
+    def carried(self) -> Judgement:
+        """Only from there is the list flown."""
+        return Judgement(None, "", f"flown only from the list's home, {in_metres(self.carried_m)} off", News.WARNING)
 
 
 class Leg(NamedTuple):

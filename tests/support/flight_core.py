@@ -14,7 +14,6 @@ from protocols.msp.mission_flight import FlightReason
 from simulator.naze.compiled_core import open_library
 from tests.support.c_core import FIRMWARE
 
-_SOURCES = ("naze_flight.c", "naze_mission.c", "naze_slots.c")
 _ARGUMENTS = [c_char_p, c_uint16, c_int32, c_int32, c_uint16, c_uint16]
 
 
@@ -23,7 +22,7 @@ class FlightCore:
 
     def __init__(self, folder: Path) -> None:
         library = folder / "libflight_check.so"
-        sources = [str(FIRMWARE / name) for name in _SOURCES]
+        sources = sorted(map(str, FIRMWARE.glob("naze_*.c")))
         command = ["cc", "-std=c99", "-O1", "-fPIC", "-shared", "-I", str(FIRMWARE)]
         subprocess.run(
             [*command, *sources, str(Path(__file__).with_name("flight_check.c")), "-lm", "-o", str(library)], check=True

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from bridge.controllers.harakiri.flight import USUAL_FLIGHT, FlightLimits, fly, low_returns
+from bridge.controllers.harakiri.flight import PLACED, USUAL_FLIGHT, FlightLimits, fly, low_returns
 from bridge.controllers.harakiri.rules import (
     CRUISE,
     NO_ROI_KNOWN,
@@ -267,8 +267,15 @@ class HarakiriCheck(ListCheck):
         """What is flown differently than it reads, or not at all."""
         craft = self._fallback_home
         home = Point(self._records[0].lat_e7, self._records[0].lon_e7)
-        departure = Departure(Point(*craft) if craft else None, home)
+        first = None
+        for record in self._records[1:]:
+            if record.command in PLACED:
+                first = record
+                break
+        departure = Departure(Point(*craft) if craft else None, home, first=first)
         self._path = path = fly(self._records, departure)
+        if departure.carried_m:
+            yield departure.carried()
         if self._flight is None:
             yield from beyond_plain_limits(path, departure)
         else:

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from bridge.missions.flown_legs import Departure, FlownPath, Judgement, Leg, first_of, in_metres
 from bridge.model.ground_track import Place, distance_m
 from protocols.msp.mission import WpCommand, WpRecord
+from reports.finding import News
 
-#: NF_MAX_LEG_M.
-MAX_LEG_M = 2000
-_PLACED = (WpCommand.WAYPOINT, WpCommand.LOITER_UNLIM, WpCommand.LOITER_TURNS, WpCommand.LOITER_TIME)
+#: NF_MAX_LEG_M; and NF_TAKEOFF_LEAST_M, also of legs, and NF_TAKEOFF_MOST_M.
+MAX_LEG_M, LEAST_M, TAKEOFF_MOST_M = 2000, 2, 15
+PLACED = (WpCommand.WAYPOINT, WpCommand.LOITER_UNLIM, WpCommand.LOITER_TURNS, WpCommand.LOITER_TIME)
 _WITHOUT_HEIGHT = (WpCommand.LAND, WpCommand.SETROI)
 
 
@@ -23,7 +24,7 @@ class FlightLimits:
 
     def judge(self, records: Sequence[WpRecord], path: FlownPath, departure: Departure) -> Iterable[Judgement]:
         """The core compares whole metres, rounded down."""
-        long, high = [], []
+        long, high, limited = [], [], []
         for leg in path.legs:
             if leg.is_first and int(leg.length_m) > self.mission_first:
                 why = f"not flown: {in_metres(leg.length_m)} off, mission_first {self.mission_first} m"
@@ -33,13 +34,23 @@ class FlightLimits:
             elif int(leg.length_m) > MAX_LEG_M:
                 long.append((leg.target, f"not flown: {in_metres(leg.length_m)} leg, at most 2 km"))
         for place, record in enumerate(records):
-            if place and record.command not in _WITHOUT_HEIGHT and abs(record.height_m) > self.mission_height:
-                high.append((place, f"not flown: {record.height_m} m, mission_height {self.mission_height}"))
+            if not place or record.command in _WITHOUT_HEIGHT:
+                continue
+            if (flown_m := _flown_m(record)) > self.mission_height:
+                high.append((place, f"not flown: {flown_m} m, mission_height {self.mission_height}"))
+            elif flown_m != record.height_m:
+                limited.append((place, f"{record.height_m} m is flown at {flown_m} m"))
+        yield from first_of(limited, "alt_m", News.WARNING)
         yield from first_of(long, "lat_e7")
         yield from first_of(high, "alt_m")
 
 
 USUAL_FLIGHT = FlightLimits()
+
+
+def _flown_m(record: WpRecord) -> int:
+    height_m = max(record.height_m, LEAST_M)
+    return min(height_m, TAKEOFF_MOST_M) if record.command == WpCommand.TAKEOFF else height_m
 
 
 def fly(records: Sequence[WpRecord], departure: Departure) -> FlownPath:
@@ -48,10 +59,10 @@ def fly(records: Sequence[WpRecord], departure: Departure) -> FlownPath:
     here: Place | None = departure.place
     here_cm = None
     for place, record in enumerate(records[1:], 1):
-        end = record if record.command in _PLACED else departure.place
-        if end is None or not (record.command in _PLACED or record.command == WpCommand.RETURN_TO_LAUNCH):
+        end = record if record.command in PLACED else departure.place
+        if end is None or not (record.command in PLACED or record.command == WpCommand.RETURN_TO_LAUNCH):
             continue
-        end_cm = 100 * record.height_m
+        end_cm = 100 * max(record.height_m, LEAST_M)
         is_return = record.command == WpCommand.RETURN_TO_LAUNCH
         start_cm = end_cm if here_cm is None else here_cm
         start = here or end

@@ -262,6 +262,8 @@ class NavCheck(ListCheck):
         self._path = path = fly(self._records, departure, limits, lands=lands)
         plain = beyond_plain_limits(path, departure)
         judgements = limits.judge(self._records, path, departure) if limits else plain
+        if departure.carried_m:
+            judgements = (departure.carried(), *judgements)
         if rejection := self._apply(judgements, self._sent):
             return rejection
         returns = () if self._profile.own_rth_landing else zip(self._sent, self._records, strict=True)
@@ -278,7 +280,8 @@ class NavCheck(ListCheck):
         place = self._fallback_home
         craft = None if place is None else Point(*place)
         home = Point(self._home.lat_e7 or 0, self._home.lon_e7 or 0) if self._has_home else None
-        return Departure(craft, home, self._home.alt_m or None)
+        first = next((record for record in self._records if record.action in LEGS and record.lat_e7), None)
+        return Departure(craft, home, self._home.alt_m or None, first)
 
     def _speed_differs(self, place: int, jump: MissionItem) -> bool:
         """True if a pilot expects another speed after a JUMP than its target's own."""
