@@ -12,6 +12,7 @@ from threading import Thread
 import pytest
 
 from protocols.mission_item import Command
+from service.cli.daemon_client import BridgeClient
 from tests.service.cli.test_mission_commands import ask, assert_one_sentence, write_plan
 from tests.support.plan import HOME, PlanRow, plain_plan
 from tests.support.programs import Daemon, run_naze_bridge
@@ -19,6 +20,15 @@ from tests.support.programs import Daemon, run_naze_bridge
 
 def test_a_missing_daemon_is_one_sentence(tmp_path: Path) -> None:
     assert_one_sentence(run_naze_bridge("status", "--state-dir", tmp_path), 1, str(tmp_path), "naze-bridge run")
+
+
+def test_a_board_cannot_act_on_the_terminal_without_a_daemon_either(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def answer(*_: object, **__: object) -> dict[str, object]:
+        return {"settings": [{"name": "a\x1b[2J"}], "values": {"b\x9b": "c\u202e"}}
+
+    monkeypatch.setattr("service.cli.direct_bridge.ask_directly", answer)
+    held = BridgeClient(None, as_json=False, fc="sim:").ask({"do": "settings"})
+    assert held == {"settings": [{"name": "a[2J"}], "values": {"b": "c"}}
 
 
 def test_a_daemon_that_was_taken_over_cannot_act_on_the_terminal(tmp_path: Path) -> None:
