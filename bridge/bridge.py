@@ -99,7 +99,7 @@ class Bridge:
 
     def __init__(self, config: BridgeConfig, now: float) -> None:
         self._config = config
-        #: To be carried out, in order. Datagrams and bytes for the board are added by `take`.
+        #: To be carried out, in order; `take` adds the datagrams and the bytes for the board.
         self._effects: list[BridgeEffect] = []
         #: The line's state, speed or polls may have changed since the last `take`. A conversation that starts has
         #: output, or waits for a reply or timeout that the line already expects.
@@ -158,37 +158,37 @@ class Bridge:
         self._parts += [parameters, ground, announcer, calibration, own, self._reporter]
 
     def take(self) -> list[BridgeEffect]:
-        """What is to be done since the last call, in order. Mostly a few datagrams, or bytes for the board."""
+        """What is to be done since the last call: first what must not wait, then the rest as it arose."""
         effects: list[BridgeEffect] = []
-        if self._effects:
-            effects += self._effects
-            self._effects.clear()
         if self._ground.outgoing:
             effects.append(self._ground.take_datagrams())
+        if self._has_only_passed_on:
+            self._has_only_passed_on = False
+        else:
+            session = self._session
+            if session.output or self._has_line_changed:
+                state = session.state
+                self._has_line_changed, self._line_due = False, state.due
+                data = [*session.output]
+                session.output.clear()
+                # Heartbeats and other broadcasts are not replied to.
+                asks = not self.is_passing_through or any(MavlinkFrame(frame).has_target_field for frame in data)
+                complete_at = -inf if state.link is None else state.link.complete_at
+                effects.append(SendToBoard(data, state.speed, self.is_passing_through, asks, complete_at))
+            due = self._line_due
+            for part in self._parts:
+                if (part_due := part.due) < due:
+                    due = part_due
+            self.due = due
         if recorded := self._ground.recorded:
             effects.append(RecordFrames(tuple(recorded)))
             recorded.clear()
         if fresh := self._reporter.fresh:
             effects.append(PublishGroups(frozenset(fresh)))
             fresh.clear()
-        if self._has_only_passed_on:
-            self._has_only_passed_on = False
-            return effects
-        session = self._session
-        if session.output or self._has_line_changed:
-            state = session.state
-            self._has_line_changed, self._line_due = False, state.due
-            data = [*session.output]
-            session.output.clear()
-            # Heartbeats and other broadcasts are not replied to.
-            asks = not self.is_passing_through or any(MavlinkFrame(frame).has_target_field for frame in data)
-            complete_at = -inf if state.link is None else state.link.complete_at
-            effects.append(SendToBoard(data, state.speed, self.is_passing_through, asks, complete_at))
-        due = self._line_due
-        for part in self._parts:
-            if (part_due := part.due) < due:
-                due = part_due
-        self.due = due
+        if self._effects:
+            effects += self._effects
+            self._effects.clear()
         return effects
 
     # The flight controller's side.
