@@ -56,12 +56,11 @@ class KnownSettings:
         #: Changes through the bridge may be among the differences that the next reading finds.
         self._is_ours = False
         self._occasion = Occasion.CONNECTED
-        self._backed_up: Mapping[str, Value] | None = None
 
     def found(self) -> None:
         """Another board, or the same again."""
         self.freshness, self.board = Freshness.UNREAD, None
-        self._occasion, self._backed_up = Occasion.CONNECTED, None
+        self._occasion = Occasion.CONNECTED
 
     def identified(self, board: BoardId) -> SettingTable | None:
         """Returns the table as last read, if the board is known by its chip's number: an INAV takes 20 s to read."""
@@ -121,8 +120,8 @@ class KnownSettings:
     def _backup(self, board: BoardId, values: Mapping[str, Value]) -> TakenBackup | None:
         """With changes that are not saved yet it is no backup: a restart would lose them."""
         self.unsaved = {name: value for name, value in self.unsaved.items() if values.get(name) == value}
-        if self.unsaved or (self._occasion is Occasion.CHANGED_ELSEWHERE and values == self._backed_up):
+        if self.unsaved:
             return None
         backup = TakenBackup(board, values, self._occasion)
-        self._occasion, self._backed_up = Occasion.CHANGED_ELSEWHERE, values
+        self._occasion = Occasion.CHANGED_ELSEWHERE
         return backup

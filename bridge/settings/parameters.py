@@ -111,26 +111,28 @@ class Parameters:
 
     def set(self, station: Station, name: str, value: float, now: float) -> None:
         """PARAM_SET: answered once, with the value that is then in force, as the protocol requires."""
-        name, values = name.upper(), self._values()
-        self.was_refused = name not in values
-        setting = self._named.get(_RADIUS if name == WP_RADIUS else name)
-        if name == WP_RADIUS and isfinite(value):
+        parameter, values = name.upper(), self._values()
+        self.was_refused = parameter not in values
+        setting = self._named.get(_RADIUS if parameter == WP_RADIUS else parameter)
+        if parameter == WP_RADIUS and isfinite(value):
             value = float(round(value))  # Mission Planner keeps metres as text: 2.10 m arrives as 209.99998 cm
-
-        setting_name = name if setting is None else setting.name
+        setting_name = parameter if setting is None else setting.name
 
         def done(result: Answer, _at: float) -> None:
             if isinstance(result, SettingRefusal):
-                self.refuse(station, name, replace(result, text=result.text.replace(setting_name, name, 1)))
-            elif not self._told:
-                self._ground.broadcast(self._message(name))
+                self.refuse(station, name, replace(result, text=result.text.replace(setting_name, parameter, 1)))
+                return
+            if not self._told:
+                self._ground.broadcast(self._message(parameter))
+            if name != parameter:
+                self._send(station, name)
 
-        if setting is None and not isclose(value, values.get(name, value), rel_tol=1e-6):
-            self.refuse(station, name, SettingRefusal(Cause.FIXED, f"{name} is read-only"))
+        if setting is None and not isclose(value, values.get(parameter, value), rel_tol=1e-6):
+            self.refuse(station, name, SettingRefusal(Cause.FIXED, f"{parameter} is read-only"))
         elif setting is None or value == single(float(setting.value)):
             self._send(station, name)
         elif setting.kind is ValueKind.INTEGER and setting.accepts(value) and abs(value) >= _MOST_EXACT:
-            above = f"{name} stays {shown(setting.value)}: only up to {_MOST_EXACT - 1} over MAVLink"
+            above = f"{parameter} stays {shown(setting.value)}: only up to {_MOST_EXACT - 1} over MAVLink"
             self.refuse(station, name, SettingRefusal(Cause.OUT_OF_RANGE, above))
         else:
             self._settings.change(setting.name, value, done, now, str(station))
@@ -144,7 +146,7 @@ class Parameters:
         cause = Cause.ARMED if refused is None else refused.cause
         if refused is not None:
             # Each Write in Mission Planner sends its default radius of 30 m if its plan screen was open first.
-            is_routine = name == WP_RADIUS and cause is Cause.OUT_OF_RANGE
+            is_routine = name.upper() == WP_RADIUS and cause is Cause.OUT_OF_RANGE
             self._ground.say(Severity.NOTICE if is_routine else Severity.ERROR, refused.text, station)
         if name.upper() in self._values():
             self._error(station, name, _ERRORS.get(cause, messages.MAV_PARAM_ERROR_PERMISSION_DENIED))
@@ -237,9 +239,9 @@ class Parameters:
         return self._own.values() | self._held
 
     def _send(self, station: Station, name: str) -> None:
-        """Send PARAM_VALUE, or PARAM_ERROR without such a parameter."""
+        """Send PARAM_VALUE under the name that the station uses, or PARAM_ERROR without such a parameter."""
         if name.upper() in self._values():
-            self._ground.to(station, self._message(name.upper()))
+            self._ground.to(station, self._message(name))
         elif name:
             self._error(station, name, messages.MAV_PARAM_ERROR_DOES_NOT_EXIST)
 
@@ -249,8 +251,8 @@ class Parameters:
             self._ground.multicast(pack(message), [receiver])
 
     def _message(self, name: str) -> Message:
-        values = self._values()
-        return _message(name, values[name], len(values), list(values).index(name))
+        values, parameter = self._values(), name.upper()
+        return _message(name, values[parameter], len(values), list(values).index(parameter))
 
 
 def _message(name: str, value: float, count: int, index: int) -> Message:

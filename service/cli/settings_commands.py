@@ -144,7 +144,8 @@ def diff(client: BridgeClient, first: str, second: str) -> None:
     from bridge.settings.local_settings import by_setting  # other commands do without the bridge
 
     (left, _), (right, _) = (_source(client, each) for each in (first, second))
-    rows = settings_difference(by_setting(left, right), by_setting(right, left))
+    left = by_setting(left, right)
+    rows = settings_difference(left, by_setting(right, left))
     if client.as_json:
         print_json({"equal": not rows, "changes": [asdict(row) for row in rows]})
     elif rows:

@@ -49,13 +49,15 @@ def test_float_items_parameters_and_refusals_work(shared: Bench, tmp_path: Path)
         # It says so before it closes the file.
         packed = until(lambda: MAVFTP.ftp_param_decode(file.read_bytes()), "the whole file")
         assert len(packed.params) == 237
-        # It finds only names in capitals.
-        mavproxy.type("param set LED_ARMED 1")
         mavproxy.type("param set LED_ARMED 2")
         mavproxy.wait_for(": 0..1")
+        # It finds only names in capitals, but takes them in any case.
+        mavproxy.type("param set p_roll 44")
+        mavproxy.type("wp list")
+        mavproxy.wait_for("Requesting")
         mavproxy.type("long MAV_CMD_PREFLIGHT_STORAGE 1")
         mavproxy.wait_for("Settings saved")
-        mavproxy.type("param set LED_ARMED 0")
+        mavproxy.type("param set p_roll 35")
         mavproxy.type("arm throttle")
         mavproxy.wait_for("transmitter sticks")
 

@@ -272,16 +272,16 @@ async def test_parameters_and_telemetry_work(shared: Bench) -> None:
         for radius_cm in (300.0, 200.0):
             await parameters.set_param_float("WPNAV_RADIUS", radius_cm)
             assert await parameters.get_param_float("WPNAV_RADIUS") == radius_cm
-        assert (len(found), found["p_pitch"]) == (237, 35.0)
-        await parameters.set_param_float("p_pitch", 38.0)
-        assert await parameters.get_param_float("p_pitch") == 38.0
-        await parameters.set_param_float("p_pitch", 35.0)
+        assert (len(found), found["P_PITCH"]) == (237, 35.0)
+        await parameters.set_param_float("P_PITCH", 38.0)
+        assert await parameters.get_param_float("P_PITCH") == 38.0
+        await parameters.set_param_float("P_PITCH", 35.0)
         # Another parameter: on a busy machine MAVSDK repeats the request, and would take the second refusal for the
         # answer to the next change of the same one.
         with pytest.raises(ParamError) as refused:
             await parameters.set_param_float("p_roll", 201.0)
         assert refused.value.result == ParamResult.VALUE_OUT_OF_RANGE
-        assert await parameters.get_param_float("p_roll") == found["p_roll"]
+        assert await parameters.get_param_float("p_roll") == found["P_ROLL"]
         telemetry = TelemetryAsync(vehicle)
         async for position in telemetry.subscribe_position():
             if math.isfinite(position.latitude_deg):

@@ -191,7 +191,7 @@ def shows_mode(vehicle: Any, name: str) -> bool:
 def test_dronekit_shows_the_flight_correctly(bench: Bench) -> None:
     bench.board.set("armed 1")
     with dronekit.vehicle_at(bench.daemon.port) as vehicle:
-        assert {"SYSID_THISMAV": 1, "WPNAV_RADIUS": 200}.items() <= dict(vehicle.parameters).items()
+        assert vehicle.parameters["SYSID_THISMAV"] == 1
         assert (vehicle.gps_0.fix_type, vehicle.gps_0.satellites_visible) == (3, 9)
         for boxes, mode in ((1 << 7, "LOITER"), (1 << 6, "RTL"), (0, "ACRO")):
             bench.board.set(f"boxes {boxes}")

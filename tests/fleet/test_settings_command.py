@@ -46,7 +46,7 @@ def test_the_vehicle_that_differs_is_named(fleet: Fleet) -> None:
 def test_a_file_is_tried_and_then_restored_on_all(fleet: Fleet, tmp_path: Path) -> None:
     file = tmp_path / "tuned.param"
     assert settings(fleet, "kite", "backup", file).returncode == 0
-    file.write_text(file.read_text().replace("\np_roll,35\n", "\np_roll,48\n"))
+    file.write_text(file.read_text().replace("\nP_ROLL,35\n", "\nP_ROLL,48\n"))
     tried = fleet.ask("settings", "restore", file, "--all", "--dry-run")
     assert tried.returncode == 0, tried
     assert tried.stdout.endswith("3 of 3 vehicles could take all settings; nothing was written\n")

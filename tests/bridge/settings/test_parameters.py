@@ -373,8 +373,18 @@ def test_a_save_after_a_refused_change_writes_and_says_nothing(name: bytes, valu
 @pytest.mark.parametrize("has_listed", [False, True])
 def test_a_change_is_answered_once(has_listed: bool) -> None:
     world, station = settled_world() if has_listed else radius_world()
-    (answer,) = reply_to(world, station, b"p_roll", 44.0)
+    (answer,) = reply_to(world, station, b"P_ROLL", 44.0)
     assert (answer.get_type(), answer.param_id, answer.param_value) == ("PARAM_VALUE", "P_ROLL", 44.0)
+
+
+def test_a_station_that_uses_other_letters_is_answered_with_them() -> None:
+    """MAVSDK waits for the name that it has sent."""
+    world, station = settled_world()
+    assert [each.param_id for each in reply_to(world, station, b"p_roll", 44.0)] == ["P_ROLL", "p_roll"]
+    _, error, value = reply_to(world, station, b"p_roll", 201.0)
+    assert (error.get_type(), error.param_id, value.param_id) == ("PARAM_ERROR", "p_roll", "p_roll")
+    received = answers((world, station), m.MAVLink_param_request_read_message(1, 1, b"p_roll", -1))
+    assert [value[:2] for value in values(received)] == [("p_roll", 44.0)]
 
 
 def test_preflight_storage_in_flight_is_denied_while_something_is_unsaved() -> None:

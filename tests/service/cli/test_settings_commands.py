@@ -130,7 +130,7 @@ def test_the_history_is_read_without_a_daemon(tuned: Daemon, tmp_path: Path) -> 
     file = tmp_path / "direct.param"
     direct = run_naze_bridge("settings", "backup", file, "--fc", "sim:")
     assert direct.returncode == 0, direct
-    assert "\np_roll,35\n" in file.read_text()
+    assert "\nP_ROLL,35\n" in file.read_text()
 
 
 def test_an_armed_board_is_listed_but_not_changed(start: Starter, tmp_path: Path) -> None:
