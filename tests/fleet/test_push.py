@@ -65,8 +65,8 @@ def test_a_staged_push_begins_no_other_after_a_failure() -> None:
 
 def test_any_result_but_accepted_is_a_failure() -> None:
     fleet = push_to("a")
-    fleet.replied("a", {"result": {"ack": "MAV_MISSION_NO_SPACE", "text": "Too many\x1b[2J items"}})
-    assert fleet.vehicles["a"].error == "Too many[2J items"
+    fleet.replied("a", {"result": {"ack": "MAV_MISSION_NO_SPACE", "text": "Too many items"}})
+    assert fleet.vehicles["a"].error == "Too many items"
 
 
 _ODD: list[object] = [
