@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from bridge.controllers import other
 from bridge.effects import SendToBoard
 from bridge.gcs.rights import LinkAccess
-from bridge.gcs.station import Datagrams, Peer
+from bridge.gcs.station import Datagrams
 from protocols.mavlink.codec import FrameWriter, Packed
 from protocols.mavlink.frame import MavlinkSplitter
 from simulator.naze.board import SimulatedNaze
@@ -304,30 +304,6 @@ def test_a_companion_with_the_autopilots_system_id_is_heard_but_echoes_are_not(s
     world.run(0.1)
     assert bytes(autopilot.received) == b""
     assert two.frames == []
-
-
-def test_a_crowd_does_not_multiply_frames() -> None:
-    """Two hundred strangers are heard once; one of them then broadcasts 200 frames a second, like the autopilot."""
-    world, autopilot, (pilot, _) = passing()
-    ground = world.inside.ground
-    stranger = GroundStation(world, "stranger", sysid=99)
-    hello = stranger.pack(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
-    for number in range(200):
-        world.bridge.gcs_received(Peer("udp", (f"10.0.0.{number}", 14550)), hello, world.now, datagram=True)
-    assert len(ground.peers()) > 100
-    world.run(1)
-    ground.take_datagrams()
-    for number in range(400):
-        world.bridge.gcs_received(stranger.peer, hello, world.now + number / 200, datagram=True)
-    assert 100 < len(ground.take_datagrams()) < 1000
-    copies: list[tuple[Peer, bytes]] = []
-    for _ in range(400):
-        world.bridge.fc_received(autopilot.pack(mavlink.MAVLink_attitude_message(0, *[0.0] * 6)), world.now)
-        copies += ground.take_datagrams()
-    assert [peer for peer, _ in copies].count(pilot.peer) == 400
-    assert len(copies) < 400 * 20
-    world.bridge.fc_received(autopilot.pack(mavlink.MAVLink_heartbeat_message(2, 12, 81, 0, 3, 3)), world.now)
-    assert {peer for peer, _ in ground.take_datagrams()} == set(ground.peers())
 
 
 def test_an_address_that_is_used_again_gets_nothing_for_its_earlier_ids() -> None:
