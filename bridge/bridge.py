@@ -160,8 +160,8 @@ class Bridge:
     def take(self) -> list[BridgeEffect]:
         """What is to be done since the last call: first what must not wait, then the rest as it arose."""
         effects: list[BridgeEffect] = []
-        if self._ground.outgoing:
-            effects.append(self._ground.take_datagrams())
+        if self._ground.outbox.outgoing:
+            effects.append(self._ground.outbox.take())
         if self._has_only_passed_on:
             self._has_only_passed_on = False
         else:
@@ -180,7 +180,7 @@ class Bridge:
                 if (part_due := part.due) < due:
                     due = part_due
             self.due = due
-        if recorded := self._ground.recorded:
+        if recorded := self._ground.outbox.recorded:
             effects.append(RecordFrames(tuple(recorded)))
             recorded.clear()
         if fresh := self._reporter.fresh:
@@ -340,8 +340,8 @@ class Bridge:
     def _is_transferring(self) -> bool:
         return self.missions.transfer is not None
 
-    def _let_read(self, peer: Peer, now: float) -> None:
-        self._own_vehicle.let_read(peer, now)
+    def _let_read(self, station: GroundStation, now: float) -> None:
+        self._own_vehicle.let_read(station, now)
 
     def _settings_may_have_changed(self, now: float) -> None:
         self._board_settings.may_have_changed(now)

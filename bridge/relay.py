@@ -14,8 +14,9 @@ from math import inf
 from typing import Any
 
 from bridge.gcs.ground import Ground
+from bridge.gcs.ground_station import Sender
 from bridge.gcs.rights import LinkAccess
-from bridge.gcs.station import Datagrams, Peer, Severity, Station
+from bridge.gcs.station import Datagrams, Peer, Severity
 from bridge.line.conversation import Conversation, Pause
 from bridge.line.runner import Runner
 from bridge.missions.fc_mission_store import PushProgress, StoreReport, StoreState
@@ -120,7 +121,7 @@ class Relay:
 
     def take(self) -> Datagrams:
         """The datagrams to send."""
-        return Datagrams() if self._end is None else self._end.ground.take_datagrams()
+        return Datagrams() if self._end is None else self._end.ground.outbox.take()
 
     def gcs_received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> None:
         """Handle bytes from a ground station; before the vehicle was heard they are passed on."""
@@ -175,7 +176,7 @@ class _End:
         self.uploads = MissionUploads(self.missions, self.ground, _ignore, count(1), lambda _peer, _now: None)
         downloads = self._downloads = MissionDownloads(self.missions, self.ground)
         uploads = self.uploads
-        self._handlers: Mapping[int, Callable[[Station, Message, float], object]] = {
+        self._handlers: Mapping[int, Callable[[Sender, Message, float], object]] = {
             m.MAVLINK_MSG_ID_MISSION_COUNT: lambda s, msg, now: uploads.count(s, msg.count, now),
             m.MAVLINK_MSG_ID_MISSION_ITEM: partial(self._item, item_from_float_message),
             m.MAVLINK_MSG_ID_MISSION_ITEM_INT: partial(self._item, item_from_int_message),
@@ -198,11 +199,11 @@ class _End:
     def vehicle_sent(self, frame: MavlinkFrame, now: float) -> None:
         packed = repack(frame) if frame.sender == self.ids else None
         if packed is None:
-            self.ground.forward([frame.raw], self.ground.everyone())
+            self.ground.outbox.forward([frame.raw], self.ground.everyone)
             return
         if frame.msgid == m.MAVLINK_MSG_ID_HEARTBEAT:
-            self.ground.show_heartbeat(packed)
-        self.ground.multicast(packed, self.ground.everyone())
+            self.ground.outbox.heartbeat = self.ids, packed
+        self.ground.outbox.multicast(packed, self.ground.everyone)
         message = decode(frame) if frame.msgid in _HEARD else None
         if message is not None and frame.msgid == m.MAVLINK_MSG_ID_HEARTBEAT:
             armed = bool(message.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED)
@@ -216,35 +217,36 @@ class _End:
         self.missions.is_local = self.missions.is_local or is_known
 
     def received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> None:
-        sender = self.ground.sender(peer, len(data), now, datagram=datagram)
-        if sender is None:
+        received = self.ground.received(peer, data, now, datagram=datagram)
+        if received is None:
             return
-        for frame in self.ground.split(sender, data, datagram=datagram):
-            if not (sender.is_heard or self.ground.admits(sender, now)):
+        station, frames = received
+        for frame in frames:
+            if not (station.is_heard or self.ground.admits(station, now)):
                 return
-            is_connected = self.ground.heard(sender, frame, frame.sender, now)
-            if is_connected and not self._is_answered(Station(peer, *frame.sender), frame, now):
+            sender = self.ground.heard(station, frame, frame.sender, now)
+            if sender is not None and not self._is_answered(sender, frame, now):
                 self._to_vehicle(frame.raw)
 
-    def _item(self, convert: Callable[[Message], MissionItem], station: Station, message: Message, now: float) -> None:
-        self.uploads.item(station, convert(message), self.ground.speaker(station), now)
+    def _item(self, convert: Callable[[Message], MissionItem], sender: Sender, message: Message, now: float) -> None:
+        self.uploads.item(sender, convert(message), now)
 
-    def _is_answered(self, station: Station, frame: MavlinkFrame, now: float) -> bool:
+    def _is_answered(self, sender: Sender, frame: MavlinkFrame, now: float) -> bool:
         handler = self._handlers.get(frame.msgid) if self.missions.is_local else None
         if handler is None or frame.target not in self._targets:
             return False
         message = decode(frame)
         if message is None or getattr(message, "mission_type", 0) != m.MAV_MISSION_TYPE_MISSION:
             return False
-        if getattr(message, "current", 0) in _GUIDED and not self.uploads.is_writing(station):
+        if getattr(message, "current", 0) in _GUIDED and not self.uploads.is_writing(sender):
             return False
         if frame.msgid in _READS:
-            self.uploads.answers.went_on(station)
-            self.uploads.reads(station, now)
+            self.uploads.answers.went_on(sender)
+            self.uploads.reads(sender, now)
         elif frame.msgid in _ENDS_DOWNLOAD:
-            self.uploads.answers.went_on(station)
-            self._downloads.forget(station)
-        handler(station, message, now)
+            self.uploads.answers.went_on(sender)
+            self._downloads.forget(sender)
+        handler(sender, message, now)
         return True
 
 

@@ -2,6 +2,7 @@
 """One ground station, from its arrival to its departure. Sans-IO."""
 
 from collections import defaultdict
+from collections.abc import Iterable, Sequence
 from math import inf
 
 from bridge.gcs.budget import Budget
@@ -9,18 +10,25 @@ from bridge.gcs.cost import Cost
 from bridge.gcs.message_rates import MessageRates
 from bridge.gcs.return_path import ReturnPath
 from bridge.gcs.rights import FrameRefusal, LinkAccess, Standing
-from bridge.gcs.station import RECORDER, Peer
-from bridge.gcs.texts import RecentTexts
+from bridge.gcs.station import RECORDER, Datagrams, Peer, Severity
+from bridge.gcs.texts import RecentTexts, cut_text, split_text
+from bridge.model.events import Emit, GcsText
+from bridge.model.refusal import Refusal
 from bridge.model.transfer_memory import TransferMemory
-from protocols.mavlink.codec import FrameWriter
+from protocols.mavlink.codec import FrameWriter, Packed, pack
+from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame, MavlinkSplitter
 from protocols.mavlink.signing import Check
+from protocols.mission_item import MissionResult
 from protocols.rights.effect import Effect
 
+_MAX_TEXT_ID = 0xFFFF
+#: Mission Planner, QGroundControl, MAVSDK and MAVProxy read several frames in a datagram; MAVROS cuts at 296 bytes.
+_MAX_DATAGRAM_SIZE = 280
 #: After such a silence a station may have been restarted: all send a heartbeat each second.
 _RETURNS_S = 3.0
 #: Ids remembered for one address: a router may carry a fleet, but forged ids must not fill the memory.
-_MAX_SPEAKERS = 64
+_MAX_SENDERS = 64
 _SETUP = "set the key in naze-bridge's settings"
 _ADDRESS = "this address may only read"
 #: At most 50 characters with "Refused: ".
@@ -33,26 +41,130 @@ _MOST_LATE = 32
 _RESTARTED_S = 1.0
 
 
-class Speaker:
-    """A sysid and compid at one address: the order of its frames, and its mission transfers.
+class Outbox:
+    """Frames to be sent to ground stations. `recorded`: for the telemetry log, each once; None if there is no log."""
 
+    def __init__(self, emit: Emit, *, is_recorded: bool = False) -> None:
+        self._emit = emit
+        self.recorded: list[bytes] | None = [] if is_recorded else None
+        #: The telemetry log as a receiver, during a flight.
+        self.recorder: GroundStation | None = None
+        self.outgoing: defaultdict[GroundStation, list[bytes]] = defaultdict(list)
+        #: The vehicle's ids and last heartbeat.
+        self.heartbeat: tuple[tuple[int, int], Packed] | None = None
+        self._text_id = 0
+
+    def take(self) -> Datagrams:
+        """The datagrams to send; those of one station are in order."""
+        datagrams = Datagrams()
+        for station, frames in self.outgoing.items():
+            if station.return_path is not None:
+                frames = [*filter(station.return_path.allows, frames)]
+            together = b"".join(frames)
+            if len(together) <= _MAX_DATAGRAM_SIZE:
+                datagrams.append((station.peer, together))
+            else:
+                datagrams += ((station.peer, datagram) for datagram in _in_datagrams(frames, together))
+        self.outgoing.clear()
+        return datagrams
+
+    def send(self, receiver: "GroundStation", together: Iterable[Message], writer: FrameWriter | None = None) -> None:
+        """Send messages in one datagram. `writer`: of other ids than the vehicle's."""
+        version, writer, frames = receiver.frame_version, writer or receiver.writer, []
+        for message in together:  # a loop: a comprehension is a call
+            frames.append(writer.frame(pack(message), version))  # noqa: PERF401
+        self.outgoing[receiver] += frames
+        if self.recorded is not None and not receiver.is_listener:
+            self.recorded += frames
+
+    def multicast(self, packed: Packed, receivers: Iterable["GroundStation"]) -> None:
+        """Send a packed message to several stations that can read it."""
+        frame = None
+        # A flight is logged at the default rates, independent of the stations' requests.
+        is_logged = self.recorder is None
+        for receiver in receivers:
+            if receiver.frame_version == 1 and packed.is_v2_only:
+                continue
+            frame = receiver.writer.frame(packed, receiver.frame_version)
+            if receiver.peer is RECORDER:
+                is_logged = True
+            else:
+                self.outgoing[receiver].append(frame)
+        if self.recorded is not None and frame is not None and is_logged:
+            self.recorded.append(frame)
+
+    def beat(self, heartbeat: Message, ids: tuple[int, int], receivers: Iterable["GroundStation"]) -> None:
+        """Send the heartbeat in MAVLink 2, then in MAVLink 1 too, to stations that have not sent MAVLink 2.
+
+        QGroundControl talks to the vehicle in the version of the first frame that it gets, and a ground station that
+        knows only MAVLink 1 would not see the vehicle otherwise. Signed links need no MAVLink 1.
+        """
+        packed = pack(heartbeat)
+        self.heartbeat = ids, packed
+        logged: bytes | None = None
+        for station in receivers:
+            frames = [station.writer.frame(packed, version) for version in ((2,) if station.reads_v2_only else (2, 1))]
+            logged = logged or frames[0]
+            if station.peer is not RECORDER:
+                self.outgoing[station] += frames
+        if self.recorded is not None and logged is not None:
+            self.recorded.append(logged)
+
+    def forward(self, frames: Sequence[bytes], receivers: Iterable["GroundStation"]) -> None:
+        """Send whole frames unchanged."""
+        for receiver in receivers:
+            self.outgoing[receiver] += frames
+
+    def show(self, severity: Severity, text: str, receivers: Sequence["GroundStation"]) -> None:
+        """Show a text on these stations, in pieces that fit STATUSTEXT."""
+        self._emit(GcsText(text=text))
+        if receivers and self.recorder is not None and self.recorder not in receivers:
+            receivers = [*receivers, self.recorder]  # the log also has the texts for one station
+        self._text_id = self._text_id % _MAX_TEXT_ID + 1
+        others: list[GroundStation] = []
+        joining: list[GroundStation] = []
+        for receiver in receivers:
+            (joining if receiver.is_like_mavsdk else others).append(receiver)
+        if joining:
+            # MAVSDK joins the pieces without a separator, and shows padding as a gap.
+            self._send_pieces(severity, cut_text(text), joining)
+        if others:
+            self._send_pieces(severity, split_text(text), others)
+
+    def _send_pieces(self, severity: Severity, pieces: Sequence[str], receivers: Sequence["GroundStation"]) -> None:
+        for chunk, piece in enumerate(pieces):
+            # With an id, MAVSDK, MAVProxy and QGroundControl join the pieces; Mission Planner shows each separately.
+            text_id = self._text_id if len(pieces) > 1 else 0
+            message = messages.MAVLink_statustext_message(severity, piece.encode("ascii", "replace"), text_id, chunk)
+            self.multicast(pack(message), receivers)
+
+
+class Sender:
+    """A sysid and compid at a ground station's address, from which a message came and which gets the answers.
+
+    It knows the order of its frames, and its mission transfers.
     Senders number their frames from 0 to 255 again and again: a gap shows that a frame was lost, an older number that a
     frame was delayed. A sender without numbers seems to lose a frame each time.
     """
 
     __slots__ = (
+        "__weakref__",
         "_missing",
         "_newest",
+        "compid",
         "frames",
         "heard_at",
         "is_copy",
         "is_late",
         "last_lost",
         "number",
+        "station",
+        "sysid",
         "transfers",
     )
 
-    def __init__(self) -> None:
+    def __init__(self, station: "GroundStation", sysid: int, compid: int) -> None:
+        self.station, self.sysid, self.compid = station, sysid, compid
         self.heard_at = -inf
         #: The number of the last frame, and of the newest one with its bytes.
         self.number = 0
@@ -86,6 +198,34 @@ class Speaker:
         self.frames += ahead
         self._newest, self.heard_at = (number, raw), now
 
+    @property
+    def peer(self) -> Peer:
+        return self.station.peer
+
+    @property
+    def identity(self) -> str:
+        """A name that survives a restart of either side, and a TCP reconnection, which changes the port."""
+        return f"{self.peer.host} sysid {self.sysid} compid {self.compid}"
+
+    def __str__(self) -> str:
+        return f"{self.peer} sysid {self.sysid} compid {self.compid}"
+
+    def to(self, *together: Message) -> None:
+        """Answer with messages in one datagram, unless the station has left."""
+        if not self.station.has_left:
+            self.station.outbox.send(self.station, together)
+
+    def say(self, severity: Severity, text: str, *, is_reminder: bool = False) -> None:
+        self.station.say(severity, text, is_reminder=is_reminder)
+
+    def mission_ack(self, result: MissionResult, mission_type: int = 0) -> None:
+        self.to(messages.MAVLink_mission_ack_message(self.sysid, self.compid, result, mission_type))
+
+    def refuse(self, refusal: Refusal, mission_type: int = 0) -> None:
+        """Refuse a mission transfer: send the reason as a text, and a MISSION_ACK."""
+        self.say(Severity.ERROR, refusal.text)
+        self.mission_ack(refusal.ack, mission_type)
+
     def is_older(self, number: int) -> bool:
         """True if the last frame is late, and was sent before the one with this number."""
         return self.is_late and 0 < (number - self.number) & 0xFF <= _MOST_LATE
@@ -95,13 +235,17 @@ class GroundStation:
     """A ground station that the bridge sends to, because it was heard or is configured.
 
     It is one address, a UDP peer or a TCP connection, because rights, limits, MAVLink version and message rates belong
-    to an address. Several MAVLink ids may speak from there, behind a radio or a router: `speakers` has them all, and
-    the short-lived `Station` names one of them where a message must be addressed. All that is known about a station is
-    here, so dropping this object forgets it, except for its `budget`, which is remembered longer.
+    to an address. Several MAVLink ids may send from there, behind a radio or a router: `senders` has them. All that is
+    known about a station is here, so dropping this object forgets it, except for its `budget`, which is remembered
+    longer.
     """
 
-    def __init__(self, peer: Peer, access: LinkAccess, sysid: int, compid: int, budget: Budget | None = None) -> None:
+    def __init__(
+        self, peer: Peer, access: LinkAccess, sysid: int, compid: int, outbox: Outbox, budget: Budget | None = None
+    ) -> None:
         self.peer = peer
+        self.outbox = outbox
+        self.has_left = False
         self.access = access
         #: None until a datagram was accepted: forged addresses must cost no memory.
         self.budget = budget
@@ -120,8 +264,10 @@ class GroundStation:
         self.version = 0
         self.frame_version = 2
         self.came_at = self.heard_at = -inf
-        #: The senders there, by sysid and compid.
-        self.speakers: dict[tuple[int, int], Speaker] = {}
+        #: It is new, or has returned after a silence, perhaps restarted.
+        self.is_back = False
+        #: By sysid and compid.
+        self.senders: dict[tuple[int, int], Sender] = {}
         #: It has sent REQUEST_DATA_STREAM; a command.
         self.uses_streams = False
         self.uses_commands = False
@@ -180,23 +326,31 @@ class GroundStation:
         if self.budget is not None:
             self.budget.give_back(cost, is_proven=self.standing is Standing.PROVEN)
 
-    def heard(self, frame: MavlinkFrame, sender: tuple[int, int], now: float) -> bool:
-        """Note a frame; True if the station is new, or returns after a silence, perhaps restarted."""
-        is_new = now >= self.heard_at + _RETURNS_S
+    def heard(self, frame: MavlinkFrame, ids: tuple[int, int], now: float) -> Sender:
+        """Note a frame; returns its sender."""
+        self.is_back = now >= self.heard_at + _RETURNS_S
         if not self.is_heard:
             self.is_heard, self.came_at = True, now
         self.heard_at = now
         if self.version != 2:
             self.version = frame.version
             self.frame_version = 2 if self.access.signing is not None else self.version
-        speaker = self.speakers.get(sender)
-        if speaker is None and len(self.speakers) < _MAX_SPEAKERS:
-            speaker = self.speakers[sender] = Speaker()
-        if speaker is not None:
-            speaker.heard(frame, now)
-        return is_new
+        sender = self.senders.get(ids)
+        if sender is None:
+            if len(self.senders) >= _MAX_SENDERS:
+                del self.senders[min(self.senders, key=lambda each: self.senders[each].heard_at)]
+            sender = self.senders[ids] = Sender(self, *ids)
+        sender.heard(frame, now)
+        return sender
 
     # Sending.
+
+    def say(self, severity: Severity, text: str, *, is_reminder: bool = False) -> None:
+        """Show a text on this station; a refusal only once per attempt, unless `is_reminder`."""
+        if self.has_left or not self.allows(Cost.TEXT):
+            return
+        if severity is not Severity.ERROR or is_reminder or self.texts.is_new(text, self.heard_at):
+            self.outbox.show(severity, text, [self])
 
     @property
     def reads_v2_only(self) -> bool:
@@ -207,3 +361,15 @@ class GroundStation:
     def is_like_mavsdk(self) -> bool:
         """True for a station that requests messages only by commands, in MAVLink 2, as MAVSDK does."""
         return self.version == 2 and self.uses_commands and not self.uses_streams
+
+
+def _in_datagrams(frames: Sequence[bytes], together: bytes) -> list[bytes]:
+    """Join frames into datagrams of at most 280 bytes: the cost is per datagram, not per byte."""
+    datagrams: list[bytes] = []
+    start = end = 0
+    for frame in frames:
+        if end + len(frame) > start + _MAX_DATAGRAM_SIZE:
+            datagrams.append(together[start:end])
+            start = end
+        end += len(frame)
+    return [*datagrams, together[start:]]

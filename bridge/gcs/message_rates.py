@@ -45,7 +45,7 @@ class MessageRates:
         return not self.requested
 
 
-class Receiver(Protocol):
+class Rated(Protocol):
     """A ground station, as far as its rates matter."""
 
     @property
@@ -53,10 +53,10 @@ class Receiver(Protocol):
         """Its requests and schedule."""
 
 
-_Receiver = TypeVar("_Receiver", bound=Receiver)
+_Receiver = TypeVar("_Receiver", bound=Rated)
 
 
-def fastest_s(stations: Sequence[Receiver], defaults_s: Mapping[int, float]) -> Mapping[int, float]:
+def fastest_s(stations: Sequence[Rated], defaults_s: Mapping[int, float]) -> Mapping[int, float]:
     """The shortest interval for each message."""
     special = [station.rates for station in stations if not station.rates.is_default]
     if stations and not special:

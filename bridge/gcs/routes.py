@@ -61,19 +61,19 @@ class Routes:
         `to_stations` False: it reaches no other station.
         """
         system, component = frame.target
-        there = self._ground.everyone() if system == 0 else self._stations_of(system, component)
+        there = self._ground.everyone if system == 0 else self._stations_of(system, component)
         others = [other for other in there if other is not station]
         if to_stations:
-            self._ground.forward([frame.raw], takewhile(lambda _: station.allows(Cost.COPIED), others))
+            self._ground.outbox.forward([frame.raw], takewhile(lambda _: station.allows(Cost.COPIED), others))
         return system == 0 or self.addressed(system) is not None or not others
 
     def _stations_of(self, system: int, component: int) -> list[GroundStation]:
         """The stations with these ids. One that may only read is not found by its ids, which may be the pilot's."""
 
         def is_there(station: GroundStation) -> bool:
-            return any(sysid == system and component in (0, compid) for sysid, compid in station.speakers)
+            return any(sysid == system and component in (0, compid) for sysid, compid in station.senders)
 
-        return [station for station in self._ground.everyone() if station.rights.stations and is_there(station)]
+        return [station for station in self._ground.everyone if station.rights.stations and is_there(station)]
 
     def _is_for_all(self, kind: bytes, frame: MavlinkFrame) -> bool:
         """Meet a new kind of message from a component aboard; True if it has no target field."""
@@ -89,7 +89,7 @@ class Routes:
     def _show_heartbeat(self, frames: Sequence[bytes]) -> None:
         for frame in filter(is_autopilot_heartbeat, map(MavlinkFrame, frames)):
             if (heartbeat := repack(frame)) is not None:
-                self._ground.show_heartbeat(heartbeat, frame.sender)
+                self._ground.outbox.heartbeat = frame.sender, heartbeat
 
     def _send_alone(self, frame: MavlinkFrame) -> None:
         self._aboard.add(frame.sender)
@@ -100,12 +100,12 @@ class Routes:
             self._send([frame.raw])
             return
         self._record([frame.raw])
-        self._ground.forward([frame.raw], self._stations_of(system, component))
+        self._ground.outbox.forward([frame.raw], self._stations_of(system, component))
 
     def _send(self, frames: Sequence[bytes]) -> None:
         self._record(frames)
-        self._ground.forward(frames, self._ground.everyone())
+        self._ground.outbox.forward(frames, self._ground.everyone)
 
     def _record(self, frames: Sequence[bytes]) -> None:
-        if self._ground.recorded is not None:
-            self._ground.recorded += frames
+        if self._ground.outbox.recorded is not None:
+            self._ground.outbox.recorded += frames

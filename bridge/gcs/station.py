@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ground stations and their addresses."""
+"""The addresses of ground stations, and the severities of texts for them."""
 
 from collections.abc import Hashable
 from enum import IntEnum
@@ -32,22 +32,6 @@ class Datagrams(list[tuple[Peer, bytes]]):  # made thousands of times a second: 
 
 #: The telemetry log as a peer: it is served like a ground station, but no datagram is sent.
 RECORDER = Peer("log", "flight")
-
-
-class Station(NamedTuple):
-    """A ground station: its ids (sysid, compid) and its address."""
-
-    peer: Peer
-    sysid: int
-    compid: int
-
-    @property
-    def identity(self) -> str:
-        """A name that survives a restart of either side, and a TCP reconnection, which changes the port."""
-        return f"{self.peer.host} sysid {self.sysid} compid {self.compid}"
-
-    def __str__(self) -> str:
-        return f"{self.peer} sysid {self.sysid} compid {self.compid}"
 
 
 class Severity(IntEnum):

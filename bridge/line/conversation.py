@@ -128,7 +128,7 @@ class Recall:
 
 @dataclass(frozen=True, slots=True)
 class NoteReader:
-    """A ground station has read the list `identity` back. `reader`: its Station.identity. Answer: None."""
+    """A ground station has read the list `identity` back. `reader`: its Sender.identity. Answer: None."""
 
     identity: ListIdentity
     reader: str

@@ -90,7 +90,7 @@ class HeldMission:
     """The flight controller's list, as last read.
 
     `sent_seqs`: the item numbers of each ground station that sent this list and has not read it since, by
-    Station.identity; only of those that count otherwise than `items`.
+    Sender.identity; only of those that count otherwise than `items`.
     """
 
     identity: ListIdentity
@@ -335,7 +335,7 @@ class MissionService:
         return HeldMission(identity, verdict.records, verdict.items, newest)
 
     def note_reader(self, reader: str, now: float) -> None:
-        """A ground station (its Station.identity) has read the list: from now on it counts the items as read."""
+        """A ground station (its Sender.identity) has read the list: from now on it counts the items as read."""
         if self.held is not None and reader in self.held.sent_seqs:
             others = {sender: seqs for sender, seqs in self.held.sent_seqs.items() if sender != reader}
             self.held = replace(self.held, sent_seqs=others)

@@ -25,7 +25,7 @@ class Outcome(Enum):
 class ArrivedMission:
     """A mission as received: its source as text, the items as sent, and the verdict.
 
-    `sender`: Station.identity of the ground station; empty for other sources. `is_home_meant`: True if item 0 is surely
+    `sender`: Sender.identity of the ground station; empty for other sources. `is_home_meant`: True if item 0 is surely
     home, whatever its frame, asked at the end.
     """
 
@@ -41,7 +41,7 @@ class RecalledMission:
     """The store's facts about a list that was verified before.
 
     `sent_as`: the commands that ambiguous records were sent with, by record number. `sent_seqs`: the item numbers of
-    each ground station that sent it and has not read it back since, by Station.identity.
+    each ground station that sent it and has not read it back since, by Sender.identity.
     """
 
     sent_as: Mapping[int, int] = field(default_factory=dict)

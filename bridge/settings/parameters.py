@@ -18,8 +18,8 @@ from weakref import WeakKeyDictionary
 from bridge.fc.fc_settings import Cause, SettingRefusal
 from bridge.gcs.cost import Cost
 from bridge.gcs.ground import Ground
-from bridge.gcs.ground_station import GroundStation
-from bridge.gcs.station import Severity, Station
+from bridge.gcs.ground_station import Sender
+from bridge.gcs.station import Severity
 from bridge.model.board_setting import BoardSetting, SettingTable, ValueKind, shown
 from bridge.settings.board_settings import BoardSettings
 from bridge.settings.own_parameters import OwnParameters
@@ -49,9 +49,8 @@ _ERRORS = {
 
 @dataclass(slots=True)
 class _Dialogue:
-    """The parameters sent to a station. next: the index in the list being sent, or None. count: of the last list."""
+    """The parameters sent to a sender. next: the index in the list being sent, or None. count: of the last list."""
 
-    station: Station
     session: FtpSession
     next: int | None = None
     count: int = 0
@@ -72,44 +71,44 @@ class Parameters:
         #: The values that stations know, once one has read them.
         self._told: dict[str, float] = {}
         self._files = ParameterFiles()
-        self._dialogues: WeakKeyDictionary[GroundStation, _Dialogue] = WeakKeyDictionary()
+        self._dialogues: WeakKeyDictionary[Sender, _Dialogue] = WeakKeyDictionary()
         settings.on_table = self._take
         #: The time of the next `tick`; infinity while no list is sent.
         self.due = inf
         #: True if the last PARAM_SET was refused: Mission Planner then asks for a save all the same.
         self.was_refused = False
 
-    def request_list(self, station: Station, now: float) -> None:
+    def request_list(self, sender: Sender, now: float) -> None:
         """PARAM_REQUEST_LIST."""
-        dialogue = self._dialogue(station)
-        if dialogue is None or dialogue.awaits_list or not self._ground.allows(station, Cost.LIST):
+        dialogue = self._dialogue(sender)
+        if dialogue.awaits_list or not sender.station.allows(Cost.LIST):
             return
-        dialogue.awaits_list, dialogue.station = True, station
+        dialogue.awaits_list = True
 
         def done(table: SettingTable | SettingRefusal, at: float) -> None:
             if isinstance(table, SettingRefusal) and table.cause is Cause.NO_ANSWER:
-                self._ground.say(Severity.WARNING, table.text, station)
+                sender.say(Severity.WARNING, table.text)
             dialogue.awaits_list, dialogue.next = False, 0
             self.due = min(self.due, at)
 
         self._settings.current(done, now, _LIST_WITHIN_S)
 
-    def send_one(self, station: Station, name: str, index: int, now: float) -> None:
+    def send_one(self, sender: Sender, name: str, index: int, now: float) -> None:
         """PARAM_REQUEST_READ: by index, or by name where index is -1."""
         values = self._values()
         if index >= 0:
             name = next(islice(values, index, None), "")
         if index >= 0 or name.upper() in values or self._settings.known.table is not None:
-            self._send(station, name)
+            self._send(sender, name)
             return
 
         def done(table: SettingTable | SettingRefusal, _at: float) -> None:
             if not isinstance(table, SettingRefusal) or table.cause is not Cause.OCCUPIED:
-                self._send(station, name)
+                self._send(sender, name)
 
         self._settings.current(done, now, _LIST_WITHIN_S)
 
-    def set(self, station: Station, name: str, value: float, now: float) -> None:
+    def set(self, sender: Sender, name: str, value: float, now: float) -> None:
         """PARAM_SET: answered once, with the value that is then in force, as the protocol requires."""
         parameter, values = name.upper(), self._values()
         self.was_refused = parameter not in values
@@ -120,24 +119,24 @@ class Parameters:
 
         def done(result: Answer, _at: float) -> None:
             if isinstance(result, SettingRefusal):
-                self.refuse(station, name, replace(result, text=result.text.replace(setting_name, parameter, 1)))
+                self.refuse(sender, name, replace(result, text=result.text.replace(setting_name, parameter, 1)))
                 return
             if not self._told:
                 self._ground.broadcast(self._message(parameter))
             if name != parameter:
-                self._send(station, name)
+                self._send(sender, name)
 
         if setting is None and not isclose(value, values.get(parameter, value), rel_tol=1e-6):
-            self.refuse(station, name, SettingRefusal(Cause.FIXED, f"{parameter} is read-only"))
+            self.refuse(sender, name, SettingRefusal(Cause.FIXED, f"{parameter} is read-only"))
         elif setting is None or value == single(float(setting.value)):
-            self._send(station, name)
+            self._send(sender, name)
         elif setting.kind is ValueKind.INTEGER and setting.accepts(value) and abs(value) >= _MOST_EXACT:
             above = f"{parameter} stays {shown(setting.value)}: only up to {_MOST_EXACT - 1} over MAVLink"
-            self.refuse(station, name, SettingRefusal(Cause.OUT_OF_RANGE, above))
+            self.refuse(sender, name, SettingRefusal(Cause.OUT_OF_RANGE, above))
         else:
-            self._settings.change(setting.name, value, done, now, str(station))
+            self._settings.change(setting.name, value, done, now, str(sender))
 
-    def refuse(self, station: Station, name: str, refused: SettingRefusal | None = None) -> None:
+    def refuse(self, sender: Sender, name: str, refused: SettingRefusal | None = None) -> None:
         """Send the reason, then the value in force. PARAM_ERROR, which MAVLink 1 lacks, spares MAVSDK a wait.
 
         refused: None if the station has been told the reason.
@@ -147,26 +146,22 @@ class Parameters:
         if refused is not None:
             # Each Write in Mission Planner sends its default radius of 30 m if its plan screen was open first.
             is_routine = name.upper() == WP_RADIUS and cause is Cause.OUT_OF_RANGE
-            self._ground.say(Severity.NOTICE if is_routine else Severity.ERROR, refused.text, station)
+            sender.say(Severity.NOTICE if is_routine else Severity.ERROR, refused.text)
         if name.upper() in self._values():
-            self._error(station, name, _ERRORS.get(cause, messages.MAV_PARAM_ERROR_PERMISSION_DENIED))
-        self._send(station, name)
+            self._error(sender, name, _ERRORS.get(cause, messages.MAV_PARAM_ERROR_PERMISSION_DENIED))
+        self._send(sender, name)
 
-    def answer_file(self, station: Station, payload: Sequence[int], now: float) -> None:
+    def answer_file(self, sender: Sender, payload: Sequence[int], now: float) -> None:
         """FILE_TRANSFER_PROTOCOL."""
-        dialogue = self._dialogue(station)
-        if dialogue is None:
-            return
+        dialogue = self._dialogue(sender)
         self._files.show(self._values(), self._described())
         if is_opening(payload):
             # Changes that were not made through the bridge follow as PARAM_VALUE.
             self._settings.current(lambda _table, _at: None, now, _LIST_WITHIN_S)
         for number, answer in enumerate(dialogue.session.answer(payload)):
-            if number and not self._ground.allows(station, Cost.ANSWER):
+            if number and not sender.station.allows(Cost.ANSWER):
                 return
-            self._ground.to(
-                station, messages.MAVLink_file_transfer_protocol_message(0, station.sysid, station.compid, answer)
-            )
+            sender.to(messages.MAVLink_file_transfer_protocol_message(0, sender.sysid, sender.compid, answer))
 
     def metadata(self, uptime_ms: int) -> Message | None:
         """COMPONENT_METADATA, which names the file with the descriptions; None before the settings are known."""
@@ -188,30 +183,27 @@ class Parameters:
 
     def tick(self, now: float) -> None:
         """Send the next parameters of each list."""
-        lists = [(peer, dialogue) for peer, dialogue in self._dialogues.items() if dialogue.next is not None]
+        lists = [(sender, dialogue) for sender, dialogue in self._dialogues.items() if dialogue.next is not None]
         self.due = now + _INTERVAL_S if lists else inf
         if not lists:
             return
         self._told = self._values()
         values = [*self._told.items()]
         each = max(_EACH // len(lists), 1)
-        for ground_station, dialogue in lists[:_EACH]:
+        for sender, dialogue in lists[:_EACH]:
             assert dialogue.next is not None
             for index, (name, value) in enumerate(values[dialogue.next : dialogue.next + each], dialogue.next):
-                self._ground.to(dialogue.station, _message(name, value, len(values), index))
+                sender.to(_message(name, value, len(values), index))
             dialogue.next += each
             if dialogue.next >= len(values):
                 dialogue.next, dialogue.count = None, len(values)
             # The others' turn.
-            self._dialogues[ground_station] = self._dialogues.pop(ground_station)
+            self._dialogues[sender] = self._dialogues.pop(sender)
 
-    def _dialogue(self, station: Station) -> _Dialogue | None:
-        ground_station = self._ground.station(station.peer)
-        if ground_station is None:
-            return None
-        if ground_station not in self._dialogues:
-            self._dialogues[ground_station] = _Dialogue(station, FtpSession(self._files.find))
-        return self._dialogues[ground_station]
+    def _dialogue(self, sender: Sender) -> _Dialogue:
+        if sender not in self._dialogues:
+            self._dialogues[sender] = _Dialogue(FtpSession(self._files.find))
+        return self._dialogues[sender]
 
     def _take(self, table: SettingTable) -> None:
         """The settings were read, or some have changed."""
@@ -238,17 +230,16 @@ class Parameters:
         """Every parameter. The bridge's own keep their indexes on every board."""
         return self._own.values() | self._held
 
-    def _send(self, station: Station, name: str) -> None:
+    def _send(self, sender: Sender, name: str) -> None:
         """Send PARAM_VALUE under the name that the station uses, or PARAM_ERROR without such a parameter."""
         if name.upper() in self._values():
-            self._ground.to(station, self._message(name))
+            sender.to(self._message(name))
         elif name:
-            self._error(station, name, messages.MAV_PARAM_ERROR_DOES_NOT_EXIST)
+            self._error(sender, name, messages.MAV_PARAM_ERROR_DOES_NOT_EXIST)
 
-    def _error(self, station: Station, name: str, error: int) -> None:
-        message = messages.MAVLink_param_error_message(station.sysid, station.compid, name.encode(), -1, error)
-        if (receiver := self._ground.station(station.peer)) is not None:
-            self._ground.multicast(pack(message), [receiver])
+    def _error(self, sender: Sender, name: str, error: int) -> None:
+        message = messages.MAVLink_param_error_message(sender.sysid, sender.compid, name.encode(), -1, error)
+        self._ground.outbox.multicast(pack(message), [sender.station])
 
     def _message(self, name: str) -> Message:
         values, parameter = self._values(), name.upper()

@@ -7,7 +7,7 @@ from enum import Enum, auto
 from math import inf
 from typing import Any
 
-from bridge.gcs.ground_station import Speaker
+from bridge.gcs.ground_station import Sender
 from bridge.missions.list_check import ListCheck
 from protocols.mission_item import MissionItem
 from reports.verdict import Verdict
@@ -148,7 +148,7 @@ class ArrivingList:
         if self._one_until < inf:
             self._one_until = -inf
 
-    def take(self, item: MissionItem, sender: Speaker, now: float) -> WholeList | Reply | int:
+    def take(self, item: MissionItem, sender: Sender, now: float) -> WholeList | Reply | int:
         """Keep an item of this list; the number of the item that is requested next.
 
         An item that contradicts the list shows that its station has started again.
@@ -185,7 +185,7 @@ class ArrivingList:
         self.request.asked(wanted, now)
         return wanted
 
-    def _compare(self, sender: Speaker) -> None:
+    def _compare(self, sender: Sender) -> None:
         """Begin or end the second reading."""
         if self._unrequested >= _UNREQUESTED:
             self._compared, self._one_until = None, inf

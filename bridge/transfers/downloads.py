@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from bridge.gcs.cost import Cost
 from bridge.gcs.ground import Ground
-from bridge.gcs.station import Station
+from bridge.gcs.ground_station import Sender
 from bridge.missions.mission_service import HeldMission, MissionService
 from bridge.model.flight_memory import Home
 from bridge.model.refusal import Refusal
@@ -27,7 +27,7 @@ _POSITION_WAIT_S = 2.0
 class _Question:
     """A ground station's request: item `seq`, or the count if None."""
 
-    station: Station
+    sender: Sender
     seq: int | None
     as_int: bool
 
@@ -45,14 +45,14 @@ class MissionDownloads:
         #: While home is unknown: the mission store of the flight controller, and when item 0 was first requested.
         self._homeless: tuple[object, float] = None, 0.0
 
-    def request_list(self, station: Station, now: float) -> None:
+    def request_list(self, sender: Sender, now: float) -> None:
         """MISSION_REQUEST_LIST, armed or not."""
-        self._ask(_Question(station, None, as_int=True), now)
+        self._ask(_Question(sender, None, as_int=True), now)
 
-    def request(self, station: Station, seq: int, now: float, *, as_int: bool) -> None:
+    def request(self, sender: Sender, seq: int, now: float, *, as_int: bool) -> None:
         """MISSION_REQUEST or MISSION_REQUEST_INT; item 0 is served at any time (Mission Planner asks on arming)."""
-        question = _Question(station, seq, as_int)
-        download = self._memory(station).download
+        question = _Question(sender, seq, as_int)
+        download = self._memory(sender).download
         if download is not None and now < download.until and download.fc_store is self._missions.fc_store:
             download.until = now + _READING_S
             self._answer(question, download.items, now)
@@ -61,12 +61,12 @@ class MissionDownloads:
         else:
             self._ask(question, now)
 
-    def forget(self, station: Station) -> None:
+    def forget(self, sender: Sender) -> None:
         """The ground station has read the list, or writes a new one."""
-        self._memory(station).download = None
+        self._memory(sender).download = None
 
-    def _memory(self, station: Station) -> TransferMemory:
-        return self._ground.speaker(station).transfers[self._missions.mission_type]
+    def _memory(self, sender: Sender) -> TransferMemory:
+        return sender.transfers[self._missions.mission_type]
 
     def _ask(self, question: _Question, now: float) -> None:
         """Read the list once for all waiting requests, so that a flood of them cannot fill the queue."""
@@ -76,7 +76,7 @@ class MissionDownloads:
         if is_reading:
             return
         held = self._missions.held
-        if held is not None and not self._ground.allows(question.station, Cost.BOARD):
+        if held is not None and not question.sender.station.allows(Cost.BOARD):
             # A station that asks too often gets the copy.
             self._read(held, now)
         else:
@@ -88,37 +88,37 @@ class MissionDownloads:
             if isinstance(held, Refusal):
                 # Mission Planner requests item 0 on arming, which may have just changed the protocol.
                 if not self._has_home:
-                    self._ground.refuse(question.station, held, self._missions.mission_type)
+                    question.sender.refuse(held, self._missions.mission_type)
                 elif question.seq == 0 and (self._vehicle.armed or self._vehicle.home_or_position() is not None):
                     self._send_home(question, now)
                 elif question.seq != 0 or self._vehicle.armed is not None:
-                    self._ground.refuse(question.station, held)
+                    question.sender.refuse(held)
                 # Otherwise the craft may be armed: Mission Planner repeats the request until that is known.
                 continue
             download = Download(held.items, now + _READING_S, self._missions.fc_store)
-            self._memory(question.station).download = download
+            self._memory(question.sender).download = download
             self._answer(question, held.items, now)
 
     def _answer(self, question: _Question, items: tuple[MissionItem, ...], now: float) -> None:
-        station = question.station
+        sender = question.sender
         if question.seq is None:
             # DroneKit takes home from a download, and waits forever without one: so an empty list has home if known.
             count = len(items) or int(self._has_home and self._vehicle.home_or_position() is not None)
             kind = self._missions.mission_type
-            self._ground.to(station, messages.MAVLink_mission_count_message(station.sysid, station.compid, count, kind))
+            sender.to(messages.MAVLink_mission_count_message(sender.sysid, sender.compid, count, kind))
         elif question.seq < len(items):
             self._send_item(question, items[question.seq])
             if question.seq == len(items) - 1:
-                self._missions.note_reader(station.identity, now)
+                self._missions.note_reader(sender.identity, now)
         elif question.seq == 0 and self._has_home:
             self._send_item(question, self._home_item())
         else:
-            self._ground.mission_ack(station, MissionResult.INVALID_SEQUENCE, self._missions.mission_type)
+            sender.mission_ack(MissionResult.INVALID_SEQUENCE, self._missions.mission_type)
 
     def _send_item(self, question: _Question, item: MissionItem) -> None:
-        station = question.station
+        sender = question.sender
         kind = self._missions.mission_type
-        self._ground.to(station, item_message(item, station.sysid, station.compid, kind, as_int=question.as_int))
+        sender.to(item_message(item, sender.sysid, sender.compid, kind, as_int=question.as_int))
 
     def _send_home(self, question: _Question, now: float) -> None:
         """Item 0 while armed, at the altitude of HOME_POSITION: Mission Planner takes its ground level from it.

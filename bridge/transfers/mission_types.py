@@ -6,6 +6,7 @@ from math import inf
 from typing import NamedTuple
 
 from bridge.gcs.ground import Ground
+from bridge.gcs.ground_station import GroundStation
 from bridge.gcs.station import Peer
 from bridge.missions.fc_mission_store import AnyFcMissionStore
 from bridge.missions.mission_service import MissionService
@@ -34,7 +35,7 @@ class MissionTypes:
         ground: Ground,
         emit: Emit,
         incidents: Iterator[int],
-        let_read: Callable[[Peer, float], None],
+        let_read: Callable[[GroundStation, float], None],
     ) -> None:
         def transfers(lists: MissionService) -> Transfers:
             uploads = MissionUploads(lists, ground, emit, incidents, let_read)

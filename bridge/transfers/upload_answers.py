@@ -6,7 +6,8 @@ from math import inf
 from typing import Any
 
 from bridge.gcs.ground import Ground
-from bridge.gcs.station import Peer, Severity, Station
+from bridge.gcs.ground_station import GroundStation, Sender
+from bridge.gcs.station import Severity
 from bridge.missions.mission_service import DeliveryResult
 from bridge.missions.mission_texts import finding_lines
 from bridge.model.refusal import Refusal
@@ -35,14 +36,14 @@ class UploadAnswers:
     `let_read` is called after a text that the pilot must read.
     """
 
-    def __init__(self, ground: Ground, let_read: Callable[[Peer, float], None], mission_type: int = 0) -> None:
+    def __init__(self, ground: Ground, let_read: Callable[[GroundStation, float], None], mission_type: int = 0) -> None:
         self._ground = ground
         self._mission_type = mission_type
         self._let_read = let_read
         #: True if the flight controller stores neither fences nor rally points.
         self.are_only_missions_stored = True
         #: The answers that are to be sent again.
-        self._again: list[tuple[Station, FinalAck]] = []
+        self._again: list[tuple[Sender, FinalAck]] = []
         #: The time of the next `tick`; infinity if nothing is to be sent later.
         self.due = inf
 
@@ -50,7 +51,7 @@ class UploadAnswers:
 
     def end(
         self,
-        station: Station,
+        sender: Sender,
         ack: MissionResult,
         count: int,
         now: float,
@@ -67,52 +68,49 @@ class UploadAnswers:
         cancel_s = _CANCEL_S if count and (is_cancelled or ack is not MissionResult.ACCEPTED) else 0.0
         answer = FinalAck(ack, count, now + _MEMORY_S, now + cancel_s)
         if is_repeated and count:
-            self._repeat(station, answer, _ACK_AGAIN_S, None, now)
-        self._memory(station).final_ack = answer
-        self._ground.mission_ack(station, ack, self._mission_type if mission_type is None else mission_type)
+            self._repeat(sender, answer, _ACK_AGAIN_S, None, now)
+        self._memory(sender).final_ack = answer
+        sender.mission_ack(ack, self._mission_type if mission_type is None else mission_type)
 
-    def report(self, station: Station, verdict: Verdict[Any], delivery: DeliveryResult, now: float) -> None:
+    def report(self, sender: Sender, verdict: Verdict[Any], delivery: DeliveryResult, now: float) -> None:
         """Report everything to the sender, and the change on the aircraft to other ground stations.
 
         The summary is last: Mission Planner shows the last text. Before it only dangers are warnings, which its voice
         says.
         """
         accepted = delivery.ack is MissionResult.ACCEPTED
-        sender = self._ground.station(station.peer)
-        if verdict.result is Result.ACCEPTED and sender is not None and not sender.has_written:
-            sender.has_written = True
+        if verdict.result is Result.ACCEPTED and not sender.station.has_written:
+            sender.station.has_written = True
             if self.are_only_missions_stored:
-                self._ground.say(Severity.INFO, _ONLY_MISSIONS, station)
+                sender.say(Severity.INFO, _ONLY_MISSIONS)
         for news, line in finding_lines(verdict.findings) if accepted else ():
             if line != delivery.text:
-                self._ground.say(_SEVERITIES.get(news, Severity.INFO), line, station)
+                sender.say(_SEVERITIES.get(news, Severity.INFO), line)
         if delivery.number is None and not self._mission_type:  # the Pi stores no others
-            self._ground.say(Severity.WARNING, "The mission could not be stored on the Pi", station)
+            sender.say(Severity.WARNING, "The mission could not be stored on the Pi")
         severity = Severity.INFO if accepted else Severity.ERROR
         if accepted and delivery.is_lossy:
             severity = Severity.WARNING
-        self._ground.say(severity, delivery.text, station)
+        sender.say(severity, delivery.text)
         if severity is not Severity.INFO:
-            self._let_read(station.peer, now)
+            self._let_read(sender.station, now)
         if delivery.change:
             severity = Severity.WARNING if verdict.result is Result.CLEARED else Severity.INFO
-            self._ground.say_to_others(severity, f"{delivery.change}, by {station.peer}", station)
+            self._ground.say(severity, f"{delivery.change}, by {sender.peer}", but=sender.station)
 
-    def remind(self, station: Station, text: str, now: float) -> None:
+    def remind(self, sender: Sender, text: str, now: float) -> None:
         """Repeat the reason for a refusal that the station may not have noticed."""
-        if (answer := self._memory(station).final_ack) is not None:
-            self._repeat(station, answer, _REMINDERS_S, text, now)
+        if (answer := self._memory(sender).final_ack) is not None:
+            self._repeat(sender, answer, _REMINDERS_S, text, now)
 
-    def _repeat(
-        self, station: Station, answer: FinalAck, later_s: Sequence[float], text: str | None, now: float
-    ) -> None:
+    def _repeat(self, sender: Sender, answer: FinalAck, later_s: Sequence[float], text: str | None, now: float) -> None:
         answer.again = [(now + seconds, text) for seconds in later_s]
-        self._again.append((station, answer))
+        self._again.append((sender, answer))
         self.due = min(self.due, now + later_s[0])
 
-    def went_on(self, station: Station) -> None:
+    def went_on(self, sender: Sender) -> None:
         """The station has sent another mission message: it has the final ack, or does not wait for it."""
-        if (answer := self._memory(station).final_ack) is not None:
+        if (answer := self._memory(sender).final_ack) is not None:
             answer.again = [again for again in answer.again if again[1] is not None]
 
     def tick(self, now: float) -> None:
@@ -120,62 +118,62 @@ class UploadAnswers:
             return
         # A station may have left, or begun another upload.
         self._again = [each for each in self._again if self._memory(each[0]).final_ack is each[1]]
-        for station, answer in self._again:
+        for sender, answer in self._again:
             for due, text in answer.again:
                 if now < due:
                     continue
                 if text is not None:
-                    self._ground.say(Severity.ERROR, text, station, is_reminder=True)
+                    sender.say(Severity.ERROR, text, is_reminder=True)
                 else:
-                    self._ground.mission_ack(station, answer.ack, self._mission_type)
+                    sender.mission_ack(answer.ack, self._mission_type)
             answer.again = [again for again in answer.again if now < again[0]]
         self._again = [each for each in self._again if each[1].again]
         self.due = min((due for _, answer in self._again for due, _ in answer.again), default=inf)
 
     # After the end.
 
-    def repeat_cancelled(self, station: Station, now: float) -> bool:
+    def repeat_cancelled(self, sender: Sender, now: float) -> bool:
         """Answer a Cancel again if the first answer was lost: it must not clear the mission on the craft."""
-        answer = self._to(station, now)
+        answer = self._to(sender, now)
         if answer is None or now >= answer.cancelled_until:
             return False
-        self._ground.mission_ack(station, answer.ack, self._mission_type)
+        sender.mission_ack(answer.ack, self._mission_type)
         return True
 
-    def late_item(self, station: Station, seq: int, now: float, *, is_lost: bool) -> None:
+    def late_item(self, sender: Sender, seq: int, now: float, *, is_lost: bool) -> None:
         """Answer an item of an upload that has ended; if `is_lost`, perhaps because the daemon was restarted.
 
         A ground station whose address has just changed gets no answer.
         """
-        answer = self._to(station, now)
+        answer = self._to(sender, now)
         if answer is not None:
             if answer.is_refusal or seq == answer.count - 1:
-                self._ground.mission_ack(station, answer.ack, self._mission_type)
-        elif is_lost and not any(self.last_at(where, now) for where in self._ground.elsewhere(station)):
-            self._ground.say(Severity.ERROR, _UNKNOWN_UPLOAD.text, station)
-            self.end(station, _UNKNOWN_UPLOAD.ack, 0, now)
+                sender.mission_ack(answer.ack, self._mission_type)
+        elif is_lost and not any(self.last_at(where, now) for where in self._ground.elsewhere(sender)):
+            sender.say(Severity.ERROR, _UNKNOWN_UPLOAD.text)
+            self.end(sender, _UNKNOWN_UPLOAD.ack, 0, now)
 
-    def partial_list(self, station: Station, now: float) -> None:
+    def partial_list(self, sender: Sender, now: float) -> None:
         """MISSION_WRITE_PARTIAL_LIST: Mission Planner's answer to a refusal that it did not understand."""
-        answer = self._to(station, now)
+        answer = self._to(sender, now)
         if answer is not None and answer.is_refusal:
-            self._ground.mission_ack(station, answer.ack, self._mission_type)
+            sender.mission_ack(answer.ack, self._mission_type)
         else:
-            self._ground.refuse(station, _NOT_WHOLE, self._mission_type)
+            sender.refuse(_NOT_WHOLE, self._mission_type)
 
-    def forget(self, station: Station) -> None:
+    def forget(self, sender: Sender) -> None:
         """The ground station has begun a new upload."""
-        self._memory(station).final_ack = None
+        self._memory(sender).final_ack = None
 
-    def _memory(self, station: Station) -> TransferMemory:
-        return self._ground.speaker(station).transfers[self._mission_type]
+    def _memory(self, sender: Sender) -> TransferMemory:
+        return sender.transfers[self._mission_type]
 
-    def last_at(self, station: Station, now: float) -> FinalAck | None:
+    def last_at(self, sender: Sender, now: float) -> FinalAck | None:
         """The last answer to a ground station at its present address."""
-        answer = self._memory(station).final_ack
+        answer = self._memory(sender).final_ack
         return answer if answer is not None and now <= answer.until else None
 
-    def _to(self, station: Station, now: float) -> FinalAck | None:
+    def _to(self, sender: Sender, now: float) -> FinalAck | None:
         """The last answer to a ground station, at its current or previous address."""
-        before = (at for at in self._ground.elsewhere(station) if self._ground.has_moved(at, station, now))
-        return next((answer for at in (station, *before) if (answer := self.last_at(at, now)) is not None), None)
+        before = (at for at in self._ground.elsewhere(sender) if self._ground.has_moved(at, sender, now))
+        return next((answer for at in (sender, *before) if (answer := self.last_at(at, now)) is not None), None)

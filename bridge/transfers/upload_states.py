@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import Enum, auto
 from math import inf
 
-from bridge.gcs.station import Station
+from bridge.gcs.ground_station import Sender
 from bridge.missions.list_check import ListCheck
 from bridge.missions.mission_service import OCCUPIED
 from bridge.model.refusal import Refusal
@@ -225,7 +225,7 @@ class Upload:
     of it. `number`: of the frame that began it.
     """
 
-    station: Station
+    sender: Sender
     count: int
     incident: str
     mission_type: int
@@ -278,10 +278,10 @@ class UploadQueue:
         #: When lists began to arrive without a pause, and when the last upload ended.
         self._arriving_since = self._last_end = -inf
 
-    def of(self, station: Station) -> Upload | None:
+    def of(self, sender: Sender) -> Upload | None:
         """The newest upload of a ground station: one may wait behind another that is being written."""
         for upload in reversed(self.uploads):
-            if upload.station == station:
+            if upload.sender == sender:
                 return upload
         return None
 

@@ -13,8 +13,8 @@ from typing import Any
 
 from bridge.gcs.cost import TOO_MANY_WRITES, Cost
 from bridge.gcs.ground import Ground
-from bridge.gcs.ground_station import Speaker
-from bridge.gcs.station import Peer, Severity, Station
+from bridge.gcs.ground_station import GroundStation, Sender
+from bridge.gcs.station import Peer, Severity
 from bridge.line.conversation import Conversation
 from bridge.missions.fc_mission_store import StoreReport
 from bridge.missions.list_check import begin_check, check_count
@@ -53,8 +53,8 @@ from reports.finding import Finding
 from reports.verdict import CLEARED_LIST, Result, Verdict
 
 _TOO_MANY_UPLOADS = Refusal(MissionResult.DENIED, "Too many uploads: wait a few seconds")
-#: The maximum number of simultaneous uploads: one address may have several stations.
-_MOST_UPLOADS = 64
+#: The maximum number of simultaneous uploads.
+_MOST_UPLOADS = 256
 #: A ground station that reads the mission has given up an upload that was silent for this long.
 _SILENT_S = 1.0
 _AGAIN = Replaced("the station started again")
@@ -69,7 +69,7 @@ class MissionUploads:
         ground: Ground,
         emit: Emit,
         incidents: Iterator[int],
-        let_read: Callable[[Peer, float], None],
+        let_read: Callable[[GroundStation, float], None],
     ) -> None:
         self._missions = missions
         self._ground = ground
@@ -86,23 +86,23 @@ class MissionUploads:
     def receiving(self) -> MissionTransfer | None:
         for upload in self._queue.within(Receiving):
             received = len(upload.state.received)
-            return MissionTransfer(str(upload.station), TransferStep.RECEIVING, received, upload.count)
+            return MissionTransfer(str(upload.sender), TransferStep.RECEIVING, received, upload.count)
         return None
 
-    def is_writing(self, station: Station) -> bool:
+    def is_writing(self, sender: Sender) -> bool:
         """True if an upload of this ground station runs or waits."""
-        return self._queue.of(station) is not None
+        return self._queue.of(sender) is not None
 
     # From ground stations.
 
-    def count(self, station: Station, count: int, now: float) -> None:
+    def count(self, sender: Sender, count: int, now: float) -> None:
         """MISSION_COUNT: an upload is announced, or cancelled with a count of 0."""
-        if self._ground.speaker(station).is_late:
+        if sender.is_late:
             return
-        upload = self._find(station, now)
+        upload = self._find(sender, now)
         if upload is None:
-            if count or not self.answers.repeat_cancelled(station, now):
-                self._begin(station, count, now)
+            if count or not self.answers.repeat_cancelled(sender, now):
+                self._begin(sender, count, now)
             return
         upload.heard_at, state = now, upload.state
         if not count:
@@ -112,25 +112,25 @@ class MissionUploads:
         elif count != upload.count or state.received or isinstance(state, Delivering):
             # Perhaps the same list, which its sender has also begun again.
             self._handle(upload, _AGAIN, now)
-            self._begin(station, count, now)
+            self._begin(sender, count, now)
         elif isinstance(state, Receiving):
             self._request(upload, now, *state.repeats(now))
 
-    def clear_all(self, station: Station, mission_type: int, now: float) -> None:
+    def clear_all(self, sender: Sender, mission_type: int, now: float) -> None:
         """MISSION_CLEAR_ALL. `mission_type`: of the answer, MISSION or ALL."""
-        upload = self._find(station, now)
+        upload = self._find(sender, now)
         if upload is not None:
             if not upload.count and not isinstance(upload.state, DeliveringUnanswered):
                 return
             self._handle(upload, _AGAIN, now)
-        self._begin(station, 0, now, mission_type)
+        self._begin(sender, 0, now, mission_type)
 
-    def item(self, station: Station, item: MissionItem, speaker: Speaker, now: float) -> None:
-        upload = self._find(station, now)
+    def item(self, sender: Sender, item: MissionItem, now: float) -> None:
+        upload = self._find(sender, now)
         if upload is None:
-            self.answers.late_item(station, item.seq, now, is_lost=not self._queue.uploads)
+            self.answers.late_item(sender, item.seq, now, is_lost=not self._queue.uploads)
             return
-        if speaker.is_late and speaker.is_older(upload.number):
+        if sender.is_late and sender.is_older(upload.number):
             # Delayed by the network: an item of the previous list.
             return
         upload.heard_at, state = now, upload.state
@@ -139,22 +139,22 @@ class MissionUploads:
             state.item_repeated(now)
         elif item.seq >= upload.count:
             text = f"WP {item.seq} is beyond the {upload.count} items announced"
-            self._ground.refuse(station, Refusal(MissionResult.INVALID_SEQUENCE, text), self._missions.mission_type)
+            sender.refuse(Refusal(MissionResult.INVALID_SEQUENCE, text), self._missions.mission_type)
         else:
-            taken = state.list.take(item, speaker, now)
+            taken = state.list.take(item, sender, now)
             if isinstance(taken, int):
                 self._request(upload, now, taken)
             elif taken is Reply.START_AGAIN:
                 self._handle(upload, _AGAIN, now)
-                self._begin(station, upload.count, now)
+                self._begin(sender, upload.count, now)
             elif isinstance(taken, WholeList):
                 self._handle(upload, Arrived(taken), now)
             else:
                 self.due = min(self.due, state.due)
 
-    def ack(self, station: Station, result: int, now: float) -> None:
+    def ack(self, sender: Sender, result: int, now: float) -> None:
         """MISSION_ACK from a ground station: an error cancels its upload, ACCEPTED ends "Write Fast"."""
-        upload = self._find(station, now)
+        upload = self._find(sender, now)
         if upload is None:
             return
         upload.is_write_fast |= result == MissionResult.ACCEPTED
@@ -165,10 +165,10 @@ class MissionUploads:
         elif upload.state.received:
             self._handle(upload, SenderFinished(), now)
 
-    def reads(self, station: Station, now: float) -> None:
+    def reads(self, sender: Sender, now: float) -> None:
         """The ground station reads the mission: its silent upload ends without an ack, which it would misunderstand."""
         for upload in [*self._queue.uploads]:
-            if upload.station == station and now >= upload.heard_at + _SILENT_S:
+            if upload.sender == sender and now >= upload.heard_at + _SILENT_S:
                 self._handle(upload, Replaced("the station reads the mission"), now)
 
     # From the rest of the bridge.
@@ -181,7 +181,7 @@ class MissionUploads:
     def peer_gone(self, peer: Peer, now: float) -> None:
         """A ground station's connection is closed: its uploads end without waiting for the timeout."""
         for upload in self._queue.undelivered():
-            if upload.station.peer == peer:
+            if upload.sender.peer == peer:
                 self._handle(upload, Ended(_cancelled("ended: disconnected")), now)
 
     def tick(self, now: float) -> None:
@@ -207,16 +207,16 @@ class MissionUploads:
 
     # State changes of an upload.
 
-    def _begin(self, station: Station, count: int, now: float, mission_type: int | None = None) -> None:
+    def _begin(self, sender: Sender, count: int, now: float, mission_type: int | None = None) -> None:
         mission_type = self._missions.mission_type if mission_type is None else mission_type
-        self.answers.forget(station)
-        if not self._ground.allows(station, Cost.UPLOAD):
+        self.answers.forget(sender)
+        if not sender.station.allows(Cost.UPLOAD):
             # A flood must cost less than the lists that it announces: no incident, no log entry.
-            self._ground.say(Severity.ERROR, _TOO_MANY_UPLOADS.text, station)
-            self.answers.end(station, _TOO_MANY_UPLOADS.ack, 0, now, mission_type)
+            sender.say(Severity.ERROR, _TOO_MANY_UPLOADS.text)
+            self.answers.end(sender, _TOO_MANY_UPLOADS.ack, 0, now, mission_type)
             return
-        number = self._ground.speaker(station).number
-        upload = Upload(station, count, f"upload-{next(self._incidents)}", mission_type, now, number)
+        number = sender.number
+        upload = Upload(sender, count, f"upload-{next(self._incidents)}", mission_type, now, number)
         self._queue.uploads.append(upload)
         self.due = 0.0
         armed = self._missions.armed_refusal()
@@ -232,7 +232,7 @@ class MissionUploads:
         if isinstance(state, Complete):
             refusal = self._missions.acquire(upload)
             is_write = state.whole.verdict.result is not Result.REJECTED
-            if refusal is None and is_write and not self._ground.allows(upload.station, Cost.FLASH):
+            if refusal is None and is_write and not upload.sender.station.allows(Cost.FLASH):
                 refusal = Refusal(MissionResult.DENIED, TOO_MANY_WRITES)
         else:
             refusal = OCCUPIED if self._queue.must_wait(now) else self._missions.occupied()
@@ -264,7 +264,7 @@ class MissionUploads:
                     # The reply serves all that wait for it.
                     self._missions.run(self._missions.preflight(), self._asked, now)
             case Ready():
-                self._emit(UploadStarted(station=str(upload.station), count=upload.count, incident=upload.incident))
+                self._emit(UploadStarted(station=str(upload.sender), count=upload.count, incident=upload.incident))
                 self._request(upload, now, 0)
             case Cancelled() if after is Fixed.END:
                 self._refuse(upload, _cancelled("cancelled"), now)
@@ -288,25 +288,25 @@ class MissionUploads:
 
     def _request(self, upload: Upload, now: float, *seqs: int) -> None:
         """Request items in one datagram."""
-        state, stations = upload.state, [upload.station]
+        state, receivers = upload.state, [upload.sender]
         if isinstance(state, Receiving):
             request = state.list.request
             self.due = min(self.due, request.due)
             # Without items, a station at another address may have started again: it would take this request for its own
             # list's, whose MISSION_COUNT it repeats until it has one.
             if request.is_repeated and state.list.items:
-                stations += self._elsewhere(upload, now)
-        for to in stations:
+                receivers += self._elsewhere(upload, now)
+        for to in receivers:
             # By id 40: the only one that Mission Planner understands in both modes.
             ids, kind = (to.sysid, to.compid), self._missions.mission_type
             make = partial(messages.MAVLink_mission_request_message, *ids, mission_type=kind)
-            self._ground.to(to, *map(make, seqs))
+            to.to(*map(make, seqs))
 
     def _delivery(self, upload: Upload, whole: WholeList) -> Conversation[DeliveryResult]:
         """Store the list and write it; a rejected one is only stored, unless its sender sent too many of them."""
-        is_kept = whole.verdict.result is not Result.REJECTED or self._ground.allows(upload.station, Cost.STORED)
+        is_kept = whole.verdict.result is not Result.REJECTED or upload.sender.station.allows(Cost.STORED)
         arrived = ArrivedMission(
-            str(upload.station), whole.items, whole.verdict, upload.station.identity, lambda: upload.is_write_fast
+            str(upload.sender), whole.items, whole.verdict, upload.sender.identity, lambda: upload.is_write_fast
         )
         return self._missions.deliver(arrived, is_kept=is_kept)
 
@@ -316,16 +316,16 @@ class MissionUploads:
             return
         accepted = delivery.ack is MissionResult.ACCEPTED
         if verdict.result is not Result.REJECTED and accepted and not delivery.change:
-            self._ground.not_written(upload.station)
+            upload.sender.station.give_back(Cost.FLASH)
         shown = with_meant_home(verdict) if upload.is_write_fast else verdict
-        self.answers.report(upload.station, shown, delivery, now)
+        self.answers.report(upload.sender, shown, delivery, now)
         if upload in self._queue.uploads:
             self._answer(upload, delivery.ack, now)
             self._handle(upload, Delivered(), now)
         self._emit(
             UploadEnded(
                 level="info" if accepted else "warning",
-                station=str(upload.station),
+                station=str(upload.sender),
                 mission=delivery.number,
                 ack=delivery.ack.name,
                 detail=delivery.text,
@@ -340,39 +340,39 @@ class MissionUploads:
             finding = Finding(None, "list", len(items), None, refusal.text)
             whole = WholeList(items, Verdict(Result.REJECTED, refusal.ack, findings=(finding,)))
             self._missions.run(self._delivery(upload, whole), lambda _result, _at: None, now)
-        self._ground.say(Severity.ERROR, refusal.text, upload.station)
-        self._let_read(upload.station.peer, now)
+        upload.sender.say(Severity.ERROR, refusal.text)
+        self._let_read(upload.sender.station, now)
         self._answer(upload, refusal.ack, now)
         if items and upload.state.seems_written:
-            self.answers.remind(upload.station, refusal.text, now)
+            self.answers.remind(upload.sender, refusal.text, now)
         self._emit_refusal(upload, refusal)
 
     # Ground stations.
 
-    def _find(self, station: Station, now: float) -> Upload | None:
+    def _find(self, sender: Sender, now: float) -> Upload | None:
         """The newest upload of a ground station; it continues if its address has changed (Wi-Fi roaming).
 
         Not if it was answered at this address: then it has announced another list, and lists must never be mixed.
         """
         for upload in reversed(self._queue.uploads):
-            if upload.station == station:
+            if upload.sender == sender:
                 return upload
         found = None
-        if self.answers.last_at(station, now) is None:
+        if self.answers.last_at(sender, now) is None:
             for upload in self._queue.uploads:
-                if self._ground.has_moved(upload.station, station, now):
-                    before, after = str(upload.station), str(station)
+                if self._ground.has_moved(upload.sender, sender, now):
+                    before, after = str(upload.sender), str(sender)
                     self._emit(StationMoved(before=before, after=after, incident=upload.incident))
-                    upload.station, found = station, upload
+                    upload.sender, found = sender, upload
                     if isinstance(upload.state, Receiving):
                         upload.state.list.moved()
         return found
 
-    def _elsewhere(self, upload: Upload, now: float) -> list[Station]:
+    def _elsewhere(self, upload: Upload, now: float) -> list[Sender]:
         """Other addresses of the upload's station, except those that have announced their own list."""
         return [
             where
-            for where in self._ground.moved_to(upload.station, now)
+            for where in self._ground.moved_to(upload.sender, now)
             if self._queue.of(where) is None and self.answers.last_at(where, now) is None
         ]
 
@@ -381,14 +381,14 @@ class MissionUploads:
         if isinstance(state, DeliveringUnanswered):
             return
         is_cancelled, is_repeated = isinstance(state, DeliveringDespiteCancel), isinstance(state, Delivering)
-        for where in (upload.station, *self._elsewhere(upload, now)):
+        for where in (upload.sender, *self._elsewhere(upload, now)):
             self.answers.end(
                 where, ack, upload.count, now, upload.mission_type, is_cancelled=is_cancelled, is_repeated=is_repeated
             )
 
     def _emit_refusal(self, upload: Upload, refusal: Refusal) -> None:
-        station, ack = str(upload.station), refusal.ack.name
-        self._emit(UploadRefused(station=station, ack=ack, why=refusal.text, incident=upload.incident))
+        name, ack = str(upload.sender), refusal.ack.name
+        self._emit(UploadRefused(station=name, ack=ack, why=refusal.text, incident=upload.incident))
 
 
 def _cancelled(why: str) -> Refusal:

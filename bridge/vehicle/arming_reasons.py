@@ -9,7 +9,8 @@ from math import inf
 
 from bridge.fc.session import FcSession
 from bridge.gcs.ground import Ground
-from bridge.gcs.station import Severity, Station
+from bridge.gcs.ground_station import GroundStation
+from bridge.gcs.station import Severity
 from bridge.model.vehicle import Health
 from bridge.vehicle.link_announcer import LinkAnnouncer
 
@@ -45,10 +46,10 @@ class ArmingReasons:
         for line in lines:
             self._ground.say(Severity.WARNING, line)
 
-    def tell(self, station: Station) -> None:
+    def tell(self, station: GroundStation) -> None:
         """Report the reasons to a newcomer, or in answer to MAV_CMD_RUN_PREARM_CHECKS."""
         for line in self._told:
-            self._ground.say(Severity.WARNING, line, station)
+            station.say(Severity.WARNING, line)
 
     def _find(self, now: float) -> tuple[str, ...]:
         vehicle, state = self._session.vehicle, self._session.state

@@ -16,7 +16,8 @@ from math import inf
 from bridge.fc.session import FcSession
 from bridge.gcs.cost import TOO_MANY_WRITES, Cost
 from bridge.gcs.ground import Ground
-from bridge.gcs.station import Severity, Station
+from bridge.gcs.ground_station import Sender
+from bridge.gcs.station import Severity
 from bridge.line.conversation import Conversation, LinkLost, Pause, Receive, ask, ask_status, send
 from bridge.missions.mission_service import MissionService
 from bridge.settings.board_settings import BoardSettings
@@ -107,20 +108,20 @@ class Calibration:
     _began_at: float = 0.0
     _acknowledge_at: float = 0.0
 
-    def take(self, station: Station, command: int, action: FcAction, now: float) -> None:
+    def take(self, sender: Sender, command: int, action: FcAction, now: float) -> None:
         """Execute a command of a ground station, and acknowledge it."""
         if action in (self._asked_for, self._action):
             # Repeated by the user or duplicated by the network.
-            self._acknowledge(station, command, CommandResult.IN_PROGRESS)
+            self._acknowledge(sender, command, CommandResult.IN_PROGRESS)
         elif self._action is not None:
-            self._asked(station, command, action, ActionResult.RUNNING, now)
-        elif not self._ground.allows(station, Cost.FLASH):
-            self._ground.say(Severity.ERROR, TOO_MANY_WRITES, station)
-            self._acknowledge(station, command, CommandResult.TEMPORARILY_REJECTED)
-        elif (refused := self._start(station, command, action, now)) is not None:
-            self._asked(station, command, action, refused, now)
+            self._asked(sender, command, action, ActionResult.RUNNING, now)
+        elif not sender.station.allows(Cost.FLASH):
+            sender.say(Severity.ERROR, TOO_MANY_WRITES)
+            self._acknowledge(sender, command, CommandResult.TEMPORARILY_REJECTED)
+        elif (refused := self._start(sender, command, action, now)) is not None:
+            self._asked(sender, command, action, refused, now)
 
-    def _start(self, station: Station, command: int, action: FcAction, now: float) -> ActionResult | None:
+    def _start(self, sender: Sender, command: int, action: FcAction, now: float) -> ActionResult | None:
         """Ask the flight controller; the reason if that cannot be done now."""
         controller = self._session.state.controller
         if controller is None or controller.arm_bit is None:
@@ -142,28 +143,28 @@ class Calibration:
                 result = ActionResult.NO_ANSWER
             elif result is ActionResult.DONE and controller.profile.restarts_after_calibration:
                 result = ActionResult.FREEZES
-            self._asked(station, command, action, result, at)
+            self._asked(sender, command, action, result, at)
 
         self._asked_for = action
         self._missions.runner.start(_act(action, controller.arm_bit), done, now)
         return None
 
-    def _asked(self, station: Station, command: int, action: FcAction, outcome: ActionResult, now: float) -> None:
+    def _asked(self, sender: Sender, command: int, action: FcAction, outcome: ActionResult, now: float) -> None:
         """The flight controller has begun, or the reason why it has not is known."""
         result = outcome.ack
         if outcome in _NOT_DONE:
-            self._ground.not_written(station)
+            sender.station.give_back(Cost.FLASH)
         if result is not CommandResult.ACCEPTED:
-            self._ground.say(Severity.ERROR, outcome.text, station)
-            self._acknowledge(station, command, result)
+            sender.say(Severity.ERROR, outcome.text)
+            self._acknowledge(sender, command, result)
             return
-        self._ground.say(Severity.NOTICE, action.instruction, station)
+        sender.say(Severity.NOTICE, action.instruction)
         self._restarts = outcome is ActionResult.FREEZES
         if self._restarts:
-            self._ground.say(Severity.NOTICE, outcome.text, station)
+            sender.say(Severity.NOTICE, outcome.text)
         if command == m.MAV_CMD_DO_START_MAG_CAL:
-            self._acknowledge(station, command, result)
-        self._station, self._command, self._action = station, command, action
+            self._acknowledge(sender, command, result)
+        self._sender, self._command, self._action = sender, command, action
         self._began_at = self._acknowledge_at = now
         if self._restarts:
             self._announcer.expect_silence(now + _LONGEST_S)
@@ -181,7 +182,7 @@ class Calibration:
             self._send_progress(now)
         elif now >= self._acknowledge_at:
             self._acknowledge_at = now + _ACK_INTERVAL_S
-            self._acknowledge(self._station, self._command, CommandResult.IN_PROGRESS)
+            self._acknowledge(self._sender, self._command, CommandResult.IN_PROGRESS)
 
     def controller_found(self, now: float) -> None:
         """The flight controller answers again."""
@@ -222,16 +223,16 @@ class Calibration:
         """Report the result; `failure`: the reason, empty if it was successful."""
         sensor = "Compass" if self._action is CALIBRATE_COMPASS else "Accel"
         if failure:
-            self._ground.say(Severity.ERROR, f"{sensor} calibration failed: {failure}", self._station)
+            self._sender.say(Severity.ERROR, f"{sensor} calibration failed: {failure}")
         else:
-            self._ground.say(Severity.NOTICE, f"{sensor} calibration successful", self._station)
+            self._sender.say(Severity.NOTICE, f"{sensor} calibration successful")
         if self._command == m.MAV_CMD_DO_START_MAG_CAL:
             if not failure:
                 self._send_progress(now, 100)
             self._send_report(m.MAG_CAL_FAILED if failure else m.MAG_CAL_SUCCESS)
         else:
             result = CommandResult.FAILED if failure else CommandResult.ACCEPTED
-            self._acknowledge(self._station, self._command, result)
+            self._acknowledge(self._sender, self._command, result)
         self._action = None
 
     def _send_progress(self, now: float, percent: int | None = None) -> None:
@@ -239,8 +240,7 @@ class Calibration:
         if percent is None:
             percent = min(round(100 * (now - self._began_at) / self._usual_s), 99)
         running, nothing = m.MAG_CAL_RUNNING_STEP_ONE, [0] * 10
-        self._ground.to(
-            self._station,
+        self._sender.to(
             m.MAVLink_mag_cal_progress_message(_COMPASS, _ONE_COMPASS, running, 1, percent, nothing, 0.0, 0.0, 0.0),
         )
 
@@ -249,10 +249,10 @@ class Calibration:
 
         Not "autosaved", after which it demands a reboot: the board has restarted by itself, or needs none.
         """
-        self._ground.to(self._station, m.MAVLink_mag_cal_report_message(_COMPASS, _ONE_COMPASS, status, 0, *_UNKNOWN))
+        self._sender.to(m.MAVLink_mag_cal_report_message(_COMPASS, _ONE_COMPASS, status, 0, *_UNKNOWN))
 
-    def _acknowledge(self, station: Station, command: int, result: CommandResult) -> None:
-        self._ground.to(station, m.MAVLink_command_ack_message(command, result, 0, 0, station.sysid, station.compid))
+    def _acknowledge(self, sender: Sender, command: int, result: CommandResult) -> None:
+        sender.to(m.MAVLink_command_ack_message(command, result, 0, 0, sender.sysid, sender.compid))
 
 
 def _is_level() -> Conversation[bool | None]:

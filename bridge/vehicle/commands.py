@@ -14,7 +14,8 @@ from bridge.fc.profile import Spoken
 from bridge.fc.session import FcSession
 from bridge.gcs.cost import TOO_MANY_WRITES, Cost
 from bridge.gcs.ground import Ground
-from bridge.gcs.station import Severity, Station
+from bridge.gcs.ground_station import Sender
+from bridge.gcs.station import Severity
 from bridge.model.flight_mode import MISSION_BOXES
 from bridge.model.refusal import Refusal
 from bridge.model.vehicle import MissionLeg, Switches
@@ -102,51 +103,50 @@ class CommandService:
     _set_waypoint: SetWaypoint
     _version: str
 
-    def take(self, station: Station, command: int, params: Sequence[float], now: float) -> None:
+    def take(self, sender: Sender, command: int, params: Sequence[float], now: float) -> None:
         """Execute a command and acknowledge it. `params`: param1..param7."""
-        if (sender := self._ground.station(station.peer)) is not None:
-            sender.uses_commands = True
+        sender.station.uses_commands = True
         action = _action(command, params)
         if command == messages.MAV_CMD_PREFLIGHT_STORAGE:
-            self._store(station, command, params[0], now)
+            self._store(sender, command, params[0], now)
         elif command == messages.MAV_CMD_DO_SET_MISSION_CURRENT and self._set_waypoint.is_possible:
-            self._do_set_current(station, params[0], params[1], now)
+            self._do_set_current(sender, params[0], params[1], now)
         elif action is None:
-            self._acknowledge(station, command, self._do(station, command, params, now))
+            self._acknowledge(sender, command, self._do(sender, command, params, now))
         else:
-            self._calibration.take(station, command, action, now)
+            self._calibration.take(sender, command, action, now)
 
-    def set_current(self, station: Station, seq: int, now: float) -> None:
+    def set_current(self, sender: Sender, seq: int, now: float) -> None:
         """MISSION_SET_CURRENT, which has no acknowledgement."""
         if self._set_waypoint.is_possible:
-            self._set_waypoint.begin(station, seq, lambda refusal: self._set(station, refusal, now), now)
+            self._set_waypoint.begin(sender, seq, lambda refusal: self._set(sender, refusal, now), now)
         else:
-            self.refuse(station, messages.MAV_CMD_DO_SET_MISSION_CURRENT)
-            self._vehicle.refuse_current(station, now)
+            self.refuse(sender, messages.MAV_CMD_DO_SET_MISSION_CURRENT)
+            self._vehicle.refuse_current(sender, now)
 
-    def _do_set_current(self, station: Station, seq: float, resets: float, now: float) -> None:
+    def _do_set_current(self, sender: Sender, seq: float, resets: float, now: float) -> None:
         """MAV_CMD_DO_SET_MISSION_CURRENT."""
 
         def ended(refusal: Refusal | None) -> None:
-            self._set(station, refusal, now)
+            self._set(sender, refusal, now)
             result = CommandResult.ACCEPTED if refusal is None else _NOT_SET.get(refusal.ack, CommandResult.DENIED)
-            self._acknowledge(station, messages.MAV_CMD_DO_SET_MISSION_CURRENT, result)
+            self._acknowledge(sender, messages.MAV_CMD_DO_SET_MISSION_CURRENT, result)
 
         if resets == 1:
             ended(_NO_RESET)
         else:
-            self._set_waypoint.begin(station, seq, ended, now)
+            self._set_waypoint.begin(sender, seq, ended, now)
 
-    def _set(self, station: Station, refusal: Refusal | None, now: float) -> None:
+    def _set(self, sender: Sender, refusal: Refusal | None, now: float) -> None:
         if refusal is not None:
-            self._ground.say(Severity.ERROR, refusal.text, station)
-            self._vehicle.refuse_current(station, now)
+            sender.say(Severity.ERROR, refusal.text)
+            self._vehicle.refuse_current(sender, now)
 
-    def refuse(self, station: Station, command: int, custom_mode: float = -1) -> None:
+    def refuse(self, sender: Sender, command: int, custom_mode: float = -1) -> None:
         """Give the reason for refusing a command, or a message that does the same but is not acknowledged."""
         is_auto = command == messages.MAV_CMD_DO_SET_MODE and custom_mode == auto_mode(self._session.vehicle)
         of_mission = self._mission_refusal() if is_auto or command in _OF_A_MISSION else None
-        self._ground.say(Severity.ERROR, of_mission or _REFUSED[command], station)
+        sender.say(Severity.ERROR, of_mission or _REFUSED[command])
 
     def _mission_refusal(self) -> str | None:
         """The switch that flies the mission, or that none does; None if that is not known."""
@@ -159,86 +159,86 @@ class CommandService:
         switch = next((box for box in boxes if box in MISSION_BOXES), None)
         return None if switch is None else f"Only the switch {switch} flies the mission"
 
-    def _acknowledge(self, station: Station, command: int, result: CommandResult) -> None:
-        ack = messages.MAVLink_command_ack_message(command, result, 0, 0, station.sysid, station.compid)
-        self._ground.to(station, ack)
+    def _acknowledge(self, sender: Sender, command: int, result: CommandResult) -> None:
+        ack = messages.MAVLink_command_ack_message(command, result, 0, 0, sender.sysid, sender.compid)
+        sender.to(ack)
 
-    def _do(self, station: Station, command: int, params: Sequence[float], now: float) -> CommandResult:
+    def _do(self, sender: Sender, command: int, params: Sequence[float], now: float) -> CommandResult:
         match command:
             case messages.MAV_CMD_REQUEST_MESSAGE if params[0] == messages.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
-                return self._tell_interval(station, _msgid(params[1]))
+                return self._tell_interval(sender, _msgid(params[1]))
             case messages.MAV_CMD_REQUEST_MESSAGE if params[0] == COMPONENT_METADATA:
                 metadata = self._parameters.metadata(round(now * 1000) & 0xFFFFFFFF)
                 if metadata is None:
                     return CommandResult.TEMPORARILY_REJECTED
-                self._ground.to(station, metadata)
+                sender.to(metadata)
                 return CommandResult.ACCEPTED
             case messages.MAV_CMD_REQUEST_MESSAGE:
-                return self._send_once(station, _msgid(params[0]), now, max(_msgid(params[1]), 0))
+                return self._send_once(sender, _msgid(params[0]), now, max(_msgid(params[1]), 0))
             case messages.MAV_CMD_SET_MESSAGE_INTERVAL:
-                return self._set_interval(station, _msgid(params[0]), params[1])
+                return self._set_interval(sender, _msgid(params[0]), params[1])
             case messages.MAV_CMD_GET_MESSAGE_INTERVAL:
-                return self._tell_interval(station, _msgid(params[0]))
+                return self._tell_interval(sender, _msgid(params[0]))
             case messages.MAV_CMD_DO_SEND_BANNER:
                 controller = self._session.state.controller
                 name = "no flight controller" if controller is None else controller.name
-                self._ground.say(Severity.INFO, f"naze-bridge {self._version}: {name}", station)
-                self._vehicle.send_once(station, messages.MAVLINK_MSG_ID_HOME_POSITION, now)
+                sender.say(Severity.INFO, f"naze-bridge {self._version}: {name}")
+                self._vehicle.send_once(sender, messages.MAVLINK_MSG_ID_HOME_POSITION, now)
                 return CommandResult.ACCEPTED
             case messages.MAV_CMD_RUN_PREARM_CHECKS:
-                self._vehicle.arming_reasons.tell(station)
+                self._vehicle.arming_reasons.tell(sender.station)
                 return CommandResult.ACCEPTED
             case messages.MAV_CMD_DO_ACCEPT_MAG_CAL:
                 return CommandResult.ACCEPTED  # it is stored already
             case messages.MAV_CMD_DO_CANCEL_MAG_CAL if self._calibration.is_endless:
-                self._ground.say(Severity.ERROR, "It cannot be cancelled: wait, or power the craft off", station)
+                sender.say(Severity.ERROR, "It cannot be cancelled: wait, or power the craft off")
                 return CommandResult.DENIED
             case messages.MAV_CMD_DO_CANCEL_MAG_CAL:
                 # QGroundControl also asks in this way if there is such a calibration.
                 return CommandResult.ACCEPTED
             case messages.MAV_CMD_PREFLIGHT_CALIBRATION if _asked(params) in _CALIBRATED_AT_START:
-                self._ground.say(Severity.ERROR, _AT_START, station)
+                sender.say(Severity.ERROR, _AT_START)
                 return CommandResult.DENIED
         if command in _ASKS_FOR:
-            return self._send_once(station, _ASKS_FOR[command], now)
+            return self._send_once(sender, _ASKS_FOR[command], now)
         if command in _REFUSED:
-            self.refuse(station, command, params[1])
+            self.refuse(sender, command, params[1])
             return CommandResult.DENIED
         return CommandResult.UNSUPPORTED
 
-    def _store(self, station: Station, command: int, what: float, now: float) -> None:
+    def _store(self, sender: Sender, command: int, what: float, now: float) -> None:
         """MAV_CMD_PREFLIGHT_STORAGE. Mission Planner sends it 10 s after any PARAM_SET, even in flight."""
         settings = self._settings
         if what != _SAVE:
-            self._ground.say(Severity.ERROR, "Settings are only saved, not loaded or reset", station)
-            self._acknowledge(station, command, CommandResult.DENIED)
+            sender.say(Severity.ERROR, "Settings are only saved, not loaded or reset")
+            self._acknowledge(sender, command, CommandResult.DENIED)
         elif not settings.known.unsaved and (
             settings.known.is_saved or self._parameters.was_refused or settings.obstacle() is not None
         ):
-            self._acknowledge(station, command, CommandResult.ACCEPTED)
-        elif not self._ground.allows(station, Cost.FLASH):
-            self._ground.say(Severity.ERROR, TOO_MANY_WRITES, station)
-            self._acknowledge(station, command, CommandResult.TEMPORARILY_REJECTED)
+            self._acknowledge(sender, command, CommandResult.ACCEPTED)
+        elif not sender.station.allows(Cost.FLASH):
+            sender.say(Severity.ERROR, TOO_MANY_WRITES)
+            self._acknowledge(sender, command, CommandResult.TEMPORARILY_REJECTED)
         else:
-            settings.save(lambda result, _at: self._stored(station, command, result), now)
+            settings.save(lambda result, _at: self._stored(sender, command, result), now)
 
-    def _stored(self, station: Station, command: int, result: Answer) -> None:
+    def _stored(self, sender: Sender, command: int, result: Answer) -> None:
         if not isinstance(result, SettingRefusal):
-            self._ground.say(Severity.INFO, "Settings saved", station)
-            self._acknowledge(station, command, CommandResult.ACCEPTED)
+            sender.say(Severity.INFO, "Settings saved")
+            self._acknowledge(sender, command, CommandResult.ACCEPTED)
             return
         if result.cause is not Cause.NO_ANSWER:
-            self._ground.not_written(station)
-        self._ground.say(Severity.ERROR, result.text, station)
-        self._acknowledge(station, command, _NOT_STORED.get(result.cause, CommandResult.DENIED))
+            sender.station.give_back(Cost.FLASH)
+        sender.say(Severity.ERROR, result.text)
+        self._acknowledge(sender, command, _NOT_STORED.get(result.cause, CommandResult.DENIED))
 
-    def _send_once(self, station: Station, msgid: int, now: float, index: int = 0) -> CommandResult:
-        is_known = self._vehicle.send_once(station, msgid, now, index)
+    def _send_once(self, sender: Sender, msgid: int, now: float, index: int = 0) -> CommandResult:
+        is_known = self._vehicle.send_once(sender, msgid, now, index)
         if is_known is None:
             return CommandResult.UNSUPPORTED
         return CommandResult.ACCEPTED if is_known else CommandResult.TEMPORARILY_REJECTED
 
-    def _set_interval(self, station: Station, msgid: int, interval_us: float) -> CommandResult:
+    def _set_interval(self, sender: Sender, msgid: int, interval_us: float) -> CommandResult:
         """SET_MESSAGE_INTERVAL: -1 never, 0 the default."""
         if interval_us == 0:
             interval_s = None
@@ -248,17 +248,17 @@ class CommandService:
             interval_s = interval_us / 1e6
         else:
             return CommandResult.DENIED
-        is_known = self._vehicle.set_interval(station.peer, msgid, interval_s)
+        is_known = self._vehicle.set_interval(sender.station, msgid, interval_s)
         return CommandResult.ACCEPTED if is_known else CommandResult.UNSUPPORTED
 
-    def _tell_interval(self, station: Station, msgid: int) -> CommandResult:
+    def _tell_interval(self, sender: Sender, msgid: int) -> CommandResult:
         """Answer with MESSAGE_INTERVAL: -1 never, 0 no such message."""
-        interval_s = self._vehicle.interval_s(station.peer, msgid)
+        interval_s = self._vehicle.interval_s(sender.station, msgid)
         interval_us = 0
         if interval_s is not None:
             interval_us = -1 if interval_s == math.inf else min(round(interval_s * 1e6), _MAX_I32)
         if 0 <= msgid <= _MAX_U16:
-            self._ground.to(station, messages.MAVLink_message_interval_message(msgid, interval_us))
+            sender.to(messages.MAVLink_message_interval_message(msgid, interval_us))
         return CommandResult.UNSUPPORTED if interval_s is None else CommandResult.ACCEPTED
 
 

@@ -3,20 +3,19 @@
 
 from collections import Counter
 from collections.abc import Callable
-from functools import partial
 from itertools import product
 
 from bridge.gcs.cost import Cost
 from bridge.gcs.ground import Ground
-from bridge.gcs.ground_station import GroundStation
+from bridge.gcs.ground_station import GroundStation, Sender
 from bridge.gcs.return_path import NOT_SHOWN
 from bridge.gcs.rights import FrameRefusal
 from bridge.gcs.routes import Routes
-from bridge.gcs.station import Peer, Severity, Station
+from bridge.gcs.station import Peer, Severity
 from bridge.model.events import Emit, GcsRefused
 from bridge.settings.parameters import Parameters
 from bridge.vehicle.message_router import MessageRouter
-from protocols.mavlink.codec import decode
+from protocols.mavlink.codec import FrameWriter, decode
 from protocols.mavlink.command import CommandResult
 from protocols.mavlink.dialect import MESSAGE_FORMATS, Message
 from protocols.mavlink.dialect import messages as m
@@ -57,102 +56,111 @@ class Incoming:
 
     def received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> bool:
         """Handle bytes from a ground station; False if they are dropped. A datagram holds whole frames only."""
-        sender = self._ground.sender(peer, len(data), now, datagram=datagram)
-        if sender is None:
+        received = self._ground.received(peer, data, now, datagram=datagram)
+        if received is None:
             return False
-        for frame in self._ground.split(sender, data, datagram=datagram):
+        station, frames = received
+        for frame in frames:
             ids, target, msgid = frame.sender, frame.target, frame.msgid
             if ids == self._ids:
                 # It comes back from a broadcast, or from a router that floods.
                 continue
             effect = effect_of(frame)
-            refused = sender.refusal(frame, effect)
+            refused = station.refusal(frame, effect)
             if refused is not None:
                 self.refused[peer.link, refused.why] += 1
                 if refused.is_forged:
-                    self._report(refused, sender, frame)
+                    self._report(refused, station, frame)
                     continue
-            if not (sender.is_heard or self._ground.admits(sender, now)):
+            if not (station.is_heard or self._ground.admits(station, now)):
                 return False
-            if not self._ground.heard(sender, frame, ids, now):
-                self._ignore_unproven(sender, frame)
+            sender = self._ground.heard(station, frame, ids, now)
+            if sender is None:
+                self._ignore_unproven(station, frame)
             elif refused is not None:
                 self._answer_refused(refused, sender, frame)
             elif self.routes is not None:
                 self._pass_on(self.routes, sender, frame, effect)
             else:
-                self._ground.record(sender, frame)
+                self._record(station, frame)
                 if target in self._our_targets:
-                    self._router.take(sender, Station(peer, *ids), frame, msgid, now)
+                    self._router.take(sender, frame, msgid, now)
         return True
 
-    def _ignore_unproven(self, sender: GroundStation, frame: MavlinkFrame) -> None:
-        """Report a station that has not shown that it receives anything, once it had several opportunities."""
-        if sender.return_path is not None and sender.return_path.has_failed:
-            self.refused[sender.peer.link, NOT_SHOWN] += 1
-            self._report(FrameRefusal(NOT_SHOWN, is_routine=False), sender, frame)
+    def _record(self, station: GroundStation, frame: MavlinkFrame) -> None:
+        recorded = self._ground.outbox.recorded
+        if recorded is not None and not station.is_listener and station.allows(Cost.RECORDED):
+            recorded.append(frame.raw)
 
-    def _pass_on(self, routes: Routes, sender: GroundStation, frame: MavlinkFrame, effect: Effect) -> None:
+    def _ignore_unproven(self, station: GroundStation, frame: MavlinkFrame) -> None:
+        """Report a station that has not shown that it receives anything, once it had several opportunities."""
+        if station.return_path is not None and station.return_path.has_failed:
+            self.refused[station.peer.link, NOT_SHOWN] += 1
+            self._report(FrameRefusal(NOT_SHOWN, is_routine=False), station, frame)
+
+    def _pass_on(self, routes: Routes, sender: Sender, frame: MavlinkFrame, effect: Effect) -> None:
         """Send a frame on to its targets, within its sender's rights."""
-        if not sender.allows(Cost.PASSED) or routes.is_echo(frame):
+        station = sender.station
+        if not station.allows(Cost.PASSED) or routes.is_echo(frame):
             return
-        to_stations = effect in sender.rights.stations
-        is_for_autopilot = routes.from_station(sender, frame, to_stations=to_stations)
+        to_stations = effect in station.rights.stations
+        is_for_autopilot = routes.from_station(station, frame, to_stations=to_stations)
         if is_for_autopilot or not to_stations:
-            refused = sender.passing_refusal(effect)
+            refused = station.passing_refusal(effect)
             if refused is not None:
-                if not sender.is_listener:
-                    self.refused[sender.peer.link, refused.why] += 1
+                if not station.is_listener:
+                    self.refused[station.peer.link, refused.why] += 1
                 self._answer_refused(refused, sender, frame)
                 return
-        self._ground.record(sender, frame)
+        self._record(station, frame)
         if is_for_autopilot:
             self._send_to_autopilot(frame.raw)
 
-    def _answer_refused(self, refused: FrameRefusal, sender: GroundStation, frame: MavlinkFrame) -> None:
+    def _answer_refused(self, refused: FrameRefusal, sender: Sender, frame: MavlinkFrame) -> None:
         """Answer a refused frame under the ids that it addressed, if these are the vehicle's."""
-        self._report(refused, sender, frame)
-        station = Station(sender.peer, *frame.sender)
-        answers = partial(self._ground.to, station)
+        station = sender.station
+        self._report(refused, station, frame)
+        writer = None
         is_vehicle = frame.target in self._our_targets
         if self.routes is not None:
             asked = self.routes.addressed(*frame.target)
             is_vehicle = asked is not None
-            if asked is not None:
-                answers = partial(self._ground.to_as, asked, sender)
-        if not (is_vehicle and sender.allows(Cost.ANSWER)):
+            writer = None if asked is None else FrameWriter(*asked, station.sign)
+        if not (is_vehicle and station.allows(Cost.ANSWER)):
             return
         message = decode(frame)
-        answer = None if message is None else _denial(message, station)
+        answer = None if message is None else _denial(message, sender)
         if answer is not None:
-            answers(answer)
+            self._ground.outbox.send(station, [answer], writer)
         elif message is not None and frame.msgid == m.MAVLINK_MSG_ID_PARAM_SET and self.routes is None:
-            self._parameters.refuse(station, message.param_id)
+            self._parameters.refuse(sender, message.param_id)
         text = f"Refused: {refused.why}"
-        if not refused.is_routine and sender.texts.is_new(text, sender.heard_at) and sender.allows(Cost.TEXT):
-            answers(m.MAVLink_statustext_message(Severity.WARNING, text.encode()))
+        if not refused.is_routine and station.texts.is_new(text, station.heard_at) and station.allows(Cost.TEXT):
+            message = m.MAVLink_statustext_message(Severity.WARNING, text.encode())
+            self._ground.outbox.send(station, [message], writer)
 
     def _report(self, refused: FrameRefusal, station: GroundStation, frame: MavlinkFrame) -> None:
         """Log a connected station's refusal once for each reason."""
         if refused.is_routine or refused.why in station.reported:
             return
         station.reported.add(refused.why)
-        name, known = Station(station.peer, *frame.sender), MESSAGE_FORMATS.get(frame.msgid)
+        known = MESSAGE_FORMATS.get(frame.msgid)
+        name = "{} sysid {} compid {}".format(station.peer, *frame.sender)
         message = str(frame.msgid if known is None else known.name)
-        self._emit(GcsRefused(station=str(name), message=message, why=refused.why))
+        self._emit(GcsRefused(station=name, message=message, why=refused.why))
 
 
-def _denial(message: Message, station: Station) -> Message | None:
+def _denial(message: Message, sender: Sender) -> Message | None:
     """The protocol's own negative reply to a refused message, if there is one."""
     match message.get_type():
         case "COMMAND_LONG" | "COMMAND_INT":
             denied = CommandResult.DENIED
-            return m.MAVLink_command_ack_message(message.command, denied, 0, 0, station.sysid, station.compid)
+            return m.MAVLink_command_ack_message(message.command, denied, 0, 0, sender.sysid, sender.compid)
         case "MISSION_COUNT" | "MISSION_ITEM" | "MISSION_ITEM_INT" | "MISSION_CLEAR_ALL" | "MISSION_WRITE_PARTIAL_LIST":
             denied_mission = MissionResult.DENIED
-            return m.MAVLink_mission_ack_message(station.sysid, station.compid, denied_mission, message.mission_type)
+            return m.MAVLink_mission_ack_message(sender.sysid, sender.compid, denied_mission, message.mission_type)
         case "FILE_TRANSFER_PROTOCOL":
             payload = refuse(message.payload)
             if payload is not None:
-                return m.MAVLink_file_transfer_protocol_message(0, station.sysid, station.compid, payload)
+                return m.MAVLink_file_transfer_protocol_message(0, sender.sysid, sender.compid, payload)
     return None

@@ -7,8 +7,8 @@ from math import inf
 
 from bridge.gcs.cost import Cost
 from bridge.gcs.ground import Ground
-from bridge.gcs.ground_station import GroundStation
-from bridge.gcs.station import Severity, Station
+from bridge.gcs.ground_station import Sender
+from bridge.gcs.station import Severity
 from bridge.missions.place_lists import NO_PLACES
 from bridge.settings.parameters import Parameters
 from bridge.transfers.downloads import MissionDownloads
@@ -49,7 +49,7 @@ _READS = frozenset(
     }
 )
 
-_Handler = Callable[[Station, Message, float], object]
+_Handler = Callable[[Sender, Message, float], object]
 
 
 class MessageRouter:
@@ -96,9 +96,7 @@ class MessageRouter:
             m.MAVLINK_MSG_ID_PARAM_SET: lambda s, msg, now: parameters.set(s, msg.param_id, msg.param_value, now),
             m.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: lambda s, msg, now: parameters.answer_file(s, msg.payload, now),
             # There are none. Without an answer Mission Planner reads nothing else for 25 s.
-            m.MAVLINK_MSG_ID_LOG_REQUEST_LIST: lambda s, _msg, _now: ground.to(
-                s, m.MAVLink_log_entry_message(0, 0, 0, 0, 0)
-            ),
+            m.MAVLINK_MSG_ID_LOG_REQUEST_LIST: lambda s, _msg, _now: s.to(m.MAVLink_log_entry_message(0, 0, 0, 0, 0)),
             m.MAVLINK_MSG_ID_PING: self._ping,
             m.MAVLINK_MSG_ID_TIMESYNC: self._timesync,
         }
@@ -116,61 +114,61 @@ class MessageRouter:
             m.MAVLINK_MSG_ID_MISSION_REQUEST_INT: lambda s, msg, now: downloads.request(s, msg.seq, now, as_int=True),
         }
 
-    def take(self, sender: GroundStation, station: Station, frame: MavlinkFrame, msgid: int, now: float) -> None:
+    def take(self, sender: Sender, frame: MavlinkFrame, msgid: int, now: float) -> None:
         """Handle a frame for the bridge's vehicle, if it is understood and its sender has not sent too many."""
         handler = self.handlers.get(msgid)
         if handler is None or (message := decode(frame)) is None:
             return
-        if not sender.allows(Cost.TRANSFER if msgid in _OF_A_TRANSFER else Cost.ANSWER):
+        if not sender.station.allows(Cost.TRANSFER if msgid in _OF_A_TRANSFER else Cost.ANSWER):
             return
         mission_type = getattr(message, "mission_type", m.MAV_MISSION_TYPE_MISSION)
         clears_all = msgid == m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL and mission_type == m.MAV_MISSION_TYPE_ALL
         if msgid in _READS or msgid in _ENDS_DOWNLOAD:
             for kind in self._transfers.values():
                 if kind.uploads.answers.due < inf:
-                    kind.uploads.answers.went_on(station)
+                    kind.uploads.answers.went_on(sender)
         of_type = self._transfers.get(m.MAV_MISSION_TYPE_MISSION if clears_all else mission_type)
         if of_type is not None and of_type.lists.are_stored:
             if msgid in _READS:
-                of_type.uploads.reads(station, now)
+                of_type.uploads.reads(sender, now)
             if msgid in _ENDS_DOWNLOAD:
-                of_type.downloads.forget(station)
+                of_type.downloads.forget(sender)
             # Messages about no list have the type of missions.
-            (self._of_type[of_type.lists.mission_type].get(msgid) or handler)(station, message, now)
+            (self._of_type[of_type.lists.mission_type].get(msgid) or handler)(sender, message, now)
         elif msgid != m.MAVLINK_MSG_ID_MISSION_ACK:
             if msgid == m.MAVLINK_MSG_ID_MISSION_COUNT:
-                self._ground.say(Severity.ERROR, NO_PLACES.text, station)
-            self._ground.mission_ack(station, MissionResult.UNSUPPORTED, mission_type)
+                sender.say(Severity.ERROR, NO_PLACES.text)
+            sender.mission_ack(MissionResult.UNSUPPORTED, mission_type)
         if clears_all:
             # The one answer is the missions'.
             for number in (m.MAV_MISSION_TYPE_FENCE, m.MAV_MISSION_TYPE_RALLY):
                 if self._transfers[number].lists.are_stored:
-                    self._transfers[number].uploads.clear_all(station, number, now)
+                    self._transfers[number].uploads.clear_all(sender, number, now)
 
     def _item(
         self,
         uploads: MissionUploads,
         convert: Callable[[Message], MissionItem],
-        station: Station,
+        sender: Sender,
         message: Message,
         now: float,
     ) -> None:
-        if message.current in _GUIDED and not uploads.is_writing(station):
-            self._commands.refuse(station, m.MAV_CMD_NAV_WAYPOINT)
-            self._ground.mission_ack(station, MissionResult.DENIED)
+        if message.current in _GUIDED and not uploads.is_writing(sender):
+            self._commands.refuse(sender, m.MAV_CMD_NAV_WAYPOINT)
+            sender.mission_ack(MissionResult.DENIED)
         else:
-            uploads.item(station, convert(message), self._ground.speaker(station), now)
+            uploads.item(sender, convert(message), now)
 
-    def _data_stream(self, station: Station, message: Message, _now: float) -> None:
+    def _data_stream(self, sender: Sender, message: Message, _now: float) -> None:
         rate_hz = message.req_message_rate if message.start_stop else 0
-        self._vehicle.set_stream(station.peer, message.req_stream_id, 1 / rate_hz if rate_hz else inf)
+        self._vehicle.set_stream(sender.station, message.req_stream_id, 1 / rate_hz if rate_hz else inf)
 
-    def _ping(self, station: Station, message: Message, _now: float) -> None:
+    def _ping(self, sender: Sender, message: Message, _now: float) -> None:
         # A PING with targets is itself an answer.
         if message.target_system == 0:
-            answer = m.MAVLink_ping_message(message.time_usec, message.seq, station.sysid, station.compid)
-            self._ground.to(station, answer)
+            answer = m.MAVLink_ping_message(message.time_usec, message.seq, sender.sysid, sender.compid)
+            sender.to(answer)
 
-    def _timesync(self, station: Station, message: Message, now: float) -> None:
+    def _timesync(self, sender: Sender, message: Message, now: float) -> None:
         if message.tc1 == 0:
-            self._ground.to(station, m.MAVLink_timesync_message(int(now * 1e9), message.ts1))
+            sender.to(m.MAVLink_timesync_message(int(now * 1e9), message.ts1))

@@ -12,9 +12,9 @@ from math import floor, inf
 from bridge.fc.msp_telemetry import POLL_FOR
 from bridge.fc.session import FcSession
 from bridge.gcs.ground import Ground
-from bridge.gcs.ground_station import GroundStation
+from bridge.gcs.ground_station import GroundStation, Sender
 from bridge.gcs.message_rates import fastest_s, take_due
-from bridge.gcs.station import Peer, Severity, Station
+from bridge.gcs.station import Severity
 from bridge.missions.mission_service import MissionService
 from bridge.model.airframe import Airframe
 from bridge.model.flight_memory import Home
@@ -93,7 +93,7 @@ class OwnVehicle:
         #: Armed, mode, failsafe and lost as last announced.
         self._announced: tuple[bool | None, FlightMode | str | None, bool, bool] | None = None
         #: The ground stations whose waypoint was set since the last report of the board.
-        self._asked_current: list[Station] = []
+        self._asked_current: list[Sender] = []
         self._nav_words = NavWords()
         #: The last reason for the stop of a mission flight.
         self._said_why = ""
@@ -103,7 +103,7 @@ class OwnVehicle:
         station.greeted_until, station.is_informed = now + _NEWCOMER_S, False
         self._newcomers_due = min(self._newcomers_due, now + _NEWCOMER_INTERVAL_S)
         self.due = min(self.due, self._newcomers_due)
-        self._ground.beat(self._heartbeat(now), [station])
+        self._beat(now, [station])
         self._follow_requests()
 
     def tick(self, now: float) -> None:
@@ -112,18 +112,18 @@ class OwnVehicle:
         if now >= self._second_ends:
             self._end_second(now)
         if now >= self._polls_due:
-            self._set_polls(self._ground.everyone())
+            self._set_polls(self._ground.everyone)
             self._polls_set_at = now
         self.due = min(self._second_ends, self._newcomers_due, self._polls_due)
 
     def _end_second(self, now: float) -> None:
         # Polls are also due at whole seconds: one wake-up serves both.
         self._second_ends = floor(now) + _TICK_S
-        everyone = self._ground.everyone()
+        everyone = self._ground.everyone
         self._set_polls(everyone)
         self._polls_set_at = now
         self.arming_reasons.follow(now)
-        self._ground.beat(self._heartbeat(now), everyone)
+        self._beat(now, everyone)
         self._send_due(self._rows.get(None, ()), now)
         if self._session.vehicle.fresh(Health, now, _SILENT_S) is None:
             # No reading triggers it now: the flight controller is lost, or sends FrSky telemetry.
@@ -132,19 +132,19 @@ class OwnVehicle:
         self._inform_newcomers(everyone, now)
 
     def _greet(self, now: float) -> None:
-        newcomers = [station for station in self._ground.everyone() if now < station.greeted_until]
+        newcomers = [station for station in self._ground.everyone if now < station.greeted_until]
         self._newcomers_due = now + _NEWCOMER_INTERVAL_S if newcomers else inf
-        self._ground.beat(self._heartbeat(now), newcomers)
+        self._beat(now, newcomers)
 
     def _inform_newcomers(self, everyone: Sequence[GroundStation], now: float) -> None:
         """Tell home and the reasons not to arm."""
         newcomers = [station for station in everyone if not station.is_informed]
         for message in self._moment(now).made(*_HOME) if newcomers else ():
-            self._ground.multicast(pack(message), newcomers)
+            self._ground.outbox.multicast(pack(message), newcomers)
         for station in newcomers:
             station.is_informed = True
             if not station.is_listener:
-                self.arming_reasons.tell(Station(station.peer, 0, 0))
+                self.arming_reasons.tell(station)
 
     def heard(self, news: Collection[type[Reading]], now: float) -> None:
         """Send the messages that new readings trigger, where due."""
@@ -160,7 +160,7 @@ class OwnVehicle:
             self._follow_state(now)
 
     def _send_due(self, triggered: Iterable[_Trigger], now: float) -> None:
-        everyone, fresh = self._ground.everyone(), self._session.vehicle.fresh
+        everyone, fresh = self._ground.everyone, self._session.vehicle.fresh
         at: Moment | None = None
         for row, heard in triggered:
             if row.other is heard and row.reading is not None and heard is not None and fresh(row.reading, now):
@@ -171,16 +171,16 @@ class OwnVehicle:
             elif stations:
                 at = at or self._moment(now)
                 for message in at.made(row.maker):
-                    self._ground.multicast(pack(message), stations)
+                    self._ground.outbox.multicast(pack(message), stations)
 
     def also_want(self, readings: Mapping[type[Reading], float]) -> None:
         """Set the poll intervals for consumers other than ground stations: seconds by reading."""
         self._also_wanted = readings
-        self._set_polls(self._ground.everyone())
+        self._set_polls(self._ground.everyone)
 
     # Requests of ground stations.
 
-    def send_once(self, station: Station, msgid: int, now: float, index: int = 0) -> bool | None:
+    def send_once(self, sender: Sender, msgid: int, now: float, index: int = 0) -> bool | None:
         """Send one message to a ground station; False: its values are unknown, None: no such message.
 
         `index`: of the flight mode in AVAILABLE_MODES, from 1; 0: all.
@@ -195,70 +195,63 @@ class OwnVehicle:
             version = make.autopilot_version(self._session.vehicle, self._capabilities())
             made = [version, *self._moment(now).made(make.home_position)]
         elif (row := _ROWS.get(msgid)) is not None:
-            made = self._moment(now, self.sent_seqs(self._ground.station(station.peer))).made(row.maker)
+            made = self._moment(now, self.sent_seqs(sender.station)).made(row.maker)
         else:
             return None
         for message in made:
-            self._ground.to(station, message)
+            sender.to(message)
         return bool(made)
 
-    def set_interval(self, peer: Peer, msgid: int, interval_s: float | None) -> bool:
+    def set_interval(self, station: GroundStation, msgid: int, interval_s: float | None) -> bool:
         """Set the interval of a message for one ground station; None: the default. False: no such message."""
         if msgid not in _ROWS:
             return False
-        if (station := self._ground.station(peer)) is not None:
-            station.rates.request(msgid, None if interval_s is None else max(interval_s, _FASTEST_S))
+        station.rates.request(msgid, None if interval_s is None else max(interval_s, _FASTEST_S))
         self._follow_requests()
         return True
 
-    def refuse_current(self, station: Station, now: float) -> None:
+    def refuse_current(self, sender: Sender, now: float) -> None:
         """Send MISSION_CURRENT to a ground station whose MISSION_SET_CURRENT was refused, or withhold it.
 
         Mission Planner's window hangs until one arrives. MAVSDK, which requests no streams, repeats its request at each
         that has another number, without end.
         """
-        sender = self._ground.station(station.peer)
-        if sender is not None and sender.uses_streams:
-            self.send_once(station, messages.MAVLINK_MSG_ID_MISSION_CURRENT, now)
+        if sender.station.uses_streams:
+            self.send_once(sender, messages.MAVLINK_MSG_ID_MISSION_CURRENT, now)
         else:
-            self.withhold_current(station, now)
+            self.withhold_current(sender.station, now)
 
-    def withhold_current(self, station: Station, now: float) -> None:
+    def withhold_current(self, station: GroundStation, now: float) -> None:
         """Send no MISSION_CURRENT to a ground station until its MISSION_SET_CURRENT is answered."""
-        if (sender := self._ground.station(station.peer)) is not None:
-            sender.rates.due[messages.MAVLINK_MSG_ID_MISSION_CURRENT] = now + _NO_CURRENT_S
+        station.rates.due[messages.MAVLINK_MSG_ID_MISSION_CURRENT] = now + _NO_CURRENT_S
 
-    def confirm_current(self, station: Station) -> None:
+    def confirm_current(self, sender: Sender) -> None:
         """Send MISSION_CURRENT to a ground station with the next report of the board."""
-        self._asked_current.append(station)
+        self._asked_current.append(sender)
 
-    def let_read(self, peer: Peer, now: float) -> None:
+    def let_read(self, station: GroundStation, now: float) -> None:
         """Withhold SYS_STATUS from a ground station for as long as Mission Planner shows a text, while disarmed.
 
         An unhealthy sensor, indoors always the GPS, would replace the text after half a second.
         """
-        station = self._ground.station(peer)
-        if station is not None and not self._session.vehicle.armed:
+        if not self._session.vehicle.armed:
             station.rates.due[messages.MAVLINK_MSG_ID_SYS_STATUS] = now + _SHOWN_S
 
-    def set_stream(self, peer: Peer, stream: int, interval_s: float) -> None:
+    def set_stream(self, station: GroundStation, stream: int, interval_s: float) -> None:
         """Set the interval of all messages of one of ArduPilot's streams."""
-        if (station := self._ground.station(peer)) is not None:
-            station.uses_streams = True
+        station.uses_streams = True
         for row in TELEMETRY:
             if row.stream == stream or (stream == _ALL_STREAMS and row.stream != NO_STREAM):
-                self.set_interval(peer, row.msgid, interval_s)
+                self.set_interval(station, row.msgid, interval_s)
 
-    def interval_s(self, peer: Peer, msgid: int) -> float | None:
+    def interval_s(self, station: GroundStation, msgid: int) -> float | None:
         """The current interval of a message for a ground station; infinity: never, None: no such message."""
         if msgid == messages.MAVLINK_MSG_ID_HEARTBEAT:
             return _TICK_S
         if (row := _ROWS.get(msgid)) is None:
             return None
         pace_s = _TICK_S if row.poll is None else self._session.polls.interval_s(row.poll)
-        station = self._ground.station(peer)
-        wanted_s = row.interval_s if station is None else station.rates.interval_s(msgid, row.interval_s)
-        return max(wanted_s, pace_s or 0.0)
+        return max(station.rates.interval_s(msgid, row.interval_s), pace_s or 0.0)
 
     def _follow_requests(self) -> None:
         """Update the polls soon, but not too often."""
@@ -325,7 +318,10 @@ class OwnVehicle:
             self._ground.say(Severity.CRITICAL, "Failsafe: the flight controller has taken over")
         elif was_failsafe and not state.is_failsafe and state.armed:
             self._ground.say(Severity.NOTICE, "Failsafe ended: the pilot has control")
-        self._ground.broadcast(self._heartbeat(now))
+        self._ground.outbox.multicast(pack(self._heartbeat(now)), self._ground.everyone)
+
+    def _beat(self, now: float, stations: Sequence[GroundStation]) -> None:
+        self._ground.outbox.beat(self._heartbeat(now), self._ground.ids, stations)
 
     def _heartbeat(self, now: float) -> Message:
         return make.heartbeat(self._moment(now))
@@ -347,16 +343,16 @@ class OwnVehicle:
             return
         before = self.progress.number, self.progress.progress
         reached = self.progress.take(leg.report)
-        everyone = self._ground.everyone()
+        everyone = self._ground.everyone
         if before != (self.progress.number, self.progress.progress):
             self._send_current(everyone, now)
         asked, self._asked_current = self._asked_current, []
-        for station in asked:
-            self.send_once(station, messages.MAVLINK_MSG_ID_MISSION_CURRENT, now)
+        for sender in asked:
+            self.send_once(sender, messages.MAVLINK_MSG_ID_MISSION_CURRENT, now)
         for seq in filter(None, map(self._missions.seq_of, reached)):
             for sent_seqs, stations in self._by_item_numbers(everyone):
                 number = (sent_seqs[seq] or 0) if sent_seqs else seq
-                self._ground.multicast(pack(make.mission_item_reached(number)), stations)
+                self._ground.outbox.multicast(pack(make.mission_item_reached(number)), stations)
 
     def _say_nav_words(self, status: NavStatus, now: float) -> None:
         """The numbers are those of the items, as each ground station counts them."""
@@ -367,12 +363,13 @@ class OwnVehicle:
         if not words or ("{}" in words and not item):
             return
         flown = FlownMission(() if held is None else held.items, item)
-        for sent_seqs, stations in self._by_item_numbers(self._ground.everyone()):
-            self._ground.say_among(stations, severity_of(words), words.format(*flown.counted(sent_seqs)))
+        for sent_seqs, stations in self._by_item_numbers(self._ground.everyone):
+            readers = [station for station in stations if not station.is_listener]
+            self._ground.outbox.show(severity_of(words), words.format(*flown.counted(sent_seqs)), readers)
 
     def _send_current(self, receivers: Sequence[GroundStation], now: float) -> None:
         for sent_seqs, stations in self._by_item_numbers(receivers):
-            self._ground.multicast(pack(make.mission_current(self._moment(now, sent_seqs))), stations)
+            self._ground.outbox.multicast(pack(make.mission_current(self._moment(now, sent_seqs))), stations)
 
     def _by_item_numbers(self, stations: Sequence[GroundStation]) -> Iterable[tuple[SentSeqs, Sequence[GroundStation]]]:
         """The stations that count the items alike; () stands for the numbers of the list as read back."""
@@ -384,12 +381,12 @@ class OwnVehicle:
             alike.setdefault(self.sent_seqs(station), []).append(station)
         return alike.items()
 
-    def sent_seqs(self, station: GroundStation | None) -> SentSeqs:
+    def sent_seqs(self, station: GroundStation) -> SentSeqs:
         """The item numbers of a station that sent the list and has not read it since; else ()."""
         held = self._missions.on_board
-        if station is None or held is None or not held.sent_seqs:
+        if held is None or not held.sent_seqs:
             return ()
-        known = (held.sent_seqs.get(Station(station.peer, *ids).identity) for ids in station.speakers)
+        known = (held.sent_seqs.get(sender.identity) for sender in station.senders.values())
         return next(filter(None, known), ())
 
     def _announce_home(self, now: float) -> None:

@@ -9,7 +9,8 @@ from collections.abc import Callable
 
 from bridge.gcs.cost import Cost
 from bridge.gcs.ground import Ground
-from bridge.gcs.station import Severity, Station
+from bridge.gcs.ground_station import Sender
+from bridge.gcs.station import Severity
 from bridge.missions.fc_mission_store import FliesToItems
 from bridge.missions.mission_service import HeldMission, MissionService
 from bridge.model.refusal import Refusal
@@ -36,28 +37,28 @@ class SetWaypoint:
         self._vehicle = vehicle
         self._ground = ground
         #: The station and the item of the request in progress.
-        self._present: tuple[Station, float] | None = None
+        self._present: tuple[Sender, float] | None = None
 
     @property
     def is_possible(self) -> bool:
         """True if the flight controller has a request for it."""
         return isinstance(self._missions.fc_store, FliesToItems)
 
-    def begin(self, station: Station, seq: float, on_end: Callable[[Refusal | None], None], now: float) -> None:
+    def begin(self, sender: Sender, seq: float, on_end: Callable[[Refusal | None], None], now: float) -> None:
         """Make the craft fly to item `seq`, in the station's numbers; `on_end` gets None once it does.
 
         A repetition of the request in progress is ignored.
         """
-        if self._present == (station, seq):
+        if self._present == (sender, seq):
             return
         store, held = self._missions.fc_store, self._missions.on_board
         assert isinstance(store, FliesToItems)
-        refusal = self._obstacle(station)
+        refusal = self._obstacle(sender)
         number = 0
         if held is None:
             refusal = refusal or _UNKNOWN
         elif refusal is None:
-            item = self._as_read(held, station, seq)
+            item = self._as_read(held, sender, seq)
             number = store.leg_of(held.records, item)
             refusal = None if number else _denied(_why_not(held, item, seq))
         if held is None or refusal is not None:
@@ -69,30 +70,27 @@ class SetWaypoint:
             if refused is not None:
                 self._vehicle.progress.set_to = 0
             else:
-                self._vehicle.confirm_current(station)
-                self._ground.say_to_others(Severity.NOTICE, "Another ground station has set the waypoint", station)
+                self._vehicle.confirm_current(sender)
+                self._ground.say(Severity.NOTICE, "Another ground station has set the waypoint", but=sender.station)
             on_end(refused)
 
-        self._present = station, seq
-        self._vehicle.withhold_current(station, now)
+        self._present = sender, seq
+        self._vehicle.withhold_current(sender.station, now)
         self._vehicle.progress.set_to = number
         self._missions.run(store.fly_to(held.records, number), ended, now)
 
-    def _obstacle(self, station: Station) -> Refusal | None:
-        heard = self._ground.station(station.peer)
-        if heard is None:
-            return _BUSY
-        if (refused := heard.passing_refusal(Effect.MOVE)) is not None:
+    def _obstacle(self, sender: Sender) -> Refusal | None:
+        if (refused := sender.station.passing_refusal(Effect.MOVE)) is not None:
             return _denied(refused.why)
         if not self._missions.vehicle.armed:
             return _NOT_FLOWN
         if self._present is not None or self._missions.runner.needs_line:
             return _BUSY
-        return None if self._ground.allows(station, Cost.BOARD) else _BUSY
+        return None if sender.station.allows(Cost.BOARD) else _BUSY
 
-    def _as_read(self, held: HeldMission, station: Station, seq: float) -> int:
+    def _as_read(self, held: HeldMission, sender: Sender, seq: float) -> int:
         """The number in the list as read back of the item that the station calls `seq`; 0: none."""
-        numbers = self._vehicle.sent_seqs(self._ground.station(station.peer)) or range(len(held.items))
+        numbers = self._vehicle.sent_seqs(sender.station) or range(len(held.items))
         return next((number for number, shown in enumerate(numbers) if shown == seq), 0)
 
 

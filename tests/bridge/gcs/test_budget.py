@@ -9,7 +9,6 @@ from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.gcs.budget import Budget, Budgets
 from bridge.gcs.cost import Cost
-from bridge.gcs.station import Station
 from protocols.mission_item import MissionResult
 from protocols.msp.frame import MspParser
 from tests.support.conversations import Upload, waypoints
@@ -83,8 +82,9 @@ def test_one_stranger_leaves_half_of_the_flash_writes_to_others() -> None:
 
 
 def writes_left(world: World, station: GroundStation) -> int:
-    at = Station(station.peer, station.sysid, station.compid)
-    return sum(world.inside.ground.allows(at, Cost.FLASH) for _ in range(500))
+    found = world.inside.ground.station(station.peer)
+    assert found is not None
+    return sum(found.allows(Cost.FLASH) for _ in range(500))
 
 
 def test_an_unchanged_list_is_not_counted_as_a_flash_write() -> None:

@@ -12,6 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.gcs.ground import EXPIRY_S
 from bridge.gcs.ground_station import GroundStation as GcsStation
+from bridge.gcs.ground_station import Outbox
 from bridge.gcs.message_rates import take_due
 from bridge.gcs.rights import LinkAccess
 from bridge.gcs.station import Peer, Severity
@@ -137,11 +138,11 @@ def test_messages_of_one_moment_share_datagrams() -> None:
     station.send(gcs_heartbeat())
     world.run(5)
     ground = world.inside.ground
-    ground.take_datagrams()
+    ground.outbox.take()
     values = [own.MAVLink_named_value_int_message(0, b"number", number) for number in range(1, 21)]
     for value in values:
         ground.broadcast(value)
-    datagrams = [data for peer, data in ground.take_datagrams() if peer == station.peer]
+    datagrams = [data for peer, data in ground.outbox.take() if peer == station.peer]
     assert all(len(data) <= 280 for data in datagrams)
     assert len(datagrams) <= 3
     frames = MavlinkSplitter().feed(b"".join(datagrams))
@@ -251,7 +252,8 @@ def test_thirty_stations_that_request_everything_share_1200_messages_a_second() 
 
 def test_a_thousand_peers_all_get_telemetry() -> None:
     """Each one's share is below one message a second."""
-    stations = [GcsStation(Peer("udp", number), LinkAccess(), 1, 1) for number in range(1000)]
+    outbox = Outbox(print)
+    stations = [GcsStation(Peer("udp", number), LinkAccess(), 1, 1, outbox) for number in range(1000)]
     taken: set[Peer] = set()
     for tenth in range(50):
         taken = taken if tenth > 10 else set()  # the first share is larger

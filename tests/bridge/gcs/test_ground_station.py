@@ -9,7 +9,8 @@ from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.gcs.ground import EXPIRY_S
 from bridge.gcs.ground_station import GroundStation as GcsStation
-from bridge.gcs.ground_station import Speaker
+from bridge.gcs.ground_station import Outbox, Sender
+from bridge.gcs.rights import LinkAccess
 from bridge.gcs.station import Peer
 from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame
 from tests.support.conversations import count_message
@@ -80,20 +81,20 @@ def test_nothing_remembers_hundreds_of_stations_that_have_left(leave: Callable[[
 )
 def test_a_gap_in_the_frame_numbers_is_a_lost_frame(numbers: list[int], *, lost: bool) -> None:
     """Unless the missing frame arrives late. A sender that numbers all frames alike seems to lose many."""
-    speaker = Speaker()
+    sender = Sender(GcsStation(Peer("udp", "gcs"), LinkAccess(), 1, 1, Outbox(print)), 255, 190)
     frames = [
         MavlinkFrame(bytes((MAGIC_V2, 0, 0, 0, number, 255, 190, 0, 0, 0, at))) for at, number in enumerate(numbers)
     ]
-    speaker.heard(frames[0], 0.0)
-    first = speaker.frames
+    sender.heard(frames[0], 0.0)
+    first = sender.frames
     for frame in frames[1:]:
-        speaker.heard(frame, 0.1)
-    assert (speaker.last_lost > first) is lost
+        sender.heard(frame, 0.1)
+    assert (sender.last_lost > first) is lost
 
 
 @pytest.mark.parametrize(("silence_s", "is_late"), [(0.9, True), (1.1, False)])
 def test_an_older_number_after_a_silence_is_that_of_a_restarted_sender(silence_s: float, *, is_late: bool) -> None:
-    speaker = Speaker()
+    sender = Sender(GcsStation(Peer("udp", "gcs"), LinkAccess(), 1, 1, Outbox(print)), 255, 190)
     for at, number in ((0.0, 9), (silence_s, 0)):
-        speaker.heard(MavlinkFrame(bytes((MAGIC_V2, 0, 0, 0, number, 255, 190, 0, 0, 0))), at)
-    assert speaker.is_late is is_late
+        sender.heard(MavlinkFrame(bytes((MAGIC_V2, 0, 0, 0, number, 255, 190, 0, 0, 0))), at)
+    assert sender.is_late is is_late

@@ -537,7 +537,7 @@ def test_signed_frames_reach_the_autopilot_unchanged() -> None:
 @pytest.mark.parametrize("access", [LinkAccess(), LinkAccess(signing(), LINK_ID)])
 def test_setup_signing_is_never_forwarded(access: LinkAccess) -> None:
     world, autopilot = passing({"udp": access})
-    world.inside.ground.recorded = []
+    world.inside.ground.outbox.recorded = []
     GroundStation(world, "other", sysid=250).send(READS[0])
     world.run(0.1)
     autopilot.received.clear()
