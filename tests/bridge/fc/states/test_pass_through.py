@@ -306,6 +306,23 @@ def test_a_companion_with_the_autopilots_system_id_is_heard_but_echoes_are_not(s
     assert two.frames == []
 
 
+def test_addresses_heard_once_do_not_multiply_frames() -> None:
+    world, autopilot, (pilot, _) = passing()
+    ground = world.inside.ground
+    hello = pilot.pack(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+    for number in range(200):
+        world.bridge.gcs_received(Peer("udp", (f"10.0.0.{number}", 14550)), hello, world.now, datagram=True)
+    world.run(1)
+    ground.outbox.take()
+    copies: list[tuple[Peer, bytes]] = []
+    for _ in range(400):
+        world.bridge.fc_received(autopilot.pack(mavlink.MAVLink_attitude_message(0, *[0.0] * 6)), world.now)
+        copies += ground.outbox.take()
+    assert [peer for peer, _ in copies].count(pilot.peer) == 400
+    assert {peer for peer, _ in copies} == set(ground.peers())
+    assert len(ground.peers()) == 2
+
+
 def test_an_address_that_is_used_again_gets_nothing_for_its_earlier_ids() -> None:
     world, autopilot, (one, _) = passing()
     world.bridge.gcs_gone(one.peer, world.now)
