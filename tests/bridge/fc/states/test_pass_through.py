@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from bridge.controllers import other
 from bridge.effects import SendToBoard
 from bridge.gcs.rights import LinkAccess
-from bridge.gcs.station import Datagrams
+from bridge.gcs.station import Datagrams, Peer
 from protocols.mavlink.codec import FrameWriter, Packed
 from protocols.mavlink.frame import MavlinkSplitter
 from simulator.naze.board import SimulatedNaze
