@@ -33,7 +33,7 @@ BOXES = {
 }
 #: Home and a 300 m path around the field.
 MISSION = [
-    MissionItem(seq, 16, 3, 0, 0, 0, 0, FIELD[0] + north, FIELD[1] + east, height_m)
+    MissionItem(seq, 16, 3 if seq else 0, 0, 0, 0, 0, FIELD[0] + north, FIELD[1] + east, height_m)
     for seq, (north, east, height_m) in enumerate(
         [(0, 0, 0.0), (8900, 0, 20.0), (9000, 9000, 12.0), (1000, 9000, 25.0), (1000, 1000, 20.0)]
     )
