@@ -19,7 +19,9 @@ from protocols.mavlink.frame import MavlinkFrame
 _FACTOR = 3
 #: Small enough for both messages' fields, and for two trailing zeros that MAVLink 2 omits.
 _NONCES = 1 << 47
-_ENOUGH_QUESTIONS = 4
+_ROUND = 4
+#: A client may send a dozen requests before its answer arrives.
+_ENOUGH_QUESTIONS = 16
 #: The reason why frames of such a station are ignored, and the text for its user.
 NOT_SHOWN = "behind a router, and answers no PING or TIMESYNC"
 _ADVICE = "Behind a router: use a key, or connect by TCP"
@@ -59,7 +61,7 @@ class ReturnPath:
 
     @property
     def has_failed(self) -> bool:
-        """True if the station has left several questions unanswered."""
+        """True if the station has left many questions unanswered."""
         return self._asked > _ENOUGH_QUESTIONS
 
     def question(self) -> Message | None:
@@ -68,11 +70,11 @@ class ReturnPath:
             return None
         self._nonce = self._nonce or 1 + randbelow(_NONCES)
         self._asked += 1
-        match self._asked % _ENOUGH_QUESTIONS:
+        match self._asked % _ROUND:
             case 1:
                 return m.MAVLink_ping_message(self._nonce, 0, 0, 0)
             case 2:
                 return m.MAVLink_timesync_message(0, self._nonce)
-            case 0:
+            case 0 if self._asked >= _ENOUGH_QUESTIONS:
                 return m.MAVLink_statustext_message(Severity.WARNING, _ADVICE.encode())
         return None
