@@ -652,8 +652,7 @@ static bool too_late(nf_t *f, const nf_input_t *in)
     else if (f->state == NF_HOME) { /* too slow against the wind: land here */
         brake(f, in);
         enter(f, in, NF_SETTLE);
-    }
-    else {
+    } else {
         if (row->reason != NF_OK)
             f->reason = row->reason;
         f->height_error_cm = -in->height_cm;

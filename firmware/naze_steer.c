@@ -265,7 +265,7 @@ st_vector_t st_steer(st_t *s, const st_order_t *order)
     change = sum(wanted(s, order, gains), s->wanted, -1.0f);
     s->wanted = sum(s->wanted, limited(change, (order->mode >= ST_PASS ? ST_GATHER_CM_S2 : ST_STOP_CM_S2) * dt), 1.0f);
     off = sum(s->wanted, s->velocity, -1.0f);
-    lean = sum(sum(s->wind, s->air, -1.0f), off, gains->speed);
+    lean = sum(sum(s->wind, s->air, -1.0f), off, order->mode == ST_STOP ? ST_STOP_SPEED : gains->speed);
     if (length(lean) < most || off.n * s->wind.n + off.e * s->wind.e < 0.0f)
         s->wind = limited(sum(s->wind, off, gains->wind * dt), MOST_WIND * most);
     s->asked = limited(lean, most);

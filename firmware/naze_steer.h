@@ -29,7 +29,8 @@
 
 #define ST_BRAKE_CM_S2 60.0f
 #define ST_GATHER_CM_S2 150.0f /* greatest change of the wanted velocity, ... */
-#define ST_STOP_CM_S2 600.0f   /* ... and when it stops */
+#define ST_STOP_CM_S2 600.0f   /* ... and when it stops, */
+#define ST_STOP_SPEED 1.8f     /* ... with this gain for the speed, 1/s: without a place to fly to it may be higher */
 #define ST_LAG_MS 250u         /* the assumed age of a fix */
 #define ST_ENOUGH 25000.0f     /* (cm/s)2, summed */
 #define ST_STEP_CD 500

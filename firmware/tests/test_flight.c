@@ -306,7 +306,7 @@ static void move_craft(const nf_output_t *out)
     const double dt = STEP_MS / 1000.0;
     double climb = 0;
     craft.time_s += dt;
-    craft.baro_cm += craft.lies.baro_cm_s * dt;
+    craft.baro_cm = fmax(-100, fmin(100, craft.baro_cm + craft.lies.baro_cm_s * dt)); /* more flies a low list into the ground */
     craft.gust.n += -craft.gust.n * dt / 3 + noise() * 100 * sqrt(2 * dt / 3);
     craft.gust.e += -craft.gust.e * dt / 3 + noise() * 100 * sqrt(2 * dt / 3);
     switch (out->mode) {
@@ -484,7 +484,7 @@ static void check_step(flight_t *flight)
         const nf_record_t *record = &list.record[number];
         CHECK(!out->steer || (out->steer == ST_PASS) == (record->command == WAYPOINT && record->seconds == 0) || in->stick);
         const nf_place_t *roi = record->roi && record->command <= LOITER_TIME ? roi_before(number) : NULL;
-        if (!flight->touched && craft.lies.compass == 0 && craft.lies.magnetism == 0 && craft.lies.jump_cm == 0 && in->now_ms - flight->entered_ms > 15000) {
+        if (!flight->touched && craft.lies.compass == 0 && craft.lies.magnetism == 0 && craft.lies.jump_cm == 0 && craft.height > 0 && in->now_ms - flight->entered_ms > 15000) {
             const nf_place_t *to = roi ? roi : &out->target;
             if (nf_distance(&craft.measured, to, NULL) > 2500)
                 CHECK(fabs(remainder(bearing_to(to) - craft.heading, 360)) <= 25);
@@ -776,8 +776,8 @@ static void test_stall(void)
     CHECK(flight.core.state == NF_HELD && flight.core.reason == NF_STALLED && flight.out.mode == NF_HOLD);
 }
 
-/* The farthest from a place in the last half minute of two, m, with a compass that is off and not corrected. */
-static double stays_within(double mass, double lag_s, double compass, bool firm)
+/* The farthest from a place in the last half minute of two, m, or the fastest, m/s, with a compass that is off and not corrected. */
+static double stays_within(double mass, double lag_s, double compass, bool firm, st_mode_t mode)
 {
     st_t steer;
     nf_output_t out;
@@ -799,7 +799,7 @@ static double stays_within(double mass, double lag_s, double compass, bool firm)
         const vector_t felt = turned(craft.felt, compass);
         const st_sense_t sense = {now_ms, {(float)felt.n, (float)felt.e}, {(float)craft.measured_v.n, (float)craft.measured_v.e},
                                   craft.new_fix, true, false};
-        const st_order_t order = {ST_STAY, {(float)(way * cos(bearing / RADIAN_CD)), (float)(way * sin(bearing / RADIAN_CD))},
+        const st_order_t order = {mode, {(float)(way * cos(bearing / RADIAN_CD)), (float)(way * sin(bearing / RADIAN_CD))},
                                   CRUISE_CM_S, LEAN_CD};
         craft.felt = (vector_t){0, 0};
         st_sense(&steer, &sense);
@@ -809,7 +809,7 @@ static double stays_within(double mass, double lag_s, double compass, bool firm)
         move_craft(&out);
         measure(&out);
         if (now_ms > 90000)
-            farthest = fmax(farthest, hypot(craft.at.n - 300, craft.at.e) / 100);
+            farthest = fmax(farthest, (mode == ST_STAY ? hypot(craft.at.n - 300, craft.at.e) : hypot(craft.v.n, craft.v.e)) / 100);
     }
     return farthest;
 }
@@ -820,10 +820,55 @@ static void test_margin(void)
     for (int mass = 1; mass <= 4; mass *= 2)
         for (int lag = 2; lag <= 5; lag += 3)
             for (int side = -1; side <= 1; side += 2) {
-                CHECK(stays_within(mass / 2.0, lag / 10.0, side * 45, false) < 12);
-                CHECK(stays_within(mass / 2.0, lag / 10.0, side * 30, true) < 12);
+                CHECK(stays_within(mass / 2.0, lag / 10.0, side * 45, false, ST_STAY) < 12);
+                CHECK(stays_within(mass / 2.0, lag / 10.0, side * 30, true, ST_STAY) < 12);
+                CHECK(stays_within(mass / 2.0, lag / 10.0, side * 45, false, ST_STOP) < 2);
             }
-    CHECK(stays_within(1, 0.2, 120, true) > 12); /* the test can fail */
+    CHECK(stays_within(1, 0.2, 120, true, ST_STAY) > 12); /* the test can fail */
+}
+
+/* The way to a standstill from 8 m/s over ground, m: the hold of a flight that is switched on there, and then left alone. */
+static double stops_within(double mass, double wind_cm_s, double *farthest)
+{
+    flight_t flight;
+    lies_t lies = honest;
+    nf_record_t record = random_record(WAYPOINT);
+    lies.mass = mass;
+    list.count = 0;
+    add(&record);
+    prepare_with(&flight, true, &lies); /* the list is refused, so it holds */
+    craft.height = 1000;
+    craft.wind = (vector_t){wind_cm_s, 0};
+    craft.at = (vector_t){0, 0};
+    for (int i = 0; i < 100; i++) {
+        craft.v = (vector_t){800, 0};
+        craft.lean = craft.mislevel = craft.felt = (vector_t){0, 0};
+        step(&flight);
+    }
+    const double begun = craft.at.n;
+    flight.in.switch_on = flight.toggled = true;
+    step(&flight);
+    flight.toggled = false;
+    for (int i = 0; i < 400 && !(flight.core.holding && st_speed(&flight.core.steer) < 60); i++)
+        step(&flight);
+    CHECK(flight.core.state == NF_HELD && flight.core.holding);
+    const double stood = craft.at.n;
+    *farthest = 0;
+    for (int i = 0; i < 500; i++) {
+        step(&flight);
+        *farthest = fmax(*farthest, fabs(craft.at.n - stood) / 100);
+    }
+    return (stood - begun) / 100;
+}
+
+static void test_braking(void)
+{
+    double farthest;
+    for (int mass = 1; mass <= 4; mass *= 2)
+        for (int wind = 0; wind <= 800; wind += 400) {
+            CHECK(stops_within(mass / 2.0, wind, &farthest) < 10);
+            CHECK(farthest < 4);
+        }
 }
 
 /* Print the table of states, for the test that compares the manual. */
@@ -849,6 +894,7 @@ int main(int argc, char **argv)
     test_switch();
     test_stall();
     test_margin();
+    test_braking();
     for (seed = first; seed < first + lists; seed++) {
         chance_state = seed * 0x9E3779B97F4A7C15u + 1;
         if (seed % 4)

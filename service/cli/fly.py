@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`naze-bridge fly`: a mission file flown by a real firmware image in the simulated sky, and judged."""
 
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from enum import IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
@@ -21,7 +21,7 @@ from service.settings import SettingsError, takeoff_limit_m
 from simulator.commands.image import read_image
 from simulator.sky.body import Airframe
 from simulator.sky.earth import Place
-from simulator.sky.lies import Lies
+from simulator.sky.lies import NAMES
 from simulator.sky.sky import Weather
 from terminal.files import read_file, shown_path, write_file
 from terminal.mission_source import load_mission
@@ -30,32 +30,13 @@ from terminal.printing import print_json, print_table
 from terminal.sentences import fail, say
 
 if TYPE_CHECKING:
-    from protocols.msp.mission_flight import FlightProgress
     from simulator.flights.judgement import ItemResult
     from simulator.flights.mission_run import MissionRun
-    from simulator.flights.pilot import Pilot
+    from simulator.flights.wrongs import Wrongs
 
 #: The only firmware that flies such a list.
 _KIND = "harakiri"
 _SETTINGS = ("set mission_fly=1",)
-#: The GPS jumps, or loses its fix for gps-outage seconds, this long after the flight began.
-_EVENT_S = 20.0
-_OUTAGE = "gps-outage"
-_LIES = {name.name.replace("_", "-"): name.name for name in fields(Lies)}
-
-
-def _parse_lies(_: click.Context, __: click.Parameter, values: tuple[str, ...]) -> dict[str, float]:
-    """NAME=VALUE each. click.BadParameter."""
-    lies = {}
-    for value in values:
-        name, _equals, number = value.partition("=")
-        if name not in (*_LIES, _OUTAGE):
-            raise click.BadParameter(f"{name!r} is none of {', '.join((*_LIES, _OUTAGE))}")
-        try:
-            lies[name] = float(number)
-        except ValueError:
-            raise click.BadParameter(f"{number!r} is no number: write --lie {name}=5") from None
-    return lies
 
 
 class FlyStatus(IntEnum):
@@ -85,8 +66,7 @@ class FlyStatus(IntEnum):
     "lies",
     metavar="NAME=VALUE",
     multiple=True,
-    callback=_parse_lies,
-    help=f"What is wrong with the craft: {', '.join((*_LIES, _OUTAGE))}. May be repeated.",
+    help=f"What is wrong with the craft: {', '.join(NAMES)}. May be repeated.",
 )
 @click.option("--svg", type=PATH, help="Draw the track into this file.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
@@ -100,7 +80,7 @@ def fly(
     wind_from: float,
     seed: int,
     mass: float,
-    lies: dict[str, float],
+    lies: tuple[str, ...],
     svg: Path | None,
     as_json: bool,
 ) -> None:
@@ -115,10 +95,16 @@ def fly(
         firmware = read_image(image)
     except click.ClickException as error:
         _refuse(error.message)
+    from simulator.flights.wrongs import Wrongs
+
+    try:
+        wrongs = Wrongs(lies)
+    except ValueError as error:
+        _refuse(str(error))
     weather = Weather(wind=wind, wind_from=wind_from, seed=seed)
     place = Place(lat=records[0].lat_e7 / 1e7, lon=records[0].lon_e7 / 1e7)
     try:
-        run, results = _fly(firmware, image.name, flash, records, weather, place, mass, lies, quiet=as_json)
+        run, results = _fly(firmware, image.name, flash, records, weather, place, mass, wrongs, quiet=as_json)
     except _unfit() as error:
         _refuse(str(error))
     from simulator.flights.judgement import extremes, is_flown
@@ -144,7 +130,7 @@ def fly(
         print_table(_table(results))
         say(
             f"At most {found.farthest_m:.0f} m from home and {found.off_legs_m:.0f} m from the mission's legs, "
-            f"{found.fastest:.1f} m/s, leaning {found.steepest_deg:.0f} degrees{_compass(run)}."
+            f"{found.fastest:.1f} m/s, leaning {found.steepest_deg:.0f} degrees{run.compass}."
         )
         ending = f"Not flown: {found.problem}" if found.problem else "Flown" if flown else "Not flown"
         say(f"{ending}, in {_seconds(run):.0f} s.")
@@ -204,7 +190,7 @@ def _fly(
     weather: Weather,
     place: Place,
     mass: float,
-    lies: dict[str, float],
+    wrongs: "Wrongs",
     *,
     quiet: bool,
 ) -> "tuple[MissionRun, list[ItemResult]]":
@@ -221,32 +207,21 @@ def _fly(
 
     contents = _flash(flash_file) if flash_file else prepared_flash(firmware, say_progress, _SETTINGS)
     naze = FlyingNaze(
-        firmware, memoryview(bytearray(contents)), weather=weather, frame=Airframe().scaled(mass), place=place
+        firmware,
+        memoryview(bytearray(contents)),
+        weather=weather,
+        frame=Airframe().scaled(mass),
+        place=place,
+        lies=wrongs.lies,
     )
-    told = naze.sky.lies
-    for lie, value in lies.items():
-        if lie not in ("gps-jump", _OUTAGE):
-            setattr(told, _LIES[lie], value)
     pilot = Pilot(naze)
     say_progress(f"{name} boots.")
     pilot.power_on()
     require_mission_flight(pilot.console, name)
     upload(pilot.console, records)
     say_progress(f"{len(records) - 1} commands are on the board. It flies, in wind of {weather.wind:g} m/s.")
-    begun = pilot.now
-
-    def happen(pilot: "Pilot", _: "FlightProgress") -> None:
-        since = pilot.now - begun
-        told.gps_jump = lies.get("gps-jump", 0.0) if since > _EVENT_S else 0.0
-        naze.faults.gps_fix = not _EVENT_S < since < _EVENT_S + lies.get(_OUTAGE, 0.0)
-
-    run = fly_mission(pilot, records, happen)
+    run = fly_mission(pilot, records, wrongs.happen)
     return run, judge(run, place)
-
-
-def _compass(run: "MissionRun") -> str:
-    found = [report.progress.compass for report in run.reports if report.progress.compass is not None]
-    return f"; the compass was found {found[-1]:.0f} degrees off" if found and abs(found[-1]) >= 1 else ""
 
 
 def _seconds(run: "MissionRun") -> float:

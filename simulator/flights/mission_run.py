@@ -51,6 +51,12 @@ class MissionRun:
         """The last reason that the board gave for a stop, or the end."""
         return next((r.progress.reason for r in reversed(self.reports) if r.progress.reason), FlightReason.NONE)
 
+    @property
+    def compass(self) -> str:
+        """What the board has found out about its compass, to end a sentence."""
+        found = [report.progress.compass for report in self.reports if report.progress.compass is not None]
+        return f"; the compass was found {found[-1]:.0f} degrees off" if found and abs(found[-1]) >= 1 else ""
+
     def reached_at(self, number: int) -> float | None:
         """When the board reported this record, or a later one, as reached."""
         for report in self.reports:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a craft's sensors and motors do wrong. All of it may be changed in flight."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 
 @dataclass(slots=True, kw_only=True)
@@ -24,3 +24,8 @@ class Lies:
     vibration: float = 1.0
     #: A factor of the front right motor's thrust.
     weak_motor: float = 1.0
+
+
+#: Seconds without a fix, beside the fields' names.
+OUTAGE = "gps-outage"
+NAMES = (*(field.name.replace("_", "-") for field in fields(Lies)), OUTAGE)
