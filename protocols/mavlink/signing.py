@@ -44,11 +44,19 @@ class Timestamps:
     """The timestamps of outgoing frames: the time, but strictly increasing even if the clock steps back.
 
     `clock` returns seconds since the Unix epoch. `at_least`: the last one of an earlier run. `newest`: the newest that
-    any peer with the key had; None: the next one is believed.
+    any peer with the key had; None: the next one is believed. `is_clock_set`: False while the clock may be weeks
+    behind, so that a peer's lead is no fault of the peer.
     """
 
-    def __init__(self, clock: Callable[[], float], at_least: int = 0, newest: int | None = 0) -> None:
+    def __init__(
+        self,
+        clock: Callable[[], float],
+        at_least: int = 0,
+        newest: int | None = 0,
+        is_clock_set: Callable[[], bool] = lambda: True,
+    ) -> None:
         self._clock = clock
+        self._is_clock_set = is_clock_set
         self.last = min(at_least, _MAX_TIMESTAMP)
         self.newest = newest
         self._by_host: dict[Hashable, int] = {}
@@ -63,12 +71,16 @@ class Timestamps:
         return self.last
 
     def are_all_behind(self, timestamp: int) -> bool:
-        """True if a timestamp is over a day ahead of our clock and of those of all peers with the key."""
+        """True if a timestamp is over a day ahead of our clock, which must be set, and of those of all peers."""
+        return self._is_far_ahead(timestamp) and self._is_clock_set()
+
+    def _is_far_ahead(self, timestamp: int) -> bool:
         return self.newest is not None and timestamp > max(self.now(), self.newest) + MAX_LEAD
 
     def heard(self, timestamp: int, host: Hashable) -> None:
         """Note the timestamp of a peer with the key. Ours follows two hosts that agree, never a single one."""
-        self.newest = max(self.newest or 0, timestamp)
+        if not self._is_far_ahead(timestamp):
+            self.newest = max(self.newest or 0, timestamp)
         self._by_host[host] = timestamp
         if len(self._by_host) > _MAX_HOSTS:
             del self._by_host[next(iter(self._by_host))]

@@ -39,6 +39,7 @@ from service.machine.host import Host
 from service.machine.log_setup import warn_once
 from service.machine.own_networks import OwnNetworks
 from service.machine.package import version
+from service.machine.raspberry_pi import is_clock_set
 from service.recording.tlog_recorder import TLOG_FOLDER, TlogRecorder
 from service.settings import Settings
 from service.settings.addresses import AutoFc, FcAddress, GcsAddress, SerialFc
@@ -90,7 +91,9 @@ class Daemon:
         host = host or Host()
         self._flight = FlightFile(settings.state_dir, str(settings.fc), host)
         self._last_settings = LastSettings(settings.state_dir, lambda: self.fc.where)
-        self._signing = SigningState(settings.state_dir, settings.gcs, settings.access)
+        self._signing = SigningState(
+            settings.state_dir, settings.gcs, settings.access, is_clock_set=partial(is_clock_set, host)
+        )
         self.bridge = Bridge(
             BridgeConfig(
                 _speeds(settings.fc),

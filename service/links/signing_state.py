@@ -36,6 +36,7 @@ class SigningState:
         gcs: Sequence[GcsAddress],
         access_by_link: Mapping[str, WriteAccess],
         clock: Callable[[], float] = time.time,
+        is_clock_set: Callable[[], bool] = lambda: True,
     ) -> None:
         keys = {name: access.key for name, access in access_by_link.items() if access.key is not None}
         self._file: StateFile | None = None
@@ -45,7 +46,7 @@ class SigningState:
             kept = self._file.load(_read)
         self._stored, streams, self._refused_until, newest = kept or (0, {}, -1, 0)
         self._stored_newest = newest or 0
-        self._timestamps = Timestamps(clock, self._stored, newest)
+        self._timestamps = Timestamps(clock, self._stored, newest, is_clock_set)
         by_key = {key: Signing(key, self._timestamps, self._refused_until) for key in keys.values()}
         self._signings = {name: by_key[key] for name, key in keys.items()}
         for name, signing in self._signings.items():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Raspberry Pi models: the device of the UART on GPIO 14 and 15, and the config.txt line that enables it."""
+"""Raspberry Pi models: the UART on GPIO 14 and 15, the config.txt line that enables it, and the clock."""
 
 import re
 from dataclasses import dataclass
@@ -8,6 +8,8 @@ from service.machine.host import Host
 
 #: Bookworm and later, and before.
 BOOT_FOLDERS = ("/boot/firmware", "/boot")
+#: Made by systemd-timesyncd when it has set the clock. adjtimex(2) is forbidden to the hardened service.
+SYNCHRONIZED = "/run/systemd/timesync/synchronized"
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +33,11 @@ def pi_model(host: Host) -> PiModel | None:
     if name.startswith(("Raspberry Pi 5", "Raspberry Pi Compute Module 5")):
         return PiModel(name, "/dev/ttyAMA0", "dtparam=uart0=on")
     return PiModel(name, "/dev/serial0", "enable_uart=1")
+
+
+def is_clock_set(host: Host) -> bool:
+    """False on a Pi until a network has set the clock: without a battery it continues from the last shutdown."""
+    return host.path(SYNCHRONIZED).exists() or pi_model(host) is None
 
 
 def boot_file(host: Host, name: str) -> str | None:

@@ -6,9 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from bridge.model.vehicle import Fix, GpsFix, GpsTime, Vehicle
+from service.machine.raspberry_pi import SYNCHRONIZED
 
-#: Made by systemd-timesyncd when it has set the clock. adjtimex(2) is forbidden to the hardened service.
-_SYNCHRONIZED = Path("/run/systemd/timesync/synchronized")
 #: Autopilots send SYSTEM_TIME once a second or more often.
 _FRESH_S = 5.0
 #: A smaller difference to the Pi's clock is the time on the line.
@@ -21,7 +20,7 @@ class SampleClock:
     `now`: the monotonic time of readings, s.
     """
 
-    def __init__(self, now: Callable[[], float], synchronized: Path = _SYNCHRONIZED) -> None:
+    def __init__(self, now: Callable[[], float], synchronized: Path = Path(SYNCHRONIZED)) -> None:
         self._now = now
         self._synchronized = synchronized
         #: By GPS: when the monotonic clock was 0, seconds since 1970. None while the Pi's clock is right.

@@ -17,10 +17,10 @@ from service.cli.doctor.fixes import RESTART_BRIDGE
 from service.daemon.store_worker import DATABASE_NAME
 from service.machine.host import Host
 from service.machine.package import version
+from service.machine.raspberry_pi import SYNCHRONIZED
 from storage.database import kept_aside, read_database
 from storage.store_error import StoreError
 
-_SYNCED = "/run/systemd/timesync/synchronized"
 _TIME_PROGRAMS = ("chronyd", "ntpd", "gpsd")
 #: A Pi without a clock starts in 1970, or at its last shutdown; no release is older than this.
 EPOCH = datetime(2026, 1, 1, tzinfo=UTC)
@@ -52,7 +52,7 @@ def check_clock(host: Host, now: datetime) -> Checked:
         return problem(
             "clock", f"it is {time_text}, years in the past", f"set it: sudo date --set '{EPOCH:%Y-%m-%d} 12:00'"
         )
-    if host.path(_SYNCED).exists():
+    if host.path(SYNCHRONIZED).exists():
         return ok("clock", f"{time_text}, set by the network")
     keeper = next((process.name for process in host.processes() if process.name in _TIME_PROGRAMS), None)
     if keeper is not None:

@@ -157,6 +157,19 @@ def sent_at(peer: SignedPeer) -> int:
     return int.from_bytes(peer.sign(bytes(10))[1:7], "little")
 
 
+def test_until_the_clock_is_set_a_peer_may_be_ahead_and_shuts_nobody_out() -> None:
+    is_set = False
+    timestamps = Timestamps(lambda: NOON, is_clock_set=lambda: is_set)
+    signing = Signing(KEY, timestamps)
+    month_ahead = ticks(NOON) + 30 * DAY
+    assert signed_at(signing, month_ahead, "pilot") is Check.VALID
+    assert signed_at(signing, (1 << 48) - 1, "wrong clock", 1) is Check.VALID
+    assert signed_at(signing, ticks(NOON), "another", 2) is Check.VALID
+    assert timestamps.now() == ticks(NOON)
+    is_set = True
+    assert signed_at(signing, month_ahead + 1, "pilot") is Check.EARLY
+
+
 def test_without_a_clock_timestamps_continue() -> None:
     stored = ticks(NOON)
     signing = our_side(unix_s=0.0, at_least=stored)
