@@ -53,12 +53,16 @@ class Host:
         return self.root / str(path).lstrip("/")
 
     def resolve(self, path: str | Path) -> Path:
-        """The target of symbolic links, as a path on the machine."""
+        """The target of symbolic links, as a path on the machine. A later link that leads nowhere is not followed."""
         target = Path(path)
-        for _ in range(_MOST_LINKS):
-            if not self.path(target).is_symlink():
+        for step in range(_MOST_LINKS):
+            named = self.path(target)
+            if not named.is_symlink():
                 break
-            target = Path(os.path.normpath(target.parent / os.readlink(self.path(target))))
+            following = Path(os.path.normpath(target.parent / os.readlink(named)))
+            if step and not os.path.lexists(self.path(following)):
+                break
+            target = following
         return target
 
     def is_tty(self, device: str | Path) -> bool:

@@ -96,9 +96,13 @@ def passing(start: Starter, autopilot: Autopilot, settings: str) -> Daemon:
 def test_no_command_passes_an_open_link(start: Starter, autopilot: Autopilot) -> None:
     daemon = passing(start, autopilot, "")
     for number, (name, command) in enumerate(COMMANDS.items()):
-        with udp_station(daemon.address) as stranger:
+        # Each from a host of its own: the stations of one are limited to 16 at once.
+        with udp_station(daemon.address, host=f"127.0.0.{number + 2}") as stranger:
             stranger.send(HELLO)
             stranger.wait_for("HEARTBEAT")
+            stranger.send(HELLO)  # shows that its address receives
+            if not number:
+                stranger.wait_for("HEARTBEAT")  # the autopilot's
             stranger.send(command)
             # The reply to the next request shows that it was handled.
             question = f"LAST{number}"
@@ -154,6 +158,8 @@ def test_signed_commands_pass(start: Starter, autopilot: Autopilot, tmp_path: Pa
         sign(pilot._codec, "loop the loop")
         stranger.send(HELLO)
         stranger.wait_for("HEARTBEAT")
+        stranger.send(HELLO)  # shows that its address receives
+        stranger.wait_for("HEARTBEAT")  # the autopilot's
         stranger.send(COMMANDS["forced disarm"])
         stranger.send(m.MAVLink_radio_status_message(0, 0, 0, 0, 0, 0, 0))
         assert stranger.wait_for("COMMAND_ACK").result == m.MAV_RESULT_DENIED

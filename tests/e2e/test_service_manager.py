@@ -81,10 +81,10 @@ def test_a_push_close_to_its_end_is_finished(start: Starter) -> None:
 @pytest.mark.parametrize("trouble", ["slow", "deaf"])
 def test_a_push_that_would_take_long_is_aborted(start: Starter, trouble: str) -> None:
     """The old list is kept, the sender is told, the outcome is stored, and systemd waits at most 2 s."""
-    bench = start.bench(*(("--baud", "9600", "--capacity", "600") if trouble == "slow" else ()))
+    bench = start.bench(*(("--baud", "9600", "--capacity", "500") if trouble == "slow" else ()))
     bench.daemon.push(plain_plan(5))
     old = bench.board.records()
-    connection = push_begun(bench.daemon, plain_plan(600) if trouble == "slow" else _LONG)
+    connection = push_begun(bench.daemon, plain_plan(490) if trouble == "slow" else _LONG)
     if trouble == "deaf":
         bench.board.set("hang 10")
     # Neither push can finish within 2 s, so the result shows that the daemon did not wait.
