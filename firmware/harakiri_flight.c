@@ -175,7 +175,7 @@ bool FlightRun(bool rtl, bool flying)
     return out.mode != NF_PASS;
 }
 
-/* The compass's correction is true until the craft is disarmed, whoever flies; before the first flight it is not used. */
+/* The compass's correction is true until the craft is disarmed. Before the first flight it is not used. */
 float FlightHeading(float measured)
 {
     return flight.used ? wrap_180(measured + (float)out.correction_cd * 0.01f) : measured;

@@ -178,7 +178,7 @@ static void enter(nf_t *f, const nf_input_t *in, nf_state_t state)
     f->allowed_ms = allowance(f, &nf_states[state]);
 }
 
-/* The place to fly to, or to stay at, is new: the guard looks anew. */
+/* The place to fly to, or to stay at, is new: the guard starts again. */
 static void set_target(nf_t *f, const nf_input_t *in, const nf_place_t *place)
 {
     f->target = *place;

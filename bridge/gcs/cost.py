@@ -22,7 +22,7 @@ class Cost(IntEnum):  # hashed for each datagram: as an int, in C
 
     RECEIVED: a datagram or a read from a connection. The total is for addresses that are not known yet.
     CONTACT: an address that is not known yet, which costs memory for some seconds. FAR_CONTACT: one behind a router, as
-    anybody may forge.
+    a forger can choose.
     ARRIVAL: a station that is served from now on, which costs greetings and a log entry. In a second there are fewer
     than places, so that they displace no station that sends heartbeats.
     ANSWER: a message sent on request. Mission Planner requests about sixty when it connects, most of them parameters.

@@ -171,7 +171,7 @@ class BoardSettings:
         self._next(now)
 
     def _next(self, now: float) -> None:
-        """Start what comes next: work, else the next part of a reading."""
+        """Start the next work, else the next part of a reading."""
         while self._work and not self._is_on_line and now >= self._line_free_at:
             self._begin(self._work[0], now)
         waits_until = min((until for until, _ in self._readers), default=inf)
