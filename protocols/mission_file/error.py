@@ -16,6 +16,10 @@ class MissionFileError(FileError):
 Note = Callable[[str], None]
 
 
+#: The note on a file of a kind that has no home, or lacks it.
+NO_HOME = "the file has no home: the craft's position is used, or --home"
+
+
 def no_note(_text: str) -> None:
     """Drop the note."""
 

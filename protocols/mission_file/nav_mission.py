@@ -14,21 +14,18 @@ from dataclasses import replace
 from xml.etree.ElementTree import Element
 
 from protocols.file_error import shown
-from protocols.mission_file.error import MissionFileError, Note, file_degrees_to_e7
+from protocols.mission_file.error import NO_HOME, MissionFileError, Note, file_degrees_to_e7
 from protocols.mission_item import MissionItem
 from protocols.msp.nav import LAST, NavAction, NavRecord
 from protocols.msp.nav_items import home_item, items_from_records
 
 _SAVE_AGAIN = "save it again from INAV Configurator or mwp"
-_NO_HOME = "the file has no home: the craft's position is used, or --home"
 _NUMBER = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:e[-+]?\d+)?", re.ASCII | re.IGNORECASE)
 _WP_LINE = re.compile(r"\s*wp(?:\s+-?\d{1,10}){5,9}\s*", re.ASCII | re.IGNORECASE)
 _INT16, _INT32 = 2**15 - 1, 2**31 - 1
-#: A `wp` line's fields after the number; INAV before 2.0 had no p2 and p3.
-_WP_FIELDS = {
-    8: ("action", "lat", "lon", "alt", "p1", "p2", "p3", "flag"),
-    6: ("action", "lat", "lon", "alt", "p1", "flag"),
-}
+#: The fields of a `wp` line after the number; INAV before 2.0 had no p2 and p3.
+_PLACE = ("action", "lat_e7", "lon_e7", "alt_cm")
+_WP_FIELDS = {8: (*_PLACE, "p1", "p2", "p3", "flag"), 6: (*_PLACE, "p1", "flag")}
 
 
 def has_wp_lines(text: str) -> bool:
@@ -60,7 +57,7 @@ def read_wp_lines(text: str, name: str, note: Note) -> list[MissionItem]:
         if values["action"]:  # 0 fills the unused slots of a dump
             where = f"line {number}"
             numbers = {key: _within(value, key, name, where) for key, value in values.items()}
-            records.append(_record(numbers))
+            records.append(NavRecord(**numbers))
     return _items(records, None, name, note)
 
 
@@ -84,7 +81,7 @@ def _items(records: Sequence[NavRecord], home: tuple[int, int] | None, name: str
     if missions > 1:
         raise MissionFileError(name, "", f"the file holds {missions} missions", "save one of them as a file of its own")
     if home is None:
-        note(_NO_HOME)
+        note(NO_HOME)
     unflagged = [replace(record, flag=0) if record.flag == LAST else record for record in records]
     return list(items_from_records(unflagged, home_item(home)))
 
@@ -96,30 +93,17 @@ def _from_xml(item: Element, name: str, where: str) -> NavRecord:
         raise MissionFileError(name, where, f"its action is {shown(action)}", f"use one of {known}")
     values = {"action": int(NavAction[action])}
     for key in ("lat", "lon"):
-        values[key] = _degrees(item.get(key, "0"), key, name, where) or 0
-    values["alt"] = _within(round(_float(item.get("alt", "0"), "alt", name, where) * 100), "alt", name, where)
+        values[f"{key}_e7"] = _degrees(item.get(key, "0"), key, name, where) or 0
+    values["alt_cm"] = _within(round(_float(item.get("alt", "0"), "alt", name, where) * 100), "alt_cm", name, where)
     for field, key in {"p1": "parameter1", "p2": "parameter2", "p3": "parameter3", "flag": "flag"}.items():
         values[field] = _within(int(_float(item.get(key, "0"), key, name, where)), field, name, where)
-    return _record(values)
-
-
-def _record(values: dict[str, int]) -> NavRecord:
-    return NavRecord(
-        values["action"],
-        values["lat"],
-        values["lon"],
-        values["alt"],
-        values["p1"],
-        values.get("p2", 0),
-        values.get("p3", 0),
-        values["flag"],
-    )
+    return NavRecord(**values)
 
 
 def _within(value: int, field: str, name: str, where: str) -> int:
-    highest = _INT32 if field in ("lat", "lon", "alt") else _INT16
-    if abs(value) > highest:
-        raise MissionFileError(name, where, f"{field} is {shown(value)}, out of range", _SAVE_AGAIN)
+    key, _, unit = field.partition("_")
+    if abs(value) > (_INT32 if unit else _INT16):
+        raise MissionFileError(name, where, f"{key} is {shown(value)}, out of range", _SAVE_AGAIN)
     return value
 
 

@@ -17,11 +17,10 @@ from xml.etree.ElementTree import Element
 
 from protocols.file_error import shown
 from protocols.file_text import file_text
-from protocols.mission_file.error import MissionFileError, Note, file_degrees_to_e7
-from protocols.mission_file.xml_text import parse_xml
+from protocols.mission_file.error import NO_HOME, MissionFileError, Note, file_degrees_to_e7
+from protocols.mission_file.xml_text import MAX_SIZE, parse_xml
 from protocols.mission_item import Command, Frame, MissionItem
 
-_MAX_KML = 2 * 2**20
 _FEET = 0.3048
 #: The frame of a height, by KML's altitudeMode; heights of paths on the ground have no meaning.
 _KML_MODES = {"relativetoground": Frame.GLOBAL_TERRAIN_ALT, "absolute": Frame.GLOBAL}
@@ -57,7 +56,7 @@ def read_kmz(data: bytes, name: str, note: Note, alt_m: float | None) -> list[Mi
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             inside = next(each for each in archive.namelist() if each.lower().endswith(".kml"))
             with archive.open(inside) as file:
-                kml = file.read(_MAX_KML + 1)
+                kml = file.read(MAX_SIZE + 1)
     except StopIteration:
         raise MissionFileError(name, "", "this zip archive holds no KML", "unpack it and give the mission") from None
     except (OSError, zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, NotImplementedError):
@@ -149,7 +148,7 @@ def _items(points: Sequence[_Point], name: str, note: Note, alt_m: float | None)
     if alt_m is None and (bare := next((point for point in points if point.alt_m is None), None)) is not None:
         remedy = f"set it for all points: `naze-bridge convert {name} MISSION.waypoints --alt METRES`"
         raise MissionFileError(name, bare.where, "the path has no altitude", remedy)
-    note("the file has no home: the craft's position is used, or --home")
+    note(NO_HOME)
     items = [_item(0, Frame.GLOBAL, None, None, 0.0)]
     for point in points:
         lat_e7, lon_e7 = (

@@ -5,8 +5,8 @@ from xml.etree.ElementTree import Element, ParseError, fromstring
 
 from protocols.mission_file.error import MissionFileError
 
-#: The parsed tree takes up to forty times the memory of the text.
-_MAX_SIZE = 2 * 2**20
+#: Characters. The parsed tree takes up to forty times the memory of the text.
+MAX_SIZE = 2 * 2**20
 
 
 def parse_xml(text: str, name: str) -> Element:
@@ -14,7 +14,7 @@ def parse_xml(text: str, name: str) -> Element:
 
     A document type is refused, because the entities in it can grow without limit or name other files.
     """
-    if len(text) > _MAX_SIZE:
+    if len(text) > MAX_SIZE:
         raise MissionFileError(name, "", "this XML is longer than 2 MB", "save only the path to be flown")
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise MissionFileError(name, "", "this XML has a document type", "delete the line that begins with <!DOCTYPE")
