@@ -25,7 +25,7 @@ from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.line.conversation import Conversation, LinkLost, Send
 from bridge.missions.fc_mission_store import PushResult
 from bridge.missions.list_check import check_list
-from bridge.model.refusal import Refusal
+from bridge.model.missions import Refusal
 from protocols.msp.mission import RECORD_SIZE, MissionCommand, WpRecord
 from service.daemon.daemon import Daemon
 from service.machine import event_loop

@@ -32,13 +32,12 @@ from bridge.line.msp_link import RoundTrips
 from bridge.line.runner import Runner
 from bridge.missions.mission_service import NO_LINK, MissionService
 from bridge.model.events import Armed, Disarmed
-from bridge.model.refusal import ARMED, Refusal
+from bridge.model.missions import ARMED, Refusal
 from bridge.model.settings import SettingsState
 from bridge.model.vehicle import FlightState, Health, MissionLeg, Readiness
 from bridge.settings.board_settings import BoardSettings
 from bridge.settings.local_settings import LocalSettings
-from bridge.settings.own_parameters import OwnParameters
-from bridge.settings.parameters import Parameters
+from bridge.settings.parameters import OwnParameters, Parameters
 from bridge.sharing.msp_sharing import MspSharing
 from bridge.sharing.program import Program
 from bridge.transfers.local_missions import LocalMissions

@@ -10,7 +10,7 @@ from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
 from bridge.controllers.table import PROFILES
 from bridge.fc.profile import Autopilot, Profile
 from bridge.gcs.rights import LinkAccess
-from bridge.model.flight_memory import FlightMemory
+from bridge.model.craft import FlightMemory
 from bridge.model.settings import MemoryOfThisRun, SettingsMemory
 
 

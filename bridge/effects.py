@@ -8,8 +8,8 @@ from typing import NamedTuple
 from bridge.gcs.station import Datagrams
 from bridge.line.conversation import StoreEffect
 from bridge.missions.mission_service import MissionEnded
+from bridge.model.craft import FlightMemory
 from bridge.model.events import BridgeEvent
-from bridge.model.flight_memory import FlightMemory
 from bridge.model.settings import TakenBackup
 from reports.vehicle_groups import Group
 

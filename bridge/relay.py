@@ -23,8 +23,7 @@ from bridge.missions.fc_mission_store import PushProgress, StoreReport, StoreSta
 from bridge.missions.list_check import ListCheck
 from bridge.missions.mission_service import DeliveryResult, HeldMission, MissionService
 from bridge.model.events import BridgeEvent
-from bridge.model.mission_log import ArrivedMission
-from bridge.model.refusal import ARMED, Refusal
+from bridge.model.missions import ARMED, ArrivedMission, Refusal
 from bridge.model.vehicle import FlightState, Source, Vehicle
 from bridge.transfers.downloads import MissionDownloads
 from bridge.transfers.uploads import MissionUploads
@@ -32,8 +31,7 @@ from protocols.mavlink.codec import decode, item_from_float_message, item_from_i
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
-from protocols.mission_item import MissionItem, MissionResult
-from protocols.mission_record import ListIdentity
+from protocols.mission_item import ListIdentity, MissionItem, MissionResult
 from reports.finding import Finding, RejectingFinding, without_defaults
 from reports.verdict import Result, Verdict
 

@@ -6,9 +6,8 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 
 from bridge.gcs.rights import RIGHTS
-from protocols.mavlink.command import command_name
-from protocols.mavlink.dialect import MESSAGE_FORMATS
-from protocols.rights.effect import Effect
+from protocols.mavlink.dialect import MESSAGE_FORMATS, command_name
+from protocols.rights import Effect
 from protocols.rights.mavlink import COMMANDS, MESSAGES, FieldRule
 from protocols.rights.msp import MSP_RIGHTS, Firmware, MspRight
 

@@ -11,7 +11,7 @@ from bridge.controllers.harakiri.rules import (
     command_rules,
 )
 from bridge.missions.list_check import UNUSED, Range
-from protocols.mavlink.command import command_name
+from protocols.mavlink.dialect import command_name
 from protocols.mission_item import ROI_COMMANDS, Command
 
 _PLACES = {

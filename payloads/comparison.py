@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from payloads.mission_data import MAX_ITEMS, Json, correction_texts, mission_findings, mission_items
-from protocols.mavlink.command import command_name
+from protocols.mavlink.dialect import command_name
 from protocols.mission_item import MissionItem
 from reports.finding import DROPPED, REJECTED, Finding, value_label, without_defaults
 

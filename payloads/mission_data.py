@@ -9,8 +9,7 @@ from functools import cache
 from operator import attrgetter
 from typing import Any, TypeGuard
 
-from protocols.mission_item import MissionItem
-from protocols.mission_record import identify
+from protocols.mission_item import MissionItem, identify
 from protocols.plain_text import plain_text
 from reports.finding import Finding, News, without_defaults
 from reports.verdict import Verdict

@@ -10,11 +10,9 @@ import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from protocols.file_error import FileError, shown
-from protocols.file_text import file_text
 from protocols.msp.inav_places import Safehome
 from protocols.param_file import read_param_file
-from protocols.plain_text import plain_text
+from protocols.plain_text import FileError, file_text, plain_text, shown
 
 _SET = re.compile(r"set\s+(\w+)\s*=(.*)", re.ASCII | re.IGNORECASE)
 _SAFEHOME = re.compile(r"safehome\s+(\d{1,9})\s+([01])\s+(-?\d{1,10})\s+(-?\d{1,10})", re.ASCII | re.IGNORECASE)

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mission item as sent in a message or a file."""
+"""A mission item as sent in a message or a file; the records that flight controllers store, and a list's checksum."""
 
 import math
+import zlib
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Protocol
 
 
 class Command(IntEnum):
@@ -100,3 +103,30 @@ def degrees_to_e7(degrees: float) -> int | None:
     """Round degrees to 1e-7 degrees; None if not a finite number (docs/mission-rules.md, "Each item")."""
     scaled = degrees * 1e7  # may overflow to infinity on its own
     return round(scaled) if math.isfinite(scaled) else None
+
+
+class MissionRecord(Protocol):
+    """One record as a flight controller stores it; its number is its position in the list."""
+
+    def pack(self) -> bytes:
+        """The bytes; struct.error if a field does not fit, which is a bug in the caller."""
+
+
+@dataclass(frozen=True, slots=True)
+class ListIdentity:
+    """The identity of a stored list: number of records and CRC-32 over their bytes (0 for none)."""
+
+    count: int
+    checksum: int
+
+    def __str__(self) -> str:
+        return f"{self.count} records, checksum {self.checksum:08x}"
+
+
+def pack_records(records: Iterable[MissionRecord]) -> bytes:
+    return b"".join([record.pack() for record in records])
+
+
+def identify(records: Sequence[MissionRecord]) -> ListIdentity:
+    """The identity of a list; a Harakiri with the mission extension computes the same."""
+    return ListIdentity(len(records), zlib.crc32(pack_records(records)))

@@ -12,10 +12,8 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from protocols.file_error import FileError, shown
-from protocols.file_text import file_text
 from protocols.float32 import is_single
-from protocols.plain_text import PlainText, plain_text
+from protocols.plain_text import FileError, PlainText, file_text, plain_text, shown
 
 _NAME = re.compile(r"[!$-+\--~]{1,64}")
 # float() also accepts underscores and digits of any script.

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Text of others, made safe to show: a terminal would obey escape sequences in it."""
+"""Text of others, made safe to show, because a terminal would obey escape sequences in it; and files of others."""
 
+import codecs
 from typing import NewType
 
 #: Foreign text on one line, without control and formatting characters. Made by `plain_text` alone.
 PlainText = NewType("PlainText", str)
+_UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+_LONGEST_QUOTE = 24
 
 
 def plain_text(text: str | bytes) -> PlainText:
@@ -18,3 +21,32 @@ def plain_text(text: str | bytes) -> PlainText:
         return PlainText(known)
     known = known.encode(errors="replace").decode()  # lone surrogates become question marks
     return PlainText("".join(each if each.isprintable() else " " if each.isspace() else "" for each in known))
+
+
+def file_text(data: bytes) -> str:
+    """Decode UTF-8, UTF-16 with its mark, or else Windows-1252, as older ground stations write it.
+
+    Names and numbers in all our formats are ASCII, so only a comment can come out as other letters.
+    """
+    if data.startswith(_UTF_16):
+        return data.decode("utf-16", "replace")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", "replace")
+
+
+class FileError(Exception):
+    """One sentence: the file, the place in it, the problem, the remedy."""
+
+    def __init__(self, name: str, where: str, what: str, remedy: str) -> None:
+        place = f"{name}, {where}" if where else name
+        super().__init__(f"{place}: {what}; {remedy}")
+
+
+def shown(found: object) -> str:
+    """Quote text from a file: printable, short, on one line."""
+    if isinstance(found, list | dict):
+        return "a list" if isinstance(found, list) else "an object"
+    text = ascii(found)
+    return text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}..."

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
-from protocols.mavlink.command import command_name
+from protocols.mavlink.dialect import command_name
 from protocols.mission_item import Command, MissionItem, MissionResult
 
 DROPPED = "dropped"

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 from enum import Enum, auto
 from typing import Any, Generic, TypeVar
 
-from protocols.mission_item import MissionItem, MissionResult
-from protocols.mission_record import MissionRecord
+from protocols.mission_item import MissionItem, MissionRecord, MissionResult
 from reports.finding import Finding, RejectingFinding
 
 #: Item numbers of a list as sent, by its item numbers as read back; None: not sent.

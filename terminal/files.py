@@ -5,8 +5,7 @@ import errno
 import os
 from pathlib import Path
 
-from protocols.file_error import FileError
-from protocols.plain_text import plain_text
+from protocols.plain_text import FileError, plain_text
 from storage.os_error import reason
 from storage.small_files import read_bounded
 

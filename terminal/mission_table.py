@@ -10,7 +10,7 @@ from rich.text import Text
 
 from payloads.comparison import sent_and_stored
 from payloads.mission_data import correction_texts
-from protocols.mavlink.command import command_name
+from protocols.mavlink.dialect import command_name
 from protocols.mission_item import MissionItem
 from reports.finding import Finding
 

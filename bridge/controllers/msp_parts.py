@@ -11,14 +11,14 @@ from typing import NamedTuple
 from bridge.fc.fc_settings import NO_ANSWER, NOT_TAKEN, Cause, FcSettings, SettingRefusal, TableReading, fixed
 from bridge.fc.profile import FlightController
 from bridge.line.conversation import Conversation, Pause, ask, ask_surely
-from bridge.model.board_setting import BoardSetting, SettingTable, Value, ValueKind, table_of
+from bridge.model.settings import BoardSetting, SettingTable, Value, ValueKind, table_of
 from protocols.msp.command_line import is_clean
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, request
 from protocols.msp.mode_ranges import range_writes, ranges_text
 from protocols.msp.settings import SETTINGS, Field, Part, SettingsRequest, fields
 from protocols.msp.telemetry import decode_box_names
-from protocols.rights.effect import Effect
+from protocols.rights import Effect
 from protocols.rights.msp import msp_right
 
 _ARM = "the arm switch is set with the board's own configurator, a wrong one could arm"

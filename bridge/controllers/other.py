@@ -5,12 +5,10 @@ from dataclasses import replace
 
 from bridge.controllers.msp_parts import MspPartSettings
 from bridge.controllers.multiwii.profile import CURRENTS_PER_A
-from bridge.fc.interview import Interview
-from bridge.fc.profile import SILENCE_WITH_H7_S, FlightController, Profile, Spoken
+from bridge.fc.profile import SILENCE_WITH_H7_S, FlightController, Interview, Profile, Spoken
 from bridge.line.conversation import Conversation
-from bridge.model.airframe import airframe
-from bridge.model.flight_mode import FAILSAFE_BOX
-from bridge.model.refusal import Refusal
+from bridge.model.craft import FAILSAFE_BOX, airframe
+from bridge.model.missions import Refusal
 from protocols.mission_item import MissionResult
 from protocols.rights.msp import Firmware
 

@@ -13,7 +13,7 @@ from math import isfinite
 from typing import ClassVar
 
 from bridge.line.conversation import Conversation, ask, ask_status
-from bridge.model.board_setting import BoardSetting, SettingTable, Value, ValueKind, shown
+from bridge.model.settings import BoardSetting, SettingTable, Value, ValueKind, shown
 from protocols.msp.frame import Direction, request
 
 _EEPROM_WRITE = 250

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 from bridge.fc.profile import Decoder, FlightController
 from bridge.line.poll_schedule import Poll
-from bridge.model.mission_progress import FlightReport, Stage, Way
+from bridge.model.missions import FlightReport, Stage, Way
 from bridge.model.vehicle import MissionLeg, Source, Vehicle
 from protocols.msp.commands import Msp
 from protocols.msp.mission_flight import (

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from bridge.fc.profile import Decoder, FlightController
 from bridge.model import vehicle as v
-from bridge.model.flight_mode import ARM_BOX, FAILSAFE_BOX, flight_mode, names_of_active
+from bridge.model.craft import ARM_BOX, FAILSAFE_BOX, flight_mode, names_of_active
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame
 from protocols.msp.nav import decode_nav_status

@@ -13,8 +13,8 @@ from bridge.fc.states.frsky import Frsky
 from bridge.fc.states.mavlink import HarakiriMavlink, PassThrough
 from bridge.fc.states.msp import Identifying, Polling
 from bridge.fc.states.searching import Searching
+from bridge.model.craft import FlightMemory
 from bridge.model.events import Emit, FcFound, FcInCommandLine, FcLost, FcSensed, PortLost
-from bridge.model.flight_memory import FlightMemory
 
 _Next = Mapping[type[Event] | Spoken, type[State]]
 _LOST: _Next = {Lost: Searching, PortClosed: Closed}

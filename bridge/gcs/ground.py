@@ -4,8 +4,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from math import inf
 
-from bridge.gcs.budget import Budgets
-from bridge.gcs.cost import Cost
+from bridge.gcs.budget import Budgets, Cost
 from bridge.gcs.ground_station import GroundStation, Outbox, Sender
 from bridge.gcs.return_path import ReturnPath
 from bridge.gcs.rights import LinkAccess, Standing

@@ -5,22 +5,20 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from math import inf
 
-from bridge.gcs.budget import Budget
-from bridge.gcs.cost import Cost
+from bridge.gcs.budget import Budget, Cost
 from bridge.gcs.message_rates import MessageRates
 from bridge.gcs.return_path import ReturnPath
 from bridge.gcs.rights import FrameRefusal, LinkAccess, Standing
 from bridge.gcs.station import RECORDER, Datagrams, Peer, Severity
 from bridge.gcs.texts import RecentTexts, cut_text, split_text
 from bridge.model.events import Emit, GcsText
-from bridge.model.refusal import Refusal
-from bridge.model.transfer_memory import TransferMemory
+from bridge.model.missions import Refusal, TransferMemory
 from protocols.mavlink.codec import FrameWriter, Packed, pack
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame, MavlinkSplitter
 from protocols.mavlink.signing import Check
 from protocols.mission_item import MissionResult
-from protocols.rights.effect import Effect
+from protocols.rights import Effect
 
 _MAX_TEXT_ID = 0xFFFF
 #: Mission Planner, QGroundControl, MAVSDK and MAVProxy read several frames in a datagram; MAVROS cuts at 296 bytes.

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from bridge.gcs.station import Peer
 from protocols.mavlink.signing import SignedPeer, Signing
-from protocols.rights.effect import Effect
+from protocols.rights import Effect
 
 
 class Standing(Enum):

@@ -9,7 +9,7 @@ not heard yet go to the autopilot.
 from collections.abc import Sequence
 from itertools import takewhile
 
-from bridge.gcs.cost import Cost
+from bridge.gcs.budget import Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import GroundStation
 from protocols.mavlink.codec import repack

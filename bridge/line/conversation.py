@@ -15,9 +15,9 @@ from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
-from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission, RecalledMission
+from bridge.model.missions import ArrivedMission, Outcome, PendingMission, RecalledMission
 from protocols.mavlink.codec import Packed
-from protocols.mission_record import ListIdentity
+from protocols.mission_item import ListIdentity
 from protocols.msp.commands import Msp
 from protocols.msp.frame import MspFrame, frame_size, request
 from protocols.msp.telemetry import STATUS_SIZE, StatusReport, decode_status

@@ -15,7 +15,6 @@ from math import inf
 from operator import attrgetter
 
 from bridge.line.conversation import Send
-from bridge.line.last_replies import LastReplies
 from protocols.frsky import FRSKY_SPEED
 from protocols.msp.command_line import EchoWatch, is_clean
 from protocols.msp.commands import Msp
@@ -413,3 +412,39 @@ class RoundTrips:
     def __init__(self) -> None:
         self.counts = [0] * (len(BOUNDS_S) + 1)
         self.sum_s = 0.0
+
+
+#: Constant while the same board is connected: API_VERSION, FC_VARIANT, FC_VERSION, BOARD_INFO, BUILD_INFO, IDENT,
+#: BOXNAMES, PIDNAMES, BOXIDS, UID.
+_CONSTANT = frozenset(map(request, (1, 2, 3, 4, 5, 100, 116, 117, 119, 160)))
+#: More than a board has commands; the rest are requests with an index, whose replies are current for a moment only.
+_MOST = 256
+
+
+class LastReplies:
+    """The last reply to each request, including errors, by the request's frame."""
+
+    def __init__(self) -> None:
+        self._replies: dict[bytes, tuple[MspFrame, float]] = {}  # the one heard least recently first
+        #: Constant replies that were heard twice: MSP's 8-bit checksum misses some damage.
+        self._confirmed: dict[bytes, MspFrame] = {}
+
+    def heard(self, asked: bytes, reply: MspFrame, now: float) -> None:
+        before = self._replies.pop(asked, None)
+        if asked in _CONSTANT and before is not None and before[0] == reply:
+            self._confirmed[asked] = reply
+        elif len(self._replies) >= _MOST:
+            del self._replies[next(iter(self._replies))]
+        self._replies[asked] = reply, now
+
+    def get(self, asked: bytes, max_age_s: float, now: float) -> MspFrame | None:
+        """The reply to a request if it is at most this old, or constant."""
+        if (constant := self._confirmed.get(asked)) is not None:
+            return constant
+        reply, heard_at = self._replies.get(asked, (None, now))
+        return reply if now <= heard_at + max_age_s else None
+
+    def forget(self) -> None:
+        """Forget all replies, because the board was changed."""
+        self._replies.clear()
+        self._confirmed.clear()

@@ -13,9 +13,8 @@ from typing import Any, Generic
 
 from bridge.line.conversation import Conversation
 from bridge.missions.list_check import MissionRules
-from bridge.model.refusal import Refusal
-from protocols.mission_item import MissionItem
-from protocols.mission_record import ListIdentity
+from bridge.model.missions import Refusal
+from protocols.mission_item import ListIdentity, MissionItem
 from protocols.msp.nav import NavStatus
 from reports.verdict import RecordT
 

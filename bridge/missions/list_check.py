@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 from bridge.missions.flown_legs import Judgement
-from protocols.mavlink.command import command_name
+from protocols.mavlink.dialect import command_name
 from protocols.mission_item import MAX_LAT_E7, MAX_LON_E7, Command, Frame, MissionItem, MissionResult
 from reports.finding import DROPPED, Finding, News, RejectingFinding, reject, reject_list
 from reports.verdict import CLEARED_LIST, Verdict, rejected

@@ -35,12 +35,9 @@ from bridge.missions.fc_mission_store import (
 )
 from bridge.missions.list_check import check_list
 from bridge.missions.mission_texts import has_losses, summary, with_meant_home
-from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission, RecalledMission
-from bridge.model.mission_progress import FlightReport
-from bridge.model.refusal import ARMED, Refusal
+from bridge.model.missions import ARMED, ArrivedMission, FlightReport, Outcome, PendingMission, RecalledMission, Refusal
 from bridge.model.vehicle import Vehicle
-from protocols.mission_item import MissionItem, MissionResult
-from protocols.mission_record import ListIdentity, identify
+from protocols.mission_item import ListIdentity, MissionItem, MissionResult, identify
 from protocols.msp.nav import NavStatus
 from reports.verdict import Result, SentSeqs, Verdict, is_renumbered
 

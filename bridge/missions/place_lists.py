@@ -8,11 +8,9 @@ from bridge.line.conversation import Conversation
 from bridge.line.runner import Runner
 from bridge.missions.fc_mission_store import AnyFcMissionStore, PushProgress
 from bridge.missions.mission_service import NO_LINK, DeliveryResult, HeldMission, MissionService
-from bridge.model.mission_log import ArrivedMission
-from bridge.model.refusal import Refusal
+from bridge.model.missions import ArrivedMission, Refusal
 from bridge.model.vehicle import Vehicle
-from protocols.mission_item import MissionResult
-from protocols.mission_record import identify
+from protocols.mission_item import MissionResult, identify
 from reports.verdict import Result
 
 NO_PLACES = Refusal(MissionResult.UNSUPPORTED, "No fences or rally points: only missions are stored")

@@ -1,12 +1,132 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is remembered of a flight controller's settings, and changes made outside the bridge."""
+"""Settings of the flight controller: one, the table of all, what is remembered of it, and changes made elsewhere."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import math
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import Protocol
+from typing import Any, Protocol
 
-from bridge.model.board_setting import Value
+from protocols.float32 import single
+from protocols.param_file import is_setting_name
+
+#: A text only where the setting is one.
+Value = float | str
+#: Of single precision.
+_LARGEST = 3.4e38
+
+
+class ValueKind(Enum):
+    """The values that a setting may have."""
+
+    INTEGER = "integer"
+    #: Single precision.
+    FLOAT = "float"
+    TEXT = "text"
+
+
+@dataclass(frozen=True, slots=True)
+class BoardSetting:
+    """A setting with the value that the board holds in RAM.
+
+    name: as in the board's command line, or made from its MSP layout if it has no such name. minimum, maximum: of a
+    number; of a text its lengths. choices: names of the values from `minimum` on. text: what it is, in a few words;
+    empty if unknown. fixed: the reason why it cannot be set over the air; empty if it can. raised: the same for a
+    higher value. handle: what its FcSettings needs to change it.
+    """
+
+    name: str
+    kind: ValueKind
+    minimum: float
+    maximum: float
+    value: Value
+    unit: str = ""
+    choices: tuple[str, ...] = ()
+    text: str = ""
+    fixed: str = ""
+    raised: str = ""
+    handle: Any = field(default=None, compare=False, repr=False)
+
+    @property
+    def range_text(self) -> str:
+        """The accepted values, for a refusal."""
+        if self.kind is ValueKind.TEXT:
+            return f"{shown(self.minimum)} to {shown(self.maximum)} characters"
+        unit = f" {self.unit}" if self.unit else ""
+        return f"{shown(self.minimum)}..{shown(self.maximum)}{unit}"
+
+    def accepts(self, value: Value) -> bool:
+        """True if the value is of this kind and in range."""
+        if isinstance(value, str):
+            is_text = self.kind is ValueKind.TEXT and value.isascii() and value.isprintable()
+            return is_text and self.minimum <= len(value) <= self.maximum
+        is_number = self.kind is not ValueKind.TEXT and math.isfinite(value) and self.minimum <= value <= self.maximum
+        return is_number and (self.kind is ValueKind.FLOAT or value == int(value))
+
+    def holds(self, value: Value) -> bool:
+        """True if the board would store it as the value it has."""
+        if isinstance(value, str) or self.kind is not ValueKind.FLOAT:
+            return value == self.value
+        return single(value) == self.value
+
+
+@dataclass(frozen=True, slots=True)
+class SettingTable:
+    """All settings of a board, in its own order.
+
+    is_complete: False if some could not be read; their names are missing. left_out: how many have a name that no ground
+    station or file could take. is_remembered: True if only the values are known, from the last time.
+    """
+
+    settings: Mapping[str, BoardSetting] = field(default_factory=dict)
+    is_complete: bool = True
+    left_out: int = 0
+    is_remembered: bool = False
+
+    def __iter__(self) -> Iterator[BoardSetting]:
+        return iter(self.settings.values())
+
+    def __len__(self) -> int:
+        return len(self.settings)
+
+    def find(self, name: str) -> BoardSetting | None:
+        """The setting of this name; letters of the other case are accepted if they leave no doubt."""
+        return self.settings.get(name) or self.find_all((name,)).get(name)
+
+    def find_all(self, names: Collection[str]) -> Mapping[str, BoardSetting]:
+        """The settings that `find` finds, by the names given, in one pass over the table."""
+        alike: dict[str, list[BoardSetting]] = {}
+        for setting in self:
+            alike.setdefault(setting.name.lower(), []).append(setting)
+        doubtless = {lower: found[0] for lower, found in alike.items() if len(found) == 1}
+        found = {name: self.settings.get(name) or doubtless.get(name.lower()) for name in names}
+        return {name: setting for name, setting in found.items() if setting is not None}
+
+    def updated(self, *settings: BoardSetting) -> "SettingTable":
+        return replace(self, settings={**self.settings, **{setting.name: setting for setting in settings}})
+
+    def differences(self, later: "SettingTable") -> tuple[str, ...]:
+        """The names of settings with another value, or only in one of the tables."""
+        before, after = ({each.name: each.value for each in table} for table in (self, later))
+        return tuple(name for name in {**before, **after} if before.get(name) != after.get(name))
+
+
+def table_of(*settings: BoardSetting, is_complete: bool = True) -> SettingTable:
+    possible = {setting.name: setting for setting in settings if is_setting_name(setting.name)}
+    return SettingTable(possible, is_complete, len(settings) - len(possible))
+
+
+def remembered_table(values: Mapping[str, Value]) -> SettingTable:
+    kinds = {name: ValueKind.TEXT if isinstance(value, str) else ValueKind.FLOAT for name, value in values.items()}
+    settings = (BoardSetting(name, kinds[name], -_LARGEST, _LARGEST, value) for name, value in values.items())
+    return replace(table_of(*settings, is_complete=False), is_remembered=True)
+
+
+def shown(value: Value) -> str:
+    """A value as the board's command line would take it; floats with the digits that single precision has."""
+    if isinstance(value, str):
+        return value
+    return str(int(value)) if abs(value) < 1e15 and value == int(value) else f"{value:.7g}"
 
 
 @dataclass(frozen=True, slots=True)

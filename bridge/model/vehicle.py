@@ -11,12 +11,9 @@ from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
 from typing import Protocol, TypeVar
 
-from bridge.model.airframe import Airframe
-from bridge.model.battery import LEAST_V, least_cells, remaining_percent
-from bridge.model.flight_memory import FlightMemory, Home
-from bridge.model.flight_mode import FlightMode
+from bridge.model.craft import LEAST_V, Airframe, FlightMemory, FlightMode, Home, least_cells, remaining_percent
 from bridge.model.ground_track import GroundTrack, distance_m
-from bridge.model.mission_progress import FlightReport
+from bridge.model.missions import FlightReport
 from protocols.mission_item import is_on_earth
 from protocols.msp.nav import NavStatus
 from protocols.msp.telemetry import Sensor

@@ -16,14 +16,13 @@ from bridge.gcs.ground import Ground
 from bridge.gcs.station import Severity
 from bridge.line.conversation import Conversation, LinkLost, Pause, ask_surely
 from bridge.missions.mission_service import MissionService
-from bridge.model.board_setting import SettingTable, Value, shown
 from bridge.model.events import BridgeEvent, SettingChanged, SettingsChangedOnBoard, SettingsRead, SettingsSaved
-from bridge.model.settings import BoardId, SettingsChange, SettingsMemory, TakenBackup
+from bridge.model.settings import BoardId, SettingsChange, SettingsMemory, SettingTable, TakenBackup, Value, shown
 from bridge.settings.known_settings import Freshness, KnownSettings
 from bridge.settings.setting_work import Answer, OnDone, SettingChange, SettingsSave, SettingWork, WorkEvent
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, request
-from protocols.rights.effect import Effect
+from protocols.rights import Effect
 from protocols.rights.msp import msp_right
 
 #: After the board was found: its list is read first. A program that changes settings sends several requests.

@@ -9,8 +9,18 @@ from dataclasses import dataclass
 from enum import IntEnum
 from zlib import crc32
 
-from bridge.model.board_setting import BoardSetting, SettingTable, Value, remembered_table
-from bridge.model.settings import BoardId, Occasion, SettingsChange, SettingsMemory, SettingsState, TakenBackup
+from bridge.model.settings import (
+    BoardId,
+    BoardSetting,
+    Occasion,
+    SettingsChange,
+    SettingsMemory,
+    SettingsState,
+    SettingTable,
+    TakenBackup,
+    Value,
+    remembered_table,
+)
 
 
 class Freshness(IntEnum):

@@ -9,7 +9,7 @@ import lzma
 from collections.abc import Mapping
 from typing import Any
 
-from bridge.model.board_setting import BoardSetting, ValueKind
+from bridge.model.settings import BoardSetting, ValueKind
 from protocols.mavlink.ftp import file_crc32
 from protocols.mavlink.param_pack import encode_param_pack
 

@@ -11,7 +11,7 @@ from enum import Enum, auto
 
 from bridge.fc.fc_settings import ARMED, NO_ANSWER, FcSettings, SettingRefusal
 from bridge.line.conversation import Conversation, ask_armed
-from bridge.model.board_setting import BoardSetting, Value
+from bridge.model.settings import BoardSetting, Value
 
 #: The changed setting as read back, or no setting after a save.
 Answer = Sequence[BoardSetting] | SettingRefusal

@@ -15,18 +15,19 @@ from math import inf
 
 from bridge.fc.profile import FlightController
 from bridge.fc.session import FcSession
-from bridge.gcs.budget import TokenBucket
-from bridge.gcs.cost import Rate
+from bridge.gcs.budget import Rate, TokenBucket
 from bridge.gcs.ground import Ground
 from bridge.gcs.station import Severity
 from bridge.line.conversation import Conversation, LinkLost, Receive, Send, ask_armed
 from bridge.line.msp_link import MspLink
 from bridge.missions.mission_service import MissionService
 from bridge.model.events import Emit, Level, ShareRefused, ShareUnanswered
-from bridge.sharing.permission import ARMED, is_unknown_read, refusal, right_of
 from bridge.sharing.program import Program, WaitingRequest
+from protocols.msp.command_line import is_clean
 from protocols.msp.frame import Direction, MspFrame, frame_size
-from protocols.rights.effect import Effect
+from protocols.msp.nav import Nav, UnsafeRecord, decode_wp, encode_set_wp
+from protocols.rights import Effect
+from protocols.rights.msp import MSP_RIGHTS, MspRight, msp_right
 
 #: The requests of all programs.
 _TOTAL = Rate(1000, 1000)
@@ -42,7 +43,7 @@ _REPORTS = Rate(0.2, 5)
 _MAX_REPORTED = 64
 #: SET_RTC and COMMON_SET_TZ: mwp sets an INAV's clock each time it connects, and continues after an error.
 _CLOCK = frozenset((247, 0x1002))
-_NO_REPLY = "no reply from the flight controller"
+_ARMED, _NO_REPLY = "armed", "no reply from the flight controller"
 
 
 @dataclass(eq=False)
@@ -121,7 +122,7 @@ class MspSharing:
                 program.answer(request, MspFrame(Direction.ERROR, frame.command))
                 continue
             armed = self._session.vehicle.armed
-            why = refusal(frame, right, link, may_write=program.may_write, armed=armed)
+            why = refusal(request, right, link, may_write=program.may_write, armed=armed)
             if why:
                 self._refuse(program, request, right.name, why, now)
                 if program not in self._programs:
@@ -169,7 +170,7 @@ class MspSharing:
             return "no flight controller speaks MSP now"
         armed = self._session.vehicle.armed
         if armed is not False:
-            return ARMED if armed else "not yet known to be disarmed"
+            return _ARMED if armed else "not yet known to be disarmed"
         if self._stopped:
             return "naze-bridge is stopping"
         return "a mission transfer is running" if self._missions.runner.needs_line else ""
@@ -191,8 +192,8 @@ class MspSharing:
             if request.is_change and request in program.waiting:
                 if isinstance(reply, MspFrame):
                     program.answer(request, reply)
-                elif reply == ARMED:
-                    self._refuse(program, request, right.name, ARMED, at)
+                elif reply == _ARMED:
+                    self._refuse(program, request, right.name, _ARMED, at)
                 else:
                     # It may have been carried out, so it is not repeated.
                     self._give_up(program, request, at)
@@ -262,8 +263,42 @@ def _carry(request: WaitingRequest, reply_size: int, arm_bit: int | None) -> Con
     if request.is_change:
         armed = yield from ask_armed(arm_bit)
         if armed is not False:
-            return ARMED if armed else _NO_REPLY
+            return _ARMED if armed else _NO_REPLY
     is_read = not request.is_change
     asked = Send(request.asked, command, reply_size, exclusive=not is_read, is_kept=is_read, is_shared=True)
     reply: MspFrame | None = yield Receive(frozenset((command,)), asked)
     return reply or _NO_REPLY
+
+
+def right_of(frame: MspFrame, controller: FlightController) -> MspRight:
+    return msp_right(controller.firmware, frame.command, frame.payload)
+
+
+def is_unknown_read(right: MspRight, frame: MspFrame) -> bool:
+    """True if this flight controller has no handler for a request that on every other firmware at most reads."""
+    if right.effect is not Effect.UNKNOWN:
+        return False
+    elsewhere = [rights[frame.command] for rights in MSP_RIGHTS.values() if frame.command in rights]
+    is_read = all(row.effect is Effect.READ for row in elsewhere)
+    return is_read and (not frame.payload or any(row.effect_of(frame.payload) is Effect.READ for row in elsewhere))
+
+
+def refusal(waiting: WaitingRequest, right: MspRight, link: MspLink, *, may_write: bool, armed: bool | None) -> str:
+    """The reason why a request is never forwarded; empty if it may be."""
+    if right.effect is Effect.MOVE:
+        return "never forwarded"
+    if right.effect is Effect.UNKNOWN:
+        return "unknown on this board"
+    if right.effect is Effect.CHANGE:
+        if not may_write:
+            return "read-only share"
+        if armed:
+            return _ARMED
+    if not (link.any_byte or is_clean(waiting.asked)):
+        return "bytes that open the command line"
+    if waiting.frame.command == Nav.SET_WP and (record := decode_wp(waiting.frame.payload)):
+        try:
+            encode_set_wp(*record)
+        except UnsafeRecord:
+            return "a record that crashes INAV"
+    return ""

@@ -4,8 +4,7 @@
 from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass, field
 
-from bridge.gcs.budget import TokenBucket
-from bridge.gcs.cost import Rate
+from bridge.gcs.budget import Rate, TokenBucket
 from protocols.msp.frame import Direction, MspFrame, MspParser, request
 
 #: mwp asks up to 190 times a second if it is answered at once; more than this is a flood.

@@ -3,13 +3,12 @@
 
 from dataclasses import dataclass, replace
 
-from bridge.gcs.cost import Cost
+from bridge.gcs.budget import Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import Sender
 from bridge.missions.mission_service import HeldMission, MissionService
-from bridge.model.flight_memory import Home
-from bridge.model.refusal import Refusal
-from bridge.model.transfer_memory import Download, TransferMemory
+from bridge.model.craft import Home
+from bridge.model.missions import Download, Refusal, TransferMemory
 from protocols.mavlink.codec import item_message
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult

@@ -12,8 +12,7 @@ from bridge.missions.fc_mission_store import StoreReport
 from bridge.missions.list_check import check_list
 from bridge.missions.mission_service import DeliveryResult, HeldMission, MissionService, MissionTransfer
 from bridge.model.events import Emit, PushEnded, PushStarted
-from bridge.model.mission_log import ArrivedMission
-from bridge.model.refusal import Refusal
+from bridge.model.missions import ArrivedMission, Refusal
 from bridge.transfers.uploads import MissionUploads
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.plain_text import plain_text

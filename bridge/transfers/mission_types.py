@@ -12,7 +12,7 @@ from bridge.missions.fc_mission_store import AnyFcMissionStore
 from bridge.missions.mission_service import MissionService
 from bridge.missions.place_lists import PlaceLists
 from bridge.model.events import Emit
-from bridge.model.refusal import Refusal
+from bridge.model.missions import Refusal
 from bridge.transfers.downloads import MissionDownloads
 from bridge.transfers.uploads import MissionUploads
 from protocols.mavlink.dialect import messages as m

@@ -9,8 +9,7 @@ from bridge.line.conversation import Conversation, LinkLost, conclude, find_pend
 from bridge.missions.fc_mission_store import Loading
 from bridge.missions.mission_service import NO_LINK, HeldMission, MissionService
 from bridge.model.events import Emit, Level, MissionChangedOnBoard
-from bridge.model.mission_log import Outcome
-from bridge.model.refusal import Refusal
+from bridge.model.missions import Outcome, Refusal
 
 #: A change of the flight controller's list that no ground station requested, as text for the pilot.
 MissionChange = tuple[Severity, str]

@@ -10,8 +10,7 @@ from bridge.gcs.ground_station import GroundStation, Sender
 from bridge.gcs.station import Severity
 from bridge.missions.mission_service import DeliveryResult
 from bridge.missions.mission_texts import finding_lines
-from bridge.model.refusal import Refusal
-from bridge.model.transfer_memory import FinalAck, TransferMemory
+from bridge.model.missions import FinalAck, Refusal, TransferMemory
 from protocols.mission_item import MissionResult
 from reports.finding import News
 from reports.verdict import Result, Verdict

@@ -9,7 +9,7 @@ from math import inf
 from bridge.gcs.ground_station import Sender
 from bridge.missions.list_check import ListCheck
 from bridge.missions.mission_service import OCCUPIED
-from bridge.model.refusal import Refusal
+from bridge.model.missions import Refusal
 from bridge.transfers.arriving_list import ArrivingList, WholeList
 from protocols.mission_item import MissionItem, MissionResult
 

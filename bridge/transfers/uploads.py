@@ -11,7 +11,7 @@ from functools import partial
 from math import inf
 from typing import Any
 
-from bridge.gcs.cost import TOO_MANY_WRITES, Cost
+from bridge.gcs.budget import TOO_MANY_WRITES, Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import GroundStation, Sender
 from bridge.gcs.station import Peer, Severity
@@ -21,8 +21,7 @@ from bridge.missions.list_check import begin_check, check_count
 from bridge.missions.mission_service import OCCUPIED, DeliveryResult, MissionService, MissionTransfer, TransferStep
 from bridge.missions.mission_texts import with_meant_home
 from bridge.model.events import Emit, StationMoved, UploadEnded, UploadRefused, UploadStarted
-from bridge.model.mission_log import ArrivedMission
-from bridge.model.refusal import Refusal
+from bridge.model.missions import ArrivedMission, Refusal
 from bridge.transfers.arriving_list import Reply, WholeList
 from bridge.transfers.upload_answers import UploadAnswers
 from bridge.transfers.upload_states import (

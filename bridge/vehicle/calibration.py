@@ -14,7 +14,7 @@ from enum import Enum
 from math import inf
 
 from bridge.fc.session import FcSession
-from bridge.gcs.cost import TOO_MANY_WRITES, Cost
+from bridge.gcs.budget import TOO_MANY_WRITES, Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import Sender
 from bridge.gcs.station import Severity
@@ -22,12 +22,12 @@ from bridge.line.conversation import Conversation, LinkLost, Pause, Receive, ask
 from bridge.missions.mission_service import MissionService
 from bridge.settings.board_settings import BoardSettings
 from bridge.vehicle.link_announcer import LinkAnnouncer
-from protocols.mavlink.command import CommandResult
+from protocols.mavlink.dialect import CommandResult
 from protocols.mavlink.dialect import messages as m
 from protocols.msp.commands import Msp, MspAction
 from protocols.msp.frame import Direction, MspFrame, request
 from protocols.msp.telemetry import RAW_IMU_SIZE, STATUS_SIZE, Sensor, decode_raw_imu
-from protocols.rights.effect import Effect
+from protocols.rights import Effect
 from protocols.rights.msp import msp_right
 
 _TICK_S = 1.0

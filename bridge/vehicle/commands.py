@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from bridge.fc.fc_settings import Cause, SettingRefusal
 from bridge.fc.profile import Spoken
 from bridge.fc.session import FcSession
-from bridge.gcs.cost import TOO_MANY_WRITES, Cost
+from bridge.gcs.budget import TOO_MANY_WRITES, Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import Sender
 from bridge.gcs.station import Severity
-from bridge.model.flight_mode import MISSION_BOXES
-from bridge.model.refusal import Refusal
+from bridge.model.craft import MISSION_BOXES
+from bridge.model.missions import Refusal
 from bridge.model.vehicle import MissionLeg, Switches
 from bridge.settings.board_settings import BoardSettings
 from bridge.settings.parameters import Parameters
@@ -27,8 +27,7 @@ from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.set_waypoint import SetWaypoint
 from bridge.vehicle.vehicle_messages import auto_mode
 from protocols.mavlink.codec import COMPONENT_METADATA
-from protocols.mavlink.command import CommandResult
-from protocols.mavlink.dialect import messages
+from protocols.mavlink.dialect import CommandResult, messages
 from protocols.mission_item import MissionResult
 
 _MAX_U16, _MAX_I32 = (1 << 16) - 1, (1 << 31) - 1

@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Callable
 from itertools import product
 
-from bridge.gcs.cost import Cost
+from bridge.gcs.budget import Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import GroundStation, Sender
 from bridge.gcs.return_path import NOT_SHOWN
@@ -16,13 +16,12 @@ from bridge.model.events import Emit, GcsRefused
 from bridge.settings.parameters import Parameters
 from bridge.vehicle.message_router import MessageRouter
 from protocols.mavlink.codec import FrameWriter, decode
-from protocols.mavlink.command import CommandResult
-from protocols.mavlink.dialect import MESSAGE_FORMATS, Message
+from protocols.mavlink.dialect import MESSAGE_FORMATS, CommandResult, Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.mavlink.ftp import refuse
 from protocols.mission_item import MissionResult
-from protocols.rights.effect import Effect
+from protocols.rights import Effect
 from protocols.rights.mavlink import effect_of
 
 

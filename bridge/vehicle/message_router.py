@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from math import inf
 
-from bridge.gcs.cost import Cost
+from bridge.gcs.budget import Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import Sender
 from bridge.gcs.station import Severity

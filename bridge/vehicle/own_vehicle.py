@@ -16,10 +16,8 @@ from bridge.gcs.ground_station import GroundStation, Sender
 from bridge.gcs.message_rates import fastest_s, take_due
 from bridge.gcs.station import Severity
 from bridge.missions.mission_service import MissionService
-from bridge.model.airframe import Airframe
-from bridge.model.flight_memory import Home
-from bridge.model.flight_mode import FlightMode
-from bridge.model.mission_progress import FlightReport, FlownMission, MissionProgress
+from bridge.model.craft import Airframe, FlightMode, Home
+from bridge.model.missions import FlightReport, FlownMission, MissionProgress
 from bridge.model.vehicle import STALE_S, FlightState, Health, MissionLeg, Mode, Readiness, Reading
 from bridge.vehicle import vehicle_messages as make
 from bridge.vehicle.arming_reasons import ArmingReasons

@@ -7,17 +7,17 @@ a station on an open link does not have.
 
 from collections.abc import Callable
 
-from bridge.gcs.cost import Cost
+from bridge.gcs.budget import Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import Sender
 from bridge.gcs.station import Severity
 from bridge.missions.fc_mission_store import FliesToItems
 from bridge.missions.mission_service import HeldMission, MissionService
-from bridge.model.refusal import Refusal
+from bridge.model.missions import Refusal
 from bridge.vehicle.own_vehicle import OwnVehicle
-from protocols.mavlink.command import command_name
+from protocols.mavlink.dialect import command_name
 from protocols.mission_item import MissionResult
-from protocols.rights.effect import Effect
+from protocols.rights import Effect
 
 
 def _denied(text: str) -> Refusal:

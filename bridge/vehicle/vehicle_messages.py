@@ -11,11 +11,9 @@ from typing import NamedTuple, TypeVar
 
 from bridge.fc.mavlink_telemetry import SENSORS
 from bridge.model import vehicle as v
-from bridge.model.airframe import Airframe
-from bridge.model.flight_memory import Home
-from bridge.model.flight_mode import FlightMode
+from bridge.model.craft import Airframe, FlightMode, Home
 from bridge.model.ground_track import bearing_deg, distance_m, north_east_m
-from bridge.model.mission_progress import FlownMission, Way
+from bridge.model.missions import FlownMission, Way
 from protocols.mavlink.codec import pack_attitude
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import Command

@@ -11,9 +11,9 @@ from bridge.fc.session import FcSession
 from bridge.gcs.ground import Ground
 from bridge.missions.mission_service import MissionService
 from bridge.model import vehicle as v
-from bridge.model.flight_mode import FlightMode
+from bridge.model.craft import FlightMode
 from bridge.model.ground_track import bearing_deg, distance_m
-from bridge.model.mission_progress import MissionProgress
+from bridge.model.missions import MissionProgress
 from bridge.settings.board_settings import BoardSettings
 from protocols.msp.telemetry import Sensor
 from reports.vehicle_groups import (

@@ -11,6 +11,7 @@ ardupilotmega.
 """
 
 import struct
+from enum import IntEnum
 from typing import Any, NamedTuple, TypeAlias
 
 from pymavlink.dialects.v20 import all as messages
@@ -58,4 +59,22 @@ MESSAGE_FORMATS = {msgid: _format(kind) for msgid, kind in messages.mavlink_map.
 #: CRC_EXTRA, one byte, by message id.
 CRC_EXTRA = {msgid: bytes((known.crc_extra,)) for msgid, known in MESSAGE_FORMATS.items()}
 
-__all__ = ["CRC_EXTRA", "MESSAGE_FORMATS", "Message", "MessageFormat", "messages"]
+
+class CommandResult(IntEnum):
+    """MAV_RESULT (https://mavlink.io/en/messages/common.html#MAV_RESULT)."""
+
+    ACCEPTED = 0
+    TEMPORARILY_REJECTED = 1
+    DENIED = 2
+    UNSUPPORTED = 3
+    FAILED = 4
+    IN_PROGRESS = 5
+
+
+def command_name(command: int) -> str:
+    """A MAV_CMD's name as Mission Planner lists it, or its number."""
+    known = messages.enums["MAV_CMD"].get(command)
+    return str(command) if known is None else known.name.removeprefix("MAV_CMD_").removeprefix("NAV_")
+
+
+__all__ = ["CRC_EXTRA", "MESSAGE_FORMATS", "CommandResult", "Message", "MessageFormat", "command_name", "messages"]

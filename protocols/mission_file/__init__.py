@@ -4,7 +4,6 @@
 from collections.abc import Sequence
 from pathlib import PurePath
 
-from protocols.file_text import file_text
 from protocols.mission_file.error import MissionFileError, Note, no_note
 from protocols.mission_file.nav_mission import has_wp_lines, read_nav_xml, read_wp_lines
 from protocols.mission_file.path_file import is_path_table, read_csv, read_gpx, read_kml, read_kmz
@@ -13,7 +12,7 @@ from protocols.mission_file.qgc_wpl import read_qgc_wpl, write_qgc_wpl
 from protocols.mission_file.strangers import refuse_binary, refuse_text
 from protocols.mission_file.xml_text import parse_xml
 from protocols.mission_item import MissionItem
-from protocols.plain_text import plain_text
+from protocols.plain_text import file_text, plain_text
 
 __all__ = ["MissionFileError", "read_mission_file", "write_mission_file", "write_qgc_wpl"]
 

@@ -4,8 +4,8 @@
 import math
 from collections.abc import Callable, Iterable
 
-from protocols.file_error import FileError, shown
 from protocols.mission_item import degrees_to_e7
+from protocols.plain_text import FileError, shown
 
 
 class MissionFileError(FileError):

@@ -13,11 +13,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from xml.etree.ElementTree import Element
 
-from protocols.file_error import shown
 from protocols.mission_file.error import NO_HOME, MissionFileError, Note, file_degrees_to_e7
 from protocols.mission_item import MissionItem
 from protocols.msp.nav import LAST, NavAction, NavRecord
 from protocols.msp.nav_items import home_item, items_from_records
+from protocols.plain_text import shown
 
 _SAVE_AGAIN = "save it again from INAV Configurator or mwp"
 _NUMBER = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:e[-+]?\d+)?", re.ASCII | re.IGNORECASE)

@@ -15,11 +15,10 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
-from protocols.file_error import shown
-from protocols.file_text import file_text
 from protocols.mission_file.error import NO_HOME, MissionFileError, Note, file_degrees_to_e7
 from protocols.mission_file.xml_text import MAX_SIZE, parse_xml
 from protocols.mission_item import Command, Frame, MissionItem
+from protocols.plain_text import file_text, shown
 
 _FEET = 0.3048
 #: The frame of a height, by KML's altitudeMode; heights of paths on the ground have no meaning.

@@ -13,9 +13,9 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from protocols.file_error import shown
 from protocols.mission_file.error import MissionFileError, Note, file_degrees_to_e7, no_note, refuse_other_plans
 from protocols.mission_item import Command, Frame, MissionItem
+from protocols.plain_text import shown
 
 _PARAM_COUNT = 7
 _VERSIONS = (1,)

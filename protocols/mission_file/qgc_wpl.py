@@ -15,9 +15,9 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
-from protocols.file_error import shown
 from protocols.mission_file.error import MissionFileError, Note, file_degrees_to_e7, no_note, refuse_other_plans
 from protocols.mission_item import Command, Frame, MissionItem
+from protocols.plain_text import shown
 
 _HEADER, _VERSIONS = ["QGC", "WPL"], ("100", "110", "120")
 #: Version 100: the place of each of version 110's fields, and the commands by its numbers.

@@ -8,7 +8,7 @@ from enum import IntEnum, IntFlag
 from itertools import filterfalse
 from typing import Any, NamedTuple
 
-from protocols.mission_record import ListIdentity, pack_records
+from protocols.mission_item import ListIdentity, pack_records
 from protocols.msp.command_line import HAZARDS, is_clean
 from protocols.msp.frame import request
 

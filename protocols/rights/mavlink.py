@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame
-from protocols.rights.effect import Effect
+from protocols.rights import Effect
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from collections.abc import Collection, Mapping
 from enum import Enum
 from typing import NamedTuple
 
-from protocols.rights.effect import Effect
+from protocols.rights import Effect
 
 
 class Firmware(Enum):

@@ -18,11 +18,10 @@ from bridge.fc.profile import RuleSettings
 from bridge.missions.list_check import MissionRules, check_list
 from bridge.settings.parameter_names import parameter_names
 from payloads.mission_data import verdict_data
-from protocols.file_error import FileError
 from protocols.inav_dump import InavDumpError, SavedSettings, read_inav_settings
 from protocols.mission_file import MissionFileError
-from protocols.mission_item import MissionItem, MissionResult
-from protocols.mission_record import identify
+from protocols.mission_item import MissionItem, MissionResult, identify
+from protocols.plain_text import FileError
 from reports.finding import DROPPED, without_defaults
 from reports.verdict import Result, Verdict
 from service.settings import SettingsError, takeoff_limit_m

@@ -10,8 +10,8 @@ from pathlib import Path
 import click
 
 from payloads.mission_data import Json
-from protocols.file_error import FileError
 from protocols.firmware_image import ImageError, check_backup, check_patched, parse_image
+from protocols.plain_text import FileError
 from service.cli.daemon_client import BridgeClient, bridge_options
 from service.machine.package import shipped
 from terminal.command_group import CommandGroup

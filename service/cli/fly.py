@@ -12,10 +12,10 @@ from rich.table import Table
 from bridge.controllers.table import PROFILES
 from bridge.fc.profile import RuleSettings
 from bridge.missions.list_check import check_list
-from protocols.file_error import FileError
 from protocols.firmware_image import FLASH_SIZE, Image
 from protocols.mission_file import MissionFileError
 from protocols.msp.mission import WpRecord
+from protocols.plain_text import FileError
 from reports.verdict import Result
 from service.settings import SettingsError, takeoff_limit_m
 from simulator.commands.image import read_image

@@ -13,8 +13,7 @@ from fleet.vehicle import BridgeId, replier
 from payloads.keys import CLEAR, MAVLINK_IN, MAVLINK_OUT, MISSION_CURRENT, STATUS, UPLOAD, full
 from payloads.mission_data import Json, mission_findings, mission_items
 from protocols.mission_file import write_qgc_wpl
-from protocols.mission_item import MissionItem, MissionResult
-from protocols.mission_record import ListIdentity
+from protocols.mission_item import ListIdentity, MissionItem, MissionResult
 from service.machine.host import Host
 from service.machine.own_networks import OwnNetworks
 from service.machine.threads import post

@@ -8,11 +8,9 @@ from pathlib import Path
 from typing import TypeVar
 
 from bridge.missions.mission_service import DeliveryResult, HeldMission
-from bridge.model.mission_log import ArrivedMission
-from bridge.model.refusal import Refusal
+from bridge.model.missions import ArrivedMission, Refusal
 from payloads.mission_data import MAX_ITEMS, MOST, Json, mission_items, plain, verdict_data, whole_number
-from protocols.mission_item import MissionItem
-from protocols.mission_record import pack_records
+from protocols.mission_item import MissionItem, pack_records
 from service.daemon.client import FIRMWARE_REQUESTS, ControlError
 from service.daemon.daemon import Daemon
 from service.daemon.firmware_api import FirmwareApi

@@ -22,7 +22,7 @@ from bridge.gcs.station import Datagrams
 from bridge.line.conversation import Conclude, FindPending, NoteReader, Recall, Save, StoreEffect
 from bridge.missions.mission_service import DeliveryResult, MissionEnded
 from bridge.model.events import Armed, BridgeEvent, Disarmed, FcFound, FcInCommandLine, FcLost, PortLost
-from bridge.model.mission_log import ArrivedMission
+from bridge.model.missions import ArrivedMission
 from bridge.model.settings import TakenBackup
 from payloads.mission_data import Json
 from reports.vehicle_groups import Group, VehicleReport

@@ -15,11 +15,19 @@ from pathlib import Path
 import structlog
 
 from bridge.controllers.harakiri.profile import PATCHED, UNPATCHED
-from bridge.firmware.command_line import CommandLineError, read_dump, settings_in, start_boot_loader
-from bridge.firmware.reflash import FlashingError, find_chip, read_flash, rewrite_flash
+from bridge.firmware.reflash import (
+    CommandLineError,
+    FlashingError,
+    find_chip,
+    read_dump,
+    read_flash,
+    rewrite_flash,
+    settings_in,
+    start_boot_loader,
+)
 from payloads.mission_data import Json
-from protocols.file_text import file_text
 from protocols.firmware_image import FLASH_SIZE, PROGRAM_END, ImageError, check_backup, check_patched
+from protocols.plain_text import file_text
 from protocols.stm32_boot_loader import BootLoaderError, start_program
 from service.daemon.client import ControlError
 from service.daemon.daemon import Daemon

@@ -5,9 +5,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from bridge.model.airframe import Airframe
-from bridge.model.flight_memory import FlightMemory, Home
-from bridge.model.flight_mode import FlightMode
+from bridge.model.craft import Airframe, FlightMemory, FlightMode, Home
 from service.machine.host import Host
 from service.machine.state_file import StateFile
 

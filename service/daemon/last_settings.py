@@ -5,8 +5,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from bridge.model.board_setting import Value
-from bridge.model.settings import BoardId
+from bridge.model.settings import BoardId, Value
 from service.machine.state_file import StateFile
 
 SETTINGS_FILE = "last-settings.json"

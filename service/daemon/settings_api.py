@@ -7,7 +7,7 @@ from functools import partial
 from typing import TypeVar
 
 from bridge.fc.fc_settings import SettingRefusal
-from bridge.model.board_setting import BoardSetting, Value, ValueKind, shown
+from bridge.model.settings import BoardSetting, Value, ValueKind, shown
 from payloads.mission_data import MOST, Json, plain, whole_number
 from payloads.settings_comparison import SettingValues, setting_values, settings_difference
 from service.daemon.client import ControlError

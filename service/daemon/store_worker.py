@@ -12,10 +12,10 @@ from typing import TypeVar
 import structlog
 
 from bridge.line.conversation import Conclude, FindPending, NoteReader, Recall, Save, StoreEffect
-from bridge.model.mission_log import ArrivedMission, PendingMission, RecalledMission
+from bridge.model.missions import ArrivedMission, PendingMission, RecalledMission
 from bridge.model.settings import Occasion, TakenBackup
 from payloads.mission_data import plain
-from protocols.mission_record import ListIdentity, identify, pack_records
+from protocols.mission_item import ListIdentity, identify, pack_records
 from service.machine.threads import BackgroundThread, post
 from storage.mission_store import MissionStore, ReceivedMission, open_store, store_in_memory
 from storage.store_error import StoreError

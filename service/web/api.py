@@ -16,7 +16,7 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from bridge.missions.mission_service import HeldMission
-from bridge.model.mission_log import Outcome
+from bridge.model.missions import Outcome
 from payloads.comparison import shown, stored_mission
 from payloads.mission_data import to_json
 from service.daemon.api import DaemonApi

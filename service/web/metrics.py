@@ -15,7 +15,7 @@ from bridge.fc.session import TRANSITIONS
 from bridge.line.msp_link import BOUNDS_S, RoundTrips
 from bridge.missions.mission_service import DeliveryResult
 from bridge.model.events import BridgeEvent
-from bridge.model.mission_log import ArrivedMission
+from bridge.model.missions import ArrivedMission
 from payloads.names import host_name
 from reports.vehicle_groups import VehicleReport
 from service.daemon.daemon import Daemon, Follower

@@ -9,7 +9,7 @@ from dataclasses import asdict
 
 from bridge.bridge import Bridge
 from bridge.missions.mission_service import DeliveryResult, HeldMission
-from bridge.model.mission_log import ArrivedMission
+from bridge.model.missions import ArrivedMission
 from payloads import keys
 from payloads.mission_data import Json, plain, strict
 from payloads.overview import overview_of

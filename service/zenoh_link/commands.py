@@ -10,10 +10,10 @@ from typing import TypeVar
 
 from payloads import keys
 from payloads.mission_data import ACCEPTED, MAX_ITEMS, MOST, Json, whole_number
-from protocols.file_error import FileError
 from protocols.mission_file import read_mission_file
 from protocols.mission_item import MissionItem
 from protocols.param_file import ParamFile, read_param_file
+from protocols.plain_text import FileError
 from service.daemon.api import DaemonApi
 from service.daemon.telemetry_logs import TelemetryLogs
 from service.zenoh_link.liveliness import RENAME

@@ -17,7 +17,7 @@ import zenoh
 
 from bridge.missions.mission_service import DeliveryResult, HeldMission
 from bridge.model.events import BridgeEvent
-from bridge.model.mission_log import ArrivedMission
+from bridge.model.missions import ArrivedMission
 from payloads import keys
 from payloads.endpoints import connect_endpoints, endpoint_trouble, tls_files
 from payloads.keys import ZenohKey

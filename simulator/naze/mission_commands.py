@@ -4,7 +4,7 @@
 import struct
 from dataclasses import dataclass
 
-from protocols.mission_record import ListIdentity
+from protocols.mission_item import ListIdentity
 from protocols.msp.mission import (
     MAX_RADIUS_CM,
     RECORD_SIZE,

@@ -8,7 +8,7 @@ seal last: until then the other slot is the list. Staging needs no RAM.
 import struct
 import zlib
 
-from protocols.mission_record import ListIdentity
+from protocols.mission_item import ListIdentity
 from protocols.msp.mission import RECORD_SIZE
 from simulator.board.flash import ERASED, PAGE_SIZE, FlashError, NorFlash
 from simulator.board.options import SimOptions

@@ -13,7 +13,7 @@ from protocols.mavlink.codec import Packed, decode, pack
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame
-from protocols.mission_record import pack_records
+from protocols.mission_item import pack_records
 from protocols.msp.mission import WpCommand, WpRecord, unpack_records
 from simulator.board.flash import FlashError, NorFlash
 from simulator.naze.mission_slots import MissionSlots

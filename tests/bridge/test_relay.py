@@ -11,8 +11,7 @@ from bridge.relay import Relay, WriteResult
 from protocols.mavlink.codec import FrameWriter, decode
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.frame import MavlinkSplitter
-from protocols.mission_item import MissionItem, MissionResult
-from protocols.mission_record import ListIdentity
+from protocols.mission_item import ListIdentity, MissionItem, MissionResult
 from reports.finding import Finding, News
 from tests.support.packing import pack
 

@@ -9,7 +9,7 @@ from bridge.relays import Relays
 from protocols.mavlink.codec import FrameWriter, decode
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.frame import MavlinkSplitter
-from protocols.mission_record import ListIdentity
+from protocols.mission_item import ListIdentity
 from tests.bridge.test_relay import PLAN, item_int
 from tests.support.packing import pack
 

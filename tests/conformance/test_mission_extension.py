@@ -13,7 +13,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from protocols.mission_record import ListIdentity, identify, pack_records
+from protocols.mission_item import ListIdentity, identify, pack_records
 from protocols.msp import mission as ext
 from protocols.msp.frame import request
 from protocols.msp.mission import Info, InfoFlag, MissionCommand, Records, ReplyStatus, Staged, Stored, WpRecord

@@ -16,7 +16,7 @@ from bridge.line.msp_link import MspLink
 from bridge.line.runner import Runner
 from bridge.missions.fc_mission_store import PushResult
 from bridge.model.vehicle import Vehicle
-from protocols.mission_record import pack_records
+from protocols.mission_item import pack_records
 from protocols.msp.frame import MspFrame
 from protocols.msp.mission import MissionCommand, WpRecord, decode_info
 from tests.support.c_core import CCore, PowerCut

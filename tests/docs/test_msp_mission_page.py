@@ -4,7 +4,7 @@
 import re
 from pathlib import Path
 
-from protocols.mission_record import identify, pack_records
+from protocols.mission_item import identify, pack_records
 from protocols.msp import mission as ext
 from protocols.msp.mission import WpCommand, WpRecord
 from protocols.msp.setting_table import (

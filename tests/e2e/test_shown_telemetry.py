@@ -19,7 +19,7 @@ from typing import Any
 import pytest
 from mavsdk.asyncio.plugins.telemetry.telemetry import TelemetryAsync
 
-from bridge.model.battery import remaining_percent
+from bridge.model.craft import remaining_percent
 from simulator.board.flight import FIELD_LAT_E7, METRES_PER_DEGREE
 from tests.e2e.test_mavsdk import vehicle_at
 from tests.support import dronekit

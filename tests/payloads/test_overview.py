@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The overview of a vehicle fits 80 bytes."""
 
-from bridge.model.flight_mode import FlightMode
+from bridge.model.craft import FlightMode
 from payloads import compact
 from payloads.keys import OVERVIEW, PayloadEncoding
 from payloads.mission_data import plain

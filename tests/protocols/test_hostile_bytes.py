@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
+from bridge.fc.port_listener import GpsWatch
 from protocols.frsky import FrskyParser
-from protocols.gps_receiver import GpsWatch
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.msp.command_line import EchoWatch
 from protocols.msp.frame import MAX_REPLY, MspParser

@@ -3,9 +3,9 @@
 
 import pytest
 
-from protocols.file_error import FileError
 from protocols.inav_dump import SavedSettings, read_inav_settings
 from protocols.msp.inav_places import Safehome
+from protocols.plain_text import FileError
 
 DUMP = b"""# INAV/SITL 9.1.0
 batch start

@@ -4,7 +4,7 @@
 import random
 
 from protocols.firmware_image import Image
-from protocols.mission_record import identify, pack_records
+from protocols.mission_item import identify, pack_records
 from protocols.msp.frame import MspFrame, request
 from protocols.msp.mission import (
     ABORT_REQUEST,

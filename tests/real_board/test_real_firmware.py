@@ -12,8 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.firmware.command_line import read_dump, start_boot_loader
-from bridge.firmware.reflash import FlashingError, find_chip, read_flash, rewrite_flash
+from bridge.firmware.reflash import FlashingError, find_chip, read_dump, read_flash, rewrite_flash, start_boot_loader
 from protocols.firmware_image import PROGRAM_END, Image, parse_image
 from protocols.msp.mission import INFO_REQUEST, decode_info
 from protocols.stm32_boot_loader import Dialogue, start_program

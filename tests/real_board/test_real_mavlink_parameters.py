@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import ardupilotmega as m
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.controllers.harakiri.mavlink_settings import HarakiriMavlinkSettings
 from bridge.fc.fc_settings import SettingRefusal
-from bridge.model.board_setting import SettingTable
+from bridge.model.settings import SettingTable
 from protocols.firmware_image import Image
 from protocols.mavlink.codec import FrameWriter
 from protocols.mavlink.frame import MavlinkSplitter

@@ -5,7 +5,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.fc.fc_settings import Cause, SettingRefusal
-from bridge.model.board_setting import BoardSetting, SettingTable, shown
+from bridge.model.settings import BoardSetting, SettingTable, shown
 from protocols.firmware_image import Image
 from protocols.msp.frame import Direction, MspParser
 from protocols.msp.setting_table import SettingCommand

@@ -11,7 +11,7 @@ from itertools import product
 from protocols.firmware_image import Image
 from protocols.msp.frame import Direction, MspFrame, request
 from protocols.msp.mission import INFO_REQUEST, MissionCommand
-from protocols.rights.effect import Effect
+from protocols.rights import Effect
 from protocols.rights.msp import MSP_RIGHTS, Firmware
 from simulator.board.simulated_board import Power
 from simulator.emulated_naze.board import EmulatedNaze

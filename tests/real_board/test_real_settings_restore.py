@@ -3,7 +3,7 @@
 
 import pytest
 
-from bridge.model.board_setting import SettingTable, Value, ValueKind
+from bridge.model.settings import SettingTable, Value, ValueKind
 from bridge.settings.local_settings import RestoreResult
 from protocols.firmware_image import Image
 from simulator.emulated_naze.board import EmulatedNaze

@@ -6,7 +6,7 @@ import pytest
 from protocols.firmware_image import Image
 from protocols.frsky import FrskyParser
 from protocols.mavlink.frame import MavlinkSplitter
-from protocols.mission_record import identify
+from protocols.mission_item import identify
 from protocols.msp.mission import INFO_REQUEST, decode_info
 from simulator.board.options import TelemetryProtocol
 from tests.support.naze_bench import mission

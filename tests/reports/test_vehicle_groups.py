@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.bridge import Bridge
-from bridge.model.flight_memory import Home
-from bridge.model.flight_mode import FlightMode
+from bridge.model.craft import FlightMode, Home
 from bridge.model.ground_track import bearing_deg, distance_m
 from bridge.model.vehicle import (
     STALE_S,

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.fc.states.base import Closed
-from bridge.model.mission_log import Outcome
+from bridge.model.missions import Outcome
 from protocols.mission_file import read_mission_file
 from protocols.mission_item import MissionResult
 from protocols.uart_capture import UartEvent, read_capture

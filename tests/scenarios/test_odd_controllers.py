@@ -10,8 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.missions.fc_mission_store import PushFailure
-from protocols.mission_item import MissionResult
-from protocols.mission_record import ListIdentity, identify
+from protocols.mission_item import ListIdentity, MissionResult, identify
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from protocols.msp.mission import (
     Info,

@@ -6,8 +6,7 @@ import random
 import pytest
 
 from bridge.missions.fc_mission_store import PushFailure
-from bridge.model.mission_log import Outcome
-from bridge.model.refusal import Refusal
+from bridge.model.missions import Outcome, Refusal
 from protocols.mission_item import MissionResult
 from protocols.msp.frame import MspParser
 from protocols.msp.mission import MissionCommand

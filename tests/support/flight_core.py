@@ -8,7 +8,7 @@ from ctypes import c_char_p, c_int, c_int32, c_uint16
 from pathlib import Path
 
 from bridge.controllers.harakiri.flight import FlightLimits
-from protocols.mission_record import pack_records
+from protocols.mission_item import pack_records
 from protocols.msp.mission import WpRecord
 from protocols.msp.mission_flight import FlightReason
 from simulator.naze.compiled_core import open_library

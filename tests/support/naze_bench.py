@@ -3,7 +3,7 @@
 
 from collections.abc import Sequence
 
-from protocols.mission_record import identify, pack_records
+from protocols.mission_item import identify, pack_records
 from protocols.msp.frame import MspFrame, MspParser
 from protocols.msp.mission import (
     ReplyStatus,

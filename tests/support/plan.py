@@ -12,8 +12,7 @@ from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.missions.list_check import check_list
 from protocols.mavlink.dialect import Message
 from protocols.mission_file.qgc_wpl import write_qgc_wpl
-from protocols.mission_item import Command, Frame, MissionItem, degrees_to_e7
-from protocols.mission_record import pack_records
+from protocols.mission_item import Command, Frame, MissionItem, degrees_to_e7, pack_records
 from protocols.msp.mission import WpRecord
 from reports.verdict import Verdict
 

@@ -5,7 +5,7 @@ import struct
 from collections.abc import Callable, Sequence
 
 from protocols.firmware_image import Image
-from protocols.mission_record import ListIdentity, identify, pack_records
+from protocols.mission_item import ListIdentity, identify, pack_records
 from protocols.msp.frame import request
 from protocols.msp.mission import WpRecord
 from simulator.board.msp_sensors import MspCommand

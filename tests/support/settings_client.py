@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bridge.fc.fc_settings import Cause, SettingRefusal
-from bridge.model.board_setting import BoardSetting, SettingTable, Value
+from bridge.model.settings import BoardSetting, SettingTable, Value
 from bridge.settings.setting_work import Answer
 from protocols.msp.frame import MspParser
 from simulator.board.options import Faults, SimOptions

@@ -33,19 +33,19 @@ from bridge.gcs.rights import LinkAccess
 from bridge.gcs.station import Datagrams, Peer
 from bridge.line.conversation import Conclude, FindPending, NoteReader, Recall, Save, StoreEffect
 from bridge.missions.mission_service import MissionEnded
+from bridge.model.craft import FlightMemory
 from bridge.model.events import BridgeEvent, Level
-from bridge.model.flight_memory import FlightMemory
-from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission, RecalledMission
+from bridge.model.missions import ArrivedMission, Outcome, PendingMission, RecalledMission
 from bridge.model.settings import MemoryOfThisRun, SettingsMemory, TakenBackup
 from bridge.sharing.program import Program
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.frame import MAGIC_V1, MavlinkSplitter
-from protocols.mission_record import ListIdentity, identify
+from protocols.mission_item import ListIdentity, identify
 from protocols.msp.command_line import is_clean
 from protocols.msp.frame import MspFrame, MspParser
 from protocols.msp.mission import WpRecord, unpack_records
 from protocols.msp.nav import SET_WP_INDEX
-from protocols.rights.effect import Effect
+from protocols.rights import Effect
 from protocols.rights.mavlink import effect_of
 from protocols.rights.msp import Firmware, msp_right
 from reports.vehicle_groups import Group

@@ -33,7 +33,7 @@ from bridge.missions.list_check import (
     refuse_frame,
     refuse_position,
 )
-from protocols.mavlink.command import command_name
+from protocols.mavlink.dialect import command_name
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.msp.mission import WpCommand, WpRecord
 from reports.finding import CLEARED, DROPPED, Finding, News, RejectingFinding, reject

@@ -8,7 +8,7 @@ from bridge.fc.mavlink_telemetry import MavlinkReadings
 from bridge.fc.mission_flight import flight_report
 from bridge.fc.msp_telemetry import velocity
 from bridge.model import vehicle as v
-from bridge.model.flight_mode import MISSION_BOXES, FlightMode, active_boxes, flight_mode, names_of_active
+from bridge.model.craft import MISSION_BOXES, FlightMode, active_boxes, flight_mode, names_of_active
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.msp.mission_flight import SUMMARY, decode_summary

@@ -11,7 +11,7 @@ from math import isfinite
 from bridge.controllers.harakiri.setting_texts import TEXTS
 from bridge.fc.fc_settings import Cause, FcSettings, SettingRefusal, TableReading, fixed
 from bridge.line.conversation import Await, Conversation, Pause, Transmit
-from bridge.model.board_setting import BoardSetting, SettingTable, Value, ValueKind, table_of
+from bridge.model.settings import BoardSetting, SettingTable, Value, ValueKind, table_of
 from protocols.mavlink.codec import decode, pack
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame

@@ -35,8 +35,7 @@ from bridge.missions.fc_mission_store import (
     StoreState,
 )
 from bridge.model.vehicle import Vehicle
-from protocols.mission_item import MissionItem
-from protocols.mission_record import ListIdentity, identify, pack_records
+from protocols.mission_item import ListIdentity, MissionItem, identify, pack_records
 from protocols.msp import mission as ext
 from protocols.msp.frame import FRAME_OVERHEAD, MspFrame
 from protocols.msp.mission import (

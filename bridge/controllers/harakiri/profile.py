@@ -13,14 +13,12 @@ from bridge.controllers.harakiri.mavlink_settings import HarakiriMavlinkSettings
 from bridge.controllers.harakiri.mission_store import HarakiriMissions
 from bridge.controllers.harakiri.settings import HarakiriFcSettings
 from bridge.controllers.msp_parts import MspPartSettings
-from bridge.fc.interview import Interview
 from bridge.fc.mission_flight import FLIGHT_DECODERS, FLIGHT_POLL
-from bridge.fc.profile import FlightController, Profile, Spoken
+from bridge.fc.profile import FlightController, Interview, Profile, Spoken
 from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import BOX_POLL, POLLS
-from bridge.model.airframe import airframe
-from bridge.model.flight_mode import FlightMode
-from bridge.model.refusal import ARMED, Refusal
+from bridge.model.craft import FlightMode, airframe
+from bridge.model.missions import ARMED, Refusal
 from bridge.model.vehicle import Health, Mode, Sticks, Vehicle
 from protocols.mission_item import MissionResult
 from protocols.msp.mission import INFO_SIZE, MissionCommand, decode_info

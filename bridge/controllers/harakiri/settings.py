@@ -22,7 +22,7 @@ from bridge.fc.fc_settings import (
 )
 from bridge.fc.profile import FlightController
 from bridge.line.conversation import Conversation, Pause, ask, ask_surely
-from bridge.model.board_setting import BoardSetting, SettingTable, Value, ValueKind, table_of
+from bridge.model.settings import BoardSetting, SettingTable, Value, ValueKind, table_of
 from protocols.msp import mission as ext
 from protocols.msp.frame import FRAME_OVERHEAD, Direction
 from protocols.msp.mission import InfoFlag, MissionCommand, ReplyStatus

@@ -8,8 +8,8 @@ so NAV_STATUS is read afterwards.
 
 from bridge.fc.profile import FlightController
 from bridge.line.conversation import Conversation, Pause, ask
-from bridge.model.flight_mode import ARM_BOX, MISSION_BOXES, names_of_active
-from bridge.model.refusal import Refusal
+from bridge.model.craft import ARM_BOX, MISSION_BOXES, names_of_active
+from bridge.model.missions import Refusal
 from protocols.mission_item import MissionResult
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, request

@@ -31,8 +31,8 @@ from bridge.missions.fc_mission_store import (
     PushResult,
     StoreReport,
 )
-from bridge.model.airframe import Airframe
-from bridge.model.refusal import Refusal
+from bridge.model.craft import Airframe
+from bridge.model.missions import Refusal
 from bridge.model.vehicle import Power, Vehicle
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, request

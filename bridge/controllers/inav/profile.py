@@ -11,13 +11,11 @@ from bridge.controllers.inav.settings import InavFcSettings
 from bridge.controllers.inav.telemetry import INAV_DECODERS, INAV_POLLS, arming_blockers
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import INAV_CAPACITY, inav_profile
-from bridge.fc.interview import Interview
-from bridge.fc.profile import SILENCE_WITH_H7_S, FlightController, Profile
+from bridge.fc.profile import SILENCE_WITH_H7_S, FlightController, Interview, Profile
 from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import NAV_POLL, POLLS
 from bridge.missions.place_lists import NO_PLACES
-from bridge.model.airframe import Airframe
-from bridge.model.flight_mode import FAILSAFE_BOX
+from bridge.model.craft import FAILSAFE_BOX, Airframe
 from protocols.msp.inav import MIXER, MIXER_SIZE, decode_platform
 from protocols.msp.nav import INFO_SIZE, Nav, decode_info
 from protocols.rights.msp import Firmware

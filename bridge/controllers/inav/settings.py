@@ -15,7 +15,7 @@ from bridge.fc.fc_settings import (
 )
 from bridge.fc.profile import FlightController
 from bridge.line.conversation import Conversation, Pause, ask
-from bridge.model.board_setting import BoardSetting, SettingTable, Value, ValueKind, table_of
+from bridge.model.settings import BoardSetting, SettingTable, Value, ValueKind, table_of
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame, frame_size, request
 from protocols.msp.inav_settings import (

@@ -7,11 +7,10 @@ from bridge.controllers.msp_parts import MspPartSettings
 from bridge.controllers.multiwii.mission_store import MultiwiiMissions
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import MULTIWII_CAPACITY, multiwii_profile
-from bridge.fc.interview import Interview
-from bridge.fc.profile import FlightController, Profile
+from bridge.fc.profile import FlightController, Interview, Profile
 from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import NAV_POLL, POLLS
-from bridge.model.airframe import airframe
+from bridge.model.craft import airframe
 from protocols.msp.nav import NAV_CONFIG_SIZE, Nav, decode_nav_config
 from protocols.rights.msp import Firmware
 

@@ -4,7 +4,7 @@
 from bridge.fc.profile import FlightController, Spoken
 from bridge.fc.states.base import Event, Found, Lost, Port, State
 from bridge.line.msp_link import PROBE
-from bridge.model.flight_memory import Home
+from bridge.model.craft import Home
 from bridge.model.ground_track import north_east_m
 from bridge.model.vehicle import STALE_S, GlobalPosition, Health, Height, Orientation, Power, Source, Vehicle
 from protocols.frsky import FRSKY_SPEED, FrskyParser, FrskyReport

@@ -4,13 +4,12 @@
 from collections.abc import Sequence
 from math import inf
 
-from bridge.fc.interview import Interview, NoAnswer
 from bridge.fc.msp_telemetry import hear_msp
-from bridge.fc.profile import MSP_SILENCE_S, FlightController, Profile, Spoken
+from bridge.fc.profile import MSP_SILENCE_S, FlightController, Interview, NoAnswer, Profile, Spoken
 from bridge.fc.states.base import Event, Found, Identified, Lost, Port, State
 from bridge.line.conversation import Conversation, LinkLost
 from bridge.line.msp_link import MspLink, PendingReplies
-from bridge.model.refusal import Refusal
+from bridge.model.missions import Refusal
 from protocols.frsky import FRSKY_SPEED
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter, is_disarmed_heartbeat
 from protocols.msp.frame import MspFrame

@@ -9,7 +9,7 @@ from bridge.controllers.harakiri.profile import PATCHED
 from bridge.fc.mission_flight import flight_report
 from bridge.fc.msp_telemetry import hear_msp
 from bridge.fc.profile import FlightController
-from bridge.model.mission_progress import Stage, Way
+from bridge.model.missions import Stage, Way
 from bridge.model.vehicle import MissionLeg, Vehicle
 from protocols.msp.frame import Direction, MspFrame
 from protocols.msp.mission_flight import FLIGHT, FlightPhase, FlightProgress, FlightReason

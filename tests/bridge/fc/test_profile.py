@@ -1,12 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A new flight controller needs one profile and one line in the table (docs/design.md)."""
 
+import random
+from functools import cache
+
+import pytest
+
+from bridge.controllers.harakiri import profile as harakiri
 from bridge.controllers.table import PROFILES
-from bridge.fc.interview import Interview
-from bridge.fc.profile import FlightController, Profile
+from bridge.fc.profile import FlightController, Interview, Profile
+from bridge.fc.states.msp import Identifying
+from bridge.fc.states.searching import SPEEDS
 from bridge.line.conversation import Conversation
-from bridge.model.refusal import Refusal
+from bridge.model.missions import Refusal
 from protocols.mission_item import MissionResult
+from simulator.board.options import SimOptions, TelemetryProtocol
+from simulator.naze.firmware import Protocol
 from tests.support.conversations import Upload, waypoints
 from tests.support.fake_inav import FakeInav
 from tests.support.world import GroundStation, World
@@ -37,3 +46,73 @@ def test_a_new_flight_controller_needs_only_a_profile() -> None:
     assert station.messages("HEARTBEAT")[-1].base_mode & 128, "its ARM box is the second one"
     assert Upload(station, waypoints(3)).run() is MissionResult.UNSUPPORTED
     assert "Toys do not navigate" in station.texts()
+
+
+#: Counted from when the board can be heard again.
+FOUND_WITHIN_S = 8.0
+ALL_SPEEDS = sorted(set(SPEEDS), reverse=True)
+MOMENTS = 12
+
+
+def begun(baud: int, protocol: TelemetryProtocol) -> World:
+    """A world in which identification has just begun."""
+    world = World(SimOptions(baud=baud, tele_prot=protocol))
+    world.wait_until(lambda w: isinstance(w.inside.session.state, Identifying), 20)
+    return world
+
+
+@cache
+def identification_s(baud: int, protocol: TelemetryProtocol) -> float:
+    return begun(baud, protocol).wait_until(lambda w: not w.inside.session.state.is_searching, 20)
+
+
+def identifying(baud: int, seed: int, protocol: TelemetryProtocol = TelemetryProtocol.MSP) -> World:
+    """A world at some moment of identification."""
+    world = begun(baud, protocol)
+    if seed:
+        world.run(identification_s(baud, protocol) * random.Random(seed).random())
+    assert isinstance(world.inside.session.state, Identifying)
+    return world
+
+
+def is_known(world: World) -> bool:
+    return world.inside.session.state.controller is not None
+
+
+@pytest.mark.parametrize("baud", ALL_SPEEDS)
+def test_a_board_is_found_again_after_a_power_cut(baud: int) -> None:
+    for seed in range(MOMENTS):
+        world = identifying(baud, seed)
+        world.power_off()
+        world.run(random.Random(seed).random() * 4)
+        world.power_on()
+        world.run(world.naze.options.boot_ms / 1000)
+        world.wait_until(is_known, FOUND_WITHIN_S)
+        assert world.kind is harakiri.PATCHED
+
+
+@pytest.mark.parametrize("baud", ALL_SPEEDS)
+@pytest.mark.parametrize("protocol", TelemetryProtocol)
+def test_a_board_that_arms_and_disarms_is_found_again(baud: int, protocol: TelemetryProtocol) -> None:
+    for seed in range(MOMENTS):
+        world = identifying(baud, seed, protocol)
+        world.faults.armed = True
+        if (baud, protocol) != (1200, TelemetryProtocol.MAVLINK):
+            world.wait_until(lambda w: is_known(w) and w.bridge.vehicle.armed is True, FOUND_WITHIN_S)
+        world.run(random.Random(seed).random() * 6)
+        world.faults.armed = False
+        # Until 4 s after the last request it hears only MAVLink; then its ring must empty.
+        world.wait_until(lambda w: w.naze.protocol is not Protocol.MAVLINK, FOUND_WITHIN_S)
+        world.run(world.naze.options.tree.value * 10 / baud)
+        world.wait_until(lambda w: w.kind is harakiri.PATCHED, FOUND_WITHIN_S)
+
+
+@pytest.mark.parametrize("baud", ALL_SPEEDS)
+def test_a_board_is_found_again_after_a_stall(baud: int) -> None:
+    for seed in range(MOMENTS):
+        world = identifying(baud, seed)
+        world.faults.hang = True
+        world.run(random.Random(seed).random() * 10)
+        world.faults.hang = False
+        world.wait_until(is_known, FOUND_WITHIN_S)
+        assert world.kind is harakiri.PATCHED

@@ -5,13 +5,25 @@ import random
 
 import pytest
 
-from bridge.firmware.reflash import FlashingError, Progress, find_chip, read_flash, rewrite_flash
+from bridge.firmware.reflash import (
+    CommandLineError,
+    FlashingError,
+    Progress,
+    find_chip,
+    read_dump,
+    read_flash,
+    rewrite_flash,
+    settings_in,
+    start_boot_loader,
+)
 from protocols.firmware_image import PROGRAM_END
 from protocols.stm32_boot_loader import PAGE_SIZE, Dialogue, start_program
+from simulator.board.options import SimOptions
 from simulator.board.simulated_board import Power
 from simulator.naze.board import SimulatedNaze
 from simulator.naze.whole_flash import stand_in
 from tests.support.boot_loader_bench import CablePulledError, DialogueBench, board_in_boot_loader
+from tests.support.naze_bench import BOOT_SECONDS
 
 _PAGES = 6
 PROGRAM = stand_in(patched=True) + random.Random(1).randbytes(_PAGES * PAGE_SIZE - 500)
@@ -115,3 +127,35 @@ def test_a_flash_that_keeps_failing_is_given_up() -> None:
     board.faults.flash_failures = 1000
     with pytest.raises(FlashingError, match="does not keep what is written at 0x08000000"):
         bench.run(rewrite_flash(present, bytes(PAGE_SIZE) + present[PAGE_SIZE:], quiet))
+
+
+def booted() -> DialogueBench:
+    board = SimulatedNaze(SimOptions(wp_radius_cm=345))
+    board.power_on(0.0)
+    bench = DialogueBench(board)
+    bench.wait(BOOT_SECONDS + 0.1)
+    return bench
+
+
+def test_the_settings_are_printed_before_the_boot_loader_starts() -> None:
+    bench = booted()
+    assert bench.run(read_dump()).splitlines()[-1] == "gps_wp_radius = 345"
+    bench.run(start_boot_loader())
+    assert isinstance(bench.board, SimulatedNaze)
+    assert bench.board.power is Power.BOOTLOADER
+
+
+def test_an_armed_board_opens_no_command_line() -> None:
+    bench = booted()
+    assert isinstance(bench.board, SimulatedNaze)
+    bench.board.faults.armed = True
+    bench.wait(0.5)
+    with pytest.raises(CommandLineError, match="does not open"):
+        bench.run(read_dump())
+    assert bench.board.power is Power.RUNNING
+    assert bench.board.armed
+
+
+def test_the_settings_in_a_dump_are_its_numbers() -> None:
+    dump = "Config:\nFW: x = 3 y\n00|ANGLE   : ---\nrc_db = 20\nrc_trm_rll =  -0.500\nEnabled features: PPM\n"
+    assert settings_in(dump) == {"rc_db": 20.0, "rc_trm_rll": -0.5}

@@ -7,8 +7,7 @@ from collections import Counter
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
-from bridge.gcs.budget import Budget, Budgets
-from bridge.gcs.cost import Cost
+from bridge.gcs.budget import Budget, Budgets, Cost
 from protocols.mission_item import MissionResult
 from protocols.msp.frame import MspParser
 from tests.support.conversations import Upload, waypoints

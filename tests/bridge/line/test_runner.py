@@ -6,8 +6,7 @@ from collections.abc import Iterator
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
-from bridge.model.mission_log import Outcome
-from bridge.model.refusal import Refusal
+from bridge.model.missions import Outcome, Refusal
 from protocols.mission_item import MissionResult
 from simulator.board.options import SimOptions
 from tests.support.conversations import Download, Upload, records_of, waypoints

@@ -20,8 +20,7 @@ from bridge.fc.states.searching import SPEEDS
 from bridge.missions.fc_mission_store import LIST_IS_GONE, PushFailure
 from bridge.missions.list_check import check_list
 from bridge.missions.mission_service import DeliveryResult, HeldMission
-from bridge.model.mission_log import Outcome
-from bridge.model.refusal import Refusal
+from bridge.model.missions import Outcome, Refusal
 from protocols.mission_item import Command, MissionItem, MissionResult
 from reports.verdict import Result
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol

@@ -6,7 +6,7 @@ import pytest
 from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.missions.fc_mission_store import PushFailure
 from bridge.missions.list_check import check_list
-from bridge.model.mission_log import ArrivedMission, Outcome
+from bridge.model.missions import ArrivedMission, Outcome
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.frame import MspParser
 from protocols.msp.mission import MissionCommand

@@ -5,8 +5,7 @@ from bridge.controllers.harakiri import profile as harakiri
 from bridge.fc.states.msp import Identifying
 from bridge.line.conversation import save
 from bridge.missions.mission_service import HeldMission
-from bridge.model.mission_log import ArrivedMission, Outcome
-from bridge.model.refusal import Refusal
+from bridge.model.missions import ArrivedMission, Outcome, Refusal
 from protocols.mission_item import MissionResult
 from reports.verdict import CLEARED_LIST
 from simulator.board.msp_options import MspOptions

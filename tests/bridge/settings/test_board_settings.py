@@ -5,7 +5,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.fc.fc_settings import Cause, SettingRefusal
-from bridge.model.board_setting import Value, shown
+from bridge.model.settings import Value, shown
 from bridge.settings.setting_work import Answer
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from protocols.msp.setting_table import SettingCommand

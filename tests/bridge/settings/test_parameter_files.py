@@ -5,7 +5,7 @@ import lzma
 
 from pymavlink.mavftp import MAVFTP
 
-from bridge.model.board_setting import BoardSetting, ValueKind
+from bridge.model.settings import BoardSetting, ValueKind
 from bridge.settings.parameter_files import ParameterFiles
 from protocols.mavlink.ftp import file_crc32
 

@@ -7,7 +7,7 @@ import pytest
 
 from bridge.fc.fc_settings import ARMED, NO_ANSWER, NOT_TAKEN, FcSettings, SettingRefusal, TableReading
 from bridge.line.conversation import Conversation, Pause, Receive
-from bridge.model.board_setting import BoardSetting, SettingTable, Value, ValueKind
+from bridge.model.settings import BoardSetting, SettingTable, Value, ValueKind
 from bridge.settings.setting_work import TRANSITIONS, Answer, SettingChange, SettingsSave, WorkEvent, WorkState
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from protocols.msp.frame import Direction
-from protocols.rights.effect import Effect
+from protocols.rights import Effect
 from protocols.rights.msp import MSP_RIGHTS, Firmware, msp_right
 from simulator.board.options import Faults
 from simulator.commands.fc_kinds import make_board

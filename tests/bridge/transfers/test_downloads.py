@@ -6,12 +6,10 @@ from dataclasses import replace
 import pytest
 
 from bridge.missions.mission_service import HeldMission
-from bridge.model.mission_log import PendingMission
-from bridge.model.refusal import Refusal
+from bridge.model.missions import PendingMission, Refusal
 from bridge.model.vehicle import MissionLeg, Source
 from protocols.mavlink.dialect import Message
-from protocols.mission_item import Command, MissionItem, MissionResult
-from protocols.mission_record import pack_records
+from protocols.mission_item import Command, MissionItem, MissionResult, pack_records
 from protocols.msp.frame import MspParser
 from protocols.msp.mission import MissionCommand
 from protocols.msp.nav import NavAction, NavMode, NavStatus

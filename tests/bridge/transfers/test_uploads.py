@@ -8,7 +8,7 @@ from itertools import pairwise
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from bridge.model.mission_log import Outcome
+from bridge.model.missions import Outcome
 from bridge.transfers.upload_states import Asking, Delivering, Receiving
 from protocols.mavlink.dialect import Message
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult

@@ -15,7 +15,7 @@ from bridge.controllers.inav import profile as inav
 from bridge.controllers.table import PROFILES
 from bridge.fc.msp_telemetry import hear_msp
 from bridge.fc.profile import FlightController, Profile, Spoken
-from bridge.model.airframe import Airframe, airframe
+from bridge.model.craft import Airframe, airframe
 from bridge.model.vehicle import FlightState, GlobalPosition, Power, Source, Vehicle
 from bridge.vehicle import vehicle_messages as make
 from bridge.vehicle.telemetry_table import TELEMETRY

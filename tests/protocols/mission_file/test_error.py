@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocols.file_error import shown
 from protocols.mission_file.error import MissionFileError, refuse_other_plans
+from protocols.plain_text import shown
 
 
 @given(found=st.text() | st.binary() | st.floats() | st.lists(st.text()) | st.dictionaries(st.text(), st.text()))

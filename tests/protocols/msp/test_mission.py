@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from protocols.mission_record import ListIdentity, pack_records
+from protocols.mission_item import ListIdentity, pack_records
 from protocols.msp.frame import MspFrame, MspParser
 from protocols.msp.mission import (
     ABORT_REQUEST,

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
-from protocols.rights.effect import Effect
+from protocols.rights import Effect
 from protocols.rights.mavlink import COMMANDS, effect_of
 
 SENDER = mavlink.MAVLink(None, srcSystem=255)

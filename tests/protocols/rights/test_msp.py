@@ -8,7 +8,7 @@ import pytest
 from bridge.controllers.inav.telemetry import INAV_POLLS
 from bridge.line.msp_link import PROBE, RESYNC
 from bridge.line.poll_schedule import BOX_POLL, NAV_POLL, POLLS
-from protocols.mission_record import ListIdentity, pack_records
+from protocols.mission_item import ListIdentity, pack_records
 from protocols.msp.commands import Msp, MspAction
 from protocols.msp.frame import MspFrame, MspParser, request
 from protocols.msp.inav import MIXER
@@ -40,7 +40,7 @@ from protocols.msp.nav import (
 )
 from protocols.msp.setting_table import TABLE_REQUEST, SettingCommand, encode_save
 from protocols.msp.settings import SETTINGS
-from protocols.rights.effect import Effect
+from protocols.rights import Effect
 from protocols.rights.msp import MSP_RIGHTS, Firmware, msp_right
 
 EVERY = tuple(Firmware)

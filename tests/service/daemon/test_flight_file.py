@@ -5,9 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.model.airframe import Airframe
-from bridge.model.flight_memory import FlightMemory, Home
-from bridge.model.flight_mode import FlightMode
+from bridge.model.craft import Airframe, FlightMemory, FlightMode, Home
 from service.daemon.flight_file import FLIGHT_FILE, FlightFile
 from service.machine.host import Host
 from tests.support.programs import until

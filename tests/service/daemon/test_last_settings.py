@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.model.board_setting import Value
-from bridge.model.settings import BoardId
+from bridge.model.settings import BoardId, Value
 from service.daemon.last_settings import SETTINGS_FILE, LastSettings
 
 NUMBERED, NAMELESS = BoardId("INAV 9.1.0", "0011"), BoardId("Harakiri 2.1.1")

@@ -3,7 +3,7 @@
 
 import pytest
 
-from protocols.mission_record import identify, pack_records
+from protocols.mission_item import identify, pack_records
 from protocols.msp.frame import request
 from protocols.msp.mission import INFO_REQUEST, decode_info, encode_begin, encode_chunk
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol

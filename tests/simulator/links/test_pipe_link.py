@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 import serial
 
-from protocols.mission_record import identify, pack_records
+from protocols.mission_item import identify, pack_records
 from protocols.msp.frame import MspFrame, MspParser, request
 from protocols.msp.mission import INFO_REQUEST, decode_info, encode_begin, encode_chunk, encode_commit
 from simulator.links.pipe_link import SimLink

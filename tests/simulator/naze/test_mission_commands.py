@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from protocols.mission_record import ListIdentity, identify, pack_records
+from protocols.mission_item import ListIdentity, identify, pack_records
 from protocols.msp.frame import request
 from protocols.msp.mission import (
     ABORT_REQUEST,

@@ -16,8 +16,7 @@ from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.controllers.harakiri.single_precision import readable_e7
 from bridge.missions.list_check import check_list
 from bridge.missions.mission_service import HeldMission
-from bridge.model.mission_log import ArrivedMission, Outcome
-from bridge.model.refusal import Refusal
+from bridge.model.missions import ArrivedMission, Outcome, Refusal
 from protocols.mission_item import Command, MissionItem, MissionResult
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from simulator.naze.board import SimulatedNaze

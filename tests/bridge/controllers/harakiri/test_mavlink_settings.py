@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as m
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.controllers.harakiri.mavlink_settings import HarakiriMavlinkSettings
 from bridge.fc.fc_settings import NO_ANSWER, Cause, SettingRefusal
-from bridge.model.board_setting import SettingTable
+from bridge.model.settings import SettingTable
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mission_item import MissionResult

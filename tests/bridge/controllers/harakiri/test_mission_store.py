@@ -12,7 +12,7 @@ import pytest
 
 from bridge.missions.fc_mission_store import PushFailure
 from bridge.missions.mission_service import DeliveryResult, HeldMission
-from bridge.model.refusal import ARMED, Refusal
+from bridge.model.missions import ARMED, Refusal
 from protocols.mission_item import MissionResult
 from protocols.msp.frame import MspParser
 from protocols.msp.mission import MissionCommand

@@ -4,7 +4,7 @@
 import pytest
 
 from bridge.controllers.harakiri import profile as harakiri
-from bridge.model.airframe import Airframe
+from bridge.model.craft import Airframe
 from simulator.board.options import Faults, SimOptions
 from tests.support.fake_controllers import MspFake, ident
 from tests.support.world import World

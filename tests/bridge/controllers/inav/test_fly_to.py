@@ -11,7 +11,7 @@ from bridge.controllers.inav.fly_to import fly_to
 from bridge.controllers.inav.profile import PROFILE
 from bridge.fc.profile import FlightController
 from bridge.line.conversation import Conversation, Receive
-from bridge.model.refusal import Refusal
+from bridge.model.missions import Refusal
 from protocols.mission_item import MissionResult
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame

@@ -11,7 +11,7 @@ import pytest
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile
 from bridge.missions.list_check import check_list
-from bridge.model.mission_log import Outcome
+from bridge.model.missions import Outcome
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from protocols.msp.nav import LAST, Nav, NavAction

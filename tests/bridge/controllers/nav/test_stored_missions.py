@@ -10,8 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as messages
 from bridge.controllers.nav.stored_missions import erased, flown, split_missions
 from bridge.missions.list_check import check_list
 from bridge.missions.mission_service import HeldMission
-from bridge.model.mission_log import Outcome
-from bridge.model.refusal import Refusal
+from bridge.model.missions import Outcome, Refusal
 from protocols.mission_item import MissionResult
 from protocols.msp.commands import Msp
 from protocols.msp.frame import MspParser

@@ -1,14 +1,110 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mission progress: the record that the craft flies to, and the ones reached."""
+"""Missions as plain data: refusals, stored records, transfers, and the progress of a flight."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from enum import IntEnum
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum, IntEnum
+from typing import Any
 
-from protocols.mission_item import MissionItem
+from protocols.mission_item import ListIdentity, MissionItem, MissionResult
 from protocols.msp.nav import FINISHED, LEGS, NavAction, NavMode, NavState, NavStatus
 from reports.vehicle_groups import Progress
-from reports.verdict import SentSeqs
+from reports.verdict import SentSeqs, Verdict
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """The reply to a ground station: the MISSION_ACK code, and the reason as a STATUSTEXT."""
+
+    ack: MissionResult
+    text: str
+
+
+ARMED = Refusal(MissionResult.DENIED, "Armed: disarm to change the mission")
+
+
+class Outcome(Enum):
+    """The outcome of a mission, as stored."""
+
+    PENDING = "PENDING"
+    VERIFIED = "VERIFIED"  # the flight controller holds it, checksum read back
+    REJECTED = "REJECTED"  # by the rules; the flight controller was not touched
+    CANCELLED = "CANCELLED"  # by the ground station, or by its timeout
+    FAILED = "FAILED"  # the flight controller refused it or was not reachable
+
+
+@dataclass(frozen=True, slots=True)
+class ArrivedMission:
+    """A mission as received: its source as text, the items as sent, and the verdict.
+
+    `sender`: Sender.identity of the ground station; empty for other sources. `is_home_meant`: True if item 0 is surely
+    home, whatever its frame, asked at the end.
+    """
+
+    source: str
+    items: tuple[MissionItem, ...]
+    verdict: Verdict[Any]
+    sender: str = ""
+    is_home_meant: Callable[[], bool] = lambda: False
+
+
+@dataclass(frozen=True, slots=True)
+class RecalledMission:
+    """The store's facts about a list that was verified before.
+
+    `sent_as`: the commands that ambiguous records were sent with, by record number. `sent_seqs`: the item numbers of
+    each ground station that sent it and has not read it back since, by Sender.identity.
+    """
+
+    sent_as: Mapping[int, int] = field(default_factory=dict)
+    sent_seqs: Mapping[str, SentSeqs] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class PendingMission:
+    """A mission that the flight controller may or may not have.
+
+    `number`: in the store, None if not stored. `identity`: of the list to look for, None if it was rejected.
+    `before`: of the previous list, None if unknown.
+    """
+
+    number: int | None
+    identity: ListIdentity | None
+    before: ListIdentity | None = None
+
+
+@dataclass(slots=True)
+class FinalAck:
+    """The MISSION_ACK that ended an upload of `count` items. It answers a Cancel until `cancelled_until`."""
+
+    ack: MissionResult
+    count: int
+    until: float
+    cancelled_until: float
+    #: When to send the ack again, or the reason for a refusal.
+    again: Sequence[tuple[float, str | None]] = ()
+
+    @property
+    def is_refusal(self) -> bool:
+        return self.ack is not MissionResult.ACCEPTED
+
+
+@dataclass(slots=True)
+class Download:
+    """The list as of the start of a download, from the flight controller's `fc_store`."""
+
+    items: tuple[MissionItem, ...]
+    until: float
+    fc_store: object
+
+
+@dataclass(slots=True)
+class TransferMemory:
+    """One station's running download, and the answer to its last upload, of one mission type."""
+
+    download: Download | None = None
+    final_ack: FinalAck | None = None
+
 
 #: In these states the craft is at its record's place.
 _THERE = frozenset((NavState.HOLD_TIMED, NavState.LAND_IN_PROGRESS, NavState.LANDED, NavState.HOVER_ABOVE_HOME))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The record that the craft flies to, and the last one reached."""
 
-from bridge.model.mission_progress import FlownMission, MissionProgress
+from bridge.model.missions import FlownMission, MissionProgress
 from protocols.msp.nav import FINISHED, NavAction, NavMode, NavState, NavStatus
 from reports.vehicle_groups import Progress
 
