@@ -26,11 +26,11 @@ from tests.support.walks import TracedDaemon, WakeUp, Walk, measure, run_traced
 #: Lower these whenever a walk has become shorter. Raised once, by a return each: to ask when all replies can be there
 #: saves a fifth of the wake-ups. That to the ack again, by ten calls: the list is judged as it is flown.
 CEILINGS = {
-    "attitude": Walk(calls=40, returns=12, files=19),
+    "attitude": Walk(calls=40, returns=12, files=18),
     "item": Walk(calls=58, returns=23, files=16),
-    "ack": Walk(calls=426, returns=208, files=42),
-    "setting": Walk(calls=266, returns=110, files=52),
-    "arming": Walk(calls=66, returns=18, files=26),
+    "ack": Walk(calls=422, returns=208, files=42),
+    "setting": Walk(calls=266, returns=107, files=51),
+    "arming": Walk(calls=66, returns=18, files=25),
 }
 #: A walk may be this much shorter than its ceiling.
 _SLACK = 0.05
