@@ -20,10 +20,9 @@ from terminal.sentences import complain
     "--config",
     type=PATH,
     envvar=CONFIG_VARIABLE,
-    help="TOML file with all settings; conf.d/*.toml in its folder override it.",
+    help="TOML file with all settings.",
 )
 @click.option("--state-dir", type=PATH, help="Folder for stored missions.")
-@click.option("--record-uart", type=PATH, help="File to record the port's traffic into.")
 @click.option("--verbose", is_flag=True, help="Also show debug events.")
 @click.option("--check-config", is_flag=True, help="Check the settings and exit.")
 def run(config: Path | None, gcs: tuple[str, ...], verbose: bool, check_config: bool, **flags: object) -> None:

@@ -121,8 +121,8 @@ class Daemon:
 
     @property
     def recording(self) -> list[str]:
-        """The files being recorded, or the reasons why recording stopped."""
-        return [recorder.describe() for recorder in (self._tlog, self.fc.capture) if recorder is not None]
+        """The telemetry log in use, or the reason why recording stopped."""
+        return [] if self._tlog is None else [self._tlog.describe()]
 
     @property
     def is_ticking(self) -> bool:

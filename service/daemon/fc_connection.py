@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The bridge's connection to the flight controller: its port is found, opened, counted and, on request, recorded."""
+"""The bridge's connection to the flight controller: the port is found, opened and counted."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
@@ -12,13 +12,11 @@ import structlog
 from bridge.bridge import Bridge
 from bridge.effects import SendToBoard
 from bridge.model.events import FcFound, FcInCommandLine, FcLost, PortLost
-from protocols.uart_capture import UartAction
 from service.links.fc_device import PortError, device_opener, open_serial
 from service.links.fc_port import MOVED_ON, STOPPED, FcPort
 from service.links.port_finder import PortFinder
 from service.links.traffic import Traffic
 from service.machine.host import Host
-from service.recording.uart_recorder import UartRecorder
 from service.settings import Settings
 from service.settings.addresses import AutoFc, SerialFc
 
@@ -31,10 +29,7 @@ _log = structlog.get_logger()
 
 
 class FcConnection:
-    """Feeds the port's bytes to the bridge. SettingsError if it cannot be recorded.
-
-    `flush` carries out the bridge's effects.
-    """
+    """Feeds the port's bytes to the bridge. `flush` carries out the bridge's effects."""
 
     def __init__(
         self,
@@ -49,7 +44,6 @@ class FcConnection:
         self._traffic = traffic
         self._flush = flush
         self._loop = asyncio.get_running_loop()
-        self.capture = None if settings.record_uart is None else UartRecorder(settings.record_uart)
         self._finder: PortFinder | None = None
         if isinstance(self._address, AutoFc):
             self._finder = PortFinder(host, settings.state_dir)
@@ -115,13 +109,11 @@ class FcConnection:
                 yield device
 
     def close(self) -> None:
-        """Stop the timers, and write the rest of the recording. The port closes with `run`."""
+        """Stop the timers. The port closes with `run`."""
         if self._search_report is not None:
             self._search_report.cancel()
         if self._finder is not None:
             self._finder.close()
-        if self.capture is not None:
-            self.capture.close()
 
     def carry_out(self, output: SendToBoard) -> None:
         if output.speed != self._speed:
@@ -130,8 +122,6 @@ class FcConnection:
         self._port.may_gather = output.may_gather
         if output.data:
             data = b"".join(output.data)
-            if self.capture is not None:
-                self.capture.note(UartAction.WRITE, self._speed, data)
             self._port.write(data, asks=output.asks)
             self._traffic.pieces_sent += 1
             self._traffic.bytes_sent += len(data)
@@ -148,23 +138,17 @@ class FcConnection:
             self.found_at, self.lost_at = None, self._loop.time()
 
     def _opened(self) -> None:
-        if self.capture is not None:
-            self.capture.note(UartAction.OPEN, self._speed)
         self._bridge.fc_opened(self._loop.time())
         self._flush()
         self._report_search()
 
     def _received(self, data: bytes, now: float) -> None:
-        if self.capture is not None:
-            self.capture.note(UartAction.READ, self._speed, data)
         if self._finder is not None:
             self._finder.received(data)
         if self._bridge.fc_received(data, now):
             self._flush()
 
     def _closed(self, why: str) -> None:
-        if self.capture is not None:
-            self.capture.note(UartAction.CLOSE, self._speed, text=why)
         self._bridge.fc_closed(self._loop.time(), None if why in (STOPPED, MOVED_ON) else why)
         self._flush()
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The far end of a line: a simulated board, or a played capture of a real one."""
+"""The far end of a line: a simulated board."""
 
 from typing import Protocol
 

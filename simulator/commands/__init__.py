@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`naze-bridge sim` and `naze-bridge play`."""
+"""`naze-bridge sim`."""

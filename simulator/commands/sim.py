@@ -14,7 +14,6 @@ from simulator.board.msp_options import MspOptions
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol, Tree
 from simulator.commands.fc_kinds import KINDS, run_other_board
 from simulator.commands.image import run_image
-from simulator.commands.play import play_capture
 from simulator.commands.run_board import RunOptions, run_board
 from simulator.commands.stick_script import read_script
 from simulator.inav.boxes import BOXES
@@ -40,17 +39,16 @@ def _load_core(path: Path, capacity: int) -> BootMissions:
         raise click.ClickException(f"the core cannot be loaded: {error}; make it with: make -C firmware sim") from error
 
 
-#: The options that --image and --play allow: the rest depends on the firmware, or is recorded.
+#: The options that --image allows: the rest depends on the firmware.
 _WITH_IMAGE = {
     "image", "link", "tcp", "armed", "bit_errors", "lost_bytes", "seed", "hang_after", "power_cut_after", "state",
     "control", "fly", "wind", "script", "speed",
 }  # fmt: skip
 #: Options of a flight.
-_WITH_FLY = {"wind", "script"}
-_WITH_PLAY = {"play", "link", "speed"}
-#: Options of Harakiri and its mission extension, of --image and of --play.
+_WITH_FLY = {"wind", "script", "speed"}
+#: Options of Harakiri and its mission extension, and of --image.
 _OF_THE_NAZE = {
-    "tele_prot", "no_extension", "flash_stall", "program_stall", "wp_radius_cm", "core", "play", "speed",
+    "tele_prot", "no_extension", "flash_stall", "program_stall", "wp_radius_cm", "core", "speed",
 }  # fmt: skip
 
 
@@ -128,15 +126,10 @@ def _address(_: click.Context, __: click.Parameter, value: str | None) -> tuple[
 @click.option("--state", "--flash", "state", type=_PATH, help="File that keeps the flash's contents.")
 @click.option("--control", type=_PATH, help="Unix socket for control commands (docs/simulator.md).")
 @click.option(
-    "--play",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    help="Play this UART capture (run --record-uart) instead.",
-)
-@click.option(
     "--speed",
     type=click.FloatRange(0.01, 100),
     default=1.0,
-    help="With --play or --fly: 10 is ten times as fast, or as fast as the computer can.",
+    help="With --fly: 10 is ten times as fast, or as fast as the computer can.",
 )
 def sim(
     kind: str,
@@ -165,7 +158,6 @@ def sim(
     script: Path | None,
     state: Path | None,
     control: Path | None,
-    play: Path | None,
     speed: float,
 ) -> None:
     """Simulate a Naze with Harakiri, or another flight controller, until Ctrl-C."""
@@ -177,8 +169,7 @@ def sim(
     if fly and image is None:
         raise click.UsageError("--fly needs a firmware: add --image FILE")
     if not fly:
-        in_flight_only = _WITH_FLY | (set() if play else {"speed"})
-        _refuse_options("a board that does not fly", lambda name: name in in_flight_only)
+        _refuse_options("a board that does not fly", lambda name: name in _WITH_FLY)
     if image is not None:
         _refuse_options("--image", lambda name: name not in _WITH_IMAGE)
         run_image(image, faults, run_options, state, seed, Weather(wind=wind, seed=seed) if fly else None, speed)
@@ -187,12 +178,6 @@ def sim(
         _refuse_options(f"--kind {kind}", lambda name: name in _OF_THE_NAZE)
         line = MspOptions(version=inav_version, baud=int(baud), capacity=capacity or 178, seed=seed)
         run_other_board(kind, line, faults, run_options, state)
-        return
-    if play is not None:
-        if link is None:
-            raise click.UsageError("--play needs --link")
-        _refuse_options("--play", lambda name: name not in _WITH_PLAY)
-        play_capture(play, link, speed)
         return
     options = SimOptions(
         seed=seed,

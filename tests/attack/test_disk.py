@@ -114,8 +114,7 @@ main(prog_name="naze-bridge")
 
 def test_the_daemon_works_and_stops_while_the_disk_hangs(start: Starter, stack: ExitStack) -> None:
     board = start.board()
-    options = ("--record-uart", str(start.directory / "naze.uart"))
-    daemon = DaemonWithoutDisk(start.directory, str(board.link), options=options)
+    daemon = DaemonWithoutDisk(start.directory, str(board.link))
     stack.callback(daemon.end, signal.SIGKILL)
     daemon.wait()
     with udp_station(daemon.address) as pilot:

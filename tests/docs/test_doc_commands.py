@@ -98,7 +98,6 @@ class Sandbox:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         (folder / "examples").symlink_to(REPOSITORY / "examples")
-        shutil.copy(next((REPOSITORY / "tests" / "captures").glob("*.uart")), folder / "naze.uart")
         shutil.copy(REPOSITORY / "examples" / "config.toml", folder)
         (folder / "gcs.key").write_text("a passphrase of the pilot\n")
         (folder / "gcs.key").chmod(0o600)

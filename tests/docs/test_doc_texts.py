@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from protocols.uart_capture import capture_header, capture_line, read_capture
 from service.cli.doctor.command import _print as print_check
 from service.cli.doctor.machine import check_clock
 from service.cli.doctor.port import check_console, check_port
@@ -114,16 +113,6 @@ def test_a_quoted_message_is_one_of_ours(quoted: str, place: str) -> None:
 
 def test_every_foreign_message_is_quoted() -> None:
     assert {quoted for quoted, _ in QUOTED} >= NOT_OURS
-
-
-def test_the_lines_of_a_capture() -> None:
-    page = REPOSITORY / "docs" / "recording.md"
-    lines = [span.replace("\N{HORIZONTAL ELLIPSIS}", "") for span in spans(page) if span.startswith("{")]
-    header, *events = map(json.loads, lines)
-    assert header == json.loads(capture_header(header["started"]))
-    written = [json.loads(capture_line(event)) for event in read_capture("\n".join(lines).encode())]
-    start_s = events[0]["t"]  # where reading counts from
-    assert written == [event | {"t": pytest.approx(event["t"] - start_s)} for event in events]
 
 
 @pytest.mark.parametrize("page", ["docs/zenoh.md", "docs/status-page.md"])

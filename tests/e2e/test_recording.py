@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A running daemon's recordings: telemetry logs, and the flight controller's port, then replayed."""
+"""A running daemon's telemetry logs."""
 
 import os
 import signal
@@ -13,7 +13,6 @@ import pytest
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from protocols.uart_capture import UartAction, read_capture
 from tests.support.benches import Starter
 from tests.support.plan import plain_plan
 from tests.support.programs import Daemon, run_naze_bridge, until
@@ -171,16 +170,15 @@ def test_unwritable_logs_are_reported_once_and_delay_nothing(start: Starter, con
     assert [event["event"] for event in daemon.events() if "tlog" in event["event"]] == ["tlog.stopped"]
 
 
-def test_the_status_names_the_recordings(start: Starter, connect: Connect) -> None:
-    capture = start.directory / "naze.uart"
-    daemon = start.daemon("sim:", options=("--record-uart", str(capture)))
+def test_the_status_names_the_telemetry_log(start: Starter, connect: Connect) -> None:
+    daemon = start.daemon("sim:")
     daemon.wait()
     listener = connect(daemon)
     until(lambda: logs_of(daemon), "a log")
     (path,) = logs_of(daemon)
     shown = run_naze_bridge("status", "--state-dir", daemon.state_dir).stdout
     recordings = [line.split(maxsplit=1)[1] for line in shown.splitlines() if line.startswith("Recording ")]
-    assert recordings == [f"telemetry log: {path}", f"UART capture: {capture}, 0.0 of 67 MB"]
+    assert recordings == [f"telemetry log: {path}"]
     listener.close()
 
 
@@ -196,89 +194,19 @@ def test_recording_can_be_switched_off(start: Starter, connect: Connect) -> None
     assert logs_of(daemon) == []
 
 
-# -- the UART --------------------------------------------------------------------------------------------------------
-
-
-def test_a_recorded_flight_controller_is_found_in_the_replay(start: Starter, connect: Connect) -> None:
-    """Recorded from the built-in simulator, with a kill in between; then replayed on another port."""
-    capture = start.directory / "naze.uart"
-    recorded = start.daemon("sim:", options=("--record-uart", str(capture)))
-    recorded.wait()
-    listener = connect(recorded)
-    until(lambda: listener.has_received(HEARTBEAT, 3), "telemetry")
-    # The last second may be lost, which in such a short run includes the beginning.
-    until(lambda: UartAction.READ in [event.action for event in read_capture(capture.read_bytes())], "a capture")
-    recorded.kill_and_restart()
-    recorded.wait()
-    assert recorded.end() == 0
-    events = read_capture(capture.read_bytes())
-    assert [event.action for event in events if event.action in (UartAction.OPEN, UartAction.CLOSE)] == [
-        UartAction.OPEN,
-        UartAction.CLOSE,
-        UartAction.OPEN,
-        UartAction.CLOSE,
-    ]
-
-    link = start.directory / "played"
-    player = start.program("player.log", "sim", "--play", str(capture), "--link", str(link))
-    until(lambda: "Playing" in player.printed or not player.is_alive, "the player")
-    daemon = start.daemon(str(link), state_dir=start.directory / "second")
-    daemon.wait()
-    found = daemon.has_logged("fc.found")
-    assert found is not None
-    assert found["name"] == "Harakiri with the mission extension"
-    listener = connect(daemon)
-    until(lambda: listener.has_received(messages.MAVLINK_MSG_ID_ATTITUDE, 3), "the recorded attitude")
-    until(lambda: "The capture has ended" in player.printed, "the end")
-    # It keeps giving its last replies.
-    daemon.wait()
-    assert player.end() == 0
-    assert not link.is_symlink()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "status", "complaint"),
-    [
-        (
-            ("run", "--fc", "sim:", "--record-uart", "{dir}"),
-            1,
-            "{dir} is not a file: name a new file for --record-uart",
-        ),
-        (("run", "--fc", "sim:", "--record-uart", "{dir}/notes.txt"), 1, "notes.txt is not a UART capture"),
-        (("sim", "--link", "{dir}/naze", "--play", "{dir}/notes.txt"), 1, "notes.txt is not a UART capture"),
-        (("sim", "--link", "{dir}/naze", "--play", "{dir}/nothing"), 2, "does not exist"),
-        (
-            ("sim", "--link", "{dir}/naze", "--play", "{dir}/notes.txt", "--armed"),
-            2,
-            "--armed has no effect with --play",
-        ),
-    ],
-)
-def test_invalid_recordings_and_replays_are_refused(
-    tmp_path: Path, arguments: tuple[str, ...], status: int, complaint: str
-) -> None:
-    (tmp_path / "notes.txt").write_text("mine\n")
-    state = ("--state-dir", "{dir}/state", "--gcs", "udpout:127.0.0.1:14999") if arguments[0] == "run" else ()
-    done = run_naze_bridge(*(word.replace("{dir}", str(tmp_path)) for word in (*arguments, *state)))
-    assert done.returncode == status
-    assert complaint.replace("{dir}", str(tmp_path)) in done.stderr.replace("\n", " ")
-    assert "Traceback" not in done.stderr
-    assert (tmp_path / "notes.txt").read_text() == "mine\n"
-
-
 def test_other_users_cannot_read_what_a_daemon_run_by_hand_stores(
     start: Starter, connect: Connect, tmp_path: Path
 ) -> None:
     before = os.umask(0o022)
     try:
-        daemon = start.daemon("sim:", state_dir=tmp_path / "private", options=("--record-uart", str(tmp_path / "uart")))
+        daemon = start.daemon("sim:", state_dir=tmp_path / "private")
         daemon.wait()
         daemon.push(plain_plan(3))
     finally:
         os.umask(before)
     connect(daemon)
     until(lambda: logs_of(daemon), "a log")
-    stored = [tmp_path / "uart", daemon.state_dir, *daemon.state_dir.rglob("*")]
+    stored = [daemon.state_dir, *daemon.state_dir.rglob("*")]
     assert {path.name for path in stored} >= {"private", "missions.db", "logs"}
     # The control socket has its own check: the service's group may use it.
     assert [path for path in stored if path.stat().st_mode & 0o077 and not path.is_socket()] == []

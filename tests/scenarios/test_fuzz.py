@@ -21,7 +21,6 @@ from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from payloads.mission_data import to_json
 from protocols.mission_file import MissionFileError, read_mission_file
-from protocols.uart_capture import read_capture
 from reports.vehicle_groups import Group
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from simulator.board.simulated_board import SimulatedBoard
@@ -105,13 +104,6 @@ def test_no_mission_file_raises(seed: int) -> None:
             read_mission_file(inputs.like(mission_files()), "fuzz")
 
 
-@_fuzz
-def test_no_capture_raises(seed: int) -> None:
-    inputs = FuzzInputs(seed)
-    for _ in range(AT_ONCE // 2):
-        read_capture(inputs.like(captures()))
-
-
 def _corrupting_board(inputs: FuzzInputs, faults: Faults) -> CorruptingBoard | RandomAutopilot:
     kind = inputs.random.choice(("harakiri", "harakiri", "autopilot", *KINDS))
     if kind == "autopilot":
@@ -147,9 +139,3 @@ def test_no_database_file_raises(store_file: bytes, seed: int) -> None:
 @cache
 def mission_files() -> list[bytes]:
     return [path.read_bytes() for kind in ("*.plan", "*.waypoints") for path in (REPOSITORY / "examples").glob(kind)]
-
-
-@cache
-def captures() -> list[bytes]:
-    """Only the beginnings: whole captures take too long."""
-    return [path.read_bytes()[:5000] for path in (REPOSITORY / "tests" / "captures").glob("*.uart")]
