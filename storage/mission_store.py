@@ -16,7 +16,6 @@ from storage.database import (
     insert,
     memory_database,
     open_database,
-    read_database,
     row_crc32,
     transaction,
 )
@@ -313,11 +312,6 @@ def open_store(path: Path, now: float, budget: int = BUDGET) -> OpenedStore:
 def store_in_memory() -> MissionStore:
     """A store in memory, for a disk that cannot be written."""
     return MissionStore(memory_database(), Path("memory"), _BUDGET_IN_MEMORY)
-
-
-def read_store(path: Path) -> MissionStore:
-    """Open the store in file `path` read-only, without the state_lock; StoreError if that fails."""
-    return MissionStore(read_database(path), path)
 
 
 def _damaged_line(number: int) -> MissionSummary:

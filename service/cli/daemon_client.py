@@ -12,11 +12,10 @@ from typing import Any
 import click
 
 from payloads.mission_data import Json, printable
-from service.daemon.client import FIRMWARE_REQUESTS, ControlError, Interrupted, NoDaemonError, ask_daemon
+from service.daemon.client import FIRMWARE_REQUESTS, ControlError, Interrupted, ask_daemon
 from service.machine import event_loop
-from service.settings import SettingsError, default_state_dir
+from service.settings import SettingsError
 from service.settings.addresses import AddressError, parse_fc
-from service.settings.load import SERVICE_STATE
 from storage.store_error import StoreError
 from terminal.options import PATH
 from terminal.printing import console, print_json, progress_bars
@@ -77,18 +76,6 @@ class BridgeClient:
             with goes_on if self.fc is None else nullcontext():
                 return self.ask(request, show)
 
-    def ask_store(self, request: Json) -> Json:
-        """Ask the daemon for what it has stored; without one, read its store. A refusal ends the program: status 1."""
-        try:
-            try:
-                return ask_daemon(self.state_dir, request)
-            except NoDaemonError:
-                return _read_store(self.state_dir, request)
-        except SettingsError as error:
-            raise click.UsageError(str(error)) from error
-        except (ControlError, StoreError) as error:
-            fail(error)
-
     def show(self, answer: object, show_people: Callable[[], object]) -> None:
         if self.as_json:
             print_json(answer)
@@ -142,28 +129,3 @@ def _first_interrupt(say: Callable[[], None]) -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, usual)
-
-
-def _read_store(state_dir: Path | None, request: Json) -> Json:
-    from service.daemon.api import listed, shown
-    from service.daemon.settings_api import backup_shown, backups_listed
-    from service.daemon.store_worker import DATABASE_NAME
-    from storage.mission_store import read_store
-
-    folders = [state_dir] if state_dir is not None else [default_state_dir(), SERVICE_STATE]
-    try:
-        path = next((path for folder in folders if (path := folder / DATABASE_NAME).exists()), None)
-    except PermissionError as error:
-        raise ControlError(f"{SERVICE_STATE} cannot be read: use sudo") from error
-    if path is None:
-        raise ControlError(f"no missions or settings are stored in {' or '.join(map(str, folders))}: use --state-dir")
-    with read_store(path) as store:
-        limit, number = request.get("limit", 0), request.get("number", 0)
-        answers: dict[str, Callable[[], Json]] = {
-            "missions": lambda: listed(store, limit),
-            "mission": lambda: shown(store, number),
-            "backups": lambda: backups_listed(store, limit),
-            "backup": lambda: backup_shown(store, number),
-        }
-        answer: Json = printable(answers[request["do"]]())
-        return answer

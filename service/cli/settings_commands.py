@@ -2,7 +2,7 @@
 """`naze-bridge settings`: the flight controller's settings, their backups, and restoring them."""
 
 import sys
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from datetime import datetime
 from pathlib import Path
 
@@ -161,7 +161,7 @@ def diff(client: BridgeClient, first: str, second: str) -> None:
 @daemon_options
 def history(client: BridgeClient, limit: int) -> None:
     """List the backups, newest first. One is taken when a board is first met, and at every change."""
-    found = client.ask_store({"do": "backups", "limit": limit})["backups"]
+    found = client.ask({"do": "backups", "limit": limit})["backups"]
     if client.as_json:
         print_json(found)
         return
@@ -199,7 +199,7 @@ def _source(client: BridgeClient, name: str) -> tuple[SettingValues, str]:
     if name.isascii() and name.isdecimal() and not Path(name).exists():
         if int(name) > MOST:
             raise click.UsageError(f"{name} is not a backup's number: see `naze-bridge settings history`")
-        stored = client.ask_store({"do": "backup", "number": int(name)})
+        stored = replace(client, fc=None).ask({"do": "backup", "number": int(name)})
         return setting_values(stored["values"]), stored["kind"]
     try:
         found = read_param_file(read_file(Path(name), ParamFileError), shown_path(Path(name)))

@@ -9,7 +9,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from payloads.mission_data import MOST, Json, mission_findings, mission_items
-from service.cli.daemon_client import BridgeClient, bridge_options, daemon_options
+from service.cli.daemon_client import BridgeClient, daemon_options
 from service.cli.mission_commands import show_delivery
 from terminal.command_group import CommandGroup
 from terminal.mission_table import mission_table
@@ -27,10 +27,7 @@ _NUMBER, _LIMIT = _Number(1, MOST), click.IntRange(1, MOST)
 
 @click.group(cls=CommandGroup)
 def missions() -> None:
-    """List, show and restore the received missions, accepted or not.
-
-    All but restore also work without a daemon.
-    """
+    """List, show and restore the received missions, accepted or not."""
 
 
 @missions.command("list")
@@ -38,7 +35,7 @@ def missions() -> None:
 @daemon_options
 def list_missions(client: BridgeClient, limit: int) -> None:
     """List the received missions, newest first."""
-    found = client.ask_store({"do": "missions", "limit": limit})["missions"]
+    found = client.ask({"do": "missions", "limit": limit})["missions"]
     if client.as_json:
         print_json(found)
         return
@@ -74,18 +71,15 @@ def show(client: BridgeClient, number: int) -> None:
 
 @missions.command(short_help="Write mission NUMBER to the flight controller again.")
 @click.argument("number", type=_NUMBER)
-@bridge_options
+@daemon_options
 def restore(client: BridgeClient, number: int) -> None:
     """Write mission NUMBER to the flight controller again, as originally sent."""
-    items = _fetch(client, number)["received"]["items"]
-    request: Json = {"do": "restore", "number": number}
-    if client.fc is not None:
-        request = {"do": "push", "items": items, "source": f"restore of mission {number}"}
-    show_delivery(client, client.ask_with_progress(request, len(items)))
+    count = len(_fetch(client, number)["received"]["items"])
+    show_delivery(client, client.ask_with_progress({"do": "restore", "number": number}, count))
 
 
 def _fetch(client: BridgeClient, number: int) -> Json:
-    return client.ask_store({"do": "mission", "number": number})
+    return client.ask({"do": "mission", "number": number})
 
 
 def _local_time(unix_s: float) -> str:

@@ -35,10 +35,6 @@ class Interrupted(Exception):
     """The user interrupted the request; one sentence about its end."""
 
 
-class NoDaemonError(ControlError):
-    """No daemon answers."""
-
-
 def ask_daemon(state_dir: Path | None, request: Json, progress: Callable[[Any], None] = lambda _: None) -> Json:
     """Ask the daemon that runs on `state_dir` (None: see find_socket); ControlError if there is none or it refuses."""
     path = find_socket(state_dir)
@@ -54,7 +50,7 @@ def ask_daemon(state_dir: Path | None, request: Json, progress: Callable[[Any], 
             raise ControlError(f"no permission to ask the daemon on {path}: {remedy}") from error
         except OSError as error:
             remedy = "start one (sudo systemctl start naze-bridge, or naze-bridge run), or use --fc FC"
-            raise NoDaemonError(f"no daemon answers on {path}: {remedy}") from error
+            raise ControlError(f"no daemon answers on {path}: {remedy}") from error
         with suppress(ConnectionError):
             # A refusal may arrive in the middle of a long request: read it.
             connection.sendall(line)

@@ -13,7 +13,7 @@ from payloads.mission_data import Json, to_json
 from service.cli.helper import actions
 from service.cli.helper.action import ThisPi, parse_action
 from service.cli.setup.change import Machine
-from service.daemon.client import NoDaemonError
+from service.daemon.client import ControlError
 from service.daemon.store_worker import DATABASE_NAME
 from service.settings.load import SERVICE_CONFIG, SERVICE_STATE
 from tests.support.doctor import STATUS
@@ -51,7 +51,7 @@ class FixablePi(FaultyMachine):
 
     def _ask(self) -> Json:
         if self.status is None:
-            raise NoDaemonError("no daemon answers")
+            raise ControlError("no daemon answers")
         return self.status
 
     def _run(self, command: Sequence[str]) -> str:

@@ -117,16 +117,7 @@ def test_an_unreadable_file_is_one_sentence(tuned: Daemon, tmp_path: Path) -> No
     assert_one_sentence(settings(tuned, "backup", tmp_path / "none" / "x"), 1, "No such file")
 
 
-def test_the_history_is_read_without_a_daemon(tuned: Daemon, tmp_path: Path) -> None:
-    settings(tuned, "set", "p_roll", "44")
-    settings(tuned, "save")
-    until(lambda: len(history(tuned)) == 2, "the second backup")
-    shown = settings(tuned, "history").stdout
-    difference = settings(tuned, "diff", "1", "2").stdout
-    tuned.end()
-    assert settings(tuned, "history").stdout == shown
-    assert settings(tuned, "diff", "1", "2").stdout == difference
-    assert_one_sentence(settings(tuned, "list"), 1, "no daemon answers")
+def test_a_backup_without_a_daemon(tmp_path: Path) -> None:
     file = tmp_path / "direct.param"
     direct = run_naze_bridge("settings", "backup", file, "--fc", "sim:")
     assert direct.returncode == 0, direct
