@@ -52,7 +52,7 @@ def lay_out(root: Path, libraries: Mapping[str, Path], project: Path, version: s
         _copy(project / "systemd" / unit, root / "usr/lib/systemd/system")
     _copy(project / "systemd/60-naze-bridge.rules", root / "usr/lib/udev/rules.d")
     _copy(project / "systemd/naze-bridge.sysusers", root / "usr/lib/sysusers.d", "naze-bridge.conf")
-    (root / "etc/naze-bridge/conf.d").mkdir(parents=True)
+    (root / "etc/naze-bridge").mkdir(parents=True)
     _copy(_HERE / "signers", environment)
     # Not in /etc: dpkg asks about changed files that a package brings. postinst copies it if there is none.
     _copy(_HERE / "config.toml", root / "usr/share/naze-bridge")

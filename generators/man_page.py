@@ -20,7 +20,7 @@ _TAIL = """\
 .SH FILES
 .TP
 /etc/naze-bridge/config.toml
-Settings, each with its default; files in conf.d override it.
+Settings, each with its default.
 .TP
 /var/lib/naze-bridge
 Stored missions and telemetry logs.

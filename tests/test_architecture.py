@@ -71,7 +71,6 @@ DECODERS = {
     "service/cli/setup/answers.py": "a secret",
     "service/cli/setup/command.py": "a secret",
     "service/cli/setup/hotspot.py": "our own file",
-    "service/cli/setup/state_folder.py": "a secret",
     "service/machine/host.py": "files of the system, which are searched for words",
     "service/settings/config_files.py": "TOML is UTF-8",
     "service/settings/write_access.py": "a secret",

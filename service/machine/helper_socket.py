@@ -16,7 +16,7 @@ _MAX_REPLY = 1 << 20
 #: The actions by the unit that carries them out: each has its own socket and privileges (systemd/).
 UNITS: Mapping[str, Sequence[str]] = {
     "look": ("overview", "doctor"),
-    "change": ("fix", "answer", "settings", "undo"),
+    "change": ("fix", "answer", "settings"),
     "update": ("install", "downgrade"),
 }
 #: The largest update, bytes.

@@ -16,8 +16,6 @@ from storage.small_files import read_bounded
 _SIOCGIFADDR = 0x8915
 _MAX_BYTES = 1 << 20
 _MOST_LINKS = 8
-#: Not /dev/tty and /dev/tty1, the terminals of programs themselves.
-_SERIAL = re.compile(r"/dev/tty[A-Za-z].*")
 #: The programs of a login console.
 LOGIN_PROGRAMS = ("agetty", "getty", "login")
 
@@ -110,13 +108,6 @@ class Host:
                 if is_same or os.readlink(descriptor) == link:
                     return True
         return False
-
-    def ports_of(self, process: Process) -> set[str]:
-        """The serial ports that a program has open, as far as permissions show: "/dev/ttyS0"."""
-        with suppress(OSError):
-            descriptors = self.path(f"/proc/{process.pid}/fd").iterdir()
-            return {link for each in descriptors if _SERIAL.fullmatch(link := os.readlink(each))}
-        return set()
 
     def has_login(self, terminal: str) -> bool:
         """True if a login console runs on a terminal, such as ttyS0.

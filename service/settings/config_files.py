@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The configuration files of one folder: the status page's, setup's answers, the configuration file, `conf.d`.
-
-Later ones win.
-"""
+"""The configuration files of one folder: the status page's, setup's answers, the configuration file. Later ones win."""
 
 import difflib
 import re
@@ -17,13 +14,10 @@ from service.settings.table import KEYS, TABLES
 from storage.os_error import reason
 from storage.small_files import read_bounded
 
-DROP_INS = "conf.d"
 #: The answers to `naze-bridge setup`: first, so that everything written by hand overrides them.
 SETUP_FILE = "setup.toml"
 #: Settings made on the status page: before setup's, so that a page cannot override an answer given on the Pi.
 PAGE_FILE = "page.toml"
-#: A link to it hides a file of the package, as with systemd.
-_MASKED = Path("/dev/null")
 _MAX_BYTES = 1 << 20
 #: Reported per file, in case another program's file was named by mistake.
 _MOST_UNKNOWN = 20
@@ -52,21 +46,9 @@ def read_files(config: Path, problems: list[Problem], page: str | None = None) -
     found: dict[str, Given] = {}
     if page is not None or page_file.exists():
         found |= _read_file(page_file, problems, page)
-    generated = [setup_file] if setup_file.exists() else []
-    for path in (*generated, config, *_drop_ins(config.parent / DROP_INS, problems)):
-        found |= _read_file(path, problems)
-    return found
-
-
-def _drop_ins(folder: Path, problems: list[Problem]) -> list[Path]:
-    try:
-        return sorted(path for path in folder.iterdir() if path.suffix == ".toml")
-    except FileNotFoundError:
-        return []
-    except OSError as error:
-        # Without the unreadable file the settings would differ from the written ones.
-        problems.append(Problem(str(folder), f"this cannot be read: {reason(error)}"))
-        return []
+    if setup_file.exists():
+        found |= _read_file(setup_file, problems)
+    return found | _read_file(config, problems)
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
@@ -76,8 +58,6 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
 
 def _read_file(path: Path, problems: list[Problem], text: str | None = None) -> dict[str, Given]:
-    if path.resolve() == _MASKED:
-        return {}
     try:
         if text is None:
             text = read_bounded(path, _MAX_BYTES).decode("utf-8-sig")

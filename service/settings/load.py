@@ -8,7 +8,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from service.settings.addresses import GcsAddress, SerialFc, parse_gcs, split_gcs
+from service.settings.addresses import GcsAddress, parse_gcs, split_gcs
 from service.settings.config_files import Given, nearest, read_files
 from service.settings.key import ENVIRONMENT_PREFIX, Problem, SettingsError, Unfit
 from service.settings.settings import DEFAULT_GCS, Settings
@@ -50,10 +50,6 @@ def load_settings(
     problems += _tlog_problems(values, given)
     zenoh = ZenohSettings(**_table("zenoh", values)) if "zenoh" in given else None
     web = WebSettings(**_table("web", values)) if "web" in given else None
-    fc, record_to = values.get("fc"), values.get("record_uart")
-    if isinstance(fc, SerialFc) and str(record_to) == fc.path:
-        text = f"record_uart {record_to} is the flight controller's port: name a file"
-        problems.append(Problem(given["record_uart"].where, text))
     if zenoh is not None:
         from service.settings.zenoh_config import make_config  # loads zenoh, 10 MB
 

@@ -114,11 +114,6 @@ class Settings(BridgeSettings):
     tlog_days: Annotated[int, range(1, 3651), "How long a telemetry log without a flight is kept, days, 1..3650."] = (
         _TLOG.days
     )
-    record_uart: Annotated[
-        Path | None,
-        "File for a recording of the traffic with the flight controller, for a bug report. Off by default.",
-        Example('"/var/lib/naze-bridge/naze.uart"'),
-    ] = None
     log_level: Annotated[LogLevel, "Minimum level of logged events: debug, info, warning or error.", LIVE] = (
         LogLevel.INFO
     )

@@ -48,17 +48,13 @@ cat /run/log; exit 1
 #: What setup leaves outside the package.
 _AS_AFTER_SETUP = """
 cd /etc
-mkdir -p NetworkManager/dnsmasq-shared.d NetworkManager/system-connections avahi/services udev/rules.d
+mkdir -p NetworkManager/dnsmasq-shared.d NetworkManager/system-connections avahi/services
 touch NetworkManager/system-connections/naze-bridge-hotspot.nmconnection avahi/services/naze-bridge.service
 touch NetworkManager/dnsmasq-shared.d/naze-bridge-captive.conf
-touch udev/rules.d/59-naze-bridge-others.rules naze-bridge/setup.toml naze-bridge/gcs.key naze-bridge/undo.json
+touch naze-bridge/setup.toml naze-bridge/gcs.key
 mkdir -p /var/lib/naze-bridge-helper
 touch naze-bridge/page.toml /var/lib/naze-bridge-helper/previous.deb
 """
-_FORMER_ANSWERS = (
-    '# Written by `naze-bridge setup`, which can be run again.\nfc = "auto"\n'
-    'gcs = [{address = "udpin:0.0.0.0:14550", key_file = "/etc/naze-bridge/gcs.key"}]'
-)
 _UNITS = (
     *(".service", "-captive.socket", "-captive.service"),
     *(f"-helper-{unit}{kind}" for unit in UNITS for kind in (".socket", "@.service")),
@@ -72,7 +68,6 @@ find / -xdev -path {_REPOSITORY} -prune -o -newer /root/before -type f -size -4M
 _EXPECTED_SECRETS = [
     "/etc/NetworkManager/system-connections/naze-bridge-hotspot.nmconnection root 600",
     "/etc/naze-bridge/gcs.key naze-bridge 600",
-    "/etc/naze-bridge/undo.json root 600",
     "/var/lib/private/naze-bridge/web-token naze-bridge 600",
 ]
 _STOP = "kill $(cat /run/pid); while grep -q . /proc/$(cat /run/pid)/cmdline; do sleep 0.1; done"
@@ -119,17 +114,6 @@ def with_version(package: Path, version: str, folder: Path) -> Path:
         own.mkdir()
         (own / "module.py").touch()
         control.write_text(re.sub(r"^Version: .*", f"Version: {version}", control.read_text(), flags=re.MULTILINE))
-    return folder / "repacked.deb"
-
-
-def as_before_0_2_1(package: Path, folder: Path) -> Path:
-    """The package as it was: config.toml is a conffile with all settings, and the scripts do not know setup.toml."""
-    with unpacked(package, folder) as control:
-        control.write_text(re.sub(r"^Version: .*", "Version: 0.2.0", control.read_text(), flags=re.MULTILINE))
-        shutil.copy(_REPOSITORY / "examples" / "config.toml", control.parents[1] / "etc/naze-bridge")
-        (control.parent / "conffiles").write_text("/etc/naze-bridge/config.toml\n")
-        for script in ("postinst", "prerm"):
-            (control.parent / script).write_text("#!/bin/sh\n")
     return folder / "repacked.deb"
 
 
@@ -337,23 +321,3 @@ def test_in_a_bare_root_a_card_sets_itself_up_and_leaves_no_secret(
     root.run(_STOP)
     found = root.run(_SECRETS.format(*secrets.values())).split("\n")
     assert sorted(filter(None, found)) == _EXPECTED_SECRETS
-
-
-@pytest.mark.timeout(1800)
-def test_the_settings_of_an_older_release_survive_an_upgrade_and_the_way_back(
-    without_libraries: Path, root: BareRoot, tmp_path: Path
-) -> None:
-    root.put(as_before_0_2_1(without_libraries, tmp_path), "/root/old.deb")
-    root.put(without_libraries, "/root/naze-bridge.deb")
-    root.run("dpkg --install /root/old.deb")
-    root.run("sed -i 's/^#sysid.*/sysid = 7/' /etc/naze-bridge/config.toml")
-    root.run(f"echo '{_FORMER_ANSWERS}' > /etc/naze-bridge/conf.d/setup.toml")
-    root.run("dpkg --install /root/naze-bridge.deb </dev/null")
-    assert "sysid = 7" in root.run("cat /etc/naze-bridge/config.toml")
-    assert 'key_file = "/etc/naze-bridge/gcs.key"' in root.run("cat /etc/naze-bridge/setup.toml").splitlines()
-    root.run("dpkg --install /root/old.deb </dev/null")
-    assert root.run("cat /etc/naze-bridge/conf.d/setup.toml") == f"{_FORMER_ANSWERS}\n"
-    assert "sysid = 7" in root.run("cat /etc/naze-bridge/config.toml")
-    root.run("dpkg --install /root/naze-bridge.deb </dev/null")
-    root.run("dpkg --purge naze-bridge")
-    root.run("ls /etc/naze-bridge", status=2)

@@ -41,8 +41,7 @@ class Pi:
         return tomllib.loads((self.root / SETTINGS_FILE.lstrip("/")).read_text())
 
     def files(self) -> dict[str, str]:
-        """All files but the record for --undo."""
-        found = (path for path in self.root.rglob("*") if path.is_file() and path.name != "undo.json")
+        found = (path for path in self.root.rglob("*") if path.is_file())
         return {str(path.relative_to(self.root)): path.read_text() for path in found}
 
     def setup(self, *options: str, answers: str = "") -> Result:

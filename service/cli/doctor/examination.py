@@ -11,7 +11,7 @@ from pathlib import Path
 
 from payloads.mission_data import Json
 from service.cli.doctor.checked import Checked, Grade
-from service.cli.doctor.flight_controller import check_daemons, check_flight_controller
+from service.cli.doctor.flight_controller import check_flight_controller
 from service.cli.doctor.machine import check_clock, check_database, check_disk, check_power, check_versions
 from service.cli.doctor.network import check_keys, check_ports, check_wifi
 from service.cli.doctor.port import (
@@ -60,7 +60,7 @@ def examine(
         results = [replace(found, grade=Grade.NOTE) if found.grade is Grade.PROBLEM else found for found in results]
     results.append(check_modem_manager(host, ports[0]) if ports else check_no_port())
     yield check_versions(host)
-    yield from filter(None, (check_power(host), check_daemons(host)))
+    yield from filter(None, [check_power(host)])
     yield from results
     is_free = not any(found.grade is Grade.PROBLEM for found in results)
     is_free = is_free and all(holder_of_port(host, port) is None for port in ports)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The remedies that the status page carries out, as changes of setup, whose undo also reverts them.
+"""The remedies that the status page carries out, as changes of setup.
 
 A remedy is only a name: its changes follow from this machine, never from a finding or a request.
 """
@@ -31,8 +31,8 @@ def fix_step(fix: str, host: Host) -> Step | None:
     return None if found is None else replace(found, purpose=fix)
 
 
-def _run(*command: str, undo: tuple[str, ...] = ()) -> list[Step]:
-    return [Step("", [Run(command, undo)])]
+def _run(*command: str) -> list[Step]:
+    return [Step("", [Run(command)])]
 
 
 def _find_fc(host: Host) -> Iterable[Step]:
@@ -43,11 +43,6 @@ def _switch_hotspot(host: Host, *, is_on: bool) -> Iterable[Step]:
     return [] if hotspot_name(host) is None else [switch_step(is_on=is_on)]
 
 
-def _stop_modem_manager(_host: Host) -> Iterable[Step]:
-    words = "--now", "ModemManager.service"
-    return _run("systemctl", "disable", *words, undo=("systemctl", "enable", *words))
-
-
 _FIXES: Mapping[str, Callable[[Host], Iterable[Step]]] = {
     CLOSE_HOTSPOT: lambda host: _switch_hotspot(host, is_on=False),
     ENABLE_UART: lambda host: uart_steps(host, SetupChoices()),
@@ -56,7 +51,7 @@ _FIXES: Mapping[str, Callable[[Host], Iterable[Step]]] = {
     OPEN_HOTSPOT: lambda host: _switch_hotspot(host, is_on=True),
     OPEN_PORTS: lambda _host: _run("udevadm", "trigger", "--settle", "--subsystem-match=tty"),
     RESTART_BRIDGE: lambda _host: _run("systemctl", "restart", "naze-bridge.service"),
-    STOP_MODEM_MANAGER: _stop_modem_manager,
+    STOP_MODEM_MANAGER: lambda _host: _run("systemctl", "disable", "--now", "ModemManager.service"),
     # Without a country the radio would be blocked again.
     UNBLOCK_WIFI: lambda host: _run("rfkill", "unblock", "wlan") if wifi_country(host) else [],
 }

@@ -13,7 +13,6 @@ from service.cli.doctor.checked import Checked, note, ok, problem
 from service.cli.doctor.fixes import RESTART_BRIDGE
 from service.cli.doctor.port import fc_fix, fc_remedy
 from service.daemon.client import ControlError
-from service.machine.host import Host, Process
 from service.machine.package import page
 from service.settings.addresses import FcAddress, SerialFc
 
@@ -23,7 +22,6 @@ _AGAIN = "after that, run `sudo naze-bridge doctor` again"
 #: Damaged replies a minute. A good wire has none for hours.
 _MOST_DAMAGED = 6
 _LEAST_DAMAGED = 10
-_UNIT = "/naze-bridge.service"
 _REFUSED = re.compile(r"(\d+) x (.*) \((.*)\)")
 
 
@@ -109,20 +107,3 @@ def _refused(status: Json) -> Iterator[Checked]:
         elif why in (Check.LATE.value, Check.EARLY.value):
             remedy = "set the clocks of the ground station and of the Pi; then: naze-bridge signing reset"
             yield note("key", f"{count} requests on {link} were refused: {why}", remedy)
-
-
-def check_daemons(host: Host) -> Checked | None:
-    """Check that no two daemons have the same port open: they take each other's replies from it."""
-    daemons = [each for each in host.processes() if each.is_naze_bridge and "run" in each.arguments]
-    by_port: dict[str, list[Process]] = {}
-    for daemon in daemons:
-        for port in host.ports_of(daemon):
-            by_port.setdefault(port, []).append(daemon)
-    port, rivals = next(((port, found) for port, found in by_port.items() if len(found) > 1), ("", []))
-    if not rivals:
-        return None
-    rivals.sort(key=lambda each: _UNIT not in host.read(f"/proc/{each.pid}/cgroup"))  # the service first: it stays
-    pids = [str(each.pid) for each in rivals]
-    remedy = f"stop all but one: sudo kill {' '.join(pids[1:])}"
-    found = f"{len(pids)} daemons have {port} open (pids {', '.join(pids)})"
-    return problem("daemon", found, remedy)

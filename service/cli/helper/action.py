@@ -10,7 +10,6 @@ from typing import BinaryIO
 
 from payloads.mission_data import Json
 from service.cli.setup.change import Machine, Step, later
-from service.cli.setup.undo import UndoLog
 from service.machine.host import Host
 
 #: The reply must arrive at the page before what ends the connection.
@@ -39,14 +38,7 @@ class ThisPi:
     body: BinaryIO
 
     def make(self, steps: Sequence[Step]) -> Json:
-        """Make the changes; setup's --undo and the page's revert them."""
-        return self._carry_out(steps, UndoLog(self.host, DeferredRestarts(self.host)))
-
-    def make_for_good(self, steps: Sequence[Step]) -> Json:
-        """Make changes that are no part of the setup."""
-        return self._carry_out(steps, DeferredRestarts(self.host))
-
-    def _carry_out(self, steps: Sequence[Step], machine: Machine | UndoLog) -> Json:
+        machine = DeferredRestarts(self.host)
         for step in steps:
             for change in step.changes:
                 machine.carry_out(change)

@@ -16,7 +16,6 @@ from service.cli.setup.change import Machine
 from service.cli.setup.command import check_answers
 from service.cli.setup.hotspot import hotspot_is_open, hotspot_name
 from service.cli.setup.steps import missing_steps
-from service.cli.setup.undo import forget_last, undo_steps
 from service.daemon.client import STATUS, ask_daemon
 from service.links.serial_ports import serial_ports
 from service.machine.helper_socket import MAX_PACKAGE
@@ -30,7 +29,7 @@ _AUTO = "auto"
 
 
 def overview(pi: ThisPi) -> Json:
-    """The answers to setup so far, the settings, and what can be undone. Changes nothing."""
+    """The answers to setup so far, and the settings. Changes nothing."""
     host = pi.host
     earlier = earlier_choices(host)
     model = pi_model(host)
@@ -44,7 +43,6 @@ def overview(pi: ThisPi) -> Json:
         "country": wifi_country(host),
         "name": host.read("/etc/hostname").strip(),
         "model": None if model is None else model.name,
-        "can_undo": bool(undo_steps(host)[0]),
         "version": version(),
         "can_update": can_update(host),
         "previous": version_of(host.path(PREVIOUS), Machine(host)),
@@ -102,15 +100,6 @@ def answer(
     return made | {"warnings": warnings, "key": None if is_trial else answers.key}
 
 
-def undo(pi: ThisPi, *, is_trial: bool = False) -> Json:
-    """Revert the last setup, fix, or change of settings. `is_trial`: only show the changes."""
-    steps, kept = undo_steps(pi.host)
-    if is_trial:
-        return pi.shown(steps) | {"kept": kept}
-    forget_last(pi.host, Machine(pi.host))
-    return pi.make_for_good(steps) | {"kept": kept}
-
-
 def install(pi: ThisPi, *, size: int) -> Json:
     """The body is a package of this program: check it, and install it in a separate process."""
     if not 0 < size <= MAX_PACKAGE:
@@ -137,7 +126,6 @@ ACTIONS: Mapping[str, Action] = {
     "fix": apply_fix,
     "answer": answer,
     "settings": change_settings,
-    "undo": undo,
     "install": install,
     "downgrade": downgrade,
 }

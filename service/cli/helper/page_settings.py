@@ -21,7 +21,7 @@ from service.settings.load import SERVICE_CONFIG, SERVICE_STATE
 from service.settings.table import KEYS
 
 _FILE = str(SERVICE_CONFIG.with_name(PAGE_FILE))
-_HEAD = "# Written by the status page. setup.toml, config.toml and conf.d, in this folder, override this.\n"
+_HEAD = "# Written by the status page. setup.toml and config.toml, in this folder, override this.\n"
 _RELOAD = ("systemctl", "reload", "naze-bridge.service")
 _NAMES = ("sysid", "takeoff_max_m", "record_tlog", "tlog_file_mb", "tlog_total_mb", "tlog_days", "log_level")
 _KEYS: Mapping[str, Key] = {key.name: key for key in KEYS if key.name in _NAMES}
@@ -67,7 +67,7 @@ def change_settings(pi: ThisPi, *, values: dict) -> Json:  # type: ignore[type-a
         return pi.shown([])
     load_settings(host.path(SERVICE_CONFIG), (), text, state_dir=host.path(SERVICE_STATE))
     is_live = all(_KEYS[name].is_live for name in values)
-    take_over = [Run(_RELOAD, undo=_RELOAD)] if is_live else restart_changes(host)
+    take_over = [Run(_RELOAD)] if is_live else restart_changes(host)
     return pi.make([Step("save the settings", [WriteFile(_FILE, text), *take_over])])
 
 

@@ -39,10 +39,9 @@ class RemoveFile:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """Run a program and wait until it exits. `undo`: the command that reverts it, empty if none is needed."""
+    """Run a program and wait until it exits."""
 
     command: tuple[str, ...]
-    undo: tuple[str, ...] = ()
 
     def describe(self) -> str:
         return f"run {' '.join(self.command)}"

@@ -22,9 +22,7 @@ from service.cli.setup.answers import (
 )
 from service.cli.setup.change import Machine, Run, SetupError, Step, WriteFile, is_root
 from service.cli.setup.hotspot import ADDRESS, JOIN_S, hotspot_name
-from service.cli.setup.state_folder import page_token
 from service.cli.setup.steps import missing_steps
-from service.cli.setup.undo import UndoLog, forget_last, undo_steps
 from service.daemon.client import STATUS, ControlError, ask_daemon
 from service.machine.host import Host
 from service.machine.raspberry_pi import pi_model
@@ -43,6 +41,8 @@ _MOST_SSID = 32
 _PASSWORD = re.compile("[ -~]{8,63}")
 #: The search spends 9 s on a port: three are tried by then.
 _SEARCH_S = 30
+#: The service may have been taken over: a token holds nothing that acts on root's terminal.
+_TOKEN = re.compile("[!-~]{1,256}")
 _NEEDS_ROOT = "setup needs root: run `sudo naze-bridge setup`, or see the changes with --dry-run"
 _HOST_NAME = re.compile("[A-Za-z0-9](?:[A-Za-z0-9-]{0,61}[A-Za-z0-9])?")
 
@@ -57,7 +57,6 @@ _HOST_NAME = re.compile("[A-Za-z0-9](?:[A-Za-z0-9-]{0,61}[A-Za-z0-9])?")
 @click.option("--page/--no-page", default=None, help="Serve the status page, or not.")
 @click.option("--key-file", type=PATH, help="File with a MAVLink signing passphrase: required for changes.")
 @click.option("--new-key", is_flag=True, help="Make such a passphrase and show it; it replaces the present one.")
-@click.option("--undo", is_flag=True, help="Revert the changes of the last setup.")
 @click.option("--yes", is_flag=True, help="Ask no questions: use the options, the last answers and the defaults.")
 @click.option("--dry-run", is_flag=True, help="Show the changes without making them.")
 @click.option("--root", type=PATH, default="/", hidden=True)
@@ -71,7 +70,6 @@ def setup(
     page: bool | None,
     key_file: Path | None,
     new_key: bool,
-    undo: bool,
     yes: bool,
     dry_run: bool,
     root: Path,
@@ -84,9 +82,6 @@ def setup(
     if not (yes or dry_run or is_root()):
         fail(_NEEDS_ROOT)  # before its questions
     host = Host(root)
-    if undo:
-        _undo(host, yes=yes, dry_run=dry_run)
-        return
     try:
         fc = None if fc is None else str(parse_fc(fc))
     except AddressError as error:
@@ -134,10 +129,10 @@ def setup(
     _show(host, steps)
     if dry_run:
         return
-    log = UndoLog(host, Machine(host))
+    machine = Machine(host)
     if steps:
         _agree(yes=yes)
-        _carry_out([step for step in steps if not step.cuts_network], log)
+        _carry_out([step for step in steps if not step.cuts_network], machine)
     _print_addresses(host, answers)
     if new_key:
         click.echo("\nIn Mission Planner enter the key under Setup, Advanced, MAVLink Signing, Add.")
@@ -149,17 +144,17 @@ def setup(
         if steps:
             _await_flight_controller()
         is_well = diagnose()
-    _switch_network([step for step in steps if step.cuts_network], log, hotspot, ask=not yes, is_kept=keep_hotspot)
+    _switch_network([step for step in steps if step.cuts_network], machine, hotspot, ask=not yes, is_kept=keep_hotspot)
     if not is_well:
         raise SystemExit(1)
 
 
-def _switch_network(steps: list[Step], log: UndoLog, hotspot: str | None, *, ask: bool, is_kept: bool) -> None:
+def _switch_network(steps: list[Step], machine: Machine, hotspot: str | None, *, ask: bool, is_kept: bool) -> None:
     """Open the hotspot last: it may end the connection over which setup is run."""
     if not steps:
         return
     if all(not isinstance(change, Run) for step in steps for change in step.changes):
-        _carry_out(steps, log)
+        _carry_out(steps, machine)
         return
     click.echo(
         f"\nNow the Wi-Fi changes to the hotspot {hotspot!r}, and a connection over the present Wi-Fi network ends."
@@ -168,28 +163,7 @@ def _switch_network(steps: list[Step], log: UndoLog, hotspot: str | None, *, ask
         click.echo(f"Join it within {JOIN_S // 60} minutes: if no device does, the Pi returns to the current network.")
     if ask:
         click.prompt("Press Enter when you have noted the above", default="", show_default=False)
-    _carry_out(steps, log)
-
-
-def _undo(host: Host, *, yes: bool, dry_run: bool) -> None:
-    try:
-        steps, kept = undo_steps(host)
-    except SetupError as error:
-        fail(error)
-    for path in kept:
-        complain(f"{path} was changed since the last setup, and is kept as it is")
-    if not steps:
-        click.echo("There is nothing to undo.")
-        return
-    _show(host, steps)
-    if dry_run:
-        return
-    _agree(yes=yes)
-    machine = Machine(host)
-    forget_last(host, machine)
     _carry_out(steps, machine)
-    if any(step.needs_reboot for step in steps):
-        click.echo("Reboot once for the UART: sudo reboot")
 
 
 def _agree(*, yes: bool) -> None:
@@ -226,7 +200,7 @@ def _show(host: Host, steps: list[Step]) -> None:
                         say(line, prefix="       ", indent=7)
 
 
-def _carry_out(steps: list[Step], machine: Machine | UndoLog) -> None:
+def _carry_out(steps: list[Step], machine: Machine) -> None:
     for step in steps:
         click.echo(f"{step.purpose} ... ", nl=False)
         try:
@@ -262,6 +236,16 @@ def _print_addresses(host: Host, answers: SetupChoices) -> None:
         show_secret("Its token, for changes", token, f"{SERVICE_STATE}/{DEFAULT_NAME}", f"{url}#token={token}")
     else:
         print_code(url)
+
+
+def page_token(host: Host) -> str:
+    """The status page's token; empty if there is none that can be shown."""
+    path = host.path(f"{SERVICE_STATE}/{DEFAULT_NAME}")
+    try:
+        token = read_bounded(path, 1 << 10, follows_links=False).decode().strip()
+    except (OSError, ValueError):
+        return ""
+    return token if _TOKEN.fullmatch(token) else ""
 
 
 def check_answers(ssid: str | None, password: str | None, country: str | None, name: str | None) -> None:

@@ -63,7 +63,7 @@ def hotspot_steps(host: Host, hotspot: tuple[str, str] | None, *, is_kept: bool 
         yield Step(purpose, [WriteFile(HOTSPOT_FILE, text, secret=True), Run(_RELOAD), Run(_OPEN)], cuts_network=True)
         return
     # Not opened at boot before a device has joined it once.
-    changes: list[Change] = [WriteFile(HOTSPOT_FILE, text.replace(_ON, _OFF), secret=True), Run(_RELOAD, undo=_RELOAD)]
+    changes: list[Change] = [WriteFile(HOTSPOT_FILE, text.replace(_ON, _OFF), secret=True), Run(_RELOAD)]
     yield Step(purpose, [*changes, *switch_step(is_on=True).changes], cuts_network=True)
 
 
@@ -89,11 +89,12 @@ def captive_steps(host: Host, hotspot: tuple[str, str] | None, *, has_page: bool
     is_wanted = has_page and (hotspot is not None or hotspot_name(host) is not None)
     text = f"# Written by `naze-bridge setup`.\n{dnsmasq_text(ADDRESS)}"
     now = ("--now", "--no-block") if host.path("/run/systemd/system").exists() else ()
-    on, off = ("systemctl", "enable", *now, _CAPTIVE_SOCKET), ("systemctl", "disable", *now, _CAPTIVE_SOCKET)
     if is_wanted and host.read(CAPTIVE_FILE) != text and not _is_shared_elsewhere(host):
-        yield Step("offer the page to phones that join the hotspot", [WriteFile(CAPTIVE_FILE, text), Run(on, undo=off)])
+        on = Run(("systemctl", "enable", *now, _CAPTIVE_SOCKET))
+        yield Step("offer the page to phones that join the hotspot", [WriteFile(CAPTIVE_FILE, text), on])
     elif not is_wanted and host.path(CAPTIVE_FILE).exists():
-        yield Step("no longer offer the page to phones that join", [RemoveFile(CAPTIVE_FILE), Run(off, undo=on)])
+        off = Run(("systemctl", "disable", *now, _CAPTIVE_SOCKET))
+        yield Step("no longer offer the page to phones that join", [RemoveFile(CAPTIVE_FILE), off])
 
 
 def _is_shared_elsewhere(host: Host) -> bool:
@@ -105,10 +106,8 @@ def _is_shared_elsewhere(host: Host) -> bool:
 
 def hotspot_name(host: Host) -> str | None:
     """The name of the hotspot's network; None without one."""
-    found = re.search(r"^ssid=(.*)$", host.read(HOTSPOT_FILE), re.MULTILINE)
-    if found is None or not re.fullmatch("([0-9]{1,3};)+", found[1]):
-        return found and found[1].replace("\\s", " ").replace("\\\\", "\\")  # written up to 0.2.0
-    return bytes(int(number) & 0xFF for number in found[1].split(";")[:-1]).decode(errors="replace")
+    found = re.search(r"^ssid=((?:[0-9]{1,3};)+)$", host.read(HOTSPOT_FILE), re.MULTILINE)
+    return found and bytes(int(number) & 0xFF for number in found[1].split(";")[:-1]).decode(errors="replace")
 
 
 def _byte_list(ssid: str) -> str:

@@ -17,18 +17,16 @@ from service.cli.setup.answers import (
 )
 from service.cli.setup.change import Change, Run, Step, WriteFile
 from service.cli.setup.hotspot import captive_steps, hotspot_steps
-from service.cli.setup.state_folder import other_devices
 from service.machine.host import Host
 from service.machine.raspberry_pi import boot_file, pi_model, wifi_country
 
 _AVAHI_FILE = "/etc/avahi/services/naze-bridge.service"
-_OTHERS_FILE = "/etc/udev/rules.d/59-naze-bridge-others.rules"
 _WANTED_BY = "/etc/systemd/system/multi-user.target.wants/naze-bridge.service"
 
 
 def missing_steps(host: Host, answers: SetupChoices) -> list[Step]:
     """The remaining steps on this machine, in order."""
-    makers = (_console, uart_steps, _country, _name, _key, settings_steps, _others, _announcement, _service)
+    makers = (_console, uart_steps, _country, _name, _key, settings_steps, _announcement, _service)
     steps = [step for make in makers for step in make(host, answers)]
     steps += captive_steps(host, answers.hotspot, has_page=answers.page)
     return [*steps, *hotspot_steps(host, answers.hotspot, is_kept=answers.keeps_hotspot)]
@@ -51,8 +49,7 @@ def console_steps(host: Host, consoles: Sequence[str]) -> Iterator[Step]:
     for console in consoles:
         wanted = f"serial-getty@{console}.service"
         if host.has_login(console) or host.path(f"/etc/systemd/system/getty.target.wants/{wanted}").is_symlink():
-            undo = ("systemctl", "enable", *_now(host), wanted)
-            changes.append(Run(("systemctl", "disable", *_now(host), wanted), undo))
+            changes.append(Run(("systemctl", "disable", *_now(host), wanted)))
     if changes:
         yield Step("free the UART from the login console", changes, needs_reboot=in_cmdline)
 
@@ -110,12 +107,10 @@ def _name(host: Host, answers: SetupChoices) -> Iterator[Step]:
     renamed = re.sub(rf"^(127\.0\.1\.1\s+){re.escape(old)}$", rf"\g<1>{answers.name}", hosts, flags=re.MULTILINE)
     changes: list[Change] = [WriteFile("/etc/hosts", renamed)] if old and renamed != hosts else []
     if _now(host):
-        undo = ("hostnamectl", "set-hostname", old) if old else ()
-        changes.append(Run(("hostnamectl", "set-hostname", answers.name), undo))
+        changes.append(Run(("hostnamectl", "set-hostname", answers.name)))
         if host.path("/etc/avahi").exists():
             # Avahi reads the name only when it starts.
-            restart = ("systemctl", "try-restart", "avahi-daemon")
-            changes.append(Run(restart, undo=restart))
+            changes.append(Run(("systemctl", "try-restart", "avahi-daemon")))
     else:
         changes.append(WriteFile("/etc/hostname", f"{answers.name}\n"))
     yield Step(f"name this machine {answers.name}.local", changes)
@@ -124,8 +119,8 @@ def _name(host: Host, answers: SetupChoices) -> Iterator[Step]:
 def _key(host: Host, answers: SetupChoices) -> Iterator[Step]:
     if answers.key is None or current_key(host) == answers.key:
         return
-    own, is_new = ("chown", "naze-bridge:", KEY_FILE), not host.path(KEY_FILE).exists()
-    changes: list[Change] = [WriteFile(KEY_FILE, f"{answers.key}\n", True), Run(own, undo=() if is_new else own)]
+    is_new = not host.path(KEY_FILE).exists()
+    changes: list[Change] = [WriteFile(KEY_FILE, f"{answers.key}\n", True), Run(("chown", "naze-bridge:", KEY_FILE))]
     if not is_new:
         changes += restart_changes(host)  # the settings, which name it, do not change
     yield Step("set the key that is required for writing", changes)
@@ -135,21 +130,6 @@ def settings_steps(host: Host, answers: SetupChoices) -> Iterator[Step]:
     text = settings_text(host, answers)
     if host.read(SETTINGS_FILE) != text:
         yield Step("save the settings", [WriteFile(SETTINGS_FILE, text), *restart_changes(host)])
-
-
-def _others(host: Host, answers: SetupChoices) -> Iterator[Step]:
-    """Keep the name /dev/naze from USB devices that proved not to be a flight controller."""
-    rules = [
-        f'SUBSYSTEM=="tty", KERNELS=="{socket}", ATTRS{{idVendor}}=="{vendor}", ATTRS{{idProduct}}=="{product}",'
-        ' ENV{NAZE_BRIDGE_OTHER}="1"\n'
-        for socket, vendor, product in other_devices(host)
-    ]
-    text = "# Written by `naze-bridge setup`: not flight controllers, so not /dev/naze.\n" + "".join(rules)
-    if rules and host.read(_OTHERS_FILE) != text:
-        commands = ("udevadm", "control", "--reload"), ("udevadm", "trigger", "--subsystem-match=tty")
-        reload = [Run(command, undo=command) for command in commands]
-        changes: list[Change] = [WriteFile(_OTHERS_FILE, text), *(reload if _now(host) else [])]
-        yield Step("keep the name /dev/naze from radios and GPS receivers", changes)
 
 
 def _announcement(host: Host, answers: SetupChoices) -> Iterator[Step]:
@@ -170,15 +150,13 @@ def _announcement(host: Host, answers: SetupChoices) -> Iterator[Step]:
 def _service(host: Host, answers: SetupChoices) -> Iterator[Step]:
     if not host.path(_WANTED_BY).is_symlink():
         command = ("systemctl", "enable", *_now(host), "naze-bridge")
-        undo = ("systemctl", "disable", *_now(host), "naze-bridge")
-        yield Step("start the bridge with the machine", [Run(command, undo)])
+        yield Step("start the bridge with the machine", [Run(command)])
 
 
 def restart_changes(host: Host) -> list[Change]:
     """Restart the service if it is in use."""
     is_in_use = _now(host) and host.path(_WANTED_BY).is_symlink()
-    undo = ("systemctl", "try-restart", "naze-bridge.service")
-    return [Run(("systemctl", "restart", "naze-bridge.service"), undo)] if is_in_use else []
+    return [Run(("systemctl", "restart", "naze-bridge.service"))] if is_in_use else []
 
 
 def _now(host: Host) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ import { byId, form, make, say } from "./dom.js";
 import { answersPanel } from "./pi_answers.js";
 import { doctorPanel } from "./pi_doctor.js";
 import { logPanel } from "./pi_log.js";
-import { action, aftermath, askPi, pressed, stepList } from "./pi_request.js";
+import { action, aftermath, askPi, pressed } from "./pi_request.js";
 import { settingsPanel } from "./pi_settings.js";
 import { updatePanel } from "./pi_update.js";
 import { tokenField } from "./token.js";
@@ -31,25 +31,11 @@ function summary(pi) {
 }
 
 // The buttons that interrupt something.
-function last({ hotspot, hotspot_is_open: isOpen, can_undo: canUndo }) {
+function last({ hotspot, hotspot_is_open: isOpen }) {
   const said = make("p", { class: "result", role: "status" });
-  const plan = make("div");
   const act = (text, fix, note) => action(text, said, async () => aftermath(await askPi({ action: "fix", fix })) + note);
-  const undo = action("Undo the last change …", said, () => showUndo(plan, said));
-  undo.disabled = !canUndo;
   const note = isOpen ? " This phone must join the Pi's other network." : " Join the hotspot within 3 minutes, or the Pi returns to this network.";
   const hotspots = hotspot === null ? [] : [act(isOpen ? "Close the hotspot" : "Open the hotspot", isOpen ? "close the hotspot" : "open the hotspot", note)];
-  return make("div", {}, make("div", { class: "row" }, undo, ...hotspots, act("Restart the bridge", "restart the bridge", " The page returns in a few seconds."), said), plan);
+  return make("div", { class: "row" }, ...hotspots, act("Restart the bridge", "restart the bridge", " The page returns in a few seconds."), said);
 }
 
-async function showUndo(plan, said) {
-  const trial = await askPi({ action: "undo", is_trial: true });
-  const confirm = action("Undo this", said, async () => {
-    const text = aftermath(await askPi({ action: "undo" }));
-    plan.replaceChildren();
-    return text;
-  });
-  const kept = trial.kept.map((file) => make("li", {}, `${file} was changed since, and is kept as it is`));
-  plan.replaceChildren(stepList(trial.steps), make("ul", {}, ...kept), confirm);
-  say(said, "", "");
-}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings from files, drop-ins, environment and flags, and messages about invalid ones."""
+"""Settings from files, environment and flags, and messages about invalid ones."""
 
 import os
 from pathlib import Path
@@ -11,30 +11,25 @@ from service.settings.passphrase import new_passphrase
 from tests.support.programs import run_naze_bridge
 
 
-def load(folder: Path, text: str, **drop_ins: str) -> Settings:
+def load(folder: Path, text: str, setup: str | None = None) -> Settings:
     config = folder / "naze.toml"
     config.write_text(text)
-    for name, drop_in in drop_ins.items():
-        (folder / "conf.d" / f"{name}.toml").write_text(drop_in)
+    if setup is not None:
+        (folder / "setup.toml").write_text(setup)
     return load_settings(config, fc="sim:", state_dir=folder)
 
 
-def problems(folder: Path, text: str, **drop_ins: str) -> list[str]:
+def problems(folder: Path, text: str, setup: str | None = None) -> list[str]:
     with pytest.raises(SettingsError) as caught:
-        load(folder, text, **drop_ins)
+        load(folder, text, setup)
     return [str(problem).removeprefix(f"{folder}/") for problem in caught.value.problems]
 
 
-def test_drop_ins_override_the_file_and_earlier_drop_ins(folder: Path) -> None:
-    settings = load(folder, "sysid = 2\ntakeoff_max_m = 20", a="sysid = 3\nlog_level = 'debug'", b="sysid = 4")
-    assert (settings.sysid, settings.takeoff_max_m, settings.log_level) == (4, 20, "debug")
-
-
-def test_a_drop_in_adds_to_a_table(folder: Path) -> None:
-    zenoh = load(folder, "[zenoh]\nvehicle = 'one'\nprefix = 'club'", a="[zenoh]\nvehicle = 'two'").zenoh
-    assert zenoh is not None
-    assert (zenoh.vehicle, zenoh.prefix) == ("two", "club")
-    assert load(folder, "", a="").zenoh is None
+def test_the_file_overrides_the_answers_to_setup_key_by_key(folder: Path) -> None:
+    settings = load(folder, "sysid = 2\n[zenoh]\nvehicle = 'two'", setup="sysid = 3\nlog_level = 'debug'\nfc = 'auto'")
+    assert (settings.sysid, settings.log_level) == (2, "debug")
+    assert settings.zenoh is not None
+    assert settings.zenoh.vehicle == "two"
 
 
 def test_flags_override_the_environment_which_overrides_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -84,12 +79,12 @@ takeof_max_m = 15
 vehicle = "a/b"
 encodings = "json"
 """
-    lines = problems(folder, text, late="tlog_days = 'all'")
+    lines = problems(folder, text, setup="tlog_days = 'all'")
     wanted = [
         "naze.toml:8: 'takeof_max_m' is not a setting; did you mean 'takeoff_max_m'?",
         "naze.toml:11: 'zenoh.encodings' is not a setting; did you mean 'zenoh.encoding'?",
         "naze.toml:4: 'tcpin:0.0.0.0' needs a host and a port: use udpin:0.0.0.0:14550",
-        "conf.d/late.toml:1: tlog_days is 'all', but must be a whole number, 1..3650 (How long",
+        "setup.toml:1: tlog_days is 'all', but must be a whole number, 1..3650 (How long",
         "naze.toml:3: sysid is 300, but must be 1..255 (MAVLink system id of the vehicle",
         "naze.toml:10: zenoh.vehicle is 'a/b', with '/' in it: make a name of letters, digits and dashes",
     ]
@@ -125,28 +120,14 @@ def test_odd_values_give_one_sentence(folder: Path, text: str, words: str) -> No
     ],
 )
 def test_a_file_that_is_not_a_configuration_is_an_error(folder: Path, content: bytes, words: str) -> None:
-    (folder / "conf.d" / "x.toml").write_bytes(content)
+    (folder / "setup.toml").write_bytes(content)
     (found,) = problems(folder, "")
-    assert found.startswith(f"conf.d/x.toml: {words}")
+    assert found.startswith(f"setup.toml: {words}")
 
 
-def test_pipes_folders_and_broken_links_are_errors(folder: Path) -> None:
-    os.mkfifo(folder / "conf.d" / "a.toml")
-    (folder / "conf.d" / "b.toml").mkdir()
-    (folder / "conf.d" / "c.toml").symlink_to("/dev/null")
-    (folder / "conf.d" / "d.toml").symlink_to("nowhere")
-    assert problems(folder, "") == [
-        "conf.d/a.toml: this cannot be read: it is not a regular file",
-        "conf.d/b.toml: this cannot be read: Is a directory",
-        "conf.d/d.toml: this cannot be read: No such file or directory",
-    ]
-
-
-def test_unlistable_drop_ins_are_an_error(folder: Path) -> None:
-    (folder / "conf.d").rmdir()
-    assert load(folder, "sysid = 2").sysid == 2
-    (folder / "conf.d").write_text("")
-    assert problems(folder, "") == ["conf.d: this cannot be read: Not a directory"]
+def test_a_pipe_is_an_error(folder: Path) -> None:
+    os.mkfifo(folder / "setup.toml")
+    assert problems(folder, "") == ["setup.toml: this cannot be read: it is not a regular file"]
 
 
 def test_a_file_of_unknown_settings_gives_21_errors_at_most(folder: Path) -> None:
@@ -186,10 +167,3 @@ def test_check_config_warns_of_a_weak_key_and_does_not_quote_it(folder: Path) ->
 def test_a_link_that_is_listed_twice_is_one_link(folder: Path) -> None:
     settings = load(folder, 'gcs = ["udpout:10.0.0.1:9", "tcpin:[::]:5", "udpout:10.0.0.1:9"]')
     assert [str(address) for address in settings.gcs] == ["udpout:10.0.0.1:9", "tcpin:[::]:5"]
-
-
-def test_the_flight_controllers_port_is_not_recorded_into(folder: Path) -> None:
-    config = folder / "naze.toml"
-    config.write_text('fc = "/dev/ttyUSB0,57600"\nrecord_uart = "/dev/ttyUSB0"')
-    with pytest.raises(SettingsError, match="is the flight controller's port: name a file"):
-        load_settings(config, state_dir=folder)

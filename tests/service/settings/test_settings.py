@@ -7,10 +7,10 @@ import pytest
 from service.settings import Settings, SettingsError, TlogLimits, load_settings
 
 
-def settings_of(tmp_path: Path, text: str, record_uart: Path | None = None) -> Settings:
+def settings_of(tmp_path: Path, text: str) -> Settings:
     config = tmp_path / "naze.toml"
     config.write_text(text)
-    return load_settings(config, fc="sim:", state_dir=tmp_path, record_uart=record_uart)
+    return load_settings(config, fc="sim:", state_dir=tmp_path)
 
 
 def test_telemetry_is_recorded_by_default(tmp_path: Path) -> None:
@@ -25,13 +25,6 @@ def test_the_limits_are_settings(tmp_path: Path) -> None:
     assert limits == TlogLimits(file_size=1 << 20, total_size=2 << 20, days=1)
 
 
-def test_the_flag_overrides_the_file(tmp_path: Path) -> None:
-    text = 'record_uart = "/var/lib/naze-bridge/naze.uart"'
-    assert settings_of(tmp_path, "").record_uart is None
-    assert settings_of(tmp_path, text).record_uart == Path("/var/lib/naze-bridge/naze.uart")
-    assert settings_of(tmp_path, text, Path("here.uart")).record_uart == Path("here.uart")
-
-
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
@@ -41,7 +34,7 @@ def test_the_flag_overrides_the_file(tmp_path: Path) -> None:
         ("tlog_file_mb = 2000", "tlog_file_mb is 2000, but must be 1..1024"),
         ("tlog_total_mb = 20", "tlog_total_mb is 20, but must be 32 or more"),
         ("tlog_day = 20", "did you mean 'tlog_days'"),
-        ("record_uart = true", "record_uart is True, but must be text in quotes"),
+        ("key_file = true", "key_file is True, but must be text in quotes"),
     ],
 )
 def test_invalid_values_are_refused(tmp_path: Path, text: str, complaint: str) -> None:

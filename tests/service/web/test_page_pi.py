@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the page does for the Pi itself: first questions, doctor's remedies, settings, log, update, undo."""
+"""What the page does for the Pi itself: first questions, doctor's remedies, settings, log, update."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -62,7 +62,7 @@ def fits_a_phone(page: Browser) -> bool:
     return bool(page.run("return document.documentElement.scrollWidth") <= PHONE[0])
 
 
-def test_first_questions_remedies_settings_log_and_undo(browsers: Browsers, bench: tuple[WebBench, FixablePi]) -> None:
+def test_first_questions_remedies_settings_and_log(browsers: Browsers, bench: tuple[WebBench, FixablePi]) -> None:
     web, pi = bench
     with browsers.tab(web.port, PHONE) as page:
         opened(page, web)
@@ -109,11 +109,6 @@ def test_first_questions_remedies_settings_log_and_undo(browsers: Browsers, benc
         page.wait_text("#pi .log", "web.pi_request")
         assert violations(page) == []
         assert fits_a_phone(page)
-
-        press(page, "Undo the last change …")
-        page.wait_text("#pi", "remove /etc/naze-bridge/page.toml")
-        press(page, "Undo this")
-        until(lambda: not pi.path("/etc/naze-bridge/page.toml").exists(), "the undone setting")
 
         unfold(page, "Setup")
         page.press("#pi [name='new_key']")

@@ -72,11 +72,6 @@ def port_taken(pi: FixablePi) -> None:
     pi.runs(63, "mavproxy.py", has_open="socket:[4711]")
 
 
-def two_daemons(pi: FixablePi) -> None:
-    for pid in (64, 65):
-        pi.runs(pid, *_DAEMON, has_open="/dev/ttyAMA0")
-
-
 def store_trouble(pi: FixablePi) -> None:
     pi.status = {**STATUS, "port": {}, "where": "/dev/serial0", "store_trouble": "disk full"}
 
@@ -115,7 +110,6 @@ def test_a_fix_makes_the_check_ok(pi: FixablePi, fault: Callable[[FixablePi], No
     [
         (another_program, "other programs"),
         (port_taken, "port for ground stations"),
-        (two_daemons, "daemon"),
         (started_with_a_console, "console"),
     ],
 )
@@ -167,7 +161,7 @@ def test_a_wrong_fixed_speed(pi: FixablePi) -> None:
 
 def test_a_value_written_by_hand_is_not_fixed_from_the_page(pi: FixablePi) -> None:
     wrong_port(pi)
-    pi.write("/etc/naze-bridge/conf.d/mine.toml", 'fc = "/dev/ttyUSB7"\n')
+    pi.write("/etc/naze-bridge/config.toml", 'fc = "/dev/ttyUSB7"\n')
     assert faults(pi, "port") == [None]
 
 

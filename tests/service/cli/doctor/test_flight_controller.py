@@ -1,17 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The flight controller behind a free port, or asked by the daemon; and the troubles that a daemon's status shows."""
 
-from pathlib import Path
-
 import pytest
 
 from bridge.controllers.harakiri.profile import PATCHED, UNPATCHED
 from bridge.fc.states.cli import Cli
 from payloads.mission_data import Json
-from service.cli.doctor.flight_controller import check_daemons, check_flight_controller, check_running
+from service.cli.doctor.flight_controller import check_flight_controller, check_running
 from service.daemon.client import ControlError
 from tests.support.doctor import STATUS, assert_note, assert_ok, assert_problem, no_answer
-from tests.support.faulty_machine import PORT, FaultyMachine
+from tests.support.faulty_machine import PORT
 
 
 def test_a_silent_flight_controller_is_a_problem() -> None:
@@ -67,22 +65,3 @@ def test_stations_without_the_key() -> None:
 
 def test_a_store_that_cannot_write() -> None:
     assert_problem(check_running(STATUS | {"store_trouble": "disk full"}), "disk full", "systemctl restart")
-
-
-def test_two_daemons_on_a_port_until_one_is_stopped(tmp_path: Path) -> None:
-    pi = FaultyMachine(tmp_path / "root")
-    for pid in (70, 71):
-        pi.runs(pid, "python3", "/usr/bin/naze-bridge", "run", has_open="/dev/ttyAMA0")
-    pi.write("/proc/71/cgroup", "0::/system.slice/naze-bridge.service\n")
-    found = check_daemons(pi)
-    assert_problem(found, "2 daemons have /dev/ttyAMA0 open (pids 71, 70)", "sudo kill 70")
-    pi.path("/proc/70/cmdline").unlink()
-    assert check_daemons(pi) is None
-
-
-@pytest.mark.parametrize("other", ["/dev/ttyUSB0", "/dev/tty1", ""])
-def test_daemons_on_different_ports(tmp_path: Path, other: str) -> None:
-    pi = FaultyMachine(tmp_path / "root")
-    pi.runs(70, "python3", "/usr/bin/naze-bridge", "run", has_open="/dev/ttyAMA0")
-    pi.runs(71, "python3", "/usr/bin/naze-bridge", "run", has_open=other)
-    assert check_daemons(pi) is None

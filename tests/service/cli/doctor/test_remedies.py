@@ -68,7 +68,7 @@ def wrong_speed(pi: FaultyMachine, settings: Settings) -> Checked:
 
 
 @pytest.mark.parametrize(("fc", "check"), [("/dev/ttyUSB7", missing_port), ("/dev/ttyUSB0,9600", wrong_speed)])
-@pytest.mark.parametrize("place", ["setup", _CONFIG, "etc/naze-bridge/conf.d/mine.toml"])
+@pytest.mark.parametrize("place", ["setup", _CONFIG])
 def test_a_wrong_fc_wherever_it_is_set(
     pi: FaultyMachine, setup_pi: Pi, fc: str, check: Callable[[FaultyMachine, Settings], Checked], place: str
 ) -> None:

@@ -38,7 +38,7 @@ def test_arguments_have_names_and_types(arguments: str) -> None:
 
 def test_a_number_is_not_a_truth_value() -> None:
     with pytest.raises(HelperRefusal, match=r"is_trial \(bool\)"):
-        parse_action(b'{"action": "undo", "is_trial": 1}', ACTIONS)
+        parse_action(b'{"action": "answer", "is_trial": 1}', ACTIONS)
 
 
 @pytest.mark.parametrize(

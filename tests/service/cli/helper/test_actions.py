@@ -7,7 +7,6 @@ from service.cli.helper.action import HelperRefusal
 from service.cli.setup.answers import KEY_FILE, SETTINGS_FILE
 from service.cli.setup.hotspot import hotspot_name
 from service.machine.host import Host
-from tests.service.cli.doctor.test_fixes import console, store_trouble
 from tests.support.fixable_pi import FixablePi
 
 _HOTSPOT = {"hotspot": "kite", "password": "long-enough", "country": "de"}
@@ -24,11 +23,10 @@ def test_the_first_questions(pi: FixablePi) -> None:
     assert made["cuts_network"]
     assert pi.read(KEY_FILE) == f"{made['key']}\n"
     overview = pi.ask("overview")
-    assert {name: overview[name] for name in ("is_set_up", "has_key", "hotspot", "can_undo")} == {
+    assert {name: overview[name] for name in ("is_set_up", "has_key", "hotspot")} == {
         "is_set_up": True,
         "has_key": True,
         "hotspot": "kite",
-        "can_undo": True,
     }
     assert "long-enough" not in str(made)
 
@@ -53,27 +51,6 @@ def test_answers_that_cannot_be_used_change_nothing(pi: FixablePi, wrong: dict[s
     with pytest.raises(HelperRefusal, match=why):
         pi.ask("answer", **wrong)
     assert not pi.path(SETTINGS_FILE).exists()
-
-
-def test_an_undo_reverts_the_last_change(pi: FixablePi) -> None:
-    pi.ask("answer", fc="/dev/ttyAMA0")
-    before = pi.read(SETTINGS_FILE)
-    pi.ask("answer", fc="auto", new_key=True)
-    assert "remove /etc/naze-bridge/gcs.key" in pi.ask("undo", is_trial=True)["steps"][0]["changes"]
-    assert pi.path(KEY_FILE).exists()
-    pi.ask("undo")
-    assert pi.read(SETTINGS_FILE) == before
-    assert not pi.path(KEY_FILE).exists()
-
-
-def test_a_fix_can_be_undone_unless_there_is_nothing_to_revert(pi: FixablePi) -> None:
-    console(pi)
-    before = pi.read("/boot/firmware/cmdline.txt")
-    pi.ask("fix", fix="free the UART from the login console")
-    store_trouble(pi)
-    pi.ask("fix", fix="restart the bridge")
-    pi.ask("undo")
-    assert pi.read("/boot/firmware/cmdline.txt") == before
 
 
 def test_the_hotspot_is_switched(pi: FixablePi) -> None:

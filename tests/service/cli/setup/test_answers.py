@@ -3,8 +3,6 @@
 
 from pathlib import Path
 
-import pytest
-
 from service.cli.setup.answers import KEY_FILE
 from service.settings import load_settings
 from tests.support.setup_pi import Pi
@@ -33,12 +31,11 @@ def test_a_key_leaves_the_configured_links_as_they_are(pi: Pi, tmp_path: Path) -
     assert all(settings.access[str(link)].key is not None for link in settings.gcs)
 
 
-@pytest.mark.parametrize("place", ["config.toml", "conf.d/mine.toml"])
-def test_an_answer_that_another_file_overrides_is_warned_of(pi: Pi, place: str) -> None:
-    file = pi.root / "etc/naze-bridge" / place
+def test_an_answer_that_another_file_overrides_is_warned_of(pi: Pi) -> None:
+    file = pi.root / "etc/naze-bridge/config.toml"
     file.parent.mkdir(parents=True)
     file.write_text('sysid = 2\nfc = "/dev/ttyAMA0"\n[web]\n')
     done = pi.setup("--yes", "--fc", "sim", "--no-page")
-    assert f"warning: /etc/naze-bridge/{place}:2 sets fc, which overrides the answer" in done.output
-    assert f"/etc/naze-bridge/{place}:3 sets web, which" in done.output
+    assert "warning: /etc/naze-bridge/config.toml:2 sets fc, which overrides the answer" in done.output
+    assert "/etc/naze-bridge/config.toml:3 sets web, which" in done.output
     assert "overrides" not in pi.setup("--yes", "--fc", "auto", "--page").output

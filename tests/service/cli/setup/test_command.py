@@ -13,9 +13,10 @@ from click.testing import Result
 
 from service.cli.setup import command
 from service.cli.setup.answers import KEY_FILE, SETTINGS_FILE
-from service.cli.setup.command import check_answers
+from service.cli.setup.command import check_answers, page_token
 from service.settings.passphrase import weakness
 from terminal import secret_text
+from tests.service.cli.setup.test_steps import FreshPi
 from tests.support.setup_pi import Pi
 
 _SHOWN = re.compile(r"^The key, .*: (\S+)$", re.MULTILINE)
@@ -193,3 +194,15 @@ def test_a_reboot_is_requested_once_the_console_left_the_uart(pi: Pi) -> None:
     assert done.exit_code == 0, done.output
     assert "sudo reboot" in done.output
     assert "sudo reboot" not in pi.setup("--yes").output
+
+
+def test_the_pages_token_is_shown_only_if_it_is_one(tmp_path: Path) -> None:
+    """The service, which writes the file, may have been taken over; setup prints it on root's terminal."""
+    pi = FreshPi(tmp_path, "4")
+    token = pi.write("/var/lib/naze-bridge/web-token", "2345-6789-abcd\n")
+    assert page_token(pi) == "2345-6789-abcd"
+    token.write_text("2345\x1b[2J6789")
+    assert page_token(pi) == ""
+    token.unlink()
+    token.symlink_to(pi.write("/root/secret", "secret"))
+    assert page_token(pi) == ""

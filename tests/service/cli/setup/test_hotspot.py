@@ -169,11 +169,6 @@ def test_network_manager_reads_the_name_and_the_password_as_given(tmp_path: Path
     assert read.stdout == repr((name.encode(), password, "shared"))
 
 
-def test_the_name_of_an_older_releases_hotspot(pi: FaultyMachine) -> None:
-    pi.write(HOTSPOT_FILE, "[wifi]\nssid=\\snaze\\\\field\n")
-    assert hotspot_name(pi) == " naze\\field"
-
-
 def test_it_is_closed_where_another_network_is_in_reach(pi: FaultyMachine) -> None:
     manager = NetworkManager(pi)
     open_hotspot(pi, manager, after(1, lambda: pi.write(_LEASES, "2 aa:bb 10.42.0.7 phone *\n")))

@@ -158,15 +158,6 @@ def test_setup_of_an_image_for_every_model_starts_nothing(tmp_path: Path) -> Non
     assert uart.text.endswith("[all]\n# naze-bridge: the UART on GPIO 14 and 15\nenable_uart=1\ndtparam=uart0=on\n")
 
 
-def test_a_radio_found_on_usb_is_not_named_naze(tmp_path: Path) -> None:
-    pi = FreshPi(tmp_path, "4")
-    pi.write("/var/lib/naze-bridge/ports.json", '{"others": {"usb 1-1.3 10c4:ea60 0001": "a SiK telemetry radio"}}')
-    pi.carry_out(missing_steps(pi, SetupChoices()))
-    rules = pi.read("/etc/udev/rules.d/59-naze-bridge-others.rules")
-    assert 'KERNELS=="1-1.3", ATTRS{idVendor}=="10c4", ATTRS{idProduct}=="ea60"' in rules
-    assert missing_steps(pi, SetupChoices()) == []
-
-
 @pytest.mark.parametrize(
     ("options", "words"),
     [
