@@ -129,14 +129,20 @@ class Bridge:
         announcer = self._announcer = LinkAnnouncer(self._say, self._trouble, now, was_found=config.flight is not None)
         # Missions, fences and rally points.
         missions = self._missions = MissionService(port.vehicle, runner, emit)
-        types = self._types = MissionTypes(missions, ground, emit, incidents, self._let_read)
+        types = self._types = MissionTypes(missions, ground, emit, incidents)
         self._watch = MissionWatch(missions, ground, emit)
         #: Missions, for the command line, the page and zenoh.
         self.missions = LocalMissions(missions, types.of_missions, ground, emit, incidents)
         # The board's settings, and other programs' requests.
         sharing = self._sharing = MspSharing(session, missions, ground, emit, self._settings_may_have_changed)
         settings = self._board_settings = BoardSettings(
-            session, missions, ground, emit, config.settings_memory, self._is_transferring, lambda: sharing.due < inf
+            session,
+            missions,
+            ground,
+            emit,
+            config.settings_memory,
+            lambda: self.missions.transfer is not None,
+            lambda: sharing.due < inf,
         )
         #: Settings, for the command line, the page and zenoh.
         self.settings = LocalSettings(settings, session)
@@ -335,12 +341,6 @@ class Bridge:
 
     def _trouble(self) -> str:
         return self._session.state.trouble
-
-    def _is_transferring(self) -> bool:
-        return self.missions.transfer is not None
-
-    def _let_read(self, station: GroundStation, now: float) -> None:
-        self._own_vehicle.let_read(station, now)
 
     def _settings_may_have_changed(self, now: float) -> None:
         self._board_settings.may_have_changed(now)

@@ -171,7 +171,7 @@ class _End:
         self.ground = Ground(*ids, _ignore, lambda _station, _now: None, {}, LinkAccess(), is_near)
         self._runner = Runner(lambda _effect: None)
         self.missions = _RemoteMissions(Vehicle(), self._runner, self.ground, write)
-        self.uploads = MissionUploads(self.missions, self.ground, _ignore, count(1), lambda _peer, _now: None)
+        self.uploads = MissionUploads(self.missions, self.ground, _ignore, count(1))
         downloads = self._downloads = MissionDownloads(self.missions, self.ground)
         uploads = self.uploads
         self._handlers: Mapping[int, Callable[[Sender, Message, float], object]] = {

@@ -37,6 +37,8 @@ _ROUTINE = Effect.RATE, Effect.SILENCE
 _MOST_LATE = 32
 #: After such a silence a sender may have been restarted, and numbers its frames from 0 again.
 _RESTARTED_S = 1.0
+#: A text that the pilot must read is repeated after these times.
+_REPEATS_S = (2.0, 4.0)
 
 
 class Outbox:
@@ -278,6 +280,8 @@ class GroundStation:
         self.is_informed = True
         #: One of its missions was accepted: it has been told that fences are not stored.
         self.has_written = False
+        #: The text that the pilot must read, and when it is to be repeated.
+        self.to_read: tuple[Severity, str, bool, list[float]] | None = None
 
     # Rights and limits.
 
@@ -349,6 +353,19 @@ class GroundStation:
             return
         if severity is not Severity.ERROR or is_reminder or self.texts.is_new(text, self.heard_at):
             self.outbox.show(severity, text, [self])
+
+    def must_read(self, severity: Severity, text: str, now: float, *, is_unexpected: bool = False) -> None:
+        """Show a text, and again if SYS_STATUS replaces it on Mission Planner's HUD, or if it is `is_unexpected`."""
+        self.say(severity, text)
+        self.to_read = severity, text, is_unexpected, [now + later_s for later_s in _REPEATS_S]
+
+    def sent_sys_status(self, now: float, *, is_unhealthy: bool) -> None:
+        """Repeat a text where the pilot can read it: right after a SYS_STATUS, it stays until the next one."""
+        if self.to_read is not None:
+            severity, text, is_unexpected, due = self.to_read
+            if due and now >= due[0] and (is_unexpected or is_unhealthy):
+                del due[0]
+                self.say(severity, text, is_reminder=True)
 
     @property
     def reads_v2_only(self) -> bool:

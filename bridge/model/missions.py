@@ -81,8 +81,8 @@ class FinalAck:
     count: int
     until: float
     cancelled_until: float
-    #: When to send the ack again, or the reason for a refusal.
-    again: Sequence[tuple[float, str | None]] = ()
+    #: When to send the ack again.
+    again: Sequence[float] = ()
 
     @property
     def is_refusal(self) -> bool:

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The three types of lists of MAVLink's mission protocol: missions, fences and rally points. Sans-IO."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from math import inf
 from typing import NamedTuple
 
 from bridge.gcs.ground import Ground
-from bridge.gcs.ground_station import GroundStation
 from bridge.gcs.station import Peer
 from bridge.missions.fc_mission_store import AnyFcMissionStore
 from bridge.missions.mission_service import MissionService
@@ -27,7 +26,7 @@ class Transfers(NamedTuple):
 
 
 class MissionTypes:
-    """`by_type`: the transfers of each MAV_MISSION_TYPE. `let_read` is called after a text that the pilot must read."""
+    """`by_type`: the transfers of each MAV_MISSION_TYPE."""
 
     def __init__(
         self,
@@ -35,10 +34,9 @@ class MissionTypes:
         ground: Ground,
         emit: Emit,
         incidents: Iterator[int],
-        let_read: Callable[[GroundStation, float], None],
     ) -> None:
         def transfers(lists: MissionService) -> Transfers:
-            uploads = MissionUploads(lists, ground, emit, incidents, let_read)
+            uploads = MissionUploads(lists, ground, emit, incidents)
             return Transfers(lists, uploads, MissionDownloads(lists, ground))
 
         vehicle, runner = missions.vehicle, missions.runner

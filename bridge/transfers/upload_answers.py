@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The answers that end uploads: sent, reported as texts, and remembered for repeated items. Sans-IO."""
 
-from collections.abc import Callable, Sequence
 from math import inf
 from typing import Any
 
 from bridge.gcs.ground import Ground
-from bridge.gcs.ground_station import GroundStation, Sender
+from bridge.gcs.ground_station import Sender
 from bridge.gcs.station import Severity
 from bridge.missions.mission_service import DeliveryResult
 from bridge.missions.mission_texts import finding_lines
@@ -18,8 +17,6 @@ from reports.verdict import Result, Verdict
 #: Mission Planner sends its last item for 5 s, its Cancel for 2.8 s.
 _MEMORY_S = 10.0
 _CANCEL_S = 3.0
-#: Mission Planner has reported "Write Fast" as a success to its user, so a failure is shown three times, 2 s apart.
-_REMINDERS_S = (2.0, 4.0)
 #: QGroundControl waits 1.5 s for the final ack, and MAVSDK 2.5 s; neither asks for it again. So it is sent three times.
 _ACK_AGAIN_S = (0.4, 0.9)
 _SEVERITIES = {News.DANGER: Severity.WARNING, News.WARNING: Severity.NOTICE}
@@ -30,15 +27,11 @@ _UNKNOWN_UPLOAD = Refusal(MissionResult.OPERATION_CANCELLED, "Unknown upload: wr
 
 
 class UploadAnswers:
-    """Answers ground stations; each one's last answer is remembered for 10 s.
+    """Answers ground stations; each one's last answer is remembered for 10 s."""
 
-    `let_read` is called after a text that the pilot must read.
-    """
-
-    def __init__(self, ground: Ground, let_read: Callable[[GroundStation, float], None], mission_type: int = 0) -> None:
+    def __init__(self, ground: Ground, mission_type: int = 0) -> None:
         self._ground = ground
         self._mission_type = mission_type
-        self._let_read = let_read
         #: True if the flight controller stores neither fences nor rally points.
         self.are_only_missions_stored = True
         #: The answers that are to be sent again.
@@ -67,7 +60,9 @@ class UploadAnswers:
         cancel_s = _CANCEL_S if count and (is_cancelled or ack is not MissionResult.ACCEPTED) else 0.0
         answer = FinalAck(ack, count, now + _MEMORY_S, now + cancel_s)
         if is_repeated and count:
-            self._repeat(sender, answer, _ACK_AGAIN_S, None, now)
+            answer.again = [now + later_s for later_s in _ACK_AGAIN_S]
+            self._again.append((sender, answer))
+            self.due = min(self.due, answer.again[0])
         self._memory(sender).final_ack = answer
         sender.mission_ack(ack, self._mission_type if mission_type is None else mission_type)
 
@@ -90,27 +85,18 @@ class UploadAnswers:
         severity = Severity.INFO if accepted else Severity.ERROR
         if accepted and delivery.is_lossy:
             severity = Severity.WARNING
-        sender.say(severity, delivery.text)
-        if severity is not Severity.INFO:
-            self._let_read(sender.station, now)
+        if severity is Severity.INFO:
+            sender.say(severity, delivery.text)
+        else:
+            sender.station.must_read(severity, delivery.text, now)
         if delivery.change:
             severity = Severity.WARNING if verdict.result is Result.CLEARED else Severity.INFO
             self._ground.say(severity, f"{delivery.change}, by {sender.peer}", but=sender.station)
 
-    def remind(self, sender: Sender, text: str, now: float) -> None:
-        """Repeat the reason for a refusal that the station may not have noticed."""
-        if (answer := self._memory(sender).final_ack) is not None:
-            self._repeat(sender, answer, _REMINDERS_S, text, now)
-
-    def _repeat(self, sender: Sender, answer: FinalAck, later_s: Sequence[float], text: str | None, now: float) -> None:
-        answer.again = [(now + seconds, text) for seconds in later_s]
-        self._again.append((sender, answer))
-        self.due = min(self.due, now + later_s[0])
-
     def went_on(self, sender: Sender) -> None:
         """The station has sent another mission message: it has the final ack, or does not wait for it."""
         if (answer := self._memory(sender).final_ack) is not None:
-            answer.again = [again for again in answer.again if again[1] is not None]
+            answer.again = []
 
     def tick(self, now: float) -> None:
         if now < self.due:
@@ -118,16 +104,11 @@ class UploadAnswers:
         # A station may have left, or begun another upload.
         self._again = [each for each in self._again if self._memory(each[0]).final_ack is each[1]]
         for sender, answer in self._again:
-            for due, text in answer.again:
-                if now < due:
-                    continue
-                if text is not None:
-                    sender.say(Severity.ERROR, text, is_reminder=True)
-                else:
-                    sender.mission_ack(answer.ack, self._mission_type)
-            answer.again = [again for again in answer.again if now < again[0]]
+            if answer.again and now >= answer.again[0]:
+                sender.mission_ack(answer.ack, self._mission_type)
+                answer.again = answer.again[1:]
         self._again = [each for each in self._again if each[1].again]
-        self.due = min((due for _, answer in self._again for due, _ in answer.again), default=inf)
+        self.due = min((answer.again[0] for _, answer in self._again), default=inf)
 
     # After the end.
 
@@ -162,7 +143,7 @@ class UploadAnswers:
 
     def forget(self, sender: Sender) -> None:
         """The ground station has begun a new upload."""
-        self._memory(sender).final_ack = None
+        self._memory(sender).final_ack = sender.station.to_read = None
 
     def _memory(self, sender: Sender) -> TransferMemory:
         return sender.transfers[self._mission_type]

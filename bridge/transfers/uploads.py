@@ -6,14 +6,14 @@ they are received in parallel and written one at a time. Mission Planner loses s
 MISSION_COUNT as "continue"; most special cases below respond to a behaviour listed in docs/ground-stations.md.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from math import inf
 from typing import Any
 
 from bridge.gcs.budget import TOO_MANY_WRITES, Cost
 from bridge.gcs.ground import Ground
-from bridge.gcs.ground_station import GroundStation, Sender
+from bridge.gcs.ground_station import Sender
 from bridge.gcs.station import Peer, Severity
 from bridge.line.conversation import Conversation
 from bridge.missions.fc_mission_store import StoreReport
@@ -60,7 +60,7 @@ _AGAIN = Replaced("the station started again")
 
 
 class MissionUploads:
-    """All ground stations' uploads and clears. `let_read` is called after a text that the pilot must read."""
+    """All ground stations' uploads and clears."""
 
     def __init__(
         self,
@@ -68,15 +68,13 @@ class MissionUploads:
         ground: Ground,
         emit: Emit,
         incidents: Iterator[int],
-        let_read: Callable[[GroundStation, float], None],
     ) -> None:
         self._missions = missions
         self._ground = ground
         self._emit = emit
         self._incidents = incidents
-        self._let_read = let_read
         self._queue = UploadQueue()
-        self.answers = UploadAnswers(ground, let_read, missions.mission_type)
+        self.answers = UploadAnswers(ground, missions.mission_type)
         #: The time of the next `tick`; infinity if there is no upload, and no answer to repeat.
         self.due = inf
         missions.on_released = self._wake
@@ -339,11 +337,10 @@ class MissionUploads:
             finding = Finding(None, "list", len(items), None, refusal.text)
             whole = WholeList(items, Verdict(Result.REJECTED, refusal.ack, findings=(finding,)))
             self._missions.run(self._delivery(upload, whole), lambda _result, _at: None, now)
-        upload.sender.say(Severity.ERROR, refusal.text)
-        self._let_read(upload.sender.station, now)
+        # Mission Planner has reported "Write Fast" as a success to its user.
+        is_unexpected = bool(items) and upload.state.seems_written
+        upload.sender.station.must_read(Severity.ERROR, refusal.text, now, is_unexpected=is_unexpected)
         self._answer(upload, refusal.ack, now)
-        if items and upload.state.seems_written:
-            self.answers.remind(upload.sender, refusal.text, now)
         self._emit_refusal(upload, refusal)
 
     # Ground stations.

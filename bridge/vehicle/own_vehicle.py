@@ -42,8 +42,6 @@ _NEWCOMER_S, _NEWCOMER_INTERVAL_S = 3.0, 0.2
 _SILENT_S = 3.0
 #: Longer than MAVSDK waits for a changed MISSION_CURRENT (2.5 s).
 _NO_CURRENT_S = 4.0
-#: Mission Planner shows a text for this time.
-_SHOWN_S = 10.0
 #: The shortest interval that a ground station may request.
 _FASTEST_S = 0.01
 _ALL_STREAMS = messages.MAV_DATA_STREAM_ALL
@@ -170,6 +168,12 @@ class OwnVehicle:
                 at = at or self._moment(now)
                 for message in at.made(row.maker):
                     self._ground.outbox.multicast(pack(message), stations)
+                    if row is _SYS_STATUS:
+                        enabled = message.onboard_control_sensors_enabled
+                        for station in stations:
+                            station.sent_sys_status(
+                                now, is_unhealthy=bool(enabled & ~message.onboard_control_sensors_health)
+                            )
 
     def also_want(self, readings: Mapping[type[Reading], float]) -> None:
         """Set the poll intervals for consumers other than ground stations: seconds by reading."""
@@ -226,14 +230,6 @@ class OwnVehicle:
     def confirm_current(self, sender: Sender) -> None:
         """Send MISSION_CURRENT to a ground station with the next report of the board."""
         self._asked_current.append(sender)
-
-    def let_read(self, station: GroundStation, now: float) -> None:
-        """Withhold SYS_STATUS from a ground station for as long as Mission Planner shows a text, while disarmed.
-
-        An unhealthy sensor, indoors always the GPS, would replace the text after half a second.
-        """
-        if not self._session.vehicle.armed:
-            station.rates.due[messages.MAVLINK_MSG_ID_SYS_STATUS] = now + _SHOWN_S
 
     def set_stream(self, station: GroundStation, stream: int, interval_s: float) -> None:
         """Set the interval of all messages of one of ArduPilot's streams."""
