@@ -34,7 +34,7 @@ from bridge.missions.mission_service import NO_LINK, MissionService
 from bridge.model.events import Armed, Disarmed
 from bridge.model.missions import ARMED, Refusal
 from bridge.model.settings import SettingsState
-from bridge.model.vehicle import FlightState, Health, MissionLeg, Readiness
+from bridge.model.vehicle import FlightState, Health, Readiness
 from bridge.settings.board_settings import BoardSettings
 from bridge.settings.local_settings import LocalSettings
 from bridge.settings.parameters import OwnParameters, Parameters
@@ -386,8 +386,6 @@ class Bridge:
                 self._own_vehicle.heard(news, now)
                 if Health in news or Readiness in news:
                     self._parameters.follow()
-            if MissionLeg in news and (leg := self.vehicle.last(MissionLeg)) is not None:
-                self._missions.follow(leg.report)
             if FlightState in news:
                 self._follow_arming(now)
                 self._remember_flight(now)

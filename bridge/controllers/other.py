@@ -4,7 +4,7 @@
 from dataclasses import replace
 
 from bridge.controllers.msp_parts import MspPartSettings
-from bridge.controllers.multiwii.profile import CURRENTS_PER_A
+from bridge.controllers.multiwii import CURRENTS_PER_A
 from bridge.fc.profile import SILENCE_WITH_H7_S, FlightController, Interview, Profile, Spoken
 from bridge.line.conversation import Conversation
 from bridge.model.craft import FAILSAFE_BOX, airframe

@@ -203,12 +203,6 @@ def _stable_part(reply: MspFrame, size: int | None) -> MspFrame:
     return replace(reply, payload=reply.payload[:size])
 
 
-def save(mission: ArrivedMission) -> Conversation[int | None]:
-    """Store a received mission; its number, or None if the store failed."""
-    number: int | None = yield Save(mission)
-    return number
-
-
 def begin_save(mission: ArrivedMission) -> Conversation[None]:
     """Start to store a received mission; `end_save` waits for it."""
     yield BeginSave(Save(mission))

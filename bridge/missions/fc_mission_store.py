@@ -15,7 +15,6 @@ from bridge.line.conversation import Conversation
 from bridge.missions.list_check import MissionRules
 from bridge.model.missions import Refusal
 from protocols.mission_item import ListIdentity, MissionItem
-from protocols.msp.nav import NavStatus
 from reports.verdict import RecordT
 
 
@@ -127,14 +126,6 @@ class FcMissionStore(ABC, Generic[RecordT]):
     def refreshed(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
         """Items read earlier, brought up to date: home may move on boards that do not store it in the list."""
         return items
-
-    def is_contradicted(self, records: Sequence[RecordT], status: NavStatus) -> bool:
-        """True if the craft flies a record that this list does not have; only for boards that are not read armed."""
-        return False
-
-    def erased_by(self, records: Sequence[RecordT]) -> tuple[tuple[RecordT, ...], ...]:
-        """The `others` that do not fit alongside a new list; writing it erases them."""
-        return ()
 
     def is_current(self) -> Conversation[bool]:
         """True if it still holds the list that was last read or written, or does not answer."""

@@ -20,7 +20,6 @@ from bridge.line.conversation import (
     end_save,
     note_reader,
     recall,
-    save,
 )
 from bridge.line.runner import Runner
 from bridge.missions.fc_mission_store import (
@@ -35,10 +34,9 @@ from bridge.missions.fc_mission_store import (
 )
 from bridge.missions.list_check import check_list
 from bridge.missions.mission_texts import has_losses, summary, with_meant_home
-from bridge.model.missions import ARMED, ArrivedMission, FlightReport, Outcome, PendingMission, RecalledMission, Refusal
+from bridge.model.missions import ARMED, ArrivedMission, Outcome, PendingMission, RecalledMission, Refusal
 from bridge.model.vehicle import Vehicle
 from protocols.mission_item import ListIdentity, MissionItem, MissionResult, identify
-from protocols.msp.nav import NavStatus
 from reports.verdict import Result, SentSeqs, Verdict, is_renumbered
 
 T = TypeVar("T")
@@ -98,9 +96,6 @@ class HeldMission:
 
 #: Ground stations whose own item numbers are remembered.
 _MOST_SENDERS = 16
-_ERASED_SOURCE = "copy from the flight controller"
-_ERASED = "erased there to make room; `naze-bridge missions restore` writes it again"
-_NO_COPY = "Nothing written: a mission that does not fit next to it could not be copied to the Pi"
 NO_LINK = Refusal(MissionResult.DENIED, "No link to the flight controller")
 _BUSY = Refusal(MissionResult.DENIED, "Flight controller is busy writing: try again")
 STOPPING = Refusal(MissionResult.DENIED, "naze-bridge is stopping: try again later")
@@ -212,13 +207,6 @@ class MissionService:
             return 0
         return self.fc_store.seq_of(known.records, number)
 
-    def follow(self, report: NavStatus | FlightReport) -> None:
-        """Forget a list that the craft does not fly: another client has changed it."""
-        if isinstance(self.fc_store, Refusal) or self.held is None:
-            return
-        if isinstance(report, NavStatus) and self.fc_store.is_contradicted(self.held.records, report):
-            self.held, self._former, self.is_settled = None, None, False
-
     def occupied(self) -> Refusal | None:
         """The reason that no list can be written now, if there is one."""
         if self._closed:
@@ -291,8 +279,6 @@ class MissionService:
             outcome = Outcome.CANCELLED if ack is MissionResult.OPERATION_CANCELLED else Outcome.REJECTED
         elif isinstance(fc_store, Refusal):
             ack, text = fc_store.ack, fc_store.text
-        elif not (yield from self._copy_erased(fc_store, verdict.records)):
-            ack, text = MissionResult.DENIED, _NO_COPY
         else:
             result = yield from self._push(fc_store, arrived, progress)
             if result.failure in LIST_IS_GONE:
@@ -395,16 +381,6 @@ class MissionService:
         if isinstance(held, Refusal) and self.vehicle.armed:
             return self._verified_before_arming() or (_UNKNOWN if held is ARMED else held)
         return held
-
-    def _copy_erased(self, fc_store: AnyFcMissionStore, records: Sequence[Any]) -> Conversation[bool]:
-        """Store the missions that the new list will erase; False if that fails."""
-        for mission in fc_store.erased_by(records) if fc_store.others else ():
-            items = fc_store.items(mission, {})
-            verdict = Verdict(Result.ACCEPTED, MissionResult.ACCEPTED, mission, items)
-            number = yield from save(ArrivedMission(_ERASED_SOURCE, items, verdict))
-            if number is None or not (yield from conclude(number, Outcome.CANCELLED, _ERASED)):
-                return False
-        return True
 
     def _refreshed(self, fc_store: AnyFcMissionStore, held: HeldMission) -> HeldMission:
         return replace(held, items=fc_store.refreshed(held.items))

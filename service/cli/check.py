@@ -11,8 +11,8 @@ import click
 from bridge.controllers.harakiri.flight import MAX_LEG_M, USUAL_FLIGHT
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M, USUAL_CAPACITY, USUAL_WP_RADIUS_CM
 from bridge.controllers.inav.limits import SETTING_NAMES, InavLimits
-from bridge.controllers.nav.leg_limits import USUAL_LEGS
-from bridge.controllers.nav.rules import INAV_CAPACITY, MULTIWII_CAPACITY
+from bridge.controllers.multiwii import MULTIWII_CAPACITY, USUAL_LEGS
+from bridge.controllers.nav.rules import INAV_CAPACITY
 from bridge.controllers.table import PROFILES
 from bridge.fc.profile import RuleSettings
 from bridge.missions.list_check import MissionRules, check_list

@@ -28,7 +28,7 @@ from tests.support.walks import TracedDaemon, WakeUp, Walk, measure, run_traced
 CEILINGS = {
     "attitude": Walk(calls=40, returns=12, files=18),
     "item": Walk(calls=58, returns=23, files=16),
-    "ack": Walk(calls=422, returns=208, files=42),
+    "ack": Walk(calls=421, returns=212, files=42),
     "setting": Walk(calls=266, returns=107, files=51),
     "arming": Walk(calls=66, returns=18, files=25),
 }

@@ -4,8 +4,9 @@
 from dataclasses import replace
 from typing import Any
 
+from bridge.controllers.multiwii import multiwii_profile
 from bridge.controllers.nav.check import NavRules
-from bridge.controllers.nav.rules import inav_profile, multiwii_profile
+from bridge.controllers.nav.rules import inav_profile
 from bridge.missions.list_check import check_list
 from protocols.mission_item import Command, MissionItem
 from protocols.msp.nav import NavAction, NavRecord

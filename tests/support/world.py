@@ -18,10 +18,9 @@ from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.bridge import Bridge
 from bridge.config import BridgeConfig, BridgeSettings, PassThroughRule
-from bridge.controllers import other
+from bridge.controllers import multiwii, other
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.controllers.inav import profile as inav
-from bridge.controllers.multiwii import profile as multiwii
 from bridge.controllers.table import PROFILES
 from bridge.effects import PublishGroups, RecordFrames, RememberFlight, SendToBoard
 from bridge.fc.profile import Profile

@@ -18,7 +18,6 @@ from bridge.line.conversation import (
     OutOfTime,
     Pause,
     Receive,
-    Send,
     Stopped,
     TimeLimit,
     ask,
@@ -46,14 +45,13 @@ from protocols.msp.mission import (
     Radius,
     ReplyStatus,
     Staged,
-    Stored,
     WpRecord,
 )
 
 _SHORT_REPLY_SIZE = 7
-#: Records per read request: two replies fit the flight controller's send ring.
+#: Records per read request, and how often one is sent.
 _READ_RECORDS = 6
-_READS_IN_FLIGHT = 2
+_READ_TRIES = 5
 _BUSY_TIMEOUT_S = 1.0
 _BUSY_INTERVAL_S = 0.1
 #: Restarts of one push (after a reset, damaged line, flash error) before it is given up.
@@ -61,11 +59,9 @@ _MAX_BEGINS = 3
 #: A push may take this long, plus twice the time of its bytes on the line: Mission Planner waits 4.9 s for the ack.
 _PUSH_S = 3.8
 #: How long to ask for the outcome of a COMMIT without a reply.
-_LOOK_S = 0.6
+_LOOK_S = 0.4
 #: Losses in a row without progress before a push is given up.
 _MAX_WASTED = 20
-#: Unanswered requests in a row after which a list cannot be read.
-_MAX_SILENCE = 5
 
 #: The failure reported if this status ends the last attempt; any other becomes "the line is bad".
 _FAILURES = {
@@ -77,9 +73,6 @@ _FAILURES = {
     ReplyStatus.BAD_RECORD: PushFailure.REFUSED,
     ReplyStatus.FLASH: PushFailure.FLASH,
 }
-
-_TRANSFER_REPLIES = frozenset((MissionCommand.CHUNK, MissionCommand.COMMIT))
-_READ_REPLIES = frozenset((MissionCommand.READ,))
 
 AnswerT = TypeVar("AnswerT", Staged, Radius)
 
@@ -129,7 +122,7 @@ class HarakiriMissions(HarakiriStore):
         return USUAL_FLIGHT if values is None else FlightLimits(*map(int, values))
 
     def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Conversation[PushResult]:
-        """Write the list: BEGIN, CHUNKs in a window, COMMIT; verified by the checksum over the flash."""
+        """Write the list: BEGIN, CHUNKs, COMMIT; verified by the checksum over the flash."""
         packed = pack_records(records)
         wanted = ListIdentity(len(records), crc32(packed))
         failure = PushFailure.NO_ANSWER
@@ -218,62 +211,34 @@ class HarakiriMissions(HarakiriStore):
     def _transfer(
         self, packed: bytes, wanted: ListIdentity, begun: Staged, progress: PushProgress
     ) -> Conversation[None]:
-        """Keep the window full and send COMMIT right after the last chunk: the line never waits for a reply.
-
-        After a loss, continue at the first record that the flight controller lacks. It answers INCOMPLETE to a COMMIT
-        that arrives before the lost chunk.
-        """
-        total = wanted.count
-        acked = sent = _confirmed(packed, begun)
-        in_flight: list[int] = []  # first record of each unanswered chunk
-        stale = 0  # chunks sent after a lost one, which will still be answered
-        committing = False
+        """Chunk by chunk, each from the first record that the flight controller lacks, then COMMIT."""
+        done = _confirmed(packed, begun)
         most = self.info.chunk_records
         wasted = 0
-        while True:
-            while sent < total and len(in_flight) + stale < self.info.chunk_window:
-                chunk = ext.encode_chunk(packed, sent, most)
-                yield send(chunk.frame, MissionCommand.CHUNK, _SHORT_REPLY_SIZE)
-                in_flight.append(sent)
-                sent += chunk.count
-            commit: Send | None = None
-            if sent == total and not committing:
-                # While a chunk may have to be repeated, COMMIT must not block the line.
-                frame = ext.encode_commit(wanted)
-                commit = send(frame, MissionCommand.COMMIT, _SHORT_REPLY_SIZE, exclusive=acked == total)
-                committing = self._may_be_stored = True
-            reply: MspFrame | None = yield Receive(_TRANSFER_REPLIES, commit)
-            answer = None if reply is None else _decode_answer(reply)
-            behind = 0
-            if isinstance(answer, Staged):
-                if answer.status not in (ReplyStatus.OK, ReplyStatus.SEQUENCE):
-                    raise _again(answer.status)
-                confirmed = _confirmed(packed, answer)
-                if confirmed > acked:
-                    acked = confirmed
-                    stale = wasted = 0
-                    progress(acked)
-                if answer.status is ReplyStatus.OK:
-                    in_flight = in_flight[1:]
-                    continue
-                if stale:
-                    stale -= 1
-                    continue
-                behind = max(sum(first > confirmed for first in in_flight) - 1, 0)
-            elif isinstance(answer, Stored) and answer.status is not ReplyStatus.INCOMPLETE:
-                if answer.status is not ReplyStatus.OK:
-                    raise _again(answer.status)
-                if answer.stored != wanted:
-                    raise PushFailed(PushFailure.FLASH, is_final=False)
-                return
+        while done < wanted.count:
+            chunk = send(ext.encode_chunk(packed, done, most).frame, MissionCommand.CHUNK, _SHORT_REPLY_SIZE)
+            reply: MspFrame | None = yield Receive(frozenset((MissionCommand.CHUNK,)), chunk)
+            answer = None if reply is None else ext.decode_progress(reply.payload)
+            if answer is not None and answer.status not in (ReplyStatus.OK, ReplyStatus.SEQUENCE):
+                raise _again(answer.status)
+            if answer is not None and (confirmed := _confirmed(packed, answer)) > done:
+                done, wasted = confirmed, 0
+                progress(done)
+                continue
             # A frame was lost. A bad line loses long frames most.
+            most = max(most // 2, 1)
             wasted += 1
             if wasted > _MAX_WASTED:
                 raise PushFailed(PushFailure.NO_ANSWER)
-            in_flight, stale = [], behind
-            sent = acked
-            committing = False
-            most = max(most // 2, 1)
+        self._may_be_stored = True
+        reply = yield from ask(ext.encode_commit(wanted), MissionCommand.COMMIT, _SHORT_REPLY_SIZE, exclusive=True)
+        stored = None if reply is None else ext.decode_stored(reply.payload)
+        if stored is None:
+            raise PushFailed(PushFailure.NO_ANSWER)
+        if stored.status is not ReplyStatus.OK:
+            raise _again(stored.status)
+        if stored.stored != wanted:
+            raise PushFailed(PushFailure.FLASH, is_final=False)
 
     def _outcome_of_commit(self, wanted: ListIdentity, failure: PushFailure) -> Conversation[PushFailure | None]:
         """Ask if COMMIT succeeded after all; only silence leaves it uncertain."""
@@ -287,37 +252,23 @@ class HarakiriMissions(HarakiriStore):
         return None if info.stored == wanted else failure
 
     def _read(self, info: Info) -> Conversation[tuple[WpRecord, ...] | None]:
-        """Read all records with two requests in flight, each repeated until it is answered."""
+        records: tuple[WpRecord, ...] = ()
         step = min(info.read_records, _READ_RECORDS)
-        total = info.stored.count
-        missing = range(0, total, step)
-        parts: dict[int, Sequence[WpRecord]] = {}
-        wasted = 0
-        in_flight = 0
-        waiting: list[int] = list(missing)
-        while len(parts) < len(missing):
-            while waiting and in_flight < _READS_IN_FLIGHT:
-                first = waiting.pop(0)
-                frame = ext.encode_read(first, step)
-                yield send(frame, MissionCommand.READ, 3 + step * RECORD_SIZE)
-                in_flight += 1
-            reply: MspFrame | None = yield Receive(_READ_REPLIES)
-            answer = None if reply is None else ext.decode_records(reply.payload)
-            if answer is None:
-                wasted += 1
-                if wasted > _MAX_SILENCE:
+        while len(records) < info.stored.count:
+            frame = ext.encode_read(len(records), step)
+            expected = min(step, info.stored.count - len(records))
+            for _ in range(_READ_TRIES):
+                reply = yield from ask(frame, MissionCommand.READ, 3 + step * RECORD_SIZE, tries=1)
+                answer = None if reply is None else ext.decode_records(reply.payload)
+                if answer is not None and answer.status is not ReplyStatus.OK:
                     return None
-                in_flight = 0
-                waiting = [first for first in missing if first not in parts]
-                continue
-            in_flight = max(in_flight - 1, 0)
-            if answer.status is not ReplyStatus.OK:
+                # Damage that the XOR missed may look like another place.
+                if answer is not None and (answer.first, len(answer.records)) == (len(records), expected):
+                    records += tuple(answer.records)
+                    break
+            else:
                 return None
-            # Damage that the XOR missed may look like another place.
-            if answer.first in missing and len(answer.records) == min(step, total - answer.first):
-                wasted = 0 if answer.first not in parts else wasted
-                parts[answer.first] = answer.records
-        return tuple(record for first in missing for record in parts[first])
+        return records
 
 
 def _confirmed(packed: bytes, answer: Staged) -> int:
@@ -326,11 +277,6 @@ def _confirmed(packed: bytes, answer: Staged) -> int:
     if size > len(packed) or crc32(packed[:size]) != answer.checksum:
         raise PushFailed(PushFailure.NO_ANSWER, is_final=False)
     return answer.next
-
-
-def _decode_answer(reply: MspFrame) -> Staged | Stored | None:
-    decode = ext.decode_stored if reply.command == MissionCommand.COMMIT else ext.decode_progress
-    return decode(reply.payload)
 
 
 def _again(status: ReplyStatus) -> PushFailed:

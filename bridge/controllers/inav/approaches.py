@@ -35,15 +35,14 @@ def read_approaches(numbers: Iterable[int]) -> Conversation[tuple[FwApproach, ..
     return tuple(found)
 
 
-def write_approaches(wanted: Sequence[FwApproach], held: Sequence[FwApproach]) -> Conversation[bool]:
-    """Set those that differ from the board's, and read them back; False if that fails.
+def write_approaches(wanted: Sequence[FwApproach], held: Sequence[FwApproach] = ()) -> Conversation[bool]:
+    """Set those that the board lacks, and read them back; False if that fails.
 
-    held: the board's, some of which may have been erased since. One that is empty in both is not asked for.
+    Of the empty ones only those are set that are not empty in `held`, the board's own.
     """
-    for new, old in zip(wanted, held, strict=True):
-        if new.is_empty and old.is_empty:
-            continue
-        if (yield from read_approaches((new.number,))) == (new,):
+    filled = {each.number for each in (*wanted, *held) if not each.is_empty}
+    for new in wanted:
+        if new.number not in filled or (yield from read_approaches((new.number,))) == (new,):
             continue
         is_taken = yield from take(SET_FW_APPROACH, new.pack())
         if not is_taken or (yield from read_approaches((new.number,))) != (new,):

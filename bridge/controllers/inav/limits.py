@@ -33,14 +33,6 @@ class RthAltMode(IntEnum):
     AT_LEAST_LINEAR_DESCENT = 5
 
 
-class RthAllowLanding(IntEnum):
-    """nav_rth_allow_landing."""
-
-    NEVER = 0
-    ALWAYS = 1
-    FS_ONLY = 2
-
-
 class SafehomeUsageMode(IntEnum):
     """safehome_usage_mode."""
 
@@ -54,9 +46,8 @@ class InavLimits:
     """Fields with a name of INAV's are settings, in INAV's units: cm, but the first in m.
 
     Their defaults are INAV's; 0 turns the first, nav_max_altitude and nav_wp_enforce_altitude off.
-    vbat_warning_cell_voltage: 0.01 V. zones: those in force; none without the feature GEOZONE. cell_voltage: of the
-    battery, as last heard. selected: the mission that was selected, from 1, if there are several. approach: an
-    aeroplane's to the LAND of the new list; None before 7.1.
+    zones: those in force; none without the feature GEOZONE. selected: the mission that was selected, from 1, if there
+    are several. approach: an aeroplane's to the LAND of the new list; None before 7.1.
     """
 
     nav_wp_max_safe_distance: int = 100
@@ -66,13 +57,10 @@ class InavLimits:
     nav_max_altitude: int = 0
     nav_rth_altitude: int = 1000
     nav_rth_alt_mode: int = RthAltMode.AT_LEAST
-    nav_rth_allow_landing: int = RthAllowLanding.ALWAYS
     safehome_usage_mode: int = SafehomeUsageMode.RTH
     safehome_max_distance: int = 20000
-    vbat_warning_cell_voltage: int = 350
     safehomes: tuple[Safehome, ...] = ()
     zones: tuple[Geozone, ...] = ()
-    cell_voltage: float | None = None
     selected: int = 1
     is_aeroplane: bool = False
     approach: FwApproach | None = None
@@ -113,7 +101,8 @@ class InavLimits:
         yield from self._ignored(records)
         yield from judge_zones(self.zones, path, departure)
         yield from beyond_plain_limits(path, departure, height=not self.nav_max_altitude)
-        yield from self._of_the_board()
+        if self.selected > 1:
+            yield Judgement(None, "", f"Stored as mission 1, mission {self.selected} was selected", News.NOTICE)
 
     def _first(self, first: NavRecord, departure: Departure) -> Iterable[Judgement]:
         """INAV measures the distance to the first record, whatever its action, from where it is armed."""
@@ -164,11 +153,6 @@ class InavLimits:
         if self.nav_rth_alt_mode == RthAltMode.FIXED and self.nav_rth_altitude < highest_cm:
             why = f"RTH at nav_rth_altitude {self.nav_rth_altitude / 100:g} m, below {highest_cm / 100:g} m"
             yield Judgement(place, "alt_m", why)
-        if not rth.p1 and self.nav_rth_allow_landing == RthAllowLanding.ALWAYS:
-            why = "hovers above home: nav_rth_allow_landing (ALWAYS) is for the pilot's RTH only, param1 1 lands"
-            yield Judgement(place, "p1", why, News.NOTICE)
-        if rth.p1 and self.nav_rth_allow_landing == RthAllowLanding.NEVER:
-            yield Judgement(place, "p1", "lands, although nav_rth_allow_landing is NEVER", News.NOTICE)
         if (start := departure.place) is not None:
             near = self._near_safehome(start)
             returns_there = self.safehome_usage_mode == SafehomeUsageMode.RTH
@@ -196,14 +180,6 @@ class InavLimits:
         there = f"at safehome {near.number}"
         return _landing(place, near.approach, f"{there} ", there if returns_there else "at home", name)
 
-    def _of_the_board(self) -> Iterable[Judgement]:
-        if self.selected > 1:
-            why = f"nav_wp_multi_mission_index changes from {self.selected} to 1: the new mission is stored first"
-            yield Judgement(None, "", why, News.NOTICE)
-        if self.cell_voltage is not None and self.cell_voltage * 100 < self.vbat_warning_cell_voltage:
-            warns = f"INAV warns at {self.vbat_warning_cell_voltage / 100:.2f} V"
-            yield Judgement(None, "", f"Battery {self.cell_voltage:.2f} V a cell, {warns}")
-
 
 def _landing(place: int, approach: FwApproach | None, where: str, otherwise: str, without: str) -> Judgement:
     """Items have no place for an approach: a second height, two headings, a circuit (docs/inav.md)."""
@@ -216,10 +192,9 @@ def _landing(place: int, approach: FwApproach | None, where: str, otherwise: str
 _NO_APPROACHES = "no FW approach before INAV 7.1"
 _CHOICES: Mapping[str, type[IntEnum]] = {
     "nav_rth_alt_mode": RthAltMode,
-    "nav_rth_allow_landing": RthAllowLanding,
     "safehome_usage_mode": SafehomeUsageMode,
 }
-_OTHER_FIELDS = ("safehomes", "zones", "cell_voltage", "selected", "is_aeroplane", "approach")
+_OTHER_FIELDS = ("safehomes", "zones", "selected", "is_aeroplane", "approach")
 #: Those that decide if a list is flown, and how high and fast.
 DECISIVE_NAMES = (
     *("nav_wp_max_safe_distance", "nav_max_altitude", "nav_wp_enforce_altitude"),

@@ -18,10 +18,9 @@ from bridge.controllers.inav.safehomes import read_safehomes, with_approaches
 from bridge.controllers.inav.settings import read_values
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.mission_store import NOTHING, NavMissions
-from bridge.controllers.nav.rules import NavProfile
-from bridge.controllers.nav.stored_missions import Mission, erased, flown, split_missions
+from bridge.controllers.nav.rules import Mission, NavProfile
 from bridge.fc.profile import FlightController
-from bridge.line.conversation import Conversation, LinkLost, Pause, ask
+from bridge.line.conversation import Conversation, LinkLost, ask
 from bridge.missions.fc_mission_store import (
     FliesToItems,
     Loading,
@@ -33,12 +32,12 @@ from bridge.missions.fc_mission_store import (
 )
 from bridge.model.craft import Airframe
 from bridge.model.missions import Refusal
-from bridge.model.vehicle import Power, Vehicle
-from protocols.msp.commands import Msp
+from bridge.model.vehicle import Vehicle
 from protocols.msp.frame import Direction, request
 from protocols.msp.inav_places import APPROACHES, MISSION_APPROACH, FwApproach
 from protocols.msp.nav import (
     INFO_SIZE,
+    LAST,
     LOAD_REQUEST,
     SAVE_REQUEST,
     SELECTED_REQUEST,
@@ -49,33 +48,24 @@ from protocols.msp.nav import (
     decode_info,
 )
 from protocols.msp.nav_items import item_seqs
-from protocols.msp.telemetry import decode_channels
 
 _MAX_SAVES = 3
 #: Requests after SAVE: their timeouts together exceed its flash time.
 _ASKS_AFTER_SAVE = 12
 _MAX_READS = 2
 _SETTING_SIZE = 1
-_RC_SIZE = 68
-#: With the throttle low, pitch and roll high for 0.4 s to 0.8 s, by receiver, INAV loads the saved missions
-#: (rc_controls.c). Its own thresholds are settings; an extra reading is harmless.
-_LOW_US, _HIGH_US = 1300, 1700
-_LOADED_AFTER_S = 0.8
 
 
 class InavMissions(NavMissions, FliesToItems):
     """The mission store of one INAV. Record 1 wipes all missions, and no list is valid before its last record."""
 
     reads_armed = True
-    #: The other missions, which are written again after a new list.
-    _kept: tuple[Mission, ...] = ()
     #: All records in the store, as last read or written while disarmed.
     _stored: Mission = ()
     #: GETINFO's reply and the selected mission, as of the last read or write; None if it is being written.
     _seen: tuple[NavInfo, int] | None = None
-    #: The same, as of the last check for changes, and whether the sticks were held for LOAD.
+    #: The same, as of the last check for changes.
     _last_look: tuple[NavInfo, int] | None = None
-    _sticks_held = False
     #: The board's own settings about missions, as last read; they may have changed since if they are doubtful.
     _limits: InavLimits | None = None
     _are_limits_doubtful = True
@@ -83,9 +73,8 @@ class InavMissions(NavMissions, FliesToItems):
     _are_limits_silent = False
     #: All of the board's landing approaches, as last read; None: they may have changed.
     _approaches: tuple[FwApproach, ...] | None = None
-    #: The same before the current Write, and as they are to be after it.
+    #: The same before the current Write.
     _previous_approaches: tuple[FwApproach, ...] = ()
-    _wanted_approaches: tuple[FwApproach, ...] = ()
 
     def __init__(self, profile: NavProfile, controller: FlightController, vehicle: Vehicle) -> None:
         super().__init__(profile, controller, vehicle)
@@ -107,17 +96,11 @@ class InavMissions(NavMissions, FliesToItems):
         self._are_limits_doubtful, self._are_limits_silent = True, False
         self._approaches = None
 
-    def erased_by(self, records: Sequence[NavRecord]) -> tuple[Mission, ...]:
-        """The last of the others, as many as do not fit."""
-        return erased(self.others, self._profile.capacity - len(records or NOTHING))
-
     def push(self, records: Mission, progress: PushProgress) -> Conversation[PushResult]:
         """Write the list, followed by the other missions, and verify it."""
         result = yield from super().push(records, progress)
         if result.failure is None:
-            self._approaches = self._approaches and self._wanted_approaches
             self._stored = self._store_content(records or NOTHING)
-            self.others = self._kept
         return result
 
     def pull(self) -> Conversation[Mission | None]:
@@ -153,7 +136,7 @@ class InavMissions(NavMissions, FliesToItems):
         if not seen[0].is_valid and seen != before:
             self._seen = None
             return True
-        return not (yield from self._sticks_load()) and (yield from self._is_unchanged(seen))
+        return (yield from self._is_unchanged(seen))
 
     def leg_of(self, records: Sequence[NavRecord], seq: int) -> int:
         numbers = (number for number, shown in enumerate(item_seqs(records), 1) if shown == seq)
@@ -161,18 +144,6 @@ class InavMissions(NavMissions, FliesToItems):
 
     def fly_to(self, records: Sequence[NavRecord], number: int) -> Conversation[Refusal | None]:
         return fly_to(number, records[number - 1], self.read(number), self._board)
-
-    def _sticks_load(self) -> Conversation[bool]:
-        """True, once, after the pilot may have loaded the saved missions with the sticks; INAV refuses it armed."""
-        if self._vehicle.armed:
-            return False
-        reply = yield from ask(request(Msp.RC), Msp.RC, _RC_SIZE)
-        channels = None if reply is None else decode_channels(reply.payload)
-        before, self._sticks_held = self._sticks_held, channels is not None and _is_load_gesture(channels)
-        if before or not self._sticks_held:
-            return False
-        yield Pause(_LOADED_AFTER_S)
-        return True
 
     def _is_unchanged(self, seen: tuple[NavInfo, int] | None) -> Conversation[bool]:
         if seen != self._seen:
@@ -195,9 +166,11 @@ class InavMissions(NavMissions, FliesToItems):
         return Loading.LOADED if info.is_valid else Loading.NOT_NEEDED
 
     def _take_over(self, records: list[NavRecord], seen: tuple[NavInfo, int]) -> None:
-        self._seen, missions = seen, split_missions(records)
+        self._seen, missions = seen, _split(records)
         is_armed = bool(self._vehicle.armed)
-        loaded = flown(missions, 1 if is_armed else seen[1])
+        # Without the selected one INAV flies the first.
+        place = seen[1] - 1 if not is_armed and 1 <= seen[1] <= len(missions) else 0
+        loaded = missions[place] if missions else ()
         if not is_armed:
             self.others = tuple(mission for mission in missions if mission is not loaded)
             self._stored = tuple(records)
@@ -206,13 +179,10 @@ class InavMissions(NavMissions, FliesToItems):
     def _rules(self) -> NavRules:
         limits = self._limits
         if limits is not None:
-            power = self._vehicle.last(Power)
-            cell_v = power.voltage_v / power.cells if power and power.voltage_v and power.cells else None
-            approaches = self._moved_approaches(self._approaches or ())
+            approaches = self._approaches or ()
             limits = replace(
                 limits,
-                cell_voltage=cell_v,
-                selected=self._selected,
+                selected=self._seen[1] if self._seen and self.others else 1,
                 safehomes=with_approaches(limits.safehomes, approaches),
                 approach=approaches[MISSION_APPROACH] if approaches else None,
             )
@@ -237,26 +207,9 @@ class InavMissions(NavMissions, FliesToItems):
             values = yield from read_values(DECISIVE_NAMES)
             self._limits = self._limits.with_settings(values or {})
 
-    @property
-    def _selected(self) -> int:
-        """The number of the mission that the new list replaces, from 1."""
-        return self._seen[1] if self._seen and self.others else 1
-
-    def _moved_approaches(self, before: tuple[FwApproach, ...]) -> tuple[FwApproach, ...]:
-        """Each mission keeps its approach; the new list, which is stored first, gets that of the one it replaces."""
-        others = [number for number in range(1, len(self.others) + 2) if number != self._selected]
-        approaches = [*before]
-        for place, number in enumerate((self._selected, *others[: len(self._kept)]), MISSION_APPROACH):
-            previous = MISSION_APPROACH + number - 1
-            if max(place, previous) < len(before):
-                approaches[place] = before[previous]._replace(number=place)
-        return tuple(approaches)
-
     def _store_content(self, records: Mission) -> Mission:
         """SAVE selects the first mission, so the new one goes there."""
-        self._kept = self.others[: len(self.others) - len(self.erased_by(records))]
-        self._wanted_approaches = self._moved_approaches(self._previous_approaches)
-        return (*records, *chain.from_iterable(self._kept))
+        return (*records, *chain.from_iterable(self.others))
 
     def _order(self, wanted: Mission) -> list[tuple[int, NavRecord]]:
         return list(enumerate(wanted, 1))
@@ -267,7 +220,7 @@ class InavMissions(NavMissions, FliesToItems):
             raise PushFailed(PushFailure.NO_ANSWER)
         if not info.is_valid or info.count != count:
             raise PushFailed(PushFailure.REFUSED, is_final=False)
-        if not (yield from write_approaches(self._wanted_approaches, self._previous_approaches)):
+        if not (yield from write_approaches(self._previous_approaches)):
             raise PushFailed(PushFailure.NO_ANSWER, is_final=False)
 
     def _keep(self) -> Conversation[None]:
@@ -291,7 +244,7 @@ class InavMissions(NavMissions, FliesToItems):
 
         An aeroplane would land without its approach: only a loaded mission has a number (loadedMultiMissionIndex).
         """
-        if self._kept or self._is_aeroplane:
+        if self.others or self._is_aeroplane:
             reply = yield from ask(LOAD_REQUEST, Nav.LOAD, 0)
             if reply is None or reply.direction is Direction.ERROR or (yield from self._info()) != saved:
                 raise PushFailed(PushFailure.UNCERTAIN)
@@ -316,19 +269,18 @@ class InavMissions(NavMissions, FliesToItems):
         """Make it LOAD the saved missions; if that is not the old list, write that one again."""
         if self._vehicle.armed:
             return False
-        self._wanted_approaches = self._previous_approaches
         with suppress(LinkLost):
             yield from ask(LOAD_REQUEST, Nav.LOAD, 0)
             loaded = yield from self.pull()
             if loaded == before and (loaded or self.others):
-                return (yield from write_approaches(self._previous_approaches, self._previous_approaches))
+                return (yield from write_approaches(self._previous_approaches))
         return (yield from super()._restore(before))
 
     def _restore_at_once(self, before: Mission | None) -> Conversation[bool]:
         """Make it LOAD the saved missions: the old list, unless another client wrote one without saving it."""
         with suppress(LinkLost):
             yield from ask(LOAD_REQUEST, Nav.LOAD, 0, tries=1)
-            yield from write_approaches(self._previous_approaches, self._previous_approaches)
+            yield from write_approaches(self._previous_approaches)
             return bool(before) and (yield from self._is_unchanged((yield from self._look())))
         return False
 
@@ -347,6 +299,12 @@ class InavMissions(NavMissions, FliesToItems):
         return None if reply is None else decode_info(reply.payload)
 
 
-def _is_load_gesture(channels_us: Sequence[int]) -> bool:
-    roll, pitch, _, throttle, *_ = channels_us
-    return throttle < _LOW_US and min(roll, pitch) > _HIGH_US
+def _split(records: Sequence[NavRecord]) -> list[Mission]:
+    """The missions in a store; records after the last flag belong to none."""
+    missions: list[Mission] = []
+    start = 0
+    for end, record in enumerate(records, 1):
+        if record.flag == LAST:
+            missions.append(tuple(records[start:end]))
+            start = end
+    return missions

@@ -23,8 +23,6 @@ from protocols.msp.inav_places import (
 from reports.finding import DROPPED, Finding, News, RejectingFinding, reject
 from reports.verdict import CLEARED_LIST, Result, Verdict
 
-#: A place that moves this far keeps its landing approach: on the same field, its headings and heights still fit.
-_SAME_RUNWAY_M = 100
 #: Items as floats are up to 0.9 m off.
 _NOT_MOVED_M = 1.0
 
@@ -125,28 +123,18 @@ class RallyCheck(ListCheck):
         return Verdict(Result.ACCEPTED, MissionResult.ACCEPTED, records, rally_items(records), findings)
 
     def _fill(self) -> tuple[Safehome, ...]:
-        """A place that is a safehome stays; one near a vanished one replaces it, and keeps its landing approach."""
+        """A place that is a safehome keeps its number and landing approach."""
         current = {each.number: each for each in self._current}
         filled: dict[int, Safehome] = {}
         ahead = [*self._places]
         for each in self._current:
-            if each.enabled and (each.lat_e7, each.lon_e7) in ahead:
-                filled[each.number] = each
-                ahead.remove((each.lat_e7, each.lon_e7))
-        for each in self._current:
-            approach = each.approach
-            if each.number in filled or approach is None or not approach.directions():
-                continue
             moved = min((_moved(each, place) for place in ahead), key=lambda to: distance_m(each, to), default=None)
-            if moved is not None and each.enabled and (metres := distance_m(each, moved)) <= _SAME_RUNWAY_M:
+            if moved is not None and each.enabled and distance_m(each, moved) < _NOT_MOVED_M:
                 filled[each.number] = moved
                 ahead.remove((moved.lat_e7, moved.lon_e7))
-                if metres >= _NOT_MOVED_M:
-                    kept = f"Safehome {each.number} moved {metres:.0f} m and keeps its {approach_text(approach)}"
-                    self._say(kept, News.NOTICE)
-            elif each.lat_e7 or each.lon_e7:
-                lost = f"Safehome {each.number} was deleted or moved over {_SAME_RUNWAY_M} m, and lost its"
-                self._say(f"{lost} {approach_text(approach)}", News.WARNING)
+            elif (each.lat_e7 or each.lon_e7) and each.approach and each.approach.directions():
+                lost = f"Safehome {each.number} was deleted or moved, and lost its {approach_text(each.approach)}"
+                self._say(lost, News.WARNING)
         for number in range(SAFEHOMES):
             if number not in filled:
                 empty = current.get(number, Safehome(number, False, 0, 0)).emptied()

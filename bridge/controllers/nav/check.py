@@ -15,10 +15,10 @@ from bridge.controllers.nav.rules import (
     NAV_RULES,
     REPEATS,
     AltitudeUse,
+    Mission,
     NavProfile,
     NavRule,
 )
-from bridge.controllers.nav.stored_missions import Mission, erased
 from bridge.controllers.nav.unshown import flies_home, keep_unshown
 from bridge.missions.flown_legs import Departure, FlownPath, Point, beyond_plain_limits
 from bridge.missions.list_check import (
@@ -35,7 +35,7 @@ from bridge.missions.list_check import (
 from protocols.float32 import is_single
 from protocols.mission_item import ROI_COMMANDS, Command, MissionItem, MissionResult
 from protocols.msp.nav import LAST, LEGS, TURNS, NavAction, NavRecord
-from protocols.msp.nav_items import GROUND_SPEED, home_item, items_from_records, leg_speed, sent_seqs
+from protocols.msp.nav_items import GROUND_SPEED, home_item, items_from_records, sent_seqs
 from reports.finding import DROPPED, Finding, News, RejectingFinding, reject, reject_list
 from reports.verdict import Result, Verdict
 
@@ -107,8 +107,10 @@ class NavCheck(ListCheck):
             takes_off = item.command == Command.NAV_TAKEOFF
             why = "it does not take off by itself" if takes_off else "not supported"
             rejection = self._drop(item, "command", item.command, why)
-        if rejection is None and len(self._records) > self._profile.capacity:
-            return reject(MissionResult.NO_SPACE, item, "command", f"more than the {self._profile.capacity} that fit")
+        room = self._profile.capacity - sum(map(len, self._rules.others))
+        if rejection is None and len(self._records) > room:
+            beside = " with the board's other missions: delete one" if self._rules.others else ""
+            return reject(MissionResult.NO_SPACE, item, "command", f"more than the {room} that fit{beside}")
         return rejection
 
     def _take_home(self, home: MissionItem) -> RejectingFinding | None:
@@ -150,9 +152,9 @@ class NavCheck(ListCheck):
         return None
 
     def _flew_home(self) -> bool:
-        """True if the record to be replaced has no place either."""
-        place = len(self._records)
-        return place < len(self._rules.current) and flies_home(self._rules.current[place])
+        """True if the record to be replaced has no place either: INAV flies home."""
+        place, current = len(self._records), self._rules.current
+        return place < len(current) and flies_home(current[place])
 
     def _hold(self, item: MissionItem) -> int:
         allowed = self._profile.longest_hold
@@ -208,7 +210,6 @@ class NavCheck(ListCheck):
         repeats = REPEATS.low if is_endless else self._fit(item, "p2", REPEATS)
         self._unused(item, "p3", "p4")
         self._jumps.wanted.append((len(self._records), item))
-        self._speed.at_jump[len(self._records)] = self._speed.cms
         self._keep(item, NavRecord(NavAction.JUMP, p2=repeats))
         return None
 
@@ -271,9 +272,6 @@ class NavCheck(ListCheck):
             if record.action == NavAction.RTH and (record.p1 > 0) != lands:
                 why = f"it would {'land' if lands else 'hover'} because of the last item: put this RTL last"
                 return reject(MissionResult.INVALID_PARAM1, item, "p1", why)
-        for place, item in self._jumps.wanted:
-            if place < len(self._records) and self._speed_differs(place, item):
-                self._warn(item, "p1", "later legs are flown at their own speeds again")
         return None
 
     def _departure(self) -> Departure:
@@ -282,15 +280,6 @@ class NavCheck(ListCheck):
         home = Point(self._home.lat_e7 or 0, self._home.lon_e7 or 0) if self._has_home else None
         first = next((record for record in self._records if record.action in LEGS and record.lat_e7), None)
         return Departure(craft, home, self._home.alt_m or None, first)
-
-    def _speed_differs(self, place: int, jump: MissionItem) -> bool:
-        """True if a pilot expects another speed after a JUMP than its target's own."""
-        record = self._records[place]
-        target = record.p1 - 1
-        if not (self._profile.leg_speed and record.p2):
-            return False
-        sets_speed = any(jump.p1 <= seq <= self._sent[target].seq for seq in self._speed.changed_at)
-        return not sets_speed and self._speed.at_jump[place] != leg_speed(self._records[target], 0)
 
     def _conclude(self) -> Verdict[NavRecord]:
         kept, lost = keep_unshown(self._records, self._rules.current)
@@ -301,11 +290,6 @@ class NavCheck(ListCheck):
             self._findings.append(
                 Finding(None, "count", len(self._rules.current), len(records), why, news=News.WARNING)
             )
-        for mission in erased(self._rules.others, self._profile.capacity - len(records)):
-            _, unshown = keep_unshown((), mission)
-            copy = f"a copy without its {unshown}" if unshown else "a copy"
-            why = f"Mission of {len(mission)} records does not fit next to it: erased, {copy} is kept on the Pi"
-            self._findings.append(Finding(None, "count", len(mission), 0, why, news=News.WARNING))
         findings = tuple(sorted(self._findings, key=lambda finding: finding.seq or 0))
         seqs = sent_seqs(records, [item.seq for item in self._sent], self._speed.changed_at)
         flight = self._path.facts()

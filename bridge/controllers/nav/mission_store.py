@@ -48,8 +48,6 @@ _WP = frozenset((Nav.WP,))
 _CHECKS = 6
 #: Other changes, and transfers, have to wait until a check ends.
 _MOST_COMPARED = 12
-#: The number of previous lists remembered: LOAD or another client is likely to bring one of them back.
-_PREVIOUS = 3
 #: Restarts of one push after a read-back mismatch.
 _MAX_BEGINS = 3
 
@@ -60,11 +58,7 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
     #: True if storing a record stalls it.
     _stores_slowly = False
     watch_s = 0.25
-    #: The list that was compared last, the ones before it, and the records that differ between them.
-    _watched: tuple[NavRecord, ...] = ()
-    _previous: tuple[tuple[NavRecord, ...], ...] = ()
-    _differing: frozenset[int] = frozenset()
-    #: The number of the record that was compared last, apart from those.
+    #: The records compared so far with the board's.
     _compared = 0
 
     def __init__(self, profile: NavProfile, controller: FlightController, vehicle: Vehicle) -> None:
@@ -120,12 +114,10 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
             before = yield from self._confirm(before)
             # Until the first record is read back, it may or may not have wiped the old list.
             failure, writing = PushFailure.UNCERTAIN, True
-            content = self._store_content(records or NOTHING)
-            yield from self._write_surely(content, proven)
+            yield from self._write_surely(self._store_content(records or NOTHING), proven)
             failure, writing = PushFailure.UNCERTAIN, False
             yield from self._keep()
             self._known = records
-            self._watch(content)
             return PushResult(None)
         except Stopped:
             if failure is PushFailure.NO_ANSWER or (writing and (yield from self._restore_at_once(before))):
@@ -232,24 +224,14 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
         return None
 
     def _has_same_records(self, known: tuple[NavRecord, ...]) -> Conversation[bool]:
-        """Compare the next records, and those that would show that a previous list is back."""
-        self._watch(known)
-        count = min(ceil(len(known) / _CHECKS), _MOST_COMPARED)
-        following = [(self._compared + step) % len(known) + 1 for step in range(count)]
-        for number in (*self._differing, *following):
-            held = yield from self.read(number)
-            if held is not None and held != known[number - 1]:
+        """Compare the next records."""
+        for _ in range(min(ceil(len(known) / _CHECKS), _MOST_COMPARED)):
+            place = self._compared % len(known)
+            held = yield from self.read(place + 1)
+            if held is not None and held != known[place]:
                 return False
-        self._compared += count
+            self._compared += 1
         return True
-
-    def _watch(self, known: tuple[NavRecord, ...]) -> None:
-        if known != self._watched:
-            self._previous = (self._watched, *[old for old in self._previous if old != known])[:_PREVIOUS]
-            pairs = [enumerate(zip(known, old, strict=False), 1) for old in self._previous]
-            firsts = [next((number for number, (one, other) in pair if one != other), 0) for pair in pairs]
-            self._differing, self._compared = frozenset(filter(None, firsts)), 0
-            self._watched = known
 
     def _restore(self, before: tuple[NavRecord, ...] | None) -> Conversation[bool]:
         """Write the old list again, if known; True if it is restored."""

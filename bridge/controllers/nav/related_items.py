@@ -89,9 +89,8 @@ class LegSpeed:
 
     cms: int = 0
     waiting: MissionItem | None = None
-    #: The numbers of the items that changed the speed, and the speed at each JUMP by its record's place.
+    #: The numbers of the items that changed the speed.
     changed_at: list[int] = field(default_factory=list)
-    at_jump: dict[int, int] = field(default_factory=dict)
 
     @staticmethod
     def leaves_it(item: MissionItem) -> bool:

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from enum import Enum, auto
 
 from bridge.controllers.nav.flown_path import BoardLimits
-from bridge.controllers.nav.leg_limits import USUAL_LEGS
 from bridge.missions.list_check import UNUSED, Range
 from protocols.mission_item import ROI_COMMANDS, Command
-from protocols.msp.nav import ENDLESS_S, NavAction
+from protocols.msp.nav import ENDLESS_S, NavAction, NavRecord
 
-#: The capacity in records: of every INAV, and of MultiWii's navigation build, whose boards report theirs.
+Mission = tuple[NavRecord, ...]
+
+#: Records.
 INAV_CAPACITY = 120
-MULTIWII_CAPACITY = 178
 #: The height above home that replaces 0, metres.
 LEAST_HEIGHT_M = 2
 HOLD = Range(0, ENDLESS_S - 1, f"seconds 0..{ENDLESS_S - 1}")
@@ -62,24 +62,6 @@ def inav_profile(capacity: int = INAV_CAPACITY, limits: BoardLimits | None = Non
         ends_on_any_record=True,
         own_rth_landing=False,
         limits=limits,
-    )
-
-
-def multiwii_profile(capacity: int = MULTIWII_CAPACITY) -> NavProfile:
-    return NavProfile(
-        "MultiWii",
-        capacity,
-        endless_hold=(NavAction.POSHOLD_UNLIM, 0),
-        sea_level=False,
-        leg_speed=False,
-        rth_height=True,
-        jumps_back_only=True,
-        # It counts milliseconds in 16 bits.
-        longest_hold=Range(0, 65, "it holds at most 65 s"),
-        ends_on_any_record=False,
-        own_rth_landing=True,
-        # Its defaults; a board reports its own (NAV_CONFIG).
-        limits=USUAL_LEGS,
     )
 
 

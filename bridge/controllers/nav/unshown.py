@@ -2,9 +2,8 @@
 """Values of a record that no item can show, from other planners: kept if the leg is written again unchanged."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import zip_longest
 
 from protocols.msp.nav import FLY_HOME, LEGS, NavAction, NavRecord
 from protocols.msp.nav_items import HIGHEST_HEADING, leg_speed
@@ -33,30 +32,16 @@ def keep_unshown(records: Sequence[NavRecord], current: Sequence[NavRecord]) -> 
     `current`: the list on the flight controller.
     """
     kept: list[NavRecord] = []
-    lost: Counter[str] = Counter()
-    for record, old in _aligned(records, current):
-        if record is not None and old is not None and _repeats(record, old):
-            kept.append(replace(old, flag=old.flag if old.flag == FLY_HOME else 0))
-            continue
-        if record is not None:
+    left = [*current]
+    for record in records:
+        repeated = next((old for old in left if _repeats(record, old)), None)
+        if repeated is None:
             kept.append(record)
-        if old is not None:
-            lost.update(_unshown(old))
+        else:
+            left.remove(repeated)
+            kept.append(replace(repeated, flag=repeated.flag if repeated.flag == FLY_HOME else 0))
+    lost = Counter(name for old in left for name in _unshown(old))
     return kept, ", ".join(f"{name} ({count})" for name, count in lost.items())
-
-
-def _aligned(
-    records: Sequence[NavRecord], current: Sequence[NavRecord]
-) -> Iterator[tuple[NavRecord | None, NavRecord | None]]:
-    """Each record and the one in its place, counted from the end where the lists end alike: items may be inserted."""
-    alike = 0
-    for record, old in zip(reversed(records), reversed(current), strict=False):
-        # The target of a jump has another number then.
-        if not (_repeats(record, old) or record.action == old.action == NavAction.JUMP):
-            break
-        alike += 1
-    yield from zip_longest(records[: len(records) - alike], current[: len(current) - alike])
-    yield from zip(records[len(records) - alike :], current[len(current) - alike :], strict=True)
 
 
 def _repeats(record: NavRecord, old: NavRecord) -> bool:

@@ -12,9 +12,9 @@ from typing import Any
 
 import pytest
 
+from bridge.controllers import multiwii
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.controllers.inav import profile as inav
-from bridge.controllers.multiwii import profile as multiwii
 from bridge.controllers.table import PROFILES
 from bridge.fc.states.searching import SPEEDS
 from bridge.missions.fc_mission_store import LIST_IS_GONE, PushFailure

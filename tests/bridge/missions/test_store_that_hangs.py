@@ -1,18 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Telemetry and mission uploads work even if the SD card answers after minutes or never."""
 
-from bridge.controllers.harakiri import profile as harakiri
-from bridge.fc.states.msp import Identifying
-from bridge.line.conversation import save
 from bridge.missions.mission_service import HeldMission
-from bridge.model.missions import ArrivedMission, Outcome, Refusal
+from bridge.model.missions import Outcome, Refusal
 from protocols.mission_item import MissionResult
-from reports.verdict import CLEARED_LIST
 from simulator.board.msp_options import MspOptions
 from simulator.board.options import Faults
 from simulator.commands.fc_kinds import make_board
 from tests.support.conversations import Download, Upload, records_of, waypoints
-from tests.support.world import GroundStation, World, flash_holding, ready_world
+from tests.support.world import GroundStation, World, flash_holding
 
 NEVER = 1e9
 
@@ -78,20 +74,6 @@ def test_the_flight_controller_is_still_found_and_read() -> None:
     world.plug()
     world.wait_ready(8)
     assert len(Download(GroundStation(world)).run(10)) == 5
-
-
-def test_identification_delayed_by_many_missions_is_repeated() -> None:
-    """Each mission waits 3 s for the store, and identification waits behind them in the queue."""
-    world = ready_world()
-    world.store.delay_s = NEVER
-    for _ in range(10):
-        world.inside.runner.start(save(ArrivedMission("", (), CLEARED_LIST)), lambda *_: None, world.now)
-    world.unplug()
-    world.plug()
-    world.wait_until(lambda w: isinstance(w.inside.session.state, Identifying), 8)
-    world.wait_until(lambda w: not isinstance(w.inside.session.state, Identifying), 15.1)
-    assert world.kind is None
-    world.wait_until(lambda w: w.kind is harakiri.PATCHED, 30)
 
 
 def test_a_list_whose_board_is_gone_when_the_store_answers_is_not_kept() -> None:

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bridge.controllers.multiwii import multiwii_profile
 from bridge.controllers.nav.check import NavRules
-from bridge.controllers.nav.rules import NavProfile, inav_profile, multiwii_profile
+from bridge.controllers.nav.rules import NavProfile, inav_profile
 from bridge.missions.list_check import check_list
 from protocols.msp.nav import FLY_HOME, LAST, NavAction, NavRecord
 from protocols.msp.nav_items import home_item, items_from_records

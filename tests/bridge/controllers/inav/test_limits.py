@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from bridge.controllers.inav.limits import InavLimits, RthAllowLanding, RthAltMode, SafehomeUsageMode, saved_limits
+from bridge.controllers.inav.limits import InavLimits, RthAltMode, SafehomeUsageMode, saved_limits
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile
 from bridge.missions.list_check import check_list
@@ -93,13 +93,7 @@ def test_waypoints_within_the_radius_are_named() -> None:
     ("rtl", "limits", "news"),
     [
         (RTL_LANDS, {}, []),
-        (RTL, {"nav_rth_allow_landing": RthAllowLanding.NEVER}, []),
-        (RTL, {}, ["hovers above home: nav_rth_allow_landing (ALWAYS) is for the pilot's RTH only, param1 1 lands"]),
-        (
-            RTL_LANDS,
-            {"nav_rth_allow_landing": RthAllowLanding.NEVER},
-            ["lands, although nav_rth_allow_landing is NEVER"],
-        ),
+        (RTL, {}, []),
         (
             RTL_LANDS,
             {"nav_rth_alt_mode": RthAltMode.FIXED},
@@ -125,11 +119,8 @@ def test_a_return_home_that_differs_from_what_is_shown_is_named(
     assert texts(WP, rtl, **limits) == [f"WP 2: {each}" for each in news]
 
 
-def test_a_low_battery_and_another_selected_mission_are_named() -> None:
-    assert texts(WP, cell_voltage=3.42, selected=2) == [
-        "nav_wp_multi_mission_index changes from 2 to 1: the new mission is stored first",
-        "Battery 3.42 V a cell, INAV warns at 3.50 V",
-    ]
+def test_another_selected_mission_is_named() -> None:
+    assert texts(WP, selected=2) == ["Stored as mission 1, mission 2 was selected"]
 
 
 @pytest.mark.parametrize(

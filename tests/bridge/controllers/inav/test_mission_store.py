@@ -8,11 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
+from bridge.controllers import multiwii
 from bridge.controllers.inav import profile as inav
 from bridge.controllers.inav.limits import InavLimits
-from bridge.controllers.multiwii import profile as multiwii
+from bridge.controllers.multiwii import multiwii_profile
 from bridge.controllers.nav.check import NavRules
-from bridge.controllers.nav.rules import inav_profile, multiwii_profile
+from bridge.controllers.nav.rules import inav_profile
 from bridge.missions.list_check import check_list
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.frame import MspParser

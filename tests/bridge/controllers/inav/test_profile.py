@@ -5,8 +5,8 @@ from collections.abc import Callable
 
 import pytest
 
+from bridge.controllers import multiwii
 from bridge.controllers.inav import profile as inav
-from bridge.controllers.multiwii import profile as multiwii
 from bridge.fc.profile import Profile
 from tests.bridge.controllers.nav.test_mission_store import found
 from tests.support.fake_inav import FakeInav, FakeMultiwii

@@ -3,9 +3,8 @@
 
 from dataclasses import replace
 
-from bridge.missions.list_check import check_list
-from reports.finding import DROPPED, News
-from tests.support.nav_lists import INAV, WP, C, findings_for, item, jump, kept, speed, verdict_on
+from reports.finding import DROPPED
+from tests.support.nav_lists import WP, C, findings_for, item, kept, speed, verdict_on
 
 
 def test_speeds_are_stored_in_the_legs_and_shown_as_items() -> None:
@@ -31,15 +30,3 @@ def test_lost_parts_of_a_speed_are_reported() -> None:
     ]
     assert findings_for(WP, speed(5), item(C.NAV_RETURN_TO_LAUNCH, at=False)) == [(2, "command", 178, DROPPED)]
     assert findings_for(speed(1e30), WP) == [(1, "p2", 1e30, 327.67)]
-
-
-def test_legs_after_a_jump_keep_their_own_speeds_which_is_reported() -> None:
-    sent = (WP, WP, speed(5), WP, WP, jump(1))
-    verdict = verdict_on(*sent)
-    assert [(f.seq, f.was, f.becomes, f.news) for f in verdict.findings] == [(6, 1, 1, News.WARNING)]
-    shown = [(it.command, it.p1, it.p2) for it in verdict.items[1:]]
-    assert shown == [(178, 1, -2), (16, 0, 0), (16, 0, 0), (178, 1, 5), (16, 0, 0), (16, 0, 0), (177, 1, 2)]
-    again = check_list(verdict.items, INAV)
-    assert (again.records, again.findings) == (verdict.records, ())
-    assert findings_for(WP, speed(5), WP, WP, WP, jump(2)) == []
-    assert findings_for(speed(5), WP, WP, WP, jump(2)) == []

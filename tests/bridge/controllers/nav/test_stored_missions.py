@@ -7,8 +7,6 @@ from dataclasses import replace
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from bridge.controllers.nav.stored_missions import erased, flown, split_missions
-from bridge.missions.list_check import check_list
 from bridge.missions.mission_service import HeldMission
 from bridge.model.missions import Outcome, Refusal
 from protocols.mission_item import MissionResult
@@ -24,7 +22,7 @@ from simulator.inav.mission import CAPACITY, EEPROM_SIZE
 from simulator.inav.places import PLACES_SIZE
 from simulator.inav.settings import SETTINGS_SIZE
 from tests.bridge.controllers.inav.test_mission_store import ACCEPTED, board_with, without_home
-from tests.bridge.controllers.nav.test_mission_store import RULES, packed, plan
+from tests.bridge.controllers.nav.test_mission_store import packed, plan
 from tests.support.conversations import Download, Upload, clear_message
 from tests.support.msp_bench import waypoint
 from tests.support.world import GroundStation, World
@@ -111,21 +109,12 @@ def test_an_upload_replaces_the_loaded_mission_and_keeps_the_others(selected: in
     assert others_of(bench) == kept
 
 
-def test_missions_that_no_longer_fit_are_reported_and_copied_to_the_pi() -> None:
+def test_a_list_that_does_not_fit_with_the_other_missions_is_refused() -> None:
     bench = Bench(4, 30, 60)
-    assert Upload(bench.station, plan(81, 7)).run() is ACCEPTED
-    assert bench.stored() == [packed(plan(81, 7)), sets(4, 30)[1]]
-    copies = [mission for mission, _ in bench.world.store.missions if mission.source.startswith("copy")]
-    assert [[record.pack() for record in copy.verdict.records] for copy in copies] == [sets(4, 30, 60)[2]]
-    assert "Mission of 60 records does not fit" in bench.text()
-
-
-def test_without_a_copy_of_what_it_erases_nothing_is_written() -> None:
-    bench = Bench(4, 30, 60)
-    bench.world.store.failing = True
-    assert Upload(bench.station, plan(81, 7)).run() is MissionResult.DENIED
-    assert "could not be copied to the Pi" in bench.text()
+    assert Upload(bench.station, plan(32, 7)).run() is MissionResult.NO_SPACE
+    assert "more than the 30 that fit with the board's other missions" in bench.text()
     assert bench.stored() == sets(4, 30, 60)
+    assert Upload(bench.station, plan(31, 7)).run() is ACCEPTED
 
 
 def test_record_fields_without_an_item_field_survive_a_read_and_a_write() -> None:
@@ -166,15 +155,6 @@ def test_after_a_failed_push_all_missions_are_restored() -> None:
     bench.world.run(3)
     assert bench.stored() == sets(4, 6)
     assert bench.flown() == sets(4, 6)[0]
-
-
-def test_missions_are_split_at_their_last_records_and_the_last_are_dropped() -> None:
-    records = check_list(plan(10), RULES).records
-    one, two = records[:3], records[3:9]
-    ended = (*one[:2], replace(one[2], flag=LAST)), (*two[:5], replace(two[5], flag=LAST))
-    assert split_missions([*ended[0], *ended[1], one[0]]) == list(ended)
-    assert (flown(ended, 2), flown(ended, 3), flown((), 1)) == (ended[1], ended[0], ())
-    assert [erased(ended, room) for room in (9, 8, 2)] == [(), ended[1:], ended]
 
 
 # -- a list that changes on the board ------------------------------------------------------------------------

@@ -48,15 +48,6 @@ def test_losses_of_a_changed_leg_are_reported(record: NavRecord, lost: str) -> N
     assert (verdict.records[1].p3 >> 1, verdict.records[1].flag) == (0, 0)
 
 
-@pytest.mark.parametrize(("p3", "copy"), [(0, "a copy"), (2, "a copy without its user actions (2)")])
-def test_losses_in_the_copy_of_an_erased_mission_are_reported(p3: int, copy: str) -> None:
-    leg = NavRecord(A.WAYPOINT, LAT, LON, 2000, p3=p3)
-    other = (leg, replace(leg, flag=LAST))
-    home, *legs = items_from_records([NavRecord(A.WAYPOINT, LAT, LON, 3000)] * 119, home_item((LAT, LON)))
-    (finding,) = check_list([home, *legs], NavRules(inav_profile(), others=(other,))).findings
-    assert finding.text() == f"Mission of 2 records does not fit next to it: erased, {copy} is kept on the Pi"
-
-
 #: User actions in each leg, both altitude datums, and a jump. Items: home, then a speed before each of the legs.
 HELD = (
     NavRecord(A.WAYPOINT, LAT, LON, 2000, p3=0b00010),
