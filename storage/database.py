@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Open the database file: check its integrity, make commits durable, migrate it to this release's schema.
+"""Open the database file: check its integrity, make commits durable, create its tables.
 
 Every start checks for damage, because SD cards decay and lose power. A damaged file is neither repaired
 nor deleted: it is renamed so that `sqlite3` can still open it, and a new one takes its place. SQLite detects damaged
@@ -9,15 +9,13 @@ page structures, but not a changed byte in a value: so every row has a checksum.
 import re
 import sqlite3
 import stat
-import struct
 import zlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 
 from storage.os_error import reason
-from storage.small_files import open_regular
 from storage.store_error import FAILURES, StoreError, explained, primary_code
 
 #: The columns of `missions` that its crc32 covers.
@@ -30,26 +28,22 @@ CONTENTS = ("items", "findings", "stored_items", "roi_commands", "records", "sen
 #: The columns of `settings_backups` that its crc32 covers.
 BACKUP = "number, board, kind, taken_at, occasion, setting_count, changed_count, contents"
 
-# SQLite's auxiliary files of a database. The log holds commits that are not in the main file yet.
-_LOG = "-wal"
-_COMPANIONS = (_LOG, "-shm", "-journal")
-
-# The magic number gives the byte order of the log's checksums (https://sqlite.org/fileformat2.html, 4).
-_LOG_HEADER = struct.Struct(">8I")
-_LOG_MAGIC = {0x377F0682: "<6I", 0x377F0683: ">6I"}
+_SCHEMA = Path(__file__).with_name("schema.sql")
+#: SQLite's auxiliary files of a database. The first holds commits that are not in the main file yet.
+COMPANIONS = ("-wal", "-shm", "-journal")
 
 _READER_TIMEOUT_S = 2.0
 #: Bytes; 65,535 items are 10 MB of text.
 _LARGEST_VALUE = 64 << 20
-#: Damaged and newer files kept, the latest: each may be as large as the store.
+#: Damaged files kept, the latest: each may be as large as the store.
 _MOST_KEPT = 3
-_ASIDE = re.compile(r"\.(corrupt|newer)-[0-9]{8}-[0-9]{6}(-[0-9]+)?\Z")
+_ASIDE = re.compile(r"\.corrupt-[0-9]{8}-[0-9]{6}(-[0-9]+)?\Z")
 # SQLITE_ERROR is "table already exists" and such: the file does not have its claimed schema.
 _DAMAGE = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR)
 
 
 def open_database(path: Path, now: float) -> tuple[sqlite3.Connection, Path | None]:
-    """Open or create the database; also returns the new path of one that is damaged or of a newer release.
+    """Open or create the database; also returns the new path of a damaged file.
 
     `now`: unix seconds, for the name of such a file. The caller holds the directory's state_lock: no other process
     may have a file open that is renamed. StoreError if the file cannot be opened, created or written.
@@ -63,9 +57,9 @@ def open_database(path: Path, now: float) -> tuple[sqlite3.Connection, Path | No
         connection = _connect(path)
         undo.callback(connection.close)
         aside = None
-        if unfit := _make_ready(connection, path):
+        if not _make_ready(connection):
             # Moved before it is closed: closing would write the log into the damaged file and delete it.
-            aside = _keep_aside(path, now, unfit)
+            aside = _keep_aside(path, now)
             connection.close()
             connection = _connect(path)
             undo.callback(connection.close)
@@ -96,7 +90,7 @@ def read_database(path: Path) -> sqlite3.Connection:
 def memory_database() -> sqlite3.Connection:
     """A database of this release's schema that ends with the process."""
     connection = _connect(":memory:")
-    migrate(connection)
+    _create_tables(connection)
     return connection
 
 
@@ -123,16 +117,8 @@ def insert(connection: sqlite3.Connection, table: str, row: Mapping[str, object]
 
 
 def row_crc32(*values: object) -> int:
-    """The checksum of a row of `missions`, over the columns of SUMMARY, or of `settings_backups`, over BACKUP."""
+    """The checksum of a row, over the columns of SUMMARY, CONTENTS or BACKUP; damaged values may have any type."""
     return zlib.crc32(repr(values).encode(errors="backslashreplace"))
-
-
-def contents_crc32(contents: Iterable[object]) -> int:
-    """The checksum of a row of `mission_contents`, over the columns of CONTENTS; a damaged one may have any type."""
-    crc = 0
-    for part in contents:
-        crc = zlib.crc32(part if isinstance(part, bytes) else str(part).encode(errors="surrogateescape"), crc)
-    return crc
 
 
 def _connect(path: Path | str) -> sqlite3.Connection:
@@ -151,74 +137,34 @@ def configured(connection: sqlite3.Connection) -> sqlite3.Connection:
     return connection
 
 
-def _make_ready(connection: sqlite3.Connection, path: Path) -> str:
-    """Prepare the connection; returns why it cannot be used, or "" if the log, every page and the schema are sound.
-
-    A newer file is of a release from which the pilot went back to this one.
-    """
-    if _log_was_lost(path):
-        return "corrupt"
+def _make_ready(connection: sqlite3.Connection) -> bool:
+    """Prepare the connection; False if a page or the schema is damaged, or of another release."""
     try:
         # Reads every page. integrity_check would also look up every row in every index: slow, for little use.
         (finding,) = connection.execute("PRAGMA quick_check(1)").fetchone()
         if finding != "ok":
-            return "corrupt"
-        (version,) = connection.execute("PRAGMA user_version").fetchone()
-        if version > len(_schema_steps()):
-            return "newer"
+            return False
         _prepare(connection)
-        return "" if _has_our_schema(connection) else "corrupt"
+        return _has_our_schema(connection)
     except FAILURES as error:
         if primary_code(error) in _DAMAGE:
-            return "corrupt"
+            return False
         raise
 
 
-def _log_was_lost(path: Path) -> bool:
-    """True if the log holds commits that SQLite would discard silently.
-
-    It does so if the main file is empty, or the log's header damaged. A header of zeros, or a partial one, is not
-    damage: the power failed before the first commit.
-    """
-    log = path.with_name(path.name + _LOG)
-    try:
-        with open_regular(log) as file:
-            header = file.read(_LOG_HEADER.size)
-        if not any(header):
-            return False
-        if path.stat().st_size <= 1:  # SQLite treats one byte as empty
-            return True
-    except OSError:
-        return False  # no log, or unreadable, for which SQLite has a better message
-    if len(header) < _LOG_HEADER.size:
-        return False
-    *words, first_sum, second_sum = _LOG_HEADER.unpack(header)
-    order = _LOG_MAGIC.get(words[0])
-    return order is None or _log_checksum(struct.unpack_from(order, header)) != (first_sum, second_sum)
-
-
-def _log_checksum(words: tuple[int, ...]) -> tuple[int, int]:
-    """SQLite's own checksum over 32-bit words (fileformat2, 4.2)."""
-    first = second = 0
-    for even, odd in zip(words[::2], words[1::2], strict=True):
-        first = (first + even + second) & 0xFFFFFFFF
-        second = (second + odd + first) & 0xFFFFFFFF
-    return first, second
-
-
-def _keep_aside(path: Path, now: float, why: str) -> Path:
+def _keep_aside(path: Path, now: float) -> Path:
     """Rename the file and its auxiliary files, and delete the oldest such files; returns the new name.
 
     The main file goes last: if it went first, a power cut here would leave a log that SQLite deletes.
     """
     stamp = datetime.fromtimestamp(now, UTC).strftime("%Y%m%d-%H%M%S")
-    aside = path.with_name(f"{path.name}.{why}-{stamp}")
+    aside = path.with_name(f"{path.name}.corrupt-{stamp}")
     attempt = 1
     while aside.exists():
         attempt += 1
-        aside = path.with_name(f"{path.name}.{why}-{stamp}-{attempt}")
+        aside = path.with_name(f"{path.name}.corrupt-{stamp}-{attempt}")
     try:
-        for suffix in _COMPANIONS:
+        for suffix in COMPANIONS:
             companion = path.with_name(path.name + suffix)
             if companion.exists():
                 companion.rename(aside.with_name(aside.name + suffix))
@@ -226,13 +172,13 @@ def _keep_aside(path: Path, now: float, why: str) -> Path:
         _forget_oldest(path, aside)
     except OSError as error:
         raise StoreError(
-            f"the mission store {path} is {why} and cannot be renamed ({reason(error)}); move it away"
+            f"the mission store {path} is corrupt and cannot be renamed ({reason(error)}); move it away"
         ) from error
     return aside
 
 
 def kept_aside(path: Path) -> list[Path]:
-    """The damaged and newer files that were renamed, in the order of their names."""
+    """The damaged files that were renamed, in the order of their names."""
     return sorted(file for file in path.parent.glob(f"{path.name}.*") if _ASIDE.search(file.name))
 
 
@@ -241,50 +187,33 @@ def _forget_oldest(path: Path, newest: Path) -> None:
     kept = [file for file in kept_aside(path) if file != newest]
     kept.sort(key=lambda file: (file.stat().st_ctime_ns, file.name))
     for file in kept[: -(_MOST_KEPT - 1)]:
-        for suffix in ("", *_COMPANIONS):
+        for suffix in ("", *COMPANIONS):
             file.with_name(file.name + suffix).unlink(missing_ok=True)
 
 
 def _prepare(connection: sqlite3.Connection) -> None:
-    """Make commits durable and migrate the file to this release's schema."""
+    """Make commits durable, and create the tables in a new file."""
     connection.execute("PRAGMA journal_mode = WAL")
     connection.execute("PRAGMA synchronous = FULL")  # NORMAL would lose the last commits in a power cut
     # KiB. The default of 2 MB would let the daemon grow with every mission.
     connection.execute("PRAGMA cache_size = -256")
-    (version,) = connection.execute("PRAGMA user_version").fetchone()
     # Finds a read-only file now, not when a mission arrives. Rolled back, it takes no space.
-    connection.executescript(f"BEGIN; PRAGMA user_version = {version}; ROLLBACK")
-    migrate(connection)
+    connection.executescript("BEGIN; PRAGMA user_version = 0; ROLLBACK")
+    _create_tables(connection)
 
 
-def _schema_steps() -> list[str]:
-    """The schema files' texts in the order of their numbers; step n migrates version n-1 to n."""
-    return _schema_files("0*.sql")
-
-
-def _schema_files(pattern: str) -> list[str]:
-    return [file.read_text() for file in sorted(Path(__file__).with_name("schema").glob(pattern))]
-
-
-def migrate(connection: sqlite3.Connection) -> None:
-    """Apply the steps that are missing, each in its own transaction, and make the added tables.
-
-    Added tables have no step: an older release, to which the pilot may go back, leaves them alone.
-    """
-    (version,) = connection.execute("PRAGMA user_version").fetchone()
-    for number, sql in enumerate(_schema_steps()[version:], start=version + 1):
-        try:
-            connection.executescript(f"BEGIN IMMEDIATE;\n{sql}\nPRAGMA user_version = {number};\nCOMMIT;")
-        except FAILURES:
-            if connection.in_transaction:
-                connection.execute("ROLLBACK")
-            raise
-    for sql in _schema_files("added_*.sql"):
-        connection.executescript(f"BEGIN IMMEDIATE;\n{sql}\nCOMMIT;")
+def _create_tables(connection: sqlite3.Connection) -> None:
+    """Create the tables that are missing."""
+    try:
+        connection.executescript(f"BEGIN IMMEDIATE;\n{_SCHEMA.read_text()}\nCOMMIT;")
+    except FAILURES:
+        if connection.in_transaction:
+            connection.execute("ROLLBACK")
+        raise
 
 
 def _has_our_schema(connection: sqlite3.Connection) -> bool:
-    """Compare the schema with that of the schema files: quick_check misses a corrupt column name."""
+    """Compare the schema with that of the schema file: quick_check misses a corrupt column name."""
     with closing(memory_database()) as sample:
         expected, found = (
             {(str(name), str(sql)) for name, sql in database.execute("SELECT name, sql FROM sqlite_schema")}

@@ -12,7 +12,6 @@ from typing import Any, Self
 from storage.database import (
     CONTENTS,
     SUMMARY,
-    contents_crc32,
     insert,
     memory_database,
     open_database,
@@ -44,8 +43,7 @@ class ReceivedMission:
     "udp 192.168.4.2:14550 sysid 255". items: as sent. verdict: ACCEPTED, CLEARED or REJECTED. ack: the
     MAV_MISSION_ name. stored_items: as the flight controller should hold them. records: the bytes written, of
     `record_count` records. checksum: their CRC-32. roi_commands: the command number that each stored region of
-    interest was sent as, by its seq. sent_seqs: for each stored item, its number as sent, None if it was inserted;
-    empty in missions of older releases.
+    interest was sent as, by its seq. sent_seqs: for each stored item, its number as sent, None if it was inserted.
     """
 
     received_at: float
@@ -146,7 +144,7 @@ class MissionStore:
         with self._transaction("cannot store the mission"):
             self._make_room()
             number = insert(self._connection, "missions", line)
-            crc32 = contents_crc32(contents.values())
+            crc32 = row_crc32(number, *contents.values())
             insert(self._connection, "mission_contents", {"number": number, **contents, "crc32": crc32})
             self._seal(number)
         return number
@@ -169,9 +167,9 @@ class MissionStore:
             return None
         with explained(f"cannot read mission {number} from {self._path}"):
             columns = ", ".join(CONTENTS)
-            question = f"SELECT {columns}, crc32 FROM mission_contents WHERE number = ?"  # noqa: S608 - constants
+            question = f"SELECT number, {columns}, crc32 FROM mission_contents WHERE number = ?"  # noqa: S608 - constants
             row = self._connection.execute(question, (number,)).fetchone()
-        if row is None or contents_crc32(row[column] for column in CONTENTS) != row["crc32"]:
+        if row is None or row_crc32(*row[:-1]) != row["crc32"]:
             raise self._damaged(number)
         try:
             received = ReceivedMission(
@@ -186,7 +184,7 @@ class MissionStore:
                 record_count=summary.record_count,
                 checksum=summary.checksum,
                 roi_commands={int(seq): command for seq, command in json.loads(row["roi_commands"]).items()},
-                sent_seqs=json.loads(row["sent_seqs"] or "[]"),
+                sent_seqs=json.loads(row["sent_seqs"]),
             )
         except (ValueError, TypeError, AttributeError, RecursionError) as error:
             raise self._damaged(number) from error
@@ -282,19 +280,11 @@ class MissionStore:
 
 @dataclass(frozen=True, slots=True)
 class OpenedStore:
-    """A store ready for use.
-
-    `set_aside`: the path of a damaged one, or of a newer release; `salvaged`: the missions recovered from it.
-    """
+    """A store ready for use. `set_aside`: the path of a damaged one; `salvaged`: the missions recovered from it."""
 
     store: MissionStore
     set_aside: Path | None
     salvaged: int
-
-    @property
-    def is_of_newer_release(self) -> bool:
-        """True if the store that was set aside is not damaged."""
-        return self.set_aside is not None and ".newer-" in self.set_aside.name
 
 
 def open_store(path: Path, now: float, budget: int = BUDGET) -> OpenedStore:

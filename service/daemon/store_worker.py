@@ -13,7 +13,7 @@ import structlog
 
 from bridge.line.conversation import Conclude, FindPending, NoteReader, Recall, Save, StoreEffect
 from bridge.model.missions import ArrivedMission, PendingMission, RecalledMission
-from bridge.model.settings import Occasion, TakenBackup
+from bridge.model.settings import TakenBackup
 from payloads.mission_data import plain
 from protocols.mission_item import ListIdentity, identify, pack_records
 from service.machine.threads import BackgroundThread, post
@@ -40,8 +40,6 @@ class StoreWorker:
         self._thread = BackgroundThread("store", _TIMEOUT_S)
         self._loop = asyncio.get_running_loop()
         self._store: MissionStore | None = None
-        #: The occasions of backups that could not be stored; the next reading of such a board is stored instead.
-        self._missed: dict[str, Occasion] = {}
         #: The file; None while missions are kept in memory.
         self._path: Path | None = None
         if directory is not None:
@@ -61,11 +59,9 @@ class StoreWorker:
         def work() -> None:
             if self._store is None:
                 return
-            occasion = self._missed.pop(board, backup.occasion)
             try:
-                self._store.backups.add(board, backup.board.kind, backup.values, time.time(), occasion.value)
+                self._store.backups.add(board, backup.board.kind, backup.values, time.time(), backup.occasion.value)
             except StoreError as error:
-                self._missed[board] = occasion
                 _log.error("store.failed", why=str(error))
 
         self._thread.submit(work)
@@ -100,11 +96,7 @@ class StoreWorker:
         self._store, self._path = opened.store, directory / DATABASE_NAME
         if opened.set_aside is not None:
             what = f"a new mission store was created with the {opened.salvaged} missions that could be read"
-            _log.error(
-                "store.newer" if opened.is_of_newer_release else "store.damaged",
-                kept_as=str(opened.set_aside),
-                what=what,
-            )
+            _log.error("store.damaged", kept_as=str(opened.set_aside), what=what)
 
     def _close(self) -> None:
         if self._store is None:

@@ -157,32 +157,6 @@ def test_an_intact_log_is_applied(path: Path, killed: bytes) -> None:
         assert len(store.list(99)) == MISSIONS + 2
 
 
-@pytest.mark.parametrize("bit", range(0, 32 * 8, 5))
-def test_a_log_with_a_damaged_header_is_kept(path: Path, killed: bytes, bit: int) -> None:
-    """SQLite would treat it as an old log and silently overwrite its commits."""
-    log = bytearray(killed)
-    log[bit // 8] ^= 1 << bit % 8
-    path.with_name("missions.db-wal").write_bytes(log)
-    assert_kept_aside(path, path.read_bytes(), salvaged=ALL)
-    assert path.with_name(f"{ASIDE}-wal").read_bytes() == log
-
-
-def test_a_log_of_random_bytes_is_kept_aside(path: Path, killed: bytes) -> None:
-    log = random.Random(1).randbytes(30_000)
-    path.with_name("missions.db-wal").write_bytes(log)
-    assert_kept_aside(path, path.read_bytes(), salvaged=ALL)
-    assert path.with_name(f"{ASIDE}-wal").read_bytes() == log
-
-
-@pytest.mark.parametrize("remains", [None, b"", b"S"])
-def test_a_log_without_its_main_file_is_kept(path: Path, killed: bytes, remains: bytes | None) -> None:
-    path.unlink()
-    if remains is not None:
-        path.write_bytes(remains)
-    assert_kept_aside(path, remains or b"")
-    assert path.with_name(f"{ASIDE}-wal").read_bytes() == killed
-
-
 def test_a_damaged_main_file_keeps_its_log(path: Path, killed: bytes) -> None:
     # Not at its start: for those pages the log holds newer copies.
     damaged = path.read_bytes()[:30_000]
@@ -205,18 +179,6 @@ def test_the_newest_damaged_files_are_kept(path: Path) -> None:
     open_store(path, NOW - 86400).store.close()
     sizes = [file.stat().st_size for file in path.parent.glob("*.corrupt-*")]
     assert sorted(sizes) == [30, 40, 50]
-
-
-def test_a_damaged_file_set_aside_can_be_opened(path: Path, killed: bytes) -> None:
-    path.with_name("missions.db-wal").write_bytes(b"x" * len(killed))
-    opened = open_store(path, NOW)
-    opened.store.close()
-    assert opened.set_aside is not None
-    with open_store(opened.set_aside.with_name("rescued.db"), NOW).store as fresh:
-        assert fresh.list(1) == []
-    connection = sqlite3.connect(opened.set_aside)
-    assert connection.execute("SELECT count(*) FROM missions").fetchone() == (MISSIONS,)
-    connection.close()
 
 
 def test_a_file_of_another_program_is_set_aside(path: Path) -> None:

@@ -6,16 +6,14 @@ import sqlite3
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
-from zlib import crc32
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from storage.database import CONTENTS, contents_crc32
+from storage.database import CONTENTS, row_crc32
 from storage.mission_store import MissionStore, ReceivedMission, open_store
 from storage.store_error import StoreError
 from tests.support.sample_missions import mission
@@ -94,7 +92,9 @@ def test_contents_that_are_no_mission_are_damage(store: MissionStore, tmp_path: 
         database.row_factory = sqlite3.Row
         database.execute("UPDATE mission_contents SET items = ?", (items,))
         row = database.execute("SELECT * FROM mission_contents").fetchone()
-        database.execute("UPDATE mission_contents SET crc32 = ?", (contents_crc32(row[name] for name in CONTENTS),))
+        database.execute(
+            "UPDATE mission_contents SET crc32 = ?", (row_crc32(number, *(row[name] for name in CONTENTS)),)
+        )
         database.commit()
     with pytest.raises(StoreError, match="was damaged"):
         store.get(number)
@@ -202,38 +202,3 @@ def test_each_sender_is_found_with_its_item_numbers_until_it_reads_the_list(stor
     assert store.item_numbers(received.record_count + 1, received.checksum) == {}
     store.note_reader(*wanted, "a")
     assert store.item_numbers(*wanted) == {"b": [0, 3]}
-
-
-def _store_of_the_first_release(path: Path) -> None:
-    """Its rows had no checksum, and no item numbers."""
-    with sqlite3.connect(path) as first:
-        first.executescript(files("storage").joinpath("schema", "0001_missions.sql").read_text())
-        first.execute("PRAGMA user_version = 1")
-        first.execute("INSERT INTO missions VALUES (1, 2.5, 'udp', 'ACCEPTED', 'ok', 0, 0, 0, 0, 'VERIFIED', '', 3.5)")
-        first.execute("INSERT INTO mission_contents VALUES (1, '[]', '[]', '[]', '{}', x'', ?)", (crc32(b"[][][]{}"),))
-    first.close()
-
-
-def test_a_store_of_the_first_release_is_migrated(tmp_path: Path) -> None:
-    _store_of_the_first_release(tmp_path / "missions.db")
-    opened = open_store(tmp_path / "missions.db", 0.0)
-    with opened.store as store:
-        assert opened.set_aside is None
-        assert [(line.source, line.outcome) for line in store.list(9)] == [("udp", "VERIFIED")]
-        assert store.get(1) is not None
-
-
-def test_a_damaged_store_of_the_first_release_is_salvaged(tmp_path: Path) -> None:
-    path = tmp_path / "missions.db"
-    _store_of_the_first_release(path)
-    with sqlite3.connect(path) as database:
-        (page,) = database.execute("SELECT rootpage FROM sqlite_schema WHERE name = 'missions_verified'").fetchone()
-        (size,) = database.execute("PRAGMA page_size").fetchone()
-    database.close()
-    with path.open("r+b") as file:
-        file.seek((page - 1) * size)
-        file.write(b"\xff" * size)
-    opened = open_store(path, 0.0)
-    with opened.store as store:
-        assert (opened.set_aside is None, opened.salvaged) == (False, 1)
-        assert [line.number for line in store.list(9)] == [1]

@@ -124,36 +124,6 @@ def test_a_directory_in_place_of_the_file_is_reported(tmp_path: Path) -> None:
         open_store(tmp_path, now=0.0)
 
 
-def test_a_store_of_a_newer_release_is_kept_and_its_missions_copied(tmp_path: Path) -> None:
-    path = tmp_path / "missions.db"
-    with open_store(path, now=0.0).store as store:
-        number = store.add(mission(1))
-    connection = sqlite3.connect(path)
-    connection.executescript("CREATE TABLE later (x); PRAGMA user_version = 4711")
-    connection.close()
-    before = path.read_bytes()
-    opened = open_store(path, now=0.0)
-    with opened.store as store:
-        assert (opened.is_of_newer_release, opened.salvaged) == (True, 1)
-        assert [each.number for each in store.list(9)] == [number]
-    assert opened.set_aside is not None
-    assert opened.set_aside.name == "missions.db.newer-19700101-000000"
-    assert opened.set_aside.read_bytes() == before
-    # Once: the next start has a store of its own release.
-    again = open_store(path, now=0.0)
-    again.store.close()
-    assert again.set_aside is None
-
-
-def test_the_release_before_can_open_the_store(tmp_path: Path) -> None:
-    """0.2.0 knows three steps, and leaves alone what was added since: going back loses no mission."""
-    path = tmp_path / "missions.db"
-    open_store(path, now=0.0).store.close()
-    connection = sqlite3.connect(path)
-    assert connection.execute("PRAGMA user_version").fetchone() == (3,)
-    connection.close()
-
-
 def test_a_file_locked_by_another_program_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "missions.db"
     with open_store(path, now=0.0).store as store:

@@ -99,9 +99,7 @@ def check_database(state_dir: Path) -> list[Checked]:
         found.append(_look_into(path))
     if aside:
         remedy = f"to save its readable part: sqlite3 {aside[-1]} .recover; then move it away"
-        if ".newer-" in aside[-1].name:
-            remedy = f"to use all of it, install that release and rename the file to {path}; else move it away"
-        found.append(note("missions", f"a damaged store, or a newer release's, was kept as {aside[-1]}", remedy))
+        found.append(note("missions", f"a damaged store was kept as {aside[-1]}", remedy))
     return found
 
 
