@@ -2,48 +2,72 @@
 """Ground stations over TCP."""
 
 import asyncio
-import errno
 import socket
 from collections import Counter
-from collections.abc import Callable
-from functools import partial
 
 from bridge.gcs.station import Peer
+from protocols.mavlink.dialect import messages as m
+from protocols.mavlink.frame import MavlinkSplitter
 from service.links.gcs_events import GcsEvents
-from service.links.send_queue import SendQueue
 from service.machine.log_setup import warn_once
 from service.settings.addresses import GcsAddress, bindable, family_of
 
 #: Small, so that the requests of a client that floods do not delay those of others.
 _READ_SIZE = 512
-#: Unsent bytes for a stalled client. Above this its telemetry is dropped, oldest first.
-_MAX_UNSENT = 65536
+#: Unsent bytes for a stalled client. Above this it gets no telemetry; at twice as many it is disconnected.
+_MAX_UNSENT = 32768
+#: The kernel would buffer minutes of old telemetry for a client that does not read.
 _KERNEL_BUFFER = 32768
 #: A client that acknowledges nothing for this long is lost: out of Wi-Fi range it cannot close the connection.
 _STALL_MS = 60000
 #: Each costs a copy of the telemetry.
 _MAX_CLIENTS = 32
-#: The pause after the system has run out of file descriptors or memory.
-_EXHAUSTED = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
-_REST_S = 1.0
+#: Never dropped, because they are not sent again: a transfer, command or parameter would fail. Files and logs are
+#: not among them: they fill the buffer at once, and their reader asks again for missing parts.
+_KEPT = frozenset(
+    {
+        m.MAVLINK_MSG_ID_PARAM_VALUE,
+        m.MAVLINK_MSG_ID_PARAM_EXT_VALUE,
+        m.MAVLINK_MSG_ID_PARAM_EXT_ACK,
+        m.MAVLINK_MSG_ID_MISSION_REQUEST_PARTIAL_LIST,
+        m.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST,
+        m.MAVLINK_MSG_ID_MISSION_ITEM,
+        m.MAVLINK_MSG_ID_MISSION_REQUEST,
+        m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST,
+        m.MAVLINK_MSG_ID_MISSION_COUNT,
+        m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL,
+        m.MAVLINK_MSG_ID_MISSION_ITEM_REACHED,
+        m.MAVLINK_MSG_ID_MISSION_ACK,
+        m.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
+        m.MAVLINK_MSG_ID_MISSION_ITEM_INT,
+        m.MAVLINK_MSG_ID_COMMAND_LONG,
+        m.MAVLINK_MSG_ID_COMMAND_INT,
+        m.MAVLINK_MSG_ID_COMMAND_ACK,
+        m.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
+        m.MAVLINK_MSG_ID_MESSAGE_INTERVAL,
+        m.MAVLINK_MSG_ID_STATUSTEXT,
+    }
+)
+
+
+def must_arrive(data: bytes) -> bool:
+    """True if one of these whole frames is not sent again when it is lost."""
+    return any(frame.msgid in _KEPT for frame in MavlinkSplitter().feed(data))
 
 
 class TcpLink:
-    """tcpin: ground stations connect."""
+    """tcpin: ground stations connect. OSError if the port cannot be opened."""
 
     def __init__(self, address: GcsAddress, events: GcsEvents) -> None:
         self.name = str(address)
         self._events = events
-        self._loop = asyncio.get_running_loop()
+        self.loop = asyncio.get_running_loop()
         self._clients: dict[Peer, _TcpClient] = {}
         self._warned: set[str] = set()
-        self._socket = socket.create_server(bindable(address.host, address.port), family=family_of(address.host))
-        self._socket.setblocking(False)
-        self._resting: asyncio.TimerHandle | None = None
-        self._listen()
-
-    def _listen(self) -> None:
-        self._loop.add_reader(self._socket.fileno(), self._acceptable)
+        self._listener = socket.create_server(bindable(address.host, address.port), family=family_of(address.host))
+        # The backlog also limits the connections that asyncio accepts in one turn of the loop.
+        opening = self.loop.create_server(lambda: _TcpClient(self), sock=self._listener, backlog=_MAX_CLIENTS)
+        self._opening = self.loop.create_task(opening)
 
     def send(self, peer: Peer, data: bytes) -> None:
         client = self._clients.get(peer)
@@ -51,132 +75,76 @@ class TcpLink:
             client.send(data)
 
     def close(self) -> None:
-        if self._resting is not None:
-            self._resting.cancel()
-        self._loop.remove_reader(self._socket.fileno())
-        self._socket.close()
+        if not self._opening.cancel():
+            self._opening.result().close()
+        self._listener.close()
         for client in self._clients.values():
-            client.close()
+            client.transport.abort()
         self._clients.clear()
 
-    def _acceptable(self) -> None:
-        try:
-            connection, sender = self._socket.accept()
-        except OSError as error:
-            if error.errno in _EXHAUSTED:
-                # The client stays in the backlog and would wake the loop again at once.
-                self._loop.remove_reader(self._socket.fileno())
-                self._resting = self._loop.call_later(_REST_S, self._listen)
-            return
+    def joined(self, client: "_TcpClient", sender: tuple[str, int]) -> Peer:
         if len(self._clients) >= _MAX_CLIENTS:
             # Of the machine with the most connections one that has sent nothing, or the one silent for longest.
             connections = Counter(peer.host for peer in self._clients)
-            displaced, _ = max(
+            displaced, former = max(
                 self._clients.items(),
                 key=lambda each: (connections[each[0].host], not each[1].has_sent, -each[1].heard_at),
             )
             warn_once(
                 self._warned, "gcs.too_many_clients", link=self.name, displaced=str(displaced), limit=_MAX_CLIENTS
             )
-            self._clients[displaced].close()
-            self._forget(displaced)
-        connection.setblocking(False)
-        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _STALL_MS)
-        # The kernel would buffer minutes of old telemetry for a client that does not read.
-        connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _KERNEL_BUFFER)
+            former.transport.abort()
+            self.left(displaced, former)
         peer = Peer(self.name, sender)
-        if (former := self._clients.pop(peer, None)) is not None:
-            # The old connection's end was never reported: a laptop was switched off and reconnects from the same port.
-            former.close()
-            self._events.gcs_gone(peer)
+        self._clients[peer] = client
         # A TCP client hears the vehicle from the start: it may wait for a heartbeat before it speaks.
         self._events.add_default_peer(peer)
-        received = partial(self._events.gcs_data, peer, datagram=False)
-        self._clients[peer] = _TcpClient(connection, self._loop, received, partial(self._forget, peer))
+        return peer
 
-    def _forget(self, peer: Peer) -> None:
-        del self._clients[peer]
-        self._events.remove_default_peer(peer)
-        self._events.gcs_gone(peer)
+    def received(self, peer: Peer, client: "_TcpClient", data: bytes) -> None:
+        client.heard_at, client.has_sent = self.loop.time(), True
+        self._events.gcs_data(peer, data, datagram=False)
+
+    def left(self, peer: Peer, client: "_TcpClient") -> None:
+        if self._clients.get(peer) is client:
+            del self._clients[peer]
+            self._events.remove_default_peer(peer)
+            self._events.gcs_gone(peer)
 
 
-class _TcpClient:
-    """One connection with a bounded amount of unsent bytes. `gone` is called when it ends, but not after `close`."""
+class _TcpClient(asyncio.BufferedProtocol):
+    """One connection. `heard_at`: when it last sent bytes, on the loop's clock; at first the time of the connection."""
 
-    def __init__(
-        self,
-        connection: socket.socket,
-        loop: asyncio.AbstractEventLoop,
-        received: Callable[[bytes], None],
-        gone: Callable[[], None],
-    ) -> None:
-        self._socket = connection
-        self._loop = loop
-        self._received = received
-        #: When it last sent bytes, on the loop's clock; at first the time of the connection.
-        self.heard_at, self.has_sent = loop.time(), False
-        self._gone = gone
-        self._unsent = SendQueue(_MAX_UNSENT)
-        self._hanging_up: asyncio.Handle | None = None
-        loop.add_reader(connection.fileno(), self._readable)
+    transport: asyncio.Transport
+
+    def __init__(self, link: TcpLink) -> None:
+        self._link = link
+        self._buffer = bytearray(_READ_SIZE)
+        self.heard_at, self.has_sent = link.loop.time(), False
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.Transport)
+        self.transport = transport
+        connection = transport.get_extra_info("socket")
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _STALL_MS)
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _KERNEL_BUFFER)
+        self._peer = self._link.joined(self, transport.get_extra_info("peername") or ("", 0))
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._link.left(self._peer, self)
+
+    def get_buffer(self, sizehint: int) -> bytearray:
+        return self._buffer
+
+    def buffer_updated(self, nbytes: int) -> None:
+        self._link.received(self._peer, self, bytes(self._buffer[:nbytes]))
 
     def send(self, data: bytes) -> None:
-        if self._hanging_up is not None:
+        """Send whole frames. Above a limit of unsent bytes telemetry is dropped."""
+        unsent = self.transport.get_write_buffer_size()
+        if self.transport.is_closing() or (unsent > _MAX_UNSENT and not must_arrive(data)):
             return
-        if self._unsent:
-            if not self._unsent.add(data):
-                # With this many unread replies, another one would be useless.
-                self._hang_up()
-            return
-        sent = self._try_send(memoryview(data))
-        if sent < len(data):
-            self._unsent.add(data)
-            self._unsent.sent(sent)
-            self._loop.add_writer(self._socket.fileno(), self._writable)
-
-    def close(self) -> None:
-        if self._hanging_up is not None:
-            self._hanging_up.cancel()
-        self._loop.remove_reader(self._socket.fileno())
-        self._loop.remove_writer(self._socket.fileno())
-        self._socket.close()
-
-    def _hang_up(self) -> None:
-        """Close soon, not now: the caller iterates over all clients."""
-        if self._hanging_up is None:
-            self._hanging_up = self._loop.call_soon(self._end)
-
-    def _end(self) -> None:
-        self.close()
-        self._gone()
-
-    def _writable(self) -> None:
-        while self._unsent:
-            sent = self._try_send(self._unsent.first())
-            if sent == 0:
-                return
-            self._unsent.sent(sent)
-        self._loop.remove_writer(self._socket.fileno())
-
-    def _try_send(self, data: memoryview) -> int:
-        try:
-            return self._socket.send(data)
-        except BlockingIOError:
-            return 0
-        except OSError:
-            self._hang_up()
-            return 0
-
-    def _readable(self) -> None:
-        try:
-            data = self._socket.recv(_READ_SIZE)
-        except BlockingIOError:
-            return
-        except OSError:
-            data = b""
-        if data:
-            self.heard_at, self.has_sent = self._loop.time(), True
-            self._received(data)
-        else:
-            self._hang_up()
+        self.transport.write(data)
+        if unsent > 2 * _MAX_UNSENT:
+            # With this many unread replies, another one would be useless.
+            self.transport.abort()
