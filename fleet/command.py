@@ -9,7 +9,8 @@ import click
 
 from fleet.conditions import Condition, matching
 from fleet.enroll_command import enroll, expel
-from fleet.logs_command import fleet_logs
+from fleet.logs import fleet_logs
+from fleet.missions import Held, pull
 from fleet.options import (
     address_options,
     fleet_session,
@@ -17,11 +18,10 @@ from fleet.options import (
     vehicle_option,
     where_option,
 )
-from fleet.pull import Held, pull
 from fleet.push_command import push_mission, verify_mission
 from fleet.roll_call import alive, chosen, roll_call
-from fleet.settings_command import fleet_settings
-from fleet.tables import complaints, fleet_table
+from fleet.settings import fleet_settings
+from fleet.tables import complaints, fleet_lines, fleet_table
 from fleet.watch import watching
 from fleet.watch_screen import print_changes, show_screen
 from protocols.mission_file import MissionFileError, write_qgc_wpl
@@ -33,6 +33,7 @@ from terminal.printing import print_json, print_table
 from terminal.sentences import complain, fail
 
 _STANDARD_OUTPUT = Path("-")
+_MANY = 500
 
 
 @click.group(cls=CommandGroup)
@@ -61,7 +62,10 @@ def list_vehicles(as_json: bool, limit: int | None, conditions: list[Condition],
         counts = {"alive": len(everyone), "unanswered": unanswered}
         print_json({"vehicles": [asdict(vehicle) for vehicle in shown], "complaints": complaints(everyone)} | counts)
     elif shown:
-        print_table(fleet_table(shown))
+        if len(shown) > _MANY:
+            click.echo("\n".join(fleet_lines(shown)))
+        else:
+            print_table(fleet_table(shown))
         if len(shown) < len(found):
             click.echo(f"and {len(found) - len(shown):,} more")
     elif everyone:

@@ -229,9 +229,7 @@ class FleetFolder:
 
 
 def _member(data: Any) -> Member:
-    """Older files hold only the role. ValueError, LookupError."""
-    if isinstance(data, str):
-        return Member(Role(data))
+    """ValueError, AttributeError, LookupError."""
     sysid = data.get("sysid")
     if sysid is not None and sysid not in SYSIDS:
         raise ValueError(f"{sysid!r} is not a system id")

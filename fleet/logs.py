@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Telemetry logs of a vehicle, fetched in pieces: an interrupted fetch continues where it stopped."""
+"""`fleet logs`: a vehicle's telemetry logs over the uplink, in pieces: an interrupted fetch continues."""
 
 import base64
 import binascii
@@ -7,15 +7,24 @@ import json
 import time
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
+import click
 import zenoh
 
-from fleet.payload import decode, part, text, whole
-from fleet.session import NO_COMMANDS, FleetError, ask_each
+from fleet.options import address_options, fleet_session, json_option
+from fleet.payload import part, text, whole
+from fleet.roll_call import alive, chosen
+from fleet.session import NO_COMMANDS, FleetError, answer_of, ask_each
 from payloads.keys import LOG_LIST, LOG_READ, ZenohKey
 from payloads.mission_data import Json
+from storage.os_error import reason
+from terminal.options import PATH
+from terminal.printing import print_json
+from terminal.sentences import fail, say
 
 _TIMEOUT_S = 30.0
 #: The limit for a piece; a bridge sends 64 kB.
@@ -67,14 +76,11 @@ def fetch_log(
 
 
 def _again(session: zenoh.Session, prefix: str, vehicle: str, request: bytes) -> Json:
-    for attempt in range(_TRIES):
-        try:
+    for _ in range(_TRIES - 1):
+        with suppress(NoReply):
             return _ask(session, prefix, vehicle, LOG_READ, request)
-        except NoReply:
-            if attempt == _TRIES - 1:
-                raise
-            time.sleep(_PAUSE_S)
-    raise AssertionError
+        time.sleep(_PAUSE_S)
+    return _ask(session, prefix, vehicle, LOG_READ, request)
 
 
 def _piece(result: Json, start: int) -> tuple[bytes, int]:
@@ -95,12 +101,56 @@ class NoReply(FleetError):
 
 def _ask(session: zenoh.Session, prefix: str, vehicle: str, key: ZenohKey, payload: bytes | None) -> Json:
     for _, reply in ask_each(session, prefix, [vehicle], key.suffix, _TIMEOUT_S, payload):
-        if reply is None:
-            break
-        data = decode(reply.ok or reply.err) or {}  # type: ignore[arg-type]
-        if reply.ok is None and text(data, "error"):
-            raise FleetError(f"{vehicle}: {text(data, 'error')}")
-        result = part(data, "result")
-        if isinstance(result, dict):
+        if reply is not None:
+            result, error = answer_of(reply)
+            if result is None:
+                raise FleetError(f"{vehicle}: {error}")
             return result
     raise NoReply(f"{vehicle} {NO_COMMANDS}")
+
+
+@click.command("logs", short_help="List and fetch a vehicle's telemetry logs.")
+@click.option("--vehicle", required=True, metavar="NAME", help="The vehicle.")
+@click.argument("names", metavar="[LOG]...", nargs=-1)
+@click.option("--folder", type=PATH, default=Path(), help="Folder to save them in; by default the current one.")
+@click.option(
+    "--rate", type=click.FloatRange(1), default=20.0, show_default=True, help="The maximum rate over the link, kB/s."
+)
+@address_options
+@json_option
+def fleet_logs(vehicle: str, names: tuple[str, ...], folder: Path, rate: float, as_json: bool, **where: Any) -> None:
+    """List a vehicle's telemetry logs, or fetch those named.
+
+    The vehicle must accept commands. A fetch that was interrupted continues where it stopped: run it again. Each log
+    becomes a file whose name begins with the vehicle's.
+    """
+    with fleet_session(where) as (session, prefix):
+        chosen(alive(session, prefix), (vehicle,), prefix)
+        logs = {log.name: log for log in list_logs(session, prefix, vehicle)}
+        for name in names:
+            if name not in logs or Path(name).name != name:
+                fail(f"{vehicle} has no log {name!r}: `naze-bridge fleet logs --vehicle {vehicle}` lists them")
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            for name in names:
+                with click.progressbar(length=logs[name].size, label=name) as bar:
+                    fetch_log(
+                        session,
+                        prefix,
+                        vehicle,
+                        logs[name],
+                        folder / f"{vehicle} {name}",
+                        rate * 1000,
+                        lambda size, bar=bar: bar.update(size - bar.pos),  # type: ignore[misc]
+                    )
+        except OSError as error:
+            fail(f"{folder} cannot be written: {reason(error)}")
+    if names:
+        return
+    if as_json:
+        print_json({"logs": [asdict(log) for log in logs.values()]})
+        return
+    for log in logs.values():
+        click.echo(f"{log.name}  {log.size / 1000:,.0f} kB")
+    if not logs:
+        say(f"{vehicle} has no telemetry logs", to_error=True)

@@ -89,7 +89,9 @@ def vehicles_options(command: F) -> F:
 
 
 staged_option = click.option(
-    "--staged", is_flag=True, help="A tenth of the vehicles first, then the rest; stop at the first failure."
+    "--staged",
+    is_flag=True,
+    help="One vehicle first, then 1, 2, 4, 8 and so on; stop at the first failure. Run it again to continue.",
 )
 
 

@@ -4,25 +4,20 @@
 `FleetPush` keeps the progress of each vehicle; `push` feeds it from zenoh.
 """
 
-from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import zenoh
 
 from fleet.payload import decode, part, text, whole
-from fleet.roll_call import replies_of
-from fleet.session import NO_COMMANDS, ask_each
-from fleet.vehicle import BridgeId
-from payloads.keys import STATE, ZenohKey, full
+from fleet.session import NO_COMMANDS, NOT_UNDERSTOOD, ask_each
+from payloads.keys import ZenohKey
 from payloads.mission_data import ACCEPTED, Json
 
 #: 146 records take 2 s at 115200 baud and half a minute at 9600; a bad line may double that.
 _PUSH_TIMEOUT_S = 120.0
-_STATE_TIMEOUT_S = 2.0
 _LOOK = "`naze-bridge fleet list` shows what it holds"
 _LOST = f"it or the router disconnected before the result was known; {_LOOK} when it is back"
-_TWO = "several bridges use this name, and the file is for one: give each its own name (zenoh.vehicle)"
 _TOO_LATE = f"no result after {_PUSH_TIMEOUT_S:.0f} s; {_LOOK}"
 
 
@@ -44,11 +39,10 @@ class PushState:
 
 
 class FleetPush:
-    """Every vehicle's progress, by name. A name used by several bridges fails at once."""
+    """Every vehicle's progress, by name."""
 
-    def __init__(self, names: Iterable[str], bridges: Iterable[BridgeId]) -> None:
-        uses = Counter(bridge.vehicle for bridge in bridges)
-        self.vehicles = {name: PushState(name, error=_TWO if uses[name] > 1 else None) for name in names}
+    def __init__(self, names: Iterable[str]) -> None:
+        self.vehicles = {name: PushState(name) for name in names}
 
     @property
     def waiting(self) -> list[str]:
@@ -93,7 +87,7 @@ class FleetPush:
             if result.get("ack") == ACCEPTED:
                 progress.result = result
             else:
-                progress.error = text(result, "text") or "this version does not understand its reply"
+                progress.error = text(result, "text") or NOT_UNDERSTOOD
 
     def refused(self, vehicle: str, error: Json | None) -> None:
         """Take an error reply; None: zenoh's own, a timeout."""
@@ -101,18 +95,21 @@ class FleetPush:
         if not progress.is_done:
             progress.error = _TOO_LATE if error is None else text(error, "error") or "it gives no reason"
 
-    def ended(self, vehicle: str, *, is_alive: bool) -> None:
-        """Take the end of the replies; `is_alive` without any reply means that the command is switched off."""
+    def held(self, vehicle: str, text: str) -> None:
+        """Take a vehicle that needs no push, because it holds the mission already."""
+        self.vehicles[vehicle].result = {"ack": ACCEPTED, "text": text}
+
+    def ended(self, vehicle: str) -> None:
+        """Take the end of the replies."""
         progress = self.vehicles[vehicle]
         if not progress.is_done:
-            progress.error = NO_COMMANDS if is_alive and progress.total is None else _LOST
+            progress.error = NO_COMMANDS if progress.total is None else _LOST
 
 
 def push(
     session: zenoh.Session,
     prefix: str,
     fleet: FleetPush,
-    bridges: Collection[BridgeId],
     file: bytes,
     show: Callable[[FleetPush], None],
     *,
@@ -121,18 +118,14 @@ def push(
 ) -> None:
     """Send the file to all and wait until each is done; `show` is called after every change.
 
-    `staged`: a tenth of the vehicles first, then the others; after a failure no other one is started.
+    `staged`: one vehicle first, then each time as many as have it; after a failure no other one is started.
     """
     show(fleet)
-    for stage in _stages(fleet.waiting, staged=staged):
+    for stage in stages(fleet.waiting) if staged else [fleet.waiting]:
         begun = fleet.begin(stage, staged=staged)
         for name, reply in ask_each(session, prefix, begun, key.suffix, _PUSH_TIMEOUT_S, file):
             if reply is None:
-                if not fleet.vehicles[name].is_done:
-                    # Neither its token nor a storage's reply proves that it is alive.
-                    own = [bridge for bridge in bridges if bridge.vehicle == name]
-                    state = replies_of(session, full(prefix, name, STATE.suffix), own, _STATE_TIMEOUT_S)
-                    fleet.ended(name, is_alive=bool(state))
+                fleet.ended(name)
             elif reply.ok is not None:
                 fleet.replied(name, decode(reply.ok))
             elif reply.err is not None:
@@ -140,6 +133,10 @@ def push(
             show(fleet)
 
 
-def _stages(names: list[str], *, staged: bool) -> list[list[str]]:
-    first = max(1, len(names) // 10) if staged else 0
-    return [names[:first], names[first:]]
+def stages(names: list[str]) -> Iterator[list[str]]:
+    """1, 1, 2, 4, 8... vehicles."""
+    done = 0
+    while done < len(names):
+        stage = names[done : done + max(done, 1)]
+        yield stage
+        done += len(stage)

@@ -9,6 +9,7 @@ import click
 import zenoh
 
 from fleet.conditions import Condition, matching
+from fleet.missions import Trial, try_mission
 from fleet.options import (
     address_options,
     fleet_session,
@@ -28,7 +29,6 @@ from fleet.tables import (
     push_table,
     verify_table,
 )
-from fleet.trial import Trial, try_mission
 from fleet.vehicle import BridgeId
 from payloads.keys import UPLOAD, ZenohKey
 from protocols.mission_file import MissionFileError, read_mission_file
@@ -85,9 +85,13 @@ def push_mission(
         if dry_run:
             _show_trials(try_mission(session, prefix, meant, bridges, mission), unknown, as_json)
             return
-        has_failed = push_file(
-            session, prefix, bridges, meant, mission, item_count, _MISSION, staged=staged, as_json=as_json
-        )
+        delivery = FleetPush(meant)
+        if staged:
+            # An interrupted push continues with the vehicles that do not hold the mission yet.
+            for trial in try_mission(session, prefix, meant, bridges, mission):
+                if trial.is_held:
+                    delivery.held(trial.vehicle, f"Mission held already: {trial.count} records")
+        has_failed = push_file(session, prefix, delivery, mission, item_count, _MISSION, staged=staged, as_json=as_json)
     end(unknown, is_bad=has_failed)
 
 
@@ -133,8 +137,7 @@ def require_choice(names: tuple[str, ...], to_all: bool) -> None:
 def push_file(
     session: zenoh.Session,
     prefix: str,
-    bridges: set[BridgeId],
-    meant: list[str],
+    delivery: FleetPush,
     file: bytes,
     count: int,
     what: Pushed,
@@ -143,10 +146,10 @@ def push_file(
     as_json: bool,
 ) -> bool:
     """Push a file with `count` parts and print the outcome; True if a vehicle failed."""
-    delivery, is_stopped = FleetPush(meant, bridges), False
+    is_stopped = False
     try:
         with push_bars(count) as show:
-            push(session, prefix, delivery, bridges, file, show, staged=staged, key=what.key)
+            push(session, prefix, delivery, file, show, staged=staged, key=what.key)
     except KeyboardInterrupt:
         is_stopped = True
     if as_json:

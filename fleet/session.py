@@ -6,16 +6,16 @@ Not a peer, because peers that have only a router in common do not see each othe
 
 import json
 import queue
-import subprocess
-import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 
 import zenoh
 
+from fleet.payload import decode, part, text
 from payloads.endpoints import connect_endpoints, endpoint_trouble, in_short, tls_files
 from payloads.keys import full
+from payloads.mission_data import Json
 from payloads.zenoh_file import read_zenoh_file
 from storage.os_error import reason
 
@@ -24,14 +24,6 @@ DEFAULT_ENDPOINT = "tcp/localhost:7447"
 AT_ONCE = 50
 #: For peers that do not speak zenoh; zenoh's own default is 10 s.
 _OPEN_TIMEOUT_MS = 3000
-_TRY = "import sys, zenoh; zenoh.init_log_from_env_or('error'); zenoh.open(zenoh.Config.from_json5(sys.stdin.read()))"
-_TIMEOUT_S = 6.0
-#: The log messages of zenoh 1.10 on either side of a rejected handshake.
-_REASONS = {
-    "reason INVALID": "the router accepts no more sessions: raise transport/unicast/max_sessions in its configuration",
-    "reason GENERIC": "the router does not accept this user and password",
-    "in response to an InitSyn": "the router requires a user and a password: give them in --zenoh-config",
-}
 
 
 class FleetError(Exception):
@@ -50,12 +42,12 @@ def open_session(connect: Sequence[str] = (), config_file: Path | None = None) -
     try:
         return zenoh.open(config)
     except zenoh.ZError as error:
-        trouble = _refusal(config) or endpoint_trouble(endpoints, tls_files(config))
-        raise FleetError(f"cannot join the fleet: {trouble}") from error
+        raise FleetError(f"cannot join the fleet: {endpoint_trouble(endpoints, tls_files(config))}") from error
 
 
-#: Why a vehicle that is alive does not reply to a command.
-NO_COMMANDS = "accepts no commands: zenoh.commands is off there, or the router denies access"
+#: Why a vehicle does not reply to a command.
+NO_COMMANDS = "accepts no commands: zenoh.commands is off there, the router denies access, or it has just left"
+NOT_UNDERSTOOD = "this version does not understand its reply"
 
 
 def ask_each(
@@ -106,6 +98,16 @@ def send_query(
     )
 
 
+def answer_of(reply: zenoh.Reply) -> tuple[Json | None, str | None]:
+    """The result of a command, or why there is none."""
+    answer = reply.ok or reply.err
+    data = (answer and decode(answer)) or {}
+    result = part(data, "result")
+    if reply.ok is not None and isinstance(result, dict):
+        return result, None
+    return None, text(data, "error") or NOT_UNDERSTOOD
+
+
 def is_connected(session: zenoh.Session) -> bool:
     """True if the router (or the one vehicle) is connected at this moment."""
     return bool(session.info.routers_zid() or session.info.peers_zid())
@@ -139,19 +141,3 @@ def _from_file(path: Path) -> zenoh.Config:
         raise FleetError(f"{path} cannot be read: {reason(error)}") from error
     except zenoh.ZError as error:
         raise FleetError(f"{path} is not a zenoh configuration: {in_short(error)}") from error
-
-
-def _refusal(config: zenoh.Config) -> str | None:
-    """The router's reason, in one line; None if it gave none. Blocks for some seconds."""
-    try:
-        tried = subprocess.run(  # noqa: S603  # this Python, without any user input
-            [sys.executable, "-c", _TRY],
-            input=str(config),
-            capture_output=True,
-            text=True,
-            timeout=_TIMEOUT_S,
-            check=False,
-        )
-    except (subprocess.TimeoutExpired, OSError):
-        return None
-    return next((said for sign, said in _REASONS.items() if sign in tried.stdout), None)

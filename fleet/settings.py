@@ -1,17 +1,33 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The settings of many vehicles: read, compared, and what a file would change."""
+"""`fleet settings`: the flight controllers' settings of many vehicles, compared and restored."""
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
 
+import click
 import zenoh
+from rich.table import Column, Table
+from rich.text import Text
 
-from fleet.payload import decode, part, text
-from fleet.session import NO_COMMANDS, ask_each
-from payloads.keys import SETTINGS_LIST, SETTINGS_PLAN
+from fleet.conditions import Condition
+from fleet.options import address_options, fleet_session, json_option, staged_option, vehicle_option, vehicles_options
+from fleet.payload import part, text
+from fleet.push import FleetPush
+from fleet.push_command import Pushed, end, push_file, require_choice, vehicles_meant
+from fleet.roll_call import alive, chosen
+from fleet.session import NO_COMMANDS, NOT_UNDERSTOOD, answer_of, ask_each
+from fleet.tables import in_few_words
+from payloads.keys import SETTINGS_LIST, SETTINGS_PLAN, SETTINGS_RESTORE
 from payloads.mission_data import Json
 from payloads.settings_comparison import SettingValues, setting_values
-from protocols.param_file import is_equal
+from protocols.param_file import ParamFileError, is_equal, read_param_file, shown_value
+from terminal.command_group import CommandGroup
+from terminal.files import read_file, shown_path
+from terminal.options import PATH
+from terminal.printing import print_json, print_table
+from terminal.sentences import UNREADABLE, fail
 
 #: INAV's table takes some seconds.
 _TIMEOUT_S = 40.0
@@ -50,14 +66,14 @@ def read_settings(session: zenoh.Session, prefix: str, names: Collection[str]) -
     for name, reply in ask_each(session, prefix, names, SETTINGS_LIST.suffix, _TIMEOUT_S):
         if reply is None:
             continue
-        result, found[name].error = _result(reply)
+        result, found[name].error = answer_of(reply)
         if result is None:
             continue
         try:
             found[name].values = setting_values(part(result, "values"))
             found[name].board = text(result, "board") or ""
         except ValueError as error:
-            found[name].error = f"this version does not understand its reply: {error}"
+            found[name].error = f"{NOT_UNDERSTOOD}: {error}"
     return list(found.values())
 
 
@@ -66,7 +82,7 @@ def try_settings(session: zenoh.Session, prefix: str, names: Collection[str], fi
     trials = {name: SettingsTrial(name) for name in names}
     for name, reply in ask_each(session, prefix, names, SETTINGS_PLAN.suffix, _TIMEOUT_S, file):
         if reply is not None:
-            result, trials[name].error = _result(reply)
+            result, trials[name].error = answer_of(reply)
             trials[name].plan = result
     return list(trials.values())
 
@@ -99,11 +115,114 @@ def _is_same(value: float | str | None, other: float | str | None) -> bool:
     return value is other or (value is not None and other is not None and is_equal(value, other))
 
 
-def _result(reply: zenoh.Reply) -> tuple[Json | None, str | None]:
-    """The result in a reply, or the error."""
-    answer = reply.ok or reply.err
-    data = None if answer is None else decode(answer)
-    result = None if data is None else part(data, "result")
-    if reply.ok is not None and isinstance(result, dict):
-        return result, None
-    return None, (None if data is None else text(data, "error")) or "this version does not understand its reply"
+_SETTINGS = Pushed(
+    SETTINGS_RESTORE,
+    "Restore",
+    "have saved these settings",
+    "stopped; restores in progress continue: `naze-bridge fleet settings diff` shows the settings later",
+)
+
+
+@click.group("settings", cls=CommandGroup)
+def fleet_settings() -> None:
+    """Compare and restore the flight controllers' settings of many vehicles."""
+
+
+@fleet_settings.command("diff")
+@vehicle_option
+@address_options
+@json_option
+def diff_settings(names: tuple[str, ...], as_json: bool, **where: Any) -> None:
+    """Show the settings in which vehicles differ: all that are alive, or those named.
+
+    Exit code 1: they differ, or the settings of one are not known.
+    """
+    with fleet_session(where) as (session, prefix):
+        held = read_settings(session, prefix, chosen(alive(session, prefix), names, prefix))
+    read = [each for each in held if each.error is None]
+    failed = [each for each in held if each.error is not None]
+    found = variants(read)
+    if as_json:
+        settings = {name: [asdict(variant) for variant in each] for name, each in found.items()}
+        print_json({"settings": settings, "errors": {each.vehicle: each.error for each in failed}})
+    else:
+        if found:
+            table = Table("Setting", Column("Value", justify="right"), "Vehicles", box=None, pad_edge=False)
+            for name, each in found.items():
+                for place, variant in enumerate(each):
+                    value = "-" if variant.value is None else shown_value(variant.value)
+                    table.add_row(name if place == 0 else "", Text(value), Text(in_few_words(variant.vehicles)))
+            print_table(table)
+        click.echo(f"{len(found)} settings differ between {len(read)} vehicles")
+        for vehicle in failed:
+            click.echo(f"{vehicle.vehicle}: {vehicle.error}", err=True)
+    if found or failed:
+        raise SystemExit(1)
+
+
+@fleet_settings.command("restore")
+@click.argument("file", type=PATH)
+@vehicles_options
+@staged_option
+@click.option("--dry-run", is_flag=True, help="Show what each vehicle would change; write nothing.")
+@address_options
+@json_option
+def restore_settings(
+    file: Path,
+    names: tuple[str, ...],
+    to_all: bool,
+    conditions: list[Condition],
+    staged: bool,
+    dry_run: bool,
+    as_json: bool,
+    **where: Any,
+) -> None:
+    """Write the settings of a .param file to vehicles, save them, and verify them there.
+
+    A vehicle that fails does not stop the others, unless --staged. Exit code 1: one does not have them (--dry-run:
+    could not take them).
+    """
+    require_choice(names, to_all)
+    data, count = _read(file)
+    with fleet_session(where) as (session, prefix):
+        _, found, unknown = vehicles_meant(session, prefix, names, conditions)
+        if dry_run:
+            _show_trials(try_settings(session, prefix, found, data), unknown, as_json)
+            return
+        has_failed = push_file(
+            session, prefix, FleetPush(found), data, count, _SETTINGS, staged=staged, as_json=as_json
+        )
+    end(unknown, is_bad=has_failed)
+
+
+def _read(file: Path) -> tuple[bytes, int]:
+    try:
+        data = read_file(file, ParamFileError)
+        return data, len(read_param_file(data, shown_path(file)).values)
+    except ParamFileError as error:
+        fail(error, UNREADABLE)
+
+
+def _show_trials(trials: list[SettingsTrial], unknown: str, as_json: bool) -> None:
+    cannot = [trial for trial in trials if trial.plan is None or trial.plan.get("left_out")]
+    if as_json:
+        print_json({"vehicles": [asdict(trial) for trial in trials], "failed": len(cannot)})
+    else:
+        table = Table("Vehicle", "Would change", Column("Details", overflow="fold"), box=None, pad_edge=False)
+        for trial in trials:
+            table.add_row(Text(trial.vehicle), *map(Text, _summary(trial)))
+        print_table(table)
+        click.echo(
+            f"{len(trials) - len(cannot)} of {len(trials)} vehicles could take all settings; nothing was written"
+        )
+    end(unknown, is_bad=bool(cannot))
+
+
+def _summary(trial: SettingsTrial) -> tuple[str, str]:
+    """The number of changes, and the rest in words."""
+    if trial.plan is None:
+        return "-", trial.error or ""
+    changes, left_out = (trial.plan.get(key) or [] for key in ("changes", "left_out"))
+    names = in_few_words([str(each.get("name")) for each in left_out])
+    details = [f"cannot be set: {names}"] if left_out else []
+    return str(len(changes)), "; ".join([*details, *filter(None, [trial.plan.get("notice")])])

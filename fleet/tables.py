@@ -9,9 +9,9 @@ from rich.progress import TaskID
 from rich.table import Table
 from rich.text import Text
 
+from fleet.missions import Trial
 from fleet.payload import text
 from fleet.push import FleetPush, PushState
-from fleet.trial import Trial
 from fleet.vehicle import FleetVehicle
 from payloads.mission_data import Json
 from terminal.printing import console, progress_bars
@@ -29,6 +29,7 @@ _ANSWERS = {
 #: Titles of columns whose cells are aligned to the right, and of those that may take several lines.
 _NUMBERS = ("Battery", "Latitude", "Longitude", "Height", "Heard", "Records")
 _FOLDED = ("Vehicle", "Details")
+_LISTED = ("Vehicle", "Speaks", "Armed", "Battery", "Latitude", "Longitude", "Height", "Mission")
 
 
 def _table(*titles: str, caption: Text | None = None) -> Table:
@@ -53,11 +54,20 @@ def watch_table(rows: Sequence[tuple[FleetVehicle, float | None, str]]) -> Table
 
 
 def fleet_table(fleet: Sequence[FleetVehicle]) -> Table:
-    titles = ("Vehicle", "Speaks", "Armed", "Battery", "Latitude", "Longitude", "Height", "Mission")
-    table = _table(*titles)
+    table = _table(*_LISTED)
     for vehicle in fleet:
         table.add_row(*_cells(vehicle))
     return table
+
+
+def fleet_lines(fleet: Sequence[FleetVehicle]) -> Iterator[str]:
+    """The same table for thousands of vehicles, which a Table would take seconds for."""
+    rows = [list(_LISTED), *([cell.plain for cell in _cells(vehicle)] for vehicle in fleet)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        cells = zip(_LISTED, row, widths, strict=True)
+        aligned = (cell.rjust(width) if title in _NUMBERS else cell.ljust(width) for title, cell, width in cells)
+        yield " ".join(aligned).rstrip()
 
 
 def complaints(fleet: Sequence[FleetVehicle]) -> list[str]:
@@ -144,29 +154,24 @@ def dry_run_table(trials: Sequence[Trial]) -> Table:
     """One row per vehicle, and below them the corrections, once for all vehicles that would hold the same records."""
     corrections = {trial.checksum: trial.corrections for trial in trials if trial.is_accepted}
     lines = [line for checksum, said in corrections.items() if said for line in ("", f"Stored as {checksum}:", *said)]
-    return _trial_table(trials, "Accepts it", lambda trial: (trial.is_accepted, ""), "\n".join(lines))
+    table = _table("Vehicle", "Records", "Checksum", "Accepts it", "Details", caption=Text("\n".join(lines)))
+    for trial in trials:
+        count = "" if trial.count is None else str(trial.count)
+        answer = _ANSWERS[trial.is_accepted]
+        table.add_row(Text(trial.vehicle), count, trial.checksum or "", answer, Text(trial.error or ""))
+    return table
 
 
 def verify_table(trials: Sequence[Trial]) -> Table:
-    """One row per vehicle: whether it holds the mission, and if not, what it holds instead."""
-    return _trial_table(trials, "Holds it", lambda trial: (trial.is_held, "" if trial.is_held else _held(trial)))
-
-
-def _held(trial: Trial) -> str:
-    if trial.held_count is None:
-        return "its mission is not known"
-    return f"holds {trial.held_count} records, {trial.held}" if trial.held_count else "holds no mission"
-
-
-def _trial_table(
-    trials: Sequence[Trial], question: str, answer: Callable[[Trial], tuple[bool | None, str]], caption: str = ""
-) -> Table:
-    table = _table("Vehicle", "Records", "Checksum", question, "Details", caption=Text(caption))
+    """One row per vehicle: the mission that it holds, and if that is another one, how it would hold the file."""
+    table = _table("Vehicle", "Records", "Checksum", "Holds it", "Details")
     for trial in trials:
-        known, details = answer(trial)
-        count = "" if trial.count is None else str(trial.count)
-        said = Text(trial.error or details)
-        table.add_row(Text(trial.vehicle), count, trial.checksum or "", _ANSWERS[known], said)
+        wanted = f"the file would be {trial.count} records, {trial.checksum}"
+        details = trial.error or ("" if trial.is_held else wanted)
+        held = ("", "not known") if trial.held_count is None else (str(trial.held_count), trial.held or "")
+        if trial.held_count == 0:
+            held = ("0", "none")
+        table.add_row(Text(trial.vehicle), *held, _ANSWERS[trial.is_held], Text(details))
     return table
 
 

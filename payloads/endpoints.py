@@ -90,7 +90,7 @@ def _trouble(endpoint: str, files: TlsFiles) -> str:
         return "a port is at most 65535"
     except OSError as error:
         return reason(error).lower()
-    return "a program listens there but rejected the session: check user and password, and that it is a zenoh router"
+    return "a program there rejected the session: check user, password, max_sessions, and that it is a zenoh router"
 
 
 def _tls_trouble(connection: socket.socket, host: str, files: TlsFiles) -> str:

@@ -210,7 +210,7 @@ def test_two_bridges_with_one_name_get_no_mission(fleet: Fleet, tmp_path: Path) 
         assert "owl: 2 bridges use this name" in " ".join(fleet.ask("list").stderr.split())
         before = fleet.daemons["owl"].pull()["records"]
         pushed = fleet.pushed(plan_file(tmp_path, plain_plan(4, start=7)), "--vehicle", "owl", code=1)
-        assert "several bridges use this name" in pushed["owl"]["error"]
+        assert "another bridge has the same vehicle name" in pushed["owl"]["error"]
         assert fleet.daemons["owl"].pull()["records"] == before
         assert "several bridges use this name" in fleet.ask("pull", "--vehicle", "owl").stderr
     finally:

@@ -152,7 +152,7 @@ def refused(listed: subprocess.CompletedProcess[str]) -> str:
 def test_a_wrong_password_is_one_sentence(passwords: Fleet) -> None:
     config = passwords.config("pilot", "pilot")
     config.write_text(config.read_text().replace("change-me", "guessed"))
-    assert "does not accept this user and password" in refused(passwords.fleet_list(config))
+    assert "check user, password" in refused(passwords.fleet_list(config))
 
 
 Issue = Callable[[trustme.CA, trustme.CA], trustme.LeafCert]

@@ -34,9 +34,9 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fleet]:
 
 
 def test_a_log_is_listed_and_fetched(fleet: Fleet, tmp_path: Path) -> None:
-    listed = fleet.ask("logs", "kite", "--json")
+    listed = fleet.ask("logs", "--vehicle", "kite", "--json")
     assert json.loads(listed.stdout)["logs"] == [{"name": NAME, "size": len(CONTENT)}]
-    fetched = fleet.ask("logs", "kite", NAME, "--folder", tmp_path, "--rate", "1000")
+    fetched = fleet.ask("logs", "--vehicle", "kite", NAME, "--folder", tmp_path, "--rate", "1000")
     assert fetched.returncode == 0, fetched
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {f"kite {NAME}": CONTENT}
 
@@ -44,7 +44,7 @@ def test_a_log_is_listed_and_fetched(fleet: Fleet, tmp_path: Path) -> None:
 def test_an_interrupted_fetch_continues(fleet: Fleet, tmp_path: Path) -> None:
     partial = tmp_path / f"kite {NAME}.part"
     where = ("--folder", str(tmp_path), "--connect", fleet.router.endpoint)
-    slow = Program(tmp_path / "fetch.log", "fleet", "logs", "kite", NAME, "--rate", "1", *where)
+    slow = Program(tmp_path / "fetch.log", "fleet", "logs", "--vehicle", "kite", NAME, "--rate", "1", *where)
     try:
         until(lambda: partial.exists() and partial.stat().st_size, "the first piece")
     finally:
@@ -69,12 +69,12 @@ def test_a_fetch_keeps_to_its_rate(fleet: Fleet, tmp_path: Path, monkeypatch: py
 def test_a_vehicle_without_logs_is_reported_as_such(fleet: Fleet) -> None:
     fleet.start("jay", commands=I_KNOW)
     fleet.wait("kite", "owl", "jay")
-    listed = fleet.ask("logs", "jay")
+    listed = fleet.ask("logs", "--vehicle", "jay")
     assert (listed.returncode, listed.stdout, listed.stderr) == (0, "", "jay has no telemetry logs\n")
 
 
 def test_what_cannot_be_fetched_is_one_sentence(fleet: Fleet, tmp_path: Path) -> None:
-    unknown = fleet.ask("logs", "kite", "2020-01-01 00-00-00.tlog", "--folder", tmp_path)
+    unknown = fleet.ask("logs", "--vehicle", "kite", "2020-01-01 00-00-00.tlog", "--folder", tmp_path)
     assert (unknown.returncode, "kite has no log '2020-01-01 00-00-00.tlog'" in unknown.stderr) == (1, True)
-    closed = fleet.ask("logs", "owl")
+    closed = fleet.ask("logs", "--vehicle", "owl")
     assert (closed.returncode, "owl accepts no commands" in closed.stderr) == (1, True)

@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The bookkeeping of a push to many vehicles: with events in any order, each ends exactly once with its own reason."""
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fleet.push import FleetPush
-from fleet.vehicle import BridgeId
+from fleet.push import FleetPush, stages
 
 ACCEPTED = {"result": {"ack": "MAV_MISSION_ACCEPTED", "text": "Mission verified: 3 records", "findings": []}}
 NAMES = ("a", "b", "c")
 
 
 def push_to(*names: str) -> FleetPush:
-    return FleetPush(names, [BridgeId(name, f"{number}") for number, name in enumerate(names)])
+    return FleetPush(names)
 
 
 def test_a_failure_does_not_affect_the_others() -> None:
@@ -21,7 +21,8 @@ def test_a_failure_does_not_affect_the_others() -> None:
     fleet.refused("b", {"error": "Armed: disarm to change the mission"})
     assert fleet.waiting == ["a", "c"]
     fleet.replied("a", ACCEPTED)
-    fleet.ended("c", is_alive=False)
+    fleet.replied("c", {"progress": 0, "of": 3})
+    fleet.ended("c")
     assert fleet.waiting == []
     assert [each.vehicle for each in fleet.failed] == ["b", "c"]
     assert fleet.vehicles["b"].error == "Armed: disarm to change the mission"
@@ -32,25 +33,19 @@ def test_a_failure_does_not_affect_the_others() -> None:
 def test_a_vehicle_that_disappears_after_its_success_has_not_failed() -> None:
     fleet = push_to("a")
     fleet.replied("a", ACCEPTED)
-    fleet.ended("a", is_alive=True)
-    fleet.ended("a", is_alive=False)
+    fleet.ended("a")
     assert fleet.failed == []
 
 
 def test_a_missing_result_has_one_of_three_reasons() -> None:
     fleet = push_to(*NAMES)
-    fleet.ended("a", is_alive=True)
-    fleet.ended("b", is_alive=False)
+    fleet.ended("a")
+    fleet.replied("b", {"progress": 0, "of": 3})
+    fleet.ended("b")
     fleet.refused("c", None)
     reasons = [str(each.error) for each in fleet.failed]
     words = ("accepts no commands", "disconnected", "no result after")
     assert [word in reason for word, reason in zip(words, reasons, strict=True)] == [True] * 3
-
-
-def test_a_name_used_by_two_bridges_gets_nothing() -> None:
-    fleet = FleetPush(["a", "b"], [BridgeId("a", "1"), BridgeId("a", "2"), BridgeId("b", "3")])
-    assert fleet.waiting == ["b"]
-    assert "several bridges" in str(fleet.vehicles["a"].error)
 
 
 def test_a_staged_push_begins_no_other_after_a_failure() -> None:
@@ -61,6 +56,13 @@ def test_a_staged_push_begins_no_other_after_a_failure() -> None:
     assert list(begun) == []
     assert [each.error for each in fleet.failed] == ["no"]
     assert [each.error for each in fleet.left_out] == ["a had failed"] * 2
+
+
+@pytest.mark.parametrize(("count", "sizes"), [(1, [1]), (3, [1, 1, 1]), (10, [1, 1, 2, 4, 2])])
+def test_stages_double_from_one_vehicle(count: int, sizes: list[int]) -> None:
+    names = [f"{number}" for number in range(count)]
+    assert [len(stage) for stage in stages(names)] == sizes
+    assert [name for stage in stages(names) for name in stage] == names
 
 
 def test_any_result_but_accepted_is_a_failure() -> None:
@@ -100,12 +102,12 @@ def test_each_vehicle_ends_exactly_once_in_any_order(events: list[tuple[str, str
             case "refused":
                 fleet.refused(name, answer)
             case "ended":
-                fleet.ended(name, is_alive=answer is None)
+                fleet.ended(name)
         for each in fleet.vehicles.values():
             if each.is_done:
                 assert ends.setdefault(each.vehicle, (each.result, each.error)) == (each.result, each.error)
                 assert (each.result is None) == (each.error is not None)
                 assert each.error != ""
     for name in fleet.waiting:
-        fleet.ended(name, is_alive=False)
+        fleet.ended(name)
     assert fleet.waiting == []

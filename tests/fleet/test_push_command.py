@@ -3,6 +3,7 @@
 
 import json
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -53,7 +54,9 @@ def test_a_mission_is_verified_by_checksum(fleet: Fleet, tmp_path: Path) -> None
     assert {name: each["is_held"] for name, each in vehicles.items()} == {"kite": True, "owl": True, "swift": False}
     checked = json.loads(run_naze_bridge("check", file, "--json").stdout)
     assert checked["checksum"] == vehicles["swift"]["checksum"] == fleet.daemons["kite"].pull()["checksum"]
-    assert "holds no mission" in fleet.ask("verify", file, "--vehicle", "swift").stdout
+    shown = fleet.ask("verify", file, "--vehicle", "swift").stdout.splitlines()
+    assert shown[-2].split()[:4] == ["swift", "0", "none", "no"]
+    assert f"the file would be 6 records, {checked['checksum']}" in shown[-2]
     result = fleet.ask("verify", file, "--vehicle", "kite", "--vehicle", "owl")
     assert (result.returncode, result.stdout.splitlines()[-1]) == (0, "2 of 2 vehicles hold the mission")
 
@@ -65,8 +68,29 @@ def test_a_staged_push_stops_at_the_first_failure(fleet: Fleet, tmp_path: Path) 
     assert "LAND must be last" in pushed["kite"]["error"]
     assert [pushed[name]["error"] for name in NAMES[1:]] == ["kite had failed"] * 2
     assert [fleet.daemons[name].pull()["records"] for name in NAMES] == before
-    pushed = fleet.pushed(plan_file(tmp_path, plain_plan(5)), "--all", "--staged", code=0)
+    file = plan_file(tmp_path, plain_plan(5))
+    fleet.pushed(file, "--vehicle", "kite", code=0)
+    pushed = fleet.pushed(file, "--all", "--staged", code=0)
     assert [pushed[name]["ok"] for name in NAMES] == [True] * 3
+    # A push that was interrupted continues: this vehicle had it.
+    assert pushed["kite"]["result"]["text"] == "Mission held already: 5 records"
+
+
+def test_a_staged_push_stops_at_an_armed_vehicle(tmp_path: Path) -> None:
+    with ExitStack() as stack:
+        fleet = Fleet(tmp_path, stack)
+        fleet.start("kite")
+        board = fleet.board("owl")
+        fleet.start("owl", fc=str(board.port))
+        fleet.start("swift")
+        fleet.wait(*NAMES)
+        board.set("armed 1")
+        until(lambda: fleet.listed()["owl"]["armed"], "the arming")
+        pushed = fleet.pushed(plan_file(tmp_path, plain_plan(5)), "--all", "--staged", code=1)
+        assert [pushed[name]["ok"] for name in NAMES] == [True, False, False]
+        assert "disarm" in pushed["owl"]["error"]
+        assert pushed["swift"]["error"] == "owl had failed"
+        assert fleet.daemons["swift"].pull()["count"] == 0
 
 
 def test_vehicles_are_selected_by_state(fleet: Fleet, tmp_path: Path) -> None:

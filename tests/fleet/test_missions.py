@@ -3,7 +3,7 @@
 
 import pytest
 
-from fleet.trial import Trial
+from fleet.missions import Trial
 
 
 @pytest.mark.parametrize(
