@@ -43,8 +43,8 @@ _CURRENT_S = 1.0
 _EARLY, _EARLIEST_S = 0.2, 0.05
 #: Replies to polls with at least this interval may be read together. A client of faster ones needs fresh values.
 _MAY_WAIT_S = 0.08
-#: A lost reply reduces all rates by a tenth, each received one restores a little: 1 % losses change nothing, 10 % halve
-#: the rates.
+#: A poll's first lost reply reduces all rates by a tenth, each received one restores a little: 1 % losses change nothing,
+#: 10 % halve the rates.
 _LOSS_FACTOR = 0.9
 _RECOVERY = 0.005
 _WORST_QUALITY = 0.1
@@ -225,9 +225,10 @@ class PollSchedule:
         return None if slot is None or slot.interval_s == inf else slot.interval_s
 
     def line_interval_s(self, command: Msp) -> float:
-        """The interval that the line's speed allows, seconds; 0 if it is not polled."""
+        """The interval that the line's speed and missions on it allow, seconds; 0 if it is not polled."""
         slot = self._slots.get(command)
-        return 0.0 if slot is None or slot.wanted_s == inf else self._interval(slot, self._line_scale)
+        scale = self._line_scale * (_BESIDE_MISSIONS if self._beside_missions else 1.0)
+        return 0.0 if slot is None or slot.wanted_s == inf else self._interval(slot, scale)
 
     def ask(self, link: MspLink, now: float, *, beside_missions: bool) -> None:
         """Send the requests that are due, and those nearly due with them, as far as the link has room."""
@@ -242,12 +243,6 @@ class PollSchedule:
                 return
             if slot.may_be_asked_at(link, room) > now + slot.early_s:
                 continue
-            if slot.is_asked:
-                slot.misses += 1
-                if slot.backoff > 1:
-                    # The board does not answer it: that is no loss of the line.
-                    self._quality = min(self._quality / _LOSS_FACTOR, 1.0)
-                self._set_intervals()
             slot.asked(now)
             self._free_at = max(self._free_at, now - _BURST_S) + slot.cost / self._budget
             link.send(slot.request, now)
@@ -291,11 +286,21 @@ class PollSchedule:
                 slot.followed_until = slot.followed_until if now < slot.followed_until else -inf
             self._unfollowed_at = min((slot.followed_until for slot in self._followed()), default=inf)
             self._fit()
-        lost, self._lost_before = link.requests_lost - self._lost_before, link.requests_lost
+        has_lost, self._lost_before = link.requests_lost != self._lost_before, link.requests_lost
+        lost: list[_Slot] = []
+        if has_lost:
+            lost = [slot for slot in self._slots.values() if slot.is_asked and not link.awaits(slot.poll.command)]
         if lost or beside_missions != self._beside_missions:
-            self._quality = max(self._quality * _LOSS_FACTOR**lost, _WORST_QUALITY)
+            for slot in lost:
+                slot.is_asked = False
+                slot.misses += 1
+            # A poll that the board does not answer is no loss of the line, nor is another request.
+            first = [slot for slot in lost if slot.misses == 1]
+            self._quality = max(self._quality * _LOSS_FACTOR ** len(first), _WORST_QUALITY)
             self._beside_missions = beside_missions
             self._set_intervals()
+            for slot in first:
+                slot.due = min(slot.due, now)  # asked again at once: a single loss makes no value stale
 
     def _followed(self) -> list[_Slot]:
         return [slot for slot in self._slots.values() if slot.followed_until > -inf and not slot.is_unknown]

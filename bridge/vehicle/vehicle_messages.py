@@ -135,11 +135,11 @@ class Moment:
         return made
 
     def altitude_m(self) -> float | None:
-        """Above mean sea level: home's altitude plus the height above it, finer than the GPS's whole metres."""
+        """Above mean sea level, by GPS, as in all other sinks; without it home's altitude plus the height above it."""
         home, height, position = self.vehicle.home, self.fresh(v.Height), self.fresh(v.GlobalPosition)
-        if home is None or home.altitude_m is None or height is None:
-            return None if position is None else position.altitude_m
-        return home.altitude_m + height.height_m
+        if position is not None and position.altitude_m is not None:
+            return position.altitude_m
+        return None if home is None or home.altitude_m is None or height is None else home.altitude_m + height.height_m
 
 
 #: Makes a message of the vehicle at a moment; raises Unknown if too little is known.

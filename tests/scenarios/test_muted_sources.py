@@ -107,6 +107,7 @@ NEEDED = {
 SHOWN: Mapping[str, tuple[str, Callable[[Message], Any]]] = {
     "attitude.roll_deg": ("ATTITUDE", lambda msg: math.degrees(msg.roll)),
     "position.height_m": ("GLOBAL_POSITION_INT", lambda msg: msg.relative_alt / 1000),
+    "position.altitude_m": ("GLOBAL_POSITION_INT", lambda msg: msg.alt / 1000),
     "position.climb_m_s": ("VFR_HUD", lambda msg: None if math.isnan(msg.climb) else msg.climb),
     "gps.ground_speed_m_s": ("VFR_HUD", lambda msg: None if math.isnan(msg.groundspeed) else msg.groundspeed),
     "position.lat_deg": ("GPS_RAW_INT", lambda msg: msg.lat / 1e7),
@@ -296,3 +297,16 @@ def test_a_muted_source_is_unknown_in_all_sinks_and_the_others_go_on(board: str,
     sinks.muted_at = math.inf
     for _ in range(10):
         sinks.step()
+
+
+@pytest.mark.parametrize("number", [20, 101, 102, 0x2000])
+def test_a_request_that_inav_does_not_answer_blanks_no_other_value(number: int) -> None:
+    """Without a ground station, so that polls are due once a second. 20 is asked before each mission list."""
+    world = World(peer=MutedBoard(make_board("inav")))
+    world.wait_ready(30)
+    world.naze.muted = frozenset([number])
+    for _ in range(600):
+        world.run(STEP_S)
+        report = world.bridge.report(world.now)
+        shown = report.battery.voltage_v, report.position.lat_deg, report.gps.fix, report.position.height_m
+        assert None not in shown, (world.now, shown)

@@ -130,6 +130,23 @@ def test_an_unanswered_poll_slows_down_without_delaying_others() -> None:
     assert line.run(10)[Msp.RAW_GPS] == pytest.approx(50, abs=3)
 
 
+def test_a_poll_is_asked_again_soon_after_a_single_loss() -> None:
+    line = Line()
+    line.run(10.5)
+    lost: list[float] = []
+
+    def lose_one(command: int) -> int | None:
+        if command == Msp.RAW_GPS and not lost:
+            lost.append(line.now)
+            return None
+        return answer_all(command)
+
+    line.answer = lose_one
+    line.run(3)
+    again = next(at for at, command in line.asked if command == Msp.RAW_GPS and at > lost[0])
+    assert again - lost[0] < 0.4
+
+
 @pytest.mark.parametrize(
     ("loss", "least", "most"), [(0.0, 1.0, 1.0), (0.01, 0.7, 1.0), (0.1, 0.2, 0.75), (0.5, 0.05, 0.2)]
 )
