@@ -35,7 +35,7 @@ from protocols.mission_item import ListIdentity, MissionItem, MissionResult
 from reports.finding import Finding, RejectingFinding, without_defaults
 from reports.verdict import Result, Verdict
 
-#: As a mission file in a command (service/zenoh_link/commands.py).
+#: As a mission file in a command (service/zenoh_link/answers.py).
 _MOST_ITEMS = 1000
 #: How often a conversation checks if the vehicle has replied.
 _LOOK_S = 0.02

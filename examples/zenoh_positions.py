@@ -20,8 +20,6 @@ def main(endpoint: str) -> None:
     least_delay_s: dict[str, float] = {}
 
     def heard(sample: zenoh.Sample) -> None:
-        if not str(sample.encoding).startswith("application/json"):
-            return  # a vehicle may be set to CBOR: docs/zenoh.md
         key = str(sample.key_expr)
         vehicle = key.split("/")[1]
         position = json.loads(sample.payload.to_bytes())

@@ -13,10 +13,9 @@ from pathlib import Path
 import zenoh
 
 from fleet.payload import decode, part, text
-from payloads.endpoints import connect_endpoints, endpoint_trouble, in_short, tls_files
+from payloads.endpoints import connect_endpoints, endpoint_trouble, in_short, read_zenoh_file, tls_files
 from payloads.keys import full
 from payloads.mission_data import Json
-from payloads.zenoh_file import read_zenoh_file
 from storage.os_error import reason
 
 DEFAULT_ENDPOINT = "tcp/localhost:7447"
@@ -46,7 +45,7 @@ def open_session(connect: Sequence[str] = (), config_file: Path | None = None) -
 
 
 #: Why a vehicle does not reply to a command.
-NO_COMMANDS = "accepts no commands: zenoh.commands is off there, the router denies access, or it has just left"
+NO_COMMANDS = "accepts no commands: zenoh.commands is off there, access is denied, or it or the router disconnected"
 NOT_UNDERSTOOD = "this version does not understand its reply"
 
 

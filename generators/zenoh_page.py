@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from itertools import groupby
 from pathlib import Path
 
-from generators.zenoh_schemas import schemas
-from payloads.compact import object_schema
+from generators.zenoh_schemas import object_schema, schemas
 from payloads.keys import KEYS
 from payloads.mission_data import Json
 

@@ -9,18 +9,19 @@ import json
 import types
 from dataclasses import is_dataclass
 from enum import Enum
+from pathlib import Path
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
-from payloads.compact import CBOR_KEY, SCHEMAS, object_schema
 from payloads.keys import VERSION
 from payloads.mission_data import Json
-from payloads.overview import Overview
+from payloads.overview import CBOR_NUMBERS, Overview
 from protocols.mission_item import MissionItem
 from reports import vehicle_groups as groups
 from reports.finding import Finding
 from reports.vehicle_groups import Group, VehicleReport
 from storage.mission_store import MissionSummary
 
+SCHEMAS = Path(__file__).parents[1] / "payloads" / "schemas"
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _TYPES = {float: "number", int: "integer", str: "string", bool: "boolean", types.NoneType: "null"}
 _ENVELOPE: Json = {
@@ -145,32 +146,17 @@ def schemas() -> dict[str, Json]:
     made["mission_report"] = upload | {"source": {"type": "string", "description": "the sender"}}
     files = {name: _file(name, _ENVELOPE | body) for name, body in made.items()}
     files["command_reply"] = _reply(_object(upload, required=("ack", "text")), items, findings)
-    return {name: numbered(schema, _published(name)) for name, schema in files.items()}
+    for name, number in CBOR_NUMBERS.items():
+        files["overview"]["properties"][name] |= {"cborKey": number}
+    return files
 
 
-def _published(name: str) -> Json:
-    path = SCHEMAS / f"{name}.json"
-    found: Json = json.loads(path.read_text()) if path.is_file() else {}
-    return found
-
-
-def numbered(schema: Json, published: Json) -> Json:
-    """Give each field its number: the published one, or for a new field the next free one."""
-    schema, inner, known = dict(schema), object_schema(schema), object_schema(published)
-    if inner is not schema and (choices := schema.get("anyOf")):
-        schema["anyOf"] = [numbered(each, known) if each is inner else each for each in choices]
-    if items := schema.get("items"):
-        schema["items"] = numbered(items, known.get("items", {}))
-    if properties := schema.get("properties"):
-        before = known.get("properties", {})
-        last = max((each[CBOR_KEY] for each in before.values() if CBOR_KEY in each), default=-1)
-        fields: Json = {}
-        for name, field in properties.items():
-            number = before.get(name, {}).get(CBOR_KEY)
-            if number is None:
-                number = last = last + 1
-            fields[name] = numbered(field, before.get(name, {})) | {CBOR_KEY: number}
-        schema["properties"] = fields
+def object_schema(schema: Json) -> Json:
+    """The object's schema, possibly one of several types."""
+    for choice in schema.get("anyOf", ()):
+        if "properties" in choice or "items" in choice:
+            found: Json = choice
+            return found
     return schema
 
 

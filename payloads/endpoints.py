@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The endpoints of a zenoh configuration, and why one rejects a session: zenoh reports only that it did not connect."""
+"""A zenoh configuration: its file, its endpoints, and why one rejects a session: zenoh reports only that it failed."""
 
 import json
 import os
@@ -14,7 +14,19 @@ from typing import Any
 import zenoh
 
 from storage.os_error import reason
+from storage.small_files import read_bounded
 
+_TLS = "transport/link/tls"
+_MAX_BYTES = 1 << 20
+#: Settings that name a file.
+_FILES = (
+    f"{_TLS}/root_ca_certificate",
+    f"{_TLS}/listen_certificate",
+    f"{_TLS}/listen_private_key",
+    f"{_TLS}/connect_certificate",
+    f"{_TLS}/connect_private_key",
+    "transport/auth/usrpwd/dictionary_file",
+)
 _ENDPOINT = re.compile(r"(?P<protocol>[a-z_]+)/(?P<host>\[[^\]]*\]|[^:/?#]+):(?P<port>\d+)(?:[?#].*)?")
 _CONNECT_TIMEOUT_S = 2.0
 #: How long to wait for a rejection of our own certificate: in TLS 1.3 it comes after the handshake.
@@ -22,6 +34,24 @@ _REFUSAL_S = 0.5
 #: X509_V_ERR_CERT_NOT_YET_VALID and _HAS_EXPIRED: a Pi without a network resumes the time of its last shutdown.
 _BY_CLOCK = (9, 10)
 _OVER_TCP = ("tcp", "tls", "ws")
+
+
+def read_zenoh_file(path: Path) -> zenoh.Config:
+    """Read a configuration, whose files are in its folder; zenoh.ZError if it is not one.
+
+    OSError if it or a file that it names cannot be read. zenoh itself would look in the working directory, and would
+    read a device or wait for a pipe without end.
+    """
+    read_bounded(path, _MAX_BYTES)
+    config = zenoh.Config.from_file(path)
+    for setting in _FILES:
+        name = json.loads(config.get_json(setting))
+        if name:
+            file = path.absolute().parent / name
+            if file.exists():
+                read_bounded(file, _MAX_BYTES)
+            config.insert_json5(setting, json.dumps(str(file)))
+    return config
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,13 +17,6 @@ VERSION = 1
 _V = f"v{VERSION}"
 
 
-class PayloadEncoding(Enum):
-    """The encoding of payloads."""
-
-    JSON = "json"
-    CBOR = "cbor"
-
-
 class SampleDelivery(Enum):
     """The quality of service of a sample."""
 
@@ -44,15 +37,13 @@ class QueryKind(Enum):
 class ZenohKey:
     """One key. `schema`: file name below schemas/, without its suffix; None: the payload is raw MAVLink.
 
-    `kept`: the number of samples kept for subscribers that lost some; 0: none. `encoding`: None for the one in the
-    settings.
+    `kept`: the number of samples kept for subscribers that lost some; 0: none.
     """
 
     suffix: str
     schema: str | None
     delivery: SampleDelivery
     kept: int = 0
-    encoding: PayloadEncoding | None = None
 
     @property
     def is_published(self) -> bool:
@@ -67,7 +58,7 @@ class ZenohKey:
 
 TELEMETRY = {group: ZenohKey(f"{_V}/telemetry/{group.value}", group.value, SampleDelivery.DROP) for group in Group}
 STATE = ZenohKey(f"{_V}/state", "state", SampleDelivery.DROP, kept=1)
-OVERVIEW = ZenohKey(f"{_V}/overview", "overview", SampleDelivery.DROP, encoding=PayloadEncoding.CBOR)
+OVERVIEW = ZenohKey(f"{_V}/overview", "overview", SampleDelivery.DROP)
 EVENT = ZenohKey(f"{_V}/event", "event", SampleDelivery.RELIABLE, kept=256)
 MISSION_CURRENT = ZenohKey(f"{_V}/mission/current", "mission_current", SampleDelivery.RELIABLE, kept=1)
 MISSION_LIST = ZenohKey(f"{_V}/mission/list", "mission_list", SampleDelivery.REPLY)
@@ -80,13 +71,12 @@ COMMANDS = f"@cmd/{_V}"
 
 
 def _command(name: str) -> ZenohKey:
-    return ZenohKey(f"{COMMANDS}/{name}", "command_reply", SampleDelivery.REPLY, encoding=PayloadEncoding.JSON)
+    return ZenohKey(f"{COMMANDS}/{name}", "command_reply", SampleDelivery.REPLY)
 
 
 UPLOAD = _command("mission/upload")
 CHECK = _command("mission/check")
 CLEAR = _command("mission/clear")
-RESTORE = _command("mission/restore")
 STATUS = _command("status")
 SETTINGS_LIST = _command("settings/list")
 SETTINGS_PLAN = _command("settings/plan")
@@ -94,7 +84,7 @@ SETTINGS_RESTORE = _command("settings/restore")
 LOG_LIST = _command("log/list")
 LOG_READ = _command("log/read")
 COMMAND_KEYS = (
-    *(UPLOAD, CHECK, CLEAR, RESTORE, STATUS),
+    *(UPLOAD, CHECK, CLEAR, STATUS),
     *(SETTINGS_LIST, SETTINGS_PLAN, SETTINGS_RESTORE),
     *(LOG_LIST, LOG_READ),
 )

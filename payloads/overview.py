@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
+import cbor2
+
 from payloads.mission_data import Json
 from reports.vehicle_groups import Progress
 
@@ -35,6 +37,10 @@ class Overview:
     def marks(self) -> object:
         """The values whose change is sent at once."""
         return self.link, self.armed, self.mode, self.mission_count, self.mission_checksum, self.mission_state
+
+
+#: The schema's `cborKey`. A field keeps its number as long as the keys keep their version: new fields come last.
+CBOR_NUMBERS = {name: number for number, name in enumerate(("v", "seq", "time_s", *Overview.__annotations__))}
 
 
 def overview_of(state: Json) -> Overview:
@@ -87,6 +93,19 @@ def state_of(overview: Json) -> Json:
             "state": named("mission_state", _PROGRESS),
         },
     }
+
+
+def packed(body: Json) -> bytes:
+    """Encode an overview with its envelope, in CBOR with a number per field instead of its name."""
+    return cbor2.dumps({CBOR_NUMBERS[name]: value for name, value in body.items()})
+
+
+def unpacked(data: bytes) -> Json:
+    """Decode an overview; ValueError or cbor2.CBORError if that is impossible. Unknown numbers are ignored."""
+    values = cbor2.loads(data)
+    if not isinstance(values, Mapping):
+        raise ValueError("an overview is a map")
+    return {name: values[number] for name, number in CBOR_NUMBERS.items() if number in values}
 
 
 def _whole(value: float | None, scale: float) -> int | None:

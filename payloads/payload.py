@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Payloads: plain data in JSON or compact CBOR, with a version, a sequence number and a time."""
+"""Payloads: plain data in JSON, or compact CBOR for the overview, with a version, a sequence number and a time."""
 
 import json
 from collections.abc import Callable
@@ -7,58 +7,49 @@ from typing import Any
 
 import zenoh
 
-from payloads import compact
-from payloads.keys import COMMAND_KEYS, OVERVIEW, VERSION, PayloadEncoding, ZenohKey
+from payloads.keys import COMMAND_KEYS, OVERVIEW, VERSION, ZenohKey
 from payloads.mission_data import Json, to_json
+from payloads.overview import packed, unpacked
 
 _write_json = json.JSONEncoder(separators=(",", ":"), allow_nan=False).encode
 _SCHEMA = f"naze-bridge/v{VERSION}/"
 
 
-def encoding_of(key: ZenohKey, encoding: PayloadEncoding) -> zenoh.Encoding:
-    """The encoding of a sample. CBOR names its schema, as in "application/cbor;naze-bridge/v1/state".
+def encoding_of(key: ZenohKey) -> zenoh.Encoding:
+    """The encoding of a sample: JSON, and CBOR for the overview, with its schema's name.
 
-    JSON does not: zenohd's REST plugin shows it as such only without a suffix. There the attachment names the schema.
+    With JSON the attachment names the schema: zenohd's REST plugin shows it as such only without a suffix.
     """
     if key.schema is None:
         return zenoh.Encoding.APPLICATION_OCTET_STREAM
-    if encoding is PayloadEncoding.JSON:
-        return zenoh.Encoding.APPLICATION_JSON
-    return zenoh.Encoding.APPLICATION_CBOR.with_schema(_SCHEMA + key.schema)
+    if key is OVERVIEW:
+        return zenoh.Encoding.APPLICATION_CBOR.with_schema(_SCHEMA + key.schema)
+    return zenoh.Encoding.APPLICATION_JSON
 
 
-def attachment_of(key: ZenohKey, encoding: PayloadEncoding) -> str | None:
+def attachment_of(key: ZenohKey) -> str | None:
     """The attachment of a sample, as in "naze-bridge/v1/state"; None if it has none."""
-    return None if key.schema is None or encoding is PayloadEncoding.CBOR else _SCHEMA + key.schema
+    return None if key.schema is None or key is OVERVIEW else _SCHEMA + key.schema
 
 
 def decoded(data: bytes, encoding: str) -> Any:
     """The contents of `data`, by the encoding of its sample; ValueError or cbor2.CBORError if it cannot be read."""
-    kind, _, schema = encoding.partition(";")
-    if kind == str(zenoh.Encoding.APPLICATION_CBOR):
-        return compact.loads(schema.removeprefix(_SCHEMA), data)
+    if encoding.startswith(str(zenoh.Encoding.APPLICATION_CBOR)):
+        return unpacked(data)
     return json.loads(data)
+
+
+def encode(key: ZenohKey, body: Json) -> bytes:
+    """Encode a payload. May be called on any thread."""
+    return packed(body) if key is OVERVIEW else _write_json(body).encode()
 
 
 class Payloads:
     """Makes the payloads of one vehicle. Each key has its own sequence. `clock`: seconds since 1970 (UTC)."""
 
-    def __init__(self, encoding: PayloadEncoding, clock: Callable[[], float]) -> None:
-        self._encoding = encoding
+    def __init__(self, clock: Callable[[], float]) -> None:
         self._clock = clock
         self._next: dict[str, int] = {}
-
-    def encoding(self, key: ZenohKey) -> zenoh.Encoding:
-        return encoding_of(key, key.encoding or self._encoding)
-
-    def attachment(self, key: ZenohKey) -> str | None:
-        return attachment_of(key, key.encoding or self._encoding)
-
-    def encode(self, key: ZenohKey, body: Json) -> bytes:
-        """Encode a payload. May be called on any thread."""
-        if (key.encoding or self._encoding) is PayloadEncoding.CBOR and key.schema is not None:
-            return compact.dumps(key.schema, body)
-        return _write_json(body).encode()
 
     def _envelope(self, key: ZenohKey, seq: int) -> Json:
         time_s = self._clock()
@@ -75,4 +66,4 @@ class Payloads:
         if key in COMMAND_KEYS:
             return to_json(body).encode()
         seq = max(self._next.get(key.suffix, 0) - 1, 0)
-        return self.encode(key, self._envelope(key, seq) | body)
+        return encode(key, self._envelope(key, seq) | body)

@@ -81,7 +81,6 @@ DECODERS = {
 }
 #: They open files of the program itself or of the kernel, or a closed standard stream.
 OWN_FILES = {
-    "payloads/compact.py",
     "service/cli/helper/signature.py",
     "service/cli/program.py",
     "service/links/serial_ports.py",

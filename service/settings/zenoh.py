@@ -7,7 +7,6 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-from payloads.keys import PayloadEncoding
 from payloads.names import DEFAULT_PREFIX, check_name, host_name
 from service.settings.key import Example, Unfit, file_name, several, text
 
@@ -44,7 +43,6 @@ class ZenohSettings:
         "This vehicle's name, the second chunk; unique within a fleet. By default the host's name.",
         Example('"naze-1"'),
     ] = field(default_factory=host_name)
-    encoding: Annotated[PayloadEncoding, "Encoding of payloads: json or cbor."] = PayloadEncoding.JSON
     profile: Annotated[
         ZenohProfile,
         "Data volume: full sends each sample; metered a group every 5 s, or 30 s if unchanged, but arming at once.",

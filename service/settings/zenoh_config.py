@@ -6,9 +6,8 @@ from typing import Any
 
 import zenoh
 
-from payloads.endpoints import all_endpoints, in_short
+from payloads.endpoints import all_endpoints, in_short, read_zenoh_file
 from payloads.names import ZenohSettingsError
-from payloads.zenoh_file import read_zenoh_file
 from service.settings.zenoh import I_KNOW, ZenohProfile, ZenohSettings
 from storage.os_error import reason
 

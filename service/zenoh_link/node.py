@@ -23,7 +23,7 @@ from payloads.endpoints import connect_endpoints, endpoint_trouble, tls_files
 from payloads.keys import ZenohKey
 from payloads.mission_data import Json, plain
 from payloads.overview import overview_of
-from payloads.payload import Payloads
+from payloads.payload import Payloads, encode
 from reports.vehicle_groups import Group
 from service.daemon.api import DaemonApi
 from service.daemon.daemon import Daemon, Follower
@@ -31,8 +31,7 @@ from service.daemon.telemetry_logs import TelemetryLogs
 from service.recording.tlog_recorder import TLOG_FOLDER
 from service.settings.zenoh import ZenohProfile, ZenohSettings
 from service.settings.zenoh_config import make_config
-from service.zenoh_link.answers import Answers, mission_current, mission_report
-from service.zenoh_link.commands import CommandQueries
+from service.zenoh_link.answers import Answers, CommandQueries, mission_current, mission_report
 from service.zenoh_link.liveliness import Liveliness
 from service.zenoh_link.mavlink_link import MavlinkLink
 from service.zenoh_link.publisher import Publisher
@@ -58,7 +57,7 @@ class Node(Follower):
         self._endpoints, self._tls_files = connect_endpoints(config), tls_files(config)
         self._thread = SessionThread(config, self._declare)
         self._clock = SampleClock(self._loop.time)
-        self._payloads = Payloads(settings.encoding, self._clock.unix_s)
+        self._payloads = Payloads(self._clock.unix_s)
         self._publisher = Publisher(self._payloads, self._readers_changed)
         self._presence = Liveliness(settings.vehicle, self._emit)
         self._mavlink = MavlinkLink(self._publisher, daemon.gcs, self._presence.others)
@@ -105,7 +104,7 @@ class Node(Follower):
         """Publish an event, and soon after it the changed state."""
         about = {"level": event.level, "event": event.name_in_log, "facts": event.facts()}
         body = self._payloads.head(keys.EVENT) | about
-        self._thread.submit(lambda: self._publisher.put_raw(keys.EVENT, self._payloads.encode(keys.EVENT, body)))
+        self._thread.submit(lambda: self._publisher.put_raw(keys.EVENT, encode(keys.EVENT, body)))
         if event.level != "debug":
             self._publish_soon()
 
@@ -165,7 +164,7 @@ class Node(Follower):
     def _send_reliably(self, key: ZenohKey, body: Callable[[], Json]) -> None:
         """Publish on the session's thread, which also makes the body: for a long list that takes time."""
         head = self._payloads.head(key)
-        self._thread.submit(lambda: self._publisher.put_raw(key, self._payloads.encode(key, head | body())))
+        self._thread.submit(lambda: self._publisher.put_raw(key, encode(key, head | body())))
 
     def _publish_soon(self) -> None:
         """Publish the state and the mission once, for all changes of this moment."""

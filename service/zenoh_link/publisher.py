@@ -12,7 +12,7 @@ from zenoh import ext
 
 from payloads.keys import STATE, SampleDelivery, ZenohKey
 from payloads.mission_data import Json
-from payloads.payload import Payloads
+from payloads.payload import Payloads, attachment_of, encode, encoding_of
 from service.machine.threads import post
 
 #: How soon after a sample its number is published, so that a subscriber notices if the last one was lost.
@@ -43,7 +43,7 @@ class Publisher:
             return
         publisher = session.declare_publisher(
             name,
-            encoding=self._payloads.encoding(key),
+            encoding=encoding_of(key),
             congestion_control=zenoh.CongestionControl.DROP,
             priority=zenoh.Priority.DATA,
             # Lets a datagram link send it unreliably; TCP ignores it.
@@ -62,7 +62,7 @@ class Publisher:
         return ext.declare_advanced_publisher(
             session,
             name,
-            encoding=self._payloads.encoding(key),
+            encoding=encoding_of(key),
             congestion_control=zenoh.CongestionControl.BLOCK if reliable else zenoh.CongestionControl.DROP,
             # Each priority has its own queue: waiting samples do not delay telemetry.
             priority=zenoh.Priority.DATA_LOW if reliable else zenoh.Priority.DATA,
@@ -80,11 +80,11 @@ class Publisher:
         return key.suffix in self._read
 
     def put(self, key: ZenohKey, body: Json) -> None:
-        self.put_raw(key, self._payloads.encode(key, self._payloads.head(key) | body))
+        self.put_raw(key, encode(key, self._payloads.head(key) | body))
 
     def put_raw(self, key: ZenohKey, data: bytes) -> None:
         try:
-            self._publishers[key.suffix].put(data, attachment=self._payloads.attachment(key))
+            self._publishers[key.suffix].put(data, attachment=attachment_of(key))
         except zenoh.ZError:
             self.failed += 1
 

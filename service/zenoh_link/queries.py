@@ -11,7 +11,7 @@ import zenoh
 
 from payloads.keys import UPLOAD, QueryKind, ZenohKey
 from payloads.mission_data import Json, to_json
-from payloads.payload import Payloads
+from payloads.payload import Payloads, attachment_of, encoding_of
 from service.daemon.client import ControlError
 from service.machine.threads import post
 from service.zenoh_link.session import JobKind, SessionThread
@@ -68,8 +68,8 @@ class Question:
 
     def send(self, body: Json) -> None:
         """Send one reply; more may follow."""
-        data, encoding = self._payloads.reply(self._key, body), self._payloads.encoding(self._key)
-        attachment = self._payloads.attachment(self._key)
+        data, encoding = self._payloads.reply(self._key, body), encoding_of(self._key)
+        attachment = attachment_of(self._key)
 
         def reply() -> None:
             timestamp = self._thread.timestamp()
@@ -79,7 +79,7 @@ class Question:
 
     def refuse(self, error: QueryRefused) -> None:
         body = {"error": str(error)} | ({} if error.result is None else {"result": error.result})
-        answer = partial(self._query.reply_err, to_json(body).encode(), encoding=self._payloads.encoding(UPLOAD))
+        answer = partial(self._query.reply_err, to_json(body).encode(), encoding=encoding_of(UPLOAD))
         self._thread.submit(answer, self._reply_kind)
 
     def end(self) -> None:

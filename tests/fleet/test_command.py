@@ -26,12 +26,12 @@ NAMES = ("kite", "owl", "swift")
 
 @pytest.fixture(scope="module")
 def fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fleet]:
-    """`owl` uses CBOR; `swift` has an external flight controller, which can be armed."""
+    """`swift` has an external flight controller, which can be armed."""
     with ExitStack() as stack:
         fleet = Fleet(tmp_path_factory.mktemp("fleet"), stack)
         board = fleet.board("swift")
         fleet.start("kite")
-        fleet.start("owl", encoding="cbor")
+        fleet.start("owl")
         fleet.start("swift", fc=str(board.link))
         fleet.wait(*NAMES)
         yield fleet

@@ -15,12 +15,12 @@ def test_a_vehicle_with_any_name_has_a_rule_of_its_own(tmp_path: Path) -> None:
 
 
 def test_each_vehicle_gets_a_system_id_that_no_other_has(tmp_path: Path) -> None:
-    """Also those of a list from before there were ids; an expelled one's is free again."""
+    """Also those that were members before; the id of an expelled member is free again."""
 
     def enroll(name: str, *more: str) -> str:
         return run_naze_bridge("fleet", "enroll", name, "--folder", tmp_path, *more).stdout
 
-    (tmp_path / "members.json").write_text(json.dumps({"anna": "pilot", "kite": "vehicle"}))
+    (tmp_path / "members.json").write_text(json.dumps({"anna": {"role": "pilot"}, "kite": {"role": "vehicle"}}))
     assert "\nsysid = 2\n\n[zenoh]\n" in enroll("owl")
     assert "\nsysid = 1\n" in enroll("kite")
     assert "sysid" not in enroll("anna", "--role", "pilot")

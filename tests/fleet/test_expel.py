@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 import zenoh
 
-from payloads.zenoh_file import read_zenoh_file
+from payloads.endpoints import read_zenoh_file
 from tests.support.programs import TIMEOUT_S, free_port, run_naze_bridge, until
 from tests.support.zenoh_router import EXAMPLES, Router, running_router
 

@@ -81,7 +81,7 @@ def test_a_staged_push_stops_at_an_armed_vehicle(tmp_path: Path) -> None:
         fleet = Fleet(tmp_path, stack)
         fleet.start("kite")
         board = fleet.board("owl")
-        fleet.start("owl", fc=str(board.port))
+        fleet.start("owl", fc=board.fc)
         fleet.start("swift")
         fleet.wait(*NAMES)
         board.set("armed 1")

@@ -10,10 +10,9 @@ from rich.console import Console
 from fleet.vehicle import FleetVehicle
 from fleet.watch import Watch, watching
 from fleet.watch_screen import ScreenRow, screen
-from payloads import compact
-from payloads.keys import OVERVIEW, PayloadEncoding
+from payloads.keys import OVERVIEW
 from payloads.mission_data import plain
-from payloads.overview import Overview
+from payloads.overview import Overview, packed
 from payloads.payload import encoding_of
 from tests.support.programs import until
 
@@ -120,8 +119,8 @@ def test_only_vehicles_on_the_screen_send_their_states() -> None:
     config.insert_json5("scouting/multicast/enabled", "false")
     config.insert_json5("listen/endpoints", "[]")
     overview = Overview("MSP", False, "AUTO", 1234, None, None, -3, 146, 0xABCD, 90, 25, 3, 3)
-    cbor = compact.dumps("overview", {"time_s": 7} | plain(overview))
-    encoding = encoding_of(OVERVIEW, PayloadEncoding.CBOR)
+    cbor = packed({"time_s": 7} | plain(overview))
+    encoding = encoding_of(OVERVIEW)
     fields = ("battery_v", "height_m", "mission_checksum", "heading_deg", "speed_m_s", "fix", "mission_state")
     with zenoh.open(config) as session, watching(session, session, "fleet") as watch:
         states = [session.declare_publisher(f"fleet/{name}/v1/state") for name in ("kite", "owl")]

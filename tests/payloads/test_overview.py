@@ -1,12 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The overview of a vehicle fits 80 bytes."""
+"""The overview of a vehicle fits 80 bytes, and its numbers never change."""
+
+from contextlib import suppress
+
+import cbor2
+from hypothesis import given
+from hypothesis import strategies as st
 
 from bridge.model.craft import FlightMode
-from payloads import compact
-from payloads.keys import OVERVIEW, PayloadEncoding
+from payloads.keys import OVERVIEW
 from payloads.mission_data import plain
-from payloads.overview import overview_of
-from payloads.payload import Payloads
+from payloads.overview import CBOR_NUMBERS, overview_of, unpacked
+from payloads.payload import Payloads, encode
 from reports.vehicle_groups import (
     Attitude,
     Battery,
@@ -33,13 +38,29 @@ def state_of() -> VehicleReport:
 
 
 def test_the_longest_overview_of_a_day_fits() -> None:
-    payloads = Payloads(PayloadEncoding.JSON, lambda: 1_777_636_800.123)
+    payloads = Payloads(lambda: 1_777_636_800.123)
     overview = overview_of(plain(state_of()))
     for _ in range(86_400 // 10):
         payloads.head(OVERVIEW)
-    sample = payloads.encode(OVERVIEW, payloads.head(OVERVIEW) | plain(overview))
+    sample = encode(OVERVIEW, payloads.head(OVERVIEW) | plain(overview))
     assert len(sample) <= 80
-    read = compact.loads("overview", sample)
+    read = unpacked(sample)
     assert (read["battery_cv"], read["lat_e7"], read["lon_e7"]) == (2520, -453838123, -1784733456)
     assert (read["height_m"], read["mission_count"], read["mission_checksum"]) == (-1200, 146, 0xDEADBEEF)
     assert [read[name] for name in ("heading_deg", "speed_dm_s", "fix", "mission_state")] == [359, 402, 3, 2]
+
+
+def test_the_numbers_of_the_fields_are_those_published() -> None:
+    names = "v seq time_s link armed mode battery_cv lat_e7 lon_e7 height_m mission_count mission_checksum heading_deg"
+    assert list(CBOR_NUMBERS) == [*names.split(), "speed_dm_s", "fix", "mission_state"]
+    assert list(CBOR_NUMBERS.values()) == list(range(16))
+
+
+def test_an_unknown_number_is_ignored() -> None:
+    assert unpacked(cbor2.dumps({99: "news", 6: 1110})) == {"battery_cv": 1110}
+
+
+@given(st.binary(max_size=60))
+def test_garbage_is_a_value_error(data: bytes) -> None:
+    with suppress(ValueError, RecursionError, cbor2.CBORError):
+        unpacked(data)

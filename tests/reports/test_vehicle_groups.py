@@ -36,9 +36,9 @@ from bridge.model.vehicle import (
 )
 from bridge.vehicle import vehicle_messages as make
 from bridge.vehicle.vehicle_messages import Maker
-from payloads.keys import TELEMETRY, PayloadEncoding
+from payloads.keys import TELEMETRY
 from payloads.mission_data import plain
-from payloads.payload import Payloads, decoded
+from payloads.payload import Payloads, decoded, encode, encoding_of
 from protocols.mavlink.codec import FrameWriter, pack
 from protocols.msp.telemetry import Sensor
 from reports.vehicle_groups import Group
@@ -117,12 +117,11 @@ class Receivers:
 
     vehicle: Vehicle
     bridge: Bridge
-    encoding: PayloadEncoding
 
     def group(self, group: Group) -> Any:
-        key, payloads = TELEMETRY[group], Payloads(self.encoding, lambda: 0.0)
+        key, payloads = TELEMETRY[group], Payloads(lambda: 0.0)
         body = payloads.head(key) | plain(self.bridge.group(group, NOW))
-        return decoded(payloads.encode(key, body), str(payloads.encoding(key)))
+        return decoded(encode(key, body), str(encoding_of(key)))
 
     def message(self, maker: Maker) -> Any:
         """The message as received; None if it is not sent."""
@@ -139,9 +138,9 @@ def near_on_circle(value: float, other: float, within: float) -> bool:
     return abs((value - other + 180) % 360 - 180) <= within
 
 
-@given(READINGS, HOMES, st.sampled_from(PayloadEncoding))
+@given(READINGS, HOMES)
 def test_groups_have_the_values_of_mavlink_messages(
-    readings: tuple[Reading | None, ...], home: tuple[int, int] | None, encoding: PayloadEncoding
+    readings: tuple[Reading | None, ...], home: tuple[int, int] | None
 ) -> None:
     bridge = World(powered=False, plugged=False).bridge
     vehicle = bridge.vehicle
@@ -150,7 +149,7 @@ def test_groups_have_the_values_of_mavlink_messages(
             vehicle.hear(reading)
     if home is not None:
         vehicle.hear_home(*home)
-    receivers = Receivers(vehicle, bridge, encoding)
+    receivers = Receivers(vehicle, bridge)
     attitude_is_true(receivers)
     position_is_true(receivers)
     home_is_true(receivers)

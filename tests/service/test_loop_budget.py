@@ -19,7 +19,7 @@ from protocols.msp.frame import request
 from protocols.param_file import MOST_SETTINGS
 from service.daemon.api import DaemonApi
 from service.daemon.telemetry_logs import PIECE, TelemetryLogs
-from service.zenoh_link.commands import CommandQueries
+from service.zenoh_link.answers import CommandQueries
 from service.zenoh_link.queries import Question
 from storage.mission_store import MissionStore, ReceivedMission
 from tests.protocols.test_hostile_bytes import PATTERNS

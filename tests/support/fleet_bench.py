@@ -38,7 +38,6 @@ class Fleet:
         name: str = "",
         fc: str = "sim:",
         commands: str = I_KNOW,
-        encoding: str = "json",
         sysid: int = 1,
     ) -> Daemon:
         """Start a vehicle; `name` if it differs from its folder's."""
@@ -46,9 +45,7 @@ class Fleet:
         own.mkdir(exist_ok=True)
         config = own / "config.toml"
         config.write_text(
-            f"sysid = {sysid}\n"
-            f'[zenoh]\nvehicle = "{name or folder}"\nconnect = ["{self.router.endpoint}"]\nencoding = "{encoding}"\n'
-            + commands
+            f'sysid = {sysid}\n[zenoh]\nvehicle = "{name or folder}"\nconnect = ["{self.router.endpoint}"]\n' + commands
         )
         daemon = Daemon(own, fc, options=("--config", str(config)))
         self._stack.callback(daemon.end, signal.SIGKILL)

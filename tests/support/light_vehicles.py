@@ -14,14 +14,13 @@ from collections.abc import Callable, Sequence
 
 import zenoh
 
-from payloads import compact
-from payloads.keys import OVERVIEW, PayloadEncoding
+from payloads.keys import OVERVIEW
 from payloads.mission_data import plain
-from payloads.overview import Overview
+from payloads.overview import Overview, packed
 from payloads.payload import encoding_of
 
 SESSIONS = 20
-_ENCODING = encoding_of(OVERVIEW, PayloadEncoding.CBOR)
+_ENCODING = encoding_of(OVERVIEW)
 #: In place of the time, which is the same in all overviews: packing each again would take most of a core.
 _MARK = b"TIME"
 
@@ -71,7 +70,7 @@ def _overview(number: int) -> bytes:
         *("MSP", armed, "AUTO" if armed else "ACRO", 1234, 453838000 + number, 84733000, 20, 146, 0xABCD),
         *(number % 360, 25, 3, None),
     )
-    return compact.dumps("overview", {"v": 1, "seq": 0, "time_s": int.from_bytes(_MARK, "big")} | plain(overview))
+    return packed({"v": 1, "seq": 0, "time_s": int.from_bytes(_MARK, "big")} | plain(overview))
 
 
 def _now(payload: bytes) -> bytes:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from structlog.testing import capture_logs
 
-from service.links.port_memory import PORTS_FILE, PortMemory
+from service.links.port_finder import PORTS_FILE, PortMemory
 from service.machine.state_file import StateFile
 
 

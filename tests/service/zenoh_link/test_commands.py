@@ -17,8 +17,8 @@ from tests.support.plan import judge, plain_plan, plan_text, records_of
 from tests.support.programs import until
 from tests.support.zenoh_bench import I_KNOW, ask, ask_surely, endpoint, key, session, write_config, zenoh_bench
 
-UPLOAD, CHECK, CLEAR, RESTORE, STATUS = (
-    f"{COMMANDS}/{each}" for each in ("mission/upload", "mission/check", "mission/clear", "mission/restore", "status")
+UPLOAD, CHECK, CLEAR, STATUS = (
+    f"{COMMANDS}/{each}" for each in ("mission/upload", "mission/check", "mission/clear", "status")
 )
 
 
@@ -75,15 +75,9 @@ def test_a_check_changes_nothing(commanded: tuple[Bench, zenoh.Session]) -> None
 def test_a_list_is_cleared_and_restored(commanded: tuple[Bench, zenoh.Session]) -> None:
     bench, opened = commanded
     ask(opened, UPLOAD, mission_file(9))
-    number = bench.daemon.missions()[0]["number"]
     (cleared,) = ask(opened, CLEAR)
     assert cleared["result"]["verdict"] == "CLEARED"
     assert bench.board.records() == []
-    (restored,) = ask(opened, f"{RESTORE}?number={number}")
-    assert restored["result"]["ack"] == "MAV_MISSION_ACCEPTED"
-    assert bench.board.records() == records_of(judge(plain_plan(9)))
-    (current,) = ask(opened, "mission/current")
-    assert (current["count"], len(current["items"])) == (9, 9)
 
 
 def test_the_state_and_the_list_of_missions_are_reported(commanded: tuple[Bench, zenoh.Session]) -> None:
@@ -128,15 +122,6 @@ def test_an_invalid_request_for_a_log_is_refused_with_the_form(
     assert "daemon.fault" not in bench.daemon.printed
 
 
-@pytest.mark.parametrize(
-    "parameters", ["", "?number=", "?number=0", "?number=-1", "?number=1e3", "?number=" + "9" * 99]
-)
-def test_restoring_a_missing_mission_is_an_error(commanded: tuple[Bench, zenoh.Session], parameters: str) -> None:
-    _, opened = commanded
-    assert "restore?number=3" in error(ask(opened, RESTORE + parameters))
-    assert "there is no mission 99999" in error(ask(opened, f"{RESTORE}?number=99999"))
-
-
 def test_no_wildcard_sends_a_command(commanded: tuple[Bench, zenoh.Session]) -> None:
     bench, opened = commanded
     ask(opened, UPLOAD, mission_file(9))
@@ -174,7 +159,7 @@ def test_nothing_is_written_while_armed(start: Starter) -> None:
         ask_surely(opened, UPLOAD, mission_file(9))
         before = bench.board.records()
         bench.board.set("armed 1")
-        for suffix in (UPLOAD, CLEAR, f"{RESTORE}?number=1"):
+        for suffix in (UPLOAD, CLEAR):
             payload = mission_file(5) if suffix == UPLOAD else None
             reason = error(ask(opened, suffix, payload))
             assert "rmed" in reason or "No link" in reason, suffix
@@ -188,7 +173,7 @@ def test_commands_are_off_by_default(start: Starter) -> None:
     zenoh_bench(start, f'listen = ["{where}"]')
     with session(connect=where) as opened:
         ask_surely(opened, "state")
-        for suffix in (UPLOAD, CHECK, CLEAR, RESTORE, STATUS):
+        for suffix in (UPLOAD, CHECK, CLEAR, STATUS):
             assert list(opened.get(key(suffix), timeout=2.0)) == []
 
 

@@ -40,7 +40,7 @@ def test_two_vehicles_with_one_name_both_report_it(start: Starter, tmp_path: Pat
         status = first.daemon.status()
         assert status is not None
         assert status["zenoh_others_of_this_name"] == 1
-        for command in ("mission/upload", "mission/clear", "mission/restore?number=1"):  # both would obey it
+        for command in ("mission/upload", "mission/clear"):  # both would obey it
             payload = plan_text(plain_plan(7)).encode() if command == "mission/upload" else None
             (refused,) = ask(opened, f"{COMMANDS}/{command}", payload)
             assert "another bridge has the same vehicle name" in refused["error"]

@@ -8,7 +8,6 @@ import zenoh
 from structlog.testing import capture_logs
 
 from payloads import keys
-from payloads.keys import PayloadEncoding
 from payloads.payload import Payloads
 from service.settings.zenoh import ZenohSettings
 from service.settings.zenoh_config import make_config
@@ -42,7 +41,7 @@ async def test_an_unexpected_error_is_logged_and_answered() -> None:
         raise KeyError("status")
 
     thread, query = cast("SessionThread", FakeThread()), FakeQuery()
-    payloads = Payloads(PayloadEncoding.JSON, lambda: 0.0)
+    payloads = Payloads(lambda: 0.0)
     question = Question(cast("zenoh.Query", query), keys.STATE, "fleet/naze-1/v1/state", payloads, thread)
     with capture_logs() as events:
         await Queries(payloads, thread)._answer(question, fail)
@@ -58,7 +57,7 @@ FLOOD = 40
 async def test_a_flood_of_queries_that_guests_may_send_refuses_no_command() -> None:
     where = endpoint()
     thread = SessionThread(make_config(ZenohSettings(listen=(where,))), lambda opened: declare(opened))
-    queries = Queries(Payloads(PayloadEncoding.JSON, lambda: 0.0), thread)
+    queries = Queries(Payloads(lambda: 0.0), thread)
 
     async def never(_question: Question) -> Any:
         await asyncio.Event().wait()
