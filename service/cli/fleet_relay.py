@@ -20,10 +20,12 @@ from service.links.gcs_links import GcsLink, open_link
 from service.machine.threads import post
 from service.settings.addresses import GcsAddress
 
-_READ_ONLY = "accepts no MAVLink: zenoh.mavlink_in is off there, the router denies access, or it is not connected"
+_READ_ONLY = "accepts no MAVLink: zenoh.mavlink_in is off there, or the router denies access"
 #: Every vehicle sends a heartbeat once a second.
 _FIRST_HEARTBEAT_S = 5.0
 _LOOK_S = 0.1
+#: The end of a vehicle's subscription may be known this long before the end of its token.
+_LEFT_S = 1.0
 
 
 async def relay_fleet(
@@ -92,7 +94,7 @@ class FleetRelay:
     def add(self, name: str) -> None:
         """Connect a vehicle."""
         if name not in self._vehicles:
-            vehicle = VehicleRelay(self._session, self._prefix, name, self._bridges, self._sent, _input_changed)
+            vehicle = VehicleRelay(self._session, self._prefix, name, self._bridges, self._sent, self._input_changed)
             self._vehicles[name] = vehicle
             self._relays.add(name, vehicle.relay)
 
@@ -125,15 +127,29 @@ class FleetRelay:
         bridge = bridge_of(str(sample.key_expr), self._prefix)
         if bridge is None:
             return
+        was_alive = self._is_alive(bridge.vehicle)
         if sample.kind == zenoh.SampleKind.PUT:
             self._bridges.add(bridge)
-            if self._is_all and len(self._relays.heard) < len(SYSIDS):
+            if not was_alive and bridge.vehicle in self._vehicles:
+                click.echo(f"{bridge.vehicle} is back", err=True)
+            elif self._is_all and len(self._relays.heard) < len(SYSIDS):
                 self.add(bridge.vehicle)
             return
         self._bridges.discard(bridge)
-        if self._is_all and bridge.vehicle not in {each.vehicle for each in self._bridges}:
-            self._remove(bridge.vehicle)
+        if was_alive and not self._is_alive(bridge.vehicle) and bridge.vehicle in self._vehicles:
             click.echo(f"{bridge.vehicle} has left", err=True)
+            if self._is_all:
+                self._remove(bridge.vehicle)
+
+    def _is_alive(self, name: str) -> bool:
+        return name in {bridge.vehicle for bridge in self._bridges}
+
+    def _input_changed(self, name: str, accepts: bool) -> None:
+        self._loop.call_later(_LEFT_S, self._tell_input, name, accepts)
+
+    def _tell_input(self, name: str, accepts: bool) -> None:
+        if self._is_alive(name):
+            click.echo(f"{name} {'accepts MAVLink again' if accepts else _READ_ONLY}", err=True)
 
     def _left_out(self, name: str, other: str, system: int) -> None:
         self._vehicles.pop(name).close()
@@ -157,7 +173,3 @@ class FleetRelay:
     def _tick(self) -> None:
         self._relays.tick(self._loop.time())
         self._flush()
-
-
-def _input_changed(name: str, accepts: bool) -> None:
-    click.echo(f"{name} {'accepts MAVLink again' if accepts else _READ_ONLY}", err=True)

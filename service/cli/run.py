@@ -14,7 +14,11 @@ from terminal.sentences import complain
 
 
 @click.command()
-@click.option("--fc", metavar="FC", help="auto (the default), /dev/ttyAMA0, /dev/ttyUSB0,57600, tcp:HOST:PORT or sim")
+@click.option(
+    "--fc",
+    metavar="FC",
+    help="auto (the default), /dev/ttyAMA0, /dev/ttyUSB0,57600, tcp:HOST:PORT, udp:HOST:PORT or sim",
+)
 @click.option("--gcs", metavar="GCS", multiple=True, help=f"Ground stations; may be repeated. Default: {DEFAULT_GCS}")
 @click.option(
     "--config",

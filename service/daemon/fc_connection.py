@@ -18,7 +18,7 @@ from service.links.port_finder import PortFinder
 from service.links.traffic import Traffic
 from service.machine.host import Host
 from service.settings import Settings
-from service.settings.addresses import AutoFc, SerialFc
+from service.settings.addresses import AutoFc, SerialFc, UdpFc
 
 #: The interval of messages about an unsuccessful search: a silent log looks like a hang.
 _SEARCH_REPORT_S = 60.0
@@ -46,7 +46,7 @@ class FcConnection:
         self._loop = asyncio.get_running_loop()
         self._finder: PortFinder | None = None
         if isinstance(self._address, AutoFc):
-            self._finder = PortFinder(host, settings.state_dir)
+            self._finder = PortFinder(host, settings.state_dir, [each.host for each in settings.gcs if each.is_serial])
         open_device = device_opener(self._address) if self._finder is None else self._finder.open
         self._port = FcPort(open_device, self._opened, self._received, self._closed, traffic)
         if self._finder is not None:
@@ -136,6 +136,9 @@ class FcConnection:
             self.found_at, self.lost_at = self._loop.time(), None
         elif self.found_at is not None:
             self.found_at, self.lost_at = None, self._loop.time()
+            if isinstance(self._address, UdpFc):
+                # A Wi-Fi bridge that restarted may have another address or port.
+                self._port.move_on()
 
     def _opened(self) -> None:
         self._bridge.fc_opened(self._loop.time())

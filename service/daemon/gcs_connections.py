@@ -39,7 +39,8 @@ class GcsConnections:
         self.add(open_link(address, self))
 
     def warn(self, address: GcsAddress) -> None:
-        _log.warning("gcs.open", link=str(address), what=_WHO_MAY_WRITE)
+        if not address.is_serial:
+            _log.warning("gcs.open", link=str(address), what=_WHO_MAY_WRITE)
 
     def add(self, link: GcsLink) -> None:
         self._links[link.name] = link

@@ -1,28 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Opens the connection to a flight controller: a serial port, a TCP connection, or the simulated Naze."""
+"""Opens the connection to a flight controller: a serial port, TCP, UDP, or the simulated Naze."""
 
 import asyncio
 import os
 import socket
 import termios
 import time
-from collections.abc import Awaitable, Callable
-from contextlib import ExitStack, suppress
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
-from typing import Protocol
+from typing import Any, Protocol
 
 import serial
 
 from service.links.port_holder import BUSY, explain_port_error, find_console
 from service.machine.threads import BackgroundThread
-from service.settings.addresses import UNKNOWN_HOST_HINT, AutoFc, FcAddress, SerialFc, TcpFc, family_of
+from service.settings.addresses import UNKNOWN_HOST_HINT, AutoFc, FcAddress, SerialFc, TcpFc, UdpFc, bindable, family_of
 from storage.os_error import reason
 
 #: Errors of an open port: pyserial raises the last two if it is unplugged, or its driver refuses the speed.
 DEVICE_ERRORS = (OSError, termios.error, ValueError)
 #: A poll takes 75 ms at 1200 baud.
 _LAST_FRAME_S = 0.1
-_TCP_TIMEOUT_S = 3.0
+_TIMEOUT_S = 3.0
 #: A connection whose other end confirms nothing for this long is lost. After a gap in the Wi-Fi a new one carries data
 #: at once; the old one might wait for as long again as the gap was.
 _TCP_STALL_MS = 5000
@@ -58,6 +58,8 @@ def device_opener(address: FcAddress) -> Callable[[], Awaitable[Device]]:
         return open_path
     if isinstance(address, TcpFc):
         return partial(_open_tcp, address, BackgroundThread("name lookup"))
+    if isinstance(address, UdpFc):
+        return partial(_open_udp, address, BackgroundThread("name lookup"))
     # Imported only here: a daemon on a real flight controller does not need a simulator in memory.
     from simulator.links.pipe_link import SimLink
     from simulator.naze.board import SimulatedNaze
@@ -114,16 +116,45 @@ async def _open_tcp(address: TcpFc, resolver: BackgroundThread) -> socket.socket
     with ExitStack() as unless_connected:
         connection = unless_connected.enter_context(socket.socket(family, socket.SOCK_STREAM))
         connection.setblocking(False)
-        try:
-            async with asyncio.timeout(_TCP_TIMEOUT_S):
-                look_up = partial(socket.getaddrinfo, address.host, address.port, family, socket.SOCK_STREAM)
-                found = await resolver.ask(look_up)
-                await asyncio.get_running_loop().sock_connect(connection, found[0][4])
-        except (OSError, TimeoutError) as error:
-            why = reason(error) or "no answer"
-            hint = UNKNOWN_HOST_HINT if isinstance(error, socket.gaierror) else "is it switched on, and the port right?"
-            raise PortError(f"{address} cannot be reached: {why}; {hint}") from error
+        with _explained(address, "is it switched on, and the port right?"):
+            async with asyncio.timeout(_TIMEOUT_S):
+                found = await _look_up(address, resolver)
+                await asyncio.get_running_loop().sock_connect(connection, found)
         unless_connected.pop_all()
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _TCP_STALL_MS)
     return connection
+
+
+async def _open_udp(address: UdpFc, resolver: BackgroundThread) -> socket.socket:
+    """A socket connected to the Wi-Fi bridge: the kernel drops datagrams of others."""
+    with ExitStack() as unless_connected:
+        connection = unless_connected.enter_context(socket.socket(family_of(address.host), socket.SOCK_DGRAM))
+        connection.setblocking(False)
+        hint = "make the Wi-Fi bridge send to this port, or use udp:HOST:PORT" if address.listens else ""
+        with _explained(address, hint):
+            async with asyncio.timeout(_TIMEOUT_S):
+                if address.listens:
+                    connection.bind(bindable(address.host, address.port))
+                    _, peer = await asyncio.get_running_loop().sock_recvfrom(connection, 0)
+                else:
+                    peer = await _look_up(address, resolver)
+                connection.connect(peer)
+        unless_connected.pop_all()
+    return connection
+
+
+async def _look_up(address: TcpFc | UdpFc, resolver: BackgroundThread) -> Any:
+    return (await resolver.ask(partial(socket.getaddrinfo, address.host, address.port, family_of(address.host))))[0][4]
+
+
+@contextmanager
+def _explained(address: TcpFc | UdpFc, hint: str) -> Iterator[None]:
+    """Convert an error to PortError."""
+    try:
+        yield
+    except (OSError, TimeoutError) as error:
+        why = reason(error) or "no answer"
+        if isinstance(error, socket.gaierror):
+            hint = UNKNOWN_HOST_HINT
+        raise PortError(f"{address} cannot be reached: {why}" + f"; {hint}" * bool(hint)) from error

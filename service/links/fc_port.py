@@ -104,7 +104,10 @@ class FcPort:
             self.trouble = str(error)
             return _IN_USE_RETRY_S if isinstance(error, PortInUseError) else _RETRY_S
         self._descriptor = self._device.fileno()
-        self._is_tcp = isinstance(self._device, socket.socket) and self._device.family != socket.AF_UNIX
+        device = self._device
+        self._is_tcp = (
+            isinstance(device, socket.socket) and device.family != socket.AF_UNIX and device.type == socket.SOCK_STREAM
+        )
         self.trouble = ""
         self._closed.clear()
         self._lane.watch(self._descriptor, self._read)

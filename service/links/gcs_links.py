@@ -6,6 +6,7 @@ from typing import Protocol
 
 from bridge.gcs.station import Peer
 from service.links.gcs_events import GcsEvents
+from service.links.serial_link import SerialLink
 from service.links.tcp_link import TcpLink
 from service.links.udp_link import UdpLink
 from service.settings.addresses import UNKNOWN_HOST_HINT, GcsAddress
@@ -39,7 +40,7 @@ def open_link(address: GcsAddress, events: GcsEvents) -> GcsLink:
     try:
         if address.kind == "tcpin":
             return TcpLink(address, events)
-        return UdpLink(address, events)
+        return SerialLink(address, events) if address.is_serial else UdpLink(address, events)
     except OSError as error:
         number = error.errno or 0  # below 0 it is one of getaddrinfo's
         hint = UNKNOWN_HOST_HINT if number < 0 else _HINTS.get(number, "")

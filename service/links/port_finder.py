@@ -7,7 +7,7 @@ not opened, and one that turned out to be a GPS receiver or a radio is not opene
 
 import asyncio
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
@@ -19,11 +19,12 @@ from bridge.fc.port_listener import OtherDeviceWatch, PortListener
 from bridge.model.events import BridgeEvent, FcFound, FcInCommandLine, FcLost
 from service.links.fc_device import DEVICE_ERRORS, PortError, open_serial
 from service.links.port_holder import find_user
-from service.links.port_memory import PortMemory
 from service.links.serial_ports import SerialPort, serial_ports
 from service.machine.host import Host
+from service.machine.state_file import StateFile
 from storage.os_error import reason
 
+PORTS_FILE = "ports.json"
 #: The search visits all speeds within this time.
 _SEARCH_S = 9.0
 #: How long to wait for a lost flight controller: a Harakiri that looks for its GPS boots for 25 s.
@@ -34,14 +35,48 @@ _READ_SIZE = 4096
 _log = structlog.get_logger()
 
 
+class PortMemory:
+    """Ports by their key (see SerialPort). Without a `folder` they are remembered until the program ends."""
+
+    def __init__(self, folder: Path | None) -> None:
+        self._file = StateFile(folder, PORTS_FILE, "every port is searched again")
+        self.close = self._file.close
+        #: The last port of the flight controller; empty at first.
+        self.flight_controller = ""
+        #: Ports to skip, and the device found on each.
+        self.others: dict[str, str] = {}
+        self._file.load(self._read)
+
+    def found_flight_controller(self, key: str) -> None:
+        if key != self.flight_controller:
+            self.flight_controller = key
+            self.others.pop(key, None)
+            self._save()
+
+    def found_other(self, key: str, what: str) -> None:
+        if self.others.get(key) != what:
+            self.others[key] = what
+            if self.flight_controller == key:
+                self.flight_controller = ""
+            self._save()
+
+    def _read(self, kept: Any) -> None:
+        others = {str(key): str(what) for key, what in kept["others"].items()}
+        self.flight_controller, self.others = str(kept["flight_controller"]), others
+
+    def _save(self) -> None:
+        self._file.save({"flight_controller": self.flight_controller, "others": self.others})
+
+
 class PortFinder:
     """Opens ports (`open`), follows the daemon's events, and moves on if no flight controller is found.
 
-    `move_on()` must close the current port, so that `open` is called again.
+    `move_on()` must close the current port, so that `open` is called again. `radios`: ports of other links.
     """
 
-    def __init__(self, host: Host, state_dir: Path | None) -> None:
+    def __init__(self, host: Host, state_dir: Path | None, radios: Collection[str] = ()) -> None:
         self._host = host
+        self._radios = {str(host.resolve(path)) for path in radios}
         self._loop = asyncio.get_running_loop()
         self._memory = PortMemory(state_dir)
         self._present: SerialPort | None = None
@@ -123,7 +158,7 @@ class PortFinder:
 
     def _in_turn(self) -> list[SerialPort]:
         """The ports not tried in this round, the flight controller's last one first."""
-        ports = serial_ports(self._host)
+        ports = [port for port in serial_ports(self._host) if port.path not in self._radios]
         there = {port.path for port in ports}
         self._passed = {path: why for path, why in self._passed.items() if path in there}
         left = [port for port in ports if port.key not in self._tried]

@@ -46,6 +46,21 @@ class TcpFc:
 
 
 @dataclass(frozen=True, slots=True)
+class UdpFc:
+    """A flight controller behind a Wi-Fi bridge (ESP8266, ESP32) that carries MSP in datagrams.
+
+    `listens`: the bridge sends to us first, and is answered where it sends from. Else we send to it.
+    """
+
+    host: str
+    port: int
+    listens: bool = False
+
+    def __str__(self) -> str:
+        return f"{'udpin' if self.listens else 'udp'}:{host_port(self.host, self.port)}"
+
+
+@dataclass(frozen=True, slots=True)
 class SimulatedFc:
     """The simulated Naze within the daemon."""
 
@@ -53,19 +68,23 @@ class SimulatedFc:
         return "sim:"
 
 
-FcAddress = AutoFc | SerialFc | TcpFc | SimulatedFc
+FcAddress = AutoFc | SerialFc | TcpFc | UdpFc | SimulatedFc
 
 
 @dataclass(frozen=True, slots=True)
 class GcsAddress:
-    """A link to ground stations. `kind`: udpin, udpout, udpbcast or tcpin."""
+    """A link to ground stations. `kind`: udpin, udpout, udpbcast, tcpin, or serial with a path and baud instead."""
 
     kind: str
     host: str
     port: int
 
+    @property
+    def is_serial(self) -> bool:
+        return self.kind == "serial"
+
     def __str__(self) -> str:
-        return f"{self.kind}:{host_port(self.host, self.port)}"
+        return f"{self.host},{self.port}" if self.is_serial else f"{self.kind}:{host_port(self.host, self.port)}"
 
 
 _GCS_KINDS = ("udpin", "udpout", "udpbcast", "tcpin")
@@ -79,11 +98,13 @@ _GCS_ALIASES = {
     "tcps": "tcpin",
 }
 _EVERY_ADDRESS = ("", "0.0.0.0", "[::]")  # noqa: S104  # ground stations may come over any network
-_FC_FORMS = "use auto, /dev/serial0, /dev/ttyUSB0,57600, tcp:HOST:PORT or sim"
-_GCS_FORMS = "use udpin:0.0.0.0:14550, udpout:HOST:PORT, udpbcast:ADDR:PORT or tcpin:HOST:PORT"
+_FC_FORMS = "use auto, /dev/serial0, /dev/ttyUSB0,57600, tcp:HOST:PORT, udp:HOST:PORT, udpin:0.0.0.0:PORT or sim"
+_GCS_FORMS = (
+    "use udpin:0.0.0.0:14550, udpout:HOST:PORT, udpbcast:ADDR:PORT, tcpin:HOST:PORT or, for a radio, /dev/ttyUSB1,57600"
+)
 _PORT_NAMES = ("tty", "serial", "rfcomm", "naze")
 _MIN_BAUD, _MAX_BAUD = 1200, 4_000_000
-_NEXT_LINK = re.compile(r"[,\s]\s*(?=[A-Za-z]+:)")
+_NEXT_LINK = re.compile(r"[,\s]\s*(?=[A-Za-z]+:|/)")
 
 
 def parse_fc(text: str) -> FcAddress:
@@ -96,6 +117,12 @@ def parse_fc(text: str) -> FcAddress:
             return SimulatedFc()
         case "tcp" if colon:
             return TcpFc(*parse_host_port(text, rest.removeprefix("//"), _FC_FORMS))
+        case ("udp" | "udpin" | "udpout") as form if colon:
+            place = rest.removeprefix("//").removeprefix(":")
+            if place.isdecimal():  # mwp's udp://:14014
+                place = f"0.0.0.0:{place}"
+            host, port = parse_host_port(text, place, _FC_FORMS)
+            return UdpFc(host, port, form == "udpin" or (form == "udp" and is_any_address(host)))
         case "serial" if colon:
             return _parse_serial(text, rest.removeprefix("//") if rest.startswith("///") else rest)
     return _parse_serial(text, text.strip())
@@ -131,6 +158,11 @@ def parse_gcs(text: str) -> GcsAddress:
     >>> str(parse_gcs("udpin:0.0.0.0:14550"))
     'udpin:0.0.0.0:14550'
     """
+    if text.strip().startswith("/"):
+        radio = _parse_serial(text, text.strip())
+        if radio.baud is None:
+            raise AddressError(f"{text!r}: add the radio's serial speed, as in {radio.path},57600")
+        return GcsAddress("serial", radio.path, radio.baud)
     word, colon, rest = text.strip().partition(":")
     kind = _GCS_ALIASES.get(word.lower(), word.lower())
     rest = rest.removeprefix("//")

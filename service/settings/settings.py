@@ -70,12 +70,14 @@ class Settings(BridgeSettings):
         FcAddress,
         text(parse=parse_fc),
         "The flight controller: auto looks for it on the header's UART and on USB; /dev/ttyAMA0 (detects the speed), "
-        "/dev/ttyUSB0,57600 (baud), tcp:HOST:PORT, or sim for a simulated one.",
+        "/dev/ttyUSB0,57600 (baud), tcp:HOST:PORT, udp:HOST:PORT for MSP over UDP (udpin:0.0.0.0:PORT if the other end "
+        "sends first), or sim for a simulated one.",
     ] = AutoFc()  # noqa: RUF009  # frozen
     gcs: Annotated[
         Sequence[GcsAddress],
         several(f'as in ["{DEFAULT_GCS}"]', parse_link, may_be_empty=False),
-        "Links to ground stations: udpin:ADDR:PORT, udpout:HOST:PORT, udpbcast:ADDR:PORT, tcpin:ADDR:PORT. As a table, "
+        "Links to ground stations: udpin:ADDR:PORT, udpout:HOST:PORT, udpbcast:ADDR:PORT, tcpin:ADDR:PORT, or "
+        "/dev/ttyUSB1,57600 for a telemetry radio. As a table, "
         '{address = "udpin:0.0.0.0:14550", key_file = "gcs.key", writers = ["192.168.4.0/24"]}, a link limits who may '
         "write.",
         Default(f'["{DEFAULT_GCS}"]'),

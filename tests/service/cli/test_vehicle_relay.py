@@ -83,14 +83,15 @@ def test_a_vehicle_that_accepts_no_mavlink_is_reported(fleet: Fleet, tmp_path: P
     fleet.wait("owl")
     with relay(tmp_path, fleet, "owl", f"udpout:127.0.0.1:{free_port()}") as program:
         until(lambda: "owl accepts no MAVLink" in program.printed, "the reason")
-    owl.end()
+        owl.end()
+        until(lambda: "owl has left" in program.printed, "its end")
     with relay(tmp_path, fleet, "kite", f"udpout:127.0.0.1:{free_port()}") as program:
         until(lambda: "kite is at" in program.printed, "the relay")
         fleet.router.process.send_signal(signal.SIGKILL)
-        until(lambda: "kite accepts no MAVLink" in program.printed, "the loss")
+        until(lambda: "kite has left" in program.printed, "the loss")
         fleet.router.process.wait()
         fleet.router.start_again()
-        until(lambda: "kite accepts MAVLink again" in program.printed, "its return")
+        until(lambda: "kite is back" in program.printed, "its return")
 
 
 def test_an_unknown_vehicle_is_one_sentence(fleet: Fleet) -> None:

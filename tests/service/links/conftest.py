@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 
-from collections.abc import Iterator
+from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
@@ -10,7 +10,7 @@ from tests.support.pi_with_ports import Pi
 
 
 @pytest.fixture
-def links() -> Iterator[Links]:
+async def links() -> AsyncIterator[Links]:
     links = Links()
     yield links
     links.close()

@@ -1,19 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A flight controller on TCP whose replies arrive byte by byte, each after the previous one's acknowledgement."""
+"""Flight controllers behind TCP, one byte at a time, and behind UDP."""
 
 import asyncio
 import fcntl
+import os
 import socket
 import struct
 import termios
 
 import pytest
 
-from service.links.fc_device import device_opener
+from service.links.fc_device import PortError, device_opener
 from service.links.fc_port import FcPort
 from service.links.traffic import Traffic
-from service.settings.addresses import TcpFc
-from tests.support.programs import TIMEOUT_S
+from service.settings.addresses import TcpFc, parse_fc
+from tests.support.programs import TIMEOUT_S, free_port
 
 
 def unacknowledged(connection: socket.socket) -> int:
@@ -77,3 +78,46 @@ async def test_a_connection_that_confirms_nothing_is_lost(monkeypatch: pytest.Mo
         board.close()
         task.cancel()
         await asyncio.wait([task])
+
+
+@pytest.mark.parametrize("form", ["udp:127.0.0.1:{}", "udp://127.0.0.1:{}", "udpout:127.0.0.1:{}"])
+async def test_a_board_behind_udp_is_asked_at_its_address(form: str) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as board:
+        board.bind(("127.0.0.1", 0))
+        device = await device_opener(parse_fc(form.format(board.getsockname()[1])))()
+        os.write(device.fileno(), b"$M<")
+        asked, sender = board.recvfrom(99)
+        board.sendto(b"$M>", sender)
+        assert (asked, os.read(device.fileno(), 99)) == (b"$M<", b"$M>")
+        device.close()
+
+
+@pytest.mark.parametrize("form", ["udpin:127.0.0.1:{}", "udp:0.0.0.0:{}", "udp://:{}", "udpin::{}"])
+async def test_a_board_that_sends_first_is_answered_where_it_sends_from(form: str) -> None:
+    port = free_port(socket.SOCK_DGRAM)
+    opening = asyncio.get_running_loop().create_task(device_opener(parse_fc(form.format(port)))())
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as board, socket.socket(type=socket.SOCK_DGRAM) as other:
+        board.setblocking(False)
+        async with asyncio.timeout(TIMEOUT_S):
+            while not opening.done():
+                board.sendto(b"hello", ("127.0.0.1", port))
+                await asyncio.sleep(0.01)
+        device = await opening
+        other.sendto(b"not the board", ("127.0.0.1", port))
+        os.write(device.fileno(), b"$M<")
+        assert await asyncio.get_running_loop().sock_recv(board, 99) == b"$M<"
+        board.sendto(b"$M>", ("127.0.0.1", port))
+        read = [os.read(device.fileno(), 99)]
+        while read[-1] == b"hello":
+            read.append(os.read(device.fileno(), 99))
+        assert read[-1] == b"$M>"
+        device.close()
+
+
+async def test_a_silent_wifi_bridge_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("service.links.fc_device._TIMEOUT_S", 0.01)
+    port = free_port(socket.SOCK_DGRAM)
+    with pytest.raises(PortError) as error:
+        await device_opener(parse_fc(f"udpin:127.0.0.1:{port}"))()
+    wanted = "no answer; make the Wi-Fi bridge send to this port, or use udp:HOST:PORT"
+    assert str(error.value) == f"udpin:127.0.0.1:{port} cannot be reached: {wanted}"

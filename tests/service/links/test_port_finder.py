@@ -14,8 +14,7 @@ import pytest
 from service.daemon.api import DaemonApi
 from service.daemon.daemon import Daemon
 from service.links.fc_device import PortError
-from service.links.port_finder import PortFinder
-from service.links.port_memory import PORTS_FILE
+from service.links.port_finder import PORTS_FILE, PortFinder
 from service.settings import Settings
 from service.settings.addresses import AutoFc
 from simulator.links.pty_link import PtyLink

@@ -3,7 +3,7 @@
 
 from pathlib import Path
 
-from service.links.port_memory import PortMemory
+from service.links.port_finder import PortMemory
 
 
 def test_finds_in_quick_succession_are_all_kept(tmp_path: Path) -> None:
