@@ -43,8 +43,8 @@ _CURRENT_S = 1.0
 _EARLY, _EARLIEST_S = 0.2, 0.05
 #: Replies to polls with at least this interval may be read together. A client of faster ones needs fresh values.
 _MAY_WAIT_S = 0.08
-#: A poll's first lost reply reduces all rates by a tenth, each received one restores a little: 1 % losses change nothing,
-#: 10 % halve the rates.
+#: A poll's first lost reply reduces all rates by a tenth, and each received one restores a little: 1 % losses change
+#: nothing, 10 % halve the rates.
 _LOSS_FACTOR = 0.9
 _RECOVERY = 0.005
 _WORST_QUALITY = 0.1
@@ -228,7 +228,7 @@ class PollSchedule:
         """The interval that the line's speed and missions on it allow, seconds; 0 if it is not polled."""
         slot = self._slots.get(command)
         scale = self._line_scale * (_BESIDE_MISSIONS if self._beside_missions else 1.0)
-        return 0.0 if slot is None or slot.wanted_s == inf else self._interval(slot, scale)
+        return 0.0 if slot is None or slot.wanted_s == inf else self._interval(slot, scale, backoff=1.0)
 
     def ask(self, link: MspLink, now: float, *, beside_missions: bool) -> None:
         """Send the requests that are due, and those nearly due with them, as far as the link has room."""
@@ -340,7 +340,7 @@ class PollSchedule:
             return interval_s
         return min(interval_s, self._followed_s / scale * slot.backoff)
 
-    def _interval(self, slot: _Slot, scale: float) -> float:
+    def _interval(self, slot: _Slot, scale: float, backoff: float | None = None) -> float:
         is_status = slot.poll.command is Msp.STATUS
         slowest = slot.cost / (self._budget * _STATUS_SHARE) if is_status else _SLOWEST_S
-        return min(slot.wanted_s / scale * slot.backoff, max(slot.wanted_s, slowest))
+        return min(slot.wanted_s / scale * (backoff or slot.backoff), max(slot.wanted_s, slowest))

@@ -101,13 +101,13 @@ SELDOM_POLLED |= {("inav", name) for name in VALUES if name.startswith("status."
 #: These messages have no "unknown" for these.
 NEEDED = {
     "VFR_HUD": {ATTITUDE, RC, M_ATTITUDE, RC_CHANNELS_RAW},
-    "GLOBAL_POSITION_INT": {RAW_GPS, GPS_RAW_INT},
+    "GLOBAL_POSITION_INT": {RAW_GPS, GPS_RAW_INT, ALTITUDE, VFR_HUD},
 }
 #: The messages to ground stations and the value that each shows; None: it shows it as unknown.
 SHOWN: Mapping[str, tuple[str, Callable[[Message], Any]]] = {
     "attitude.roll_deg": ("ATTITUDE", lambda msg: math.degrees(msg.roll)),
     "position.height_m": ("GLOBAL_POSITION_INT", lambda msg: msg.relative_alt / 1000),
-    "position.altitude_m": ("GLOBAL_POSITION_INT", lambda msg: msg.alt / 1000),
+    "position.altitude_m": ("GLOBAL_POSITION_INT", lambda msg: msg.alt / 1000 if msg.lat else None),
     "position.climb_m_s": ("VFR_HUD", lambda msg: None if math.isnan(msg.climb) else msg.climb),
     "gps.ground_speed_m_s": ("VFR_HUD", lambda msg: None if math.isnan(msg.groundspeed) else msg.groundspeed),
     "position.lat_deg": ("GPS_RAW_INT", lambda msg: msg.lat / 1e7),

@@ -75,7 +75,7 @@ SCREEN = {
     "lat": Shown("GLOBAL_POSITION_INT", lambda msg: msg.lat, lambda c: c.flight.lat_e7, 1),
     "lon": Shown("GLOBAL_POSITION_INT", lambda msg: msg.lon, lambda c: c.flight.lon_e7, 1),
     "height": Shown("GLOBAL_POSITION_INT", lambda msg: msg.relative_alt, lambda c: c.flight.height_m * 1e3, 11),
-    "altitude": Shown("GLOBAL_POSITION_INT", lambda msg: msg.alt, lambda c: c.flight.altitude_m * 1e3, 11),
+    "altitude": Shown("GLOBAL_POSITION_INT", lambda msg: msg.alt, lambda c: c.flight.altitude_m * 1e3, 501),
     "climb": Shown("GLOBAL_POSITION_INT", lambda msg: -msg.vz, lambda c: c.flight.climb_ms * 100, 1.1),
     "heading": Shown("GLOBAL_POSITION_INT", lambda msg: msg.hdg / 100, lambda c: c.flight.heading, 0.6, circle=True),
     "raw lat": Shown("GPS_RAW_INT", lambda msg: msg.lat, lambda c: c.flight.lat_e7, 1),
@@ -84,7 +84,7 @@ SCREEN = {
     "satellites": Shown("GPS_RAW_INT", lambda msg: msg.satellites_visible, lambda c: c.flight.satellites, 0),
     "speed": Shown("GPS_RAW_INT", lambda msg: msg.vel, lambda c: c.flight.speed_ms * 100, 1),
     "ground speed": Shown("VFR_HUD", lambda msg: msg.groundspeed, lambda c: c.flight.speed_ms, 0.01),
-    "HUD altitude": Shown("VFR_HUD", lambda msg: msg.alt, lambda c: c.flight.altitude_m, 0.011),
+    "HUD altitude": Shown("VFR_HUD", lambda msg: msg.alt, lambda c: c.flight.altitude_m, 0.501),
     "volts": Shown("BATTERY_STATUS", battery_mv, lambda c: c.flight.volts * 1e3, 51),
     "volts too": Shown("SYS_STATUS", known_volts, lambda c: c.flight.volts * 1e3, 51),
     "speed north": Shown("GLOBAL_POSITION_INT", lambda msg: msg.vx, lambda c: velocity_cm_s(c, 0), 30),
@@ -95,7 +95,7 @@ SCREEN = {
 #: All values from an armed Harakiri that only sends FrSky telemetry, and their resolution where coarser.
 FRSKY = "FrSky"
 FRSKY_RESOLUTION = {
-    "lat": 17, "lon": 17, "height": 11, "altitude": 11, "climb": 8, "speed north": 50, "speed east": 50,
+    "lat": 17, "lon": 17, "height": 11, "altitude": 501, "climb": 8, "speed north": 50, "speed east": 50,
     "heading": 0.6, "volts": 160, "volts too": 160,
 }  # fmt: skip
 
