@@ -126,7 +126,9 @@ class Bridge:
         session = self._session = FcSession(port, emit, incidents, self._controller_changed, config.flight)
         #: The flight controller's readings, which are kept when it is lost.
         self.vehicle = port.vehicle
-        announcer = self._announcer = LinkAnnouncer(self._say, self._trouble, now, was_found=config.flight is not None)
+        announcer = self._announcer = LinkAnnouncer(
+            self._say, self._trouble, now, was_found=config.flight is not None, is_wired=None not in config.speeds
+        )
         # Missions, fences and rally points.
         missions = self._missions = MissionService(port.vehicle, runner, emit)
         types = self._types = MissionTypes(missions, ground, emit, incidents)

@@ -25,7 +25,7 @@ class LinkAnnouncer:
     """Reports a loss, its end and a new flight controller with `say`.
 
     `trouble` gives the cause of a loss, if known, and what the pilot must do. `was_found`: before the bridge was
-    restarted in flight.
+    restarted in flight. `is_wired`: False if a Wi-Fi adapter is in between.
     """
 
     def __init__(
@@ -35,9 +35,11 @@ class LinkAnnouncer:
         now: float,
         *,
         was_found: bool = False,
+        is_wired: bool = True,
     ) -> None:
         self._say = say
         self._trouble = trouble
+        self._check = "check power, wiring" if is_wired else "check power, Wi-Fi"
         self._known: str | None = None
         #: True once a flight controller was found.
         self.was_found = was_found
@@ -52,7 +54,7 @@ class LinkAnnouncer:
     def why_unknown(self) -> str:
         """The reason for missing values while the flight controller is lost or was never found; else empty."""
         if not self.was_found:
-            return "no flight controller: check power, wiring" if self.is_lost else "looking for the flight controller"
+            return f"no flight controller: {self._check}" if self.is_lost else "looking for the flight controller"
         return "flight controller lost" if self.is_lost else ""
 
     def lost(self, silent_since: float) -> None:
@@ -92,7 +94,7 @@ class LinkAnnouncer:
             self._say(Severity.WARNING, trouble)
         elif not self.was_found:
             self.due = now + _NOT_FOUND_REPEAT_S
-            self._say(Severity.WARNING, "No flight controller found: check power, wiring")
+            self._say(Severity.WARNING, f"No flight controller found: {self._check}")
         else:
             # Another text each time: Mission Planner does not renew a text that it still shows.
             self._say(Severity.WARNING, f"Flight controller lost: silent for {now - self._silent_since:.0f} s")

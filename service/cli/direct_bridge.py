@@ -13,7 +13,7 @@ from service.daemon.client import FIRMWARE_REQUESTS, STATUS, ControlError, Inter
 from service.daemon.daemon import Daemon
 from service.machine.log_setup import set_up_logging
 from service.settings import Settings, takeoff_limit_m
-from service.settings.addresses import AutoFc, FcAddress
+from service.settings.addresses import AutoFc, FcAddress, TcpFc, UdpFc
 
 #: An unknown speed is found within 8 s.
 _SEARCH_TIMEOUT_S = 12.0
@@ -58,7 +58,8 @@ async def ask_directly(
             where = daemon.fc.where
             if even_silent:
                 return api.status()
-            raise ControlError(f"no flight controller answers on {where}: check its power, the wiring and the speed")
+            what = "the Wi-Fi adapter" if isinstance(fc, TcpFc | UdpFc) else "the wiring and the speed"
+            raise ControlError(f"no flight controller answers on {where}: check its power and {what}")
         # The controller is identified before its telemetry arrives, and some never send all of it.
         if request == STATUS:
             await _wait(lambda: None not in map(api.status().get, _SHOWN), _TELEMETRY_TIMEOUT_S)

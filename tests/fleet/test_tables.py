@@ -5,7 +5,7 @@ import io
 
 from rich.console import Console
 
-from fleet.tables import complaints, fleet_table
+from fleet.tables import complaints, fleet_lines, fleet_table
 from fleet.vehicle import FleetVehicle, as_fleet
 
 
@@ -31,4 +31,15 @@ def test_problems_are_named_once_for_each_name() -> None:
     assert [line.partition(":")[0] for line in complaints(fleet)] == [
         "naze-2",
         "1 of 4 vehicles are alive, but did not answer",
+    ]
+
+
+def test_thousands_of_vehicles_are_listed_in_columns() -> None:
+    fleet = [FleetVehicle("a-long-name", "1", True, protocol="MSP", armed=True), FleetVehicle("owl", "2")]
+    title, first, second = fleet_lines(fleet)
+    assert title.split() == "Vehicle Speaks Armed Battery Latitude Longitude Height Mission".split()
+    assert [first.index("MSP"), first.index("ARMED"), second.index("-")] == [
+        title.index("Speaks"),
+        title.index("Armed"),
+        title.index("Speaks"),
     ]

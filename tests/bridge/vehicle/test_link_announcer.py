@@ -36,6 +36,16 @@ def test_without_a_flight_controller_the_reason_is_repeated() -> None:
     assert Said("busy: another program has it open").until(10.0) == ["busy: another program has it open"]
 
 
+def test_behind_a_wifi_adapter_there_is_no_wiring_to_check() -> None:
+    texts: list[str] = []
+    announcer = LinkAnnouncer(lambda _, text: texts.append(text), lambda: "", 0.0, is_wired=False)
+    announcer.tick(announcer.due)
+    assert (texts, announcer.why_unknown) == (
+        ["No flight controller found: check power, Wi-Fi"],
+        "no flight controller: check power, Wi-Fi",
+    )
+
+
 def test_a_loss_is_reported_with_its_age_and_its_end() -> None:
     said = Said()
     said.announcer.found(BOARD, 1.0)
