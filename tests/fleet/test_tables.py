@@ -37,7 +37,7 @@ def test_problems_are_named_once_for_each_name() -> None:
 def test_thousands_of_vehicles_are_listed_in_columns() -> None:
     fleet = [FleetVehicle("a-long-name", "1", True, protocol="MSP", armed=True), FleetVehicle("owl", "2")]
     title, first, second = fleet_lines(fleet)
-    assert title.split() == "Vehicle Speaks Armed Battery Latitude Longitude Height Mission".split()
+    assert title.split() == ["Vehicle", "Speaks", "Armed", "Battery", "Latitude", "Longitude", "Height", "Mission"]
     assert [first.index("MSP"), first.index("ARMED"), second.index("-")] == [
         title.index("Speaks"),
         title.index("Armed"),
