@@ -10,12 +10,12 @@ import time
 from collections import deque
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import zenoh
 
-from fleet.payload import decode, number
+from fleet.payload import decode
 from fleet.session import send_query
 from fleet.vehicle import BridgeId, FleetVehicle, bridge_of, in_order, replier, vehicle_of
 from payloads.keys import ALIVE, OVERVIEW, STATE, full, vehicle_in
@@ -25,10 +25,6 @@ from payloads.overview import state_of
 _TIMEOUT_S = 20.0
 #: The list of ten thousand takes some seconds.
 _LIST_TIMEOUT_S = 60.0
-#: No queue delays samples for longer: beyond this the vehicle's clock was set.
-_CLOCK_WAS_SET_S = 60.0
-#: A vehicle's clock that was set back by less is noticed after this time, or twice as long.
-_RECENT_S = 120.0
 
 
 class Watch:
@@ -51,7 +47,8 @@ class Watch:
         self._arrived: deque[tuple[Callable[[Any], None], Any]] = deque()
         #: By name: the sessions of its bridges, normally one.
         self._bridges: dict[str, set[str]] = {}
-        self._heard: dict[str, _Heard] = {}
+        #: By name: the newest values, and when they arrived.
+        self._heard: dict[str, tuple[FleetVehicle, float]] = {}
         #: The names in order; empty after a change.
         self._names: list[str] = []
         self._followed: dict[str, zenoh.Subscriber[None]] = {}
@@ -139,9 +136,9 @@ class Watch:
         seen: list[tuple[FleetVehicle, float | None]] = []
         for name in self._names:
             ids, heard = self._bridges[name], self._heard.get(name)
-            age_s = None if heard is None else now - heard.made_at
+            age_s = None if heard is None else now - heard[1]
             for session_id in ids if len(ids) == 1 else sorted(ids):
-                vehicle = FleetVehicle(name, session_id) if heard is None else heard.vehicle
+                vehicle = FleetVehicle(name, session_id) if heard is None else heard[0]
                 if len(ids) > 1 or vehicle.session_id != session_id:
                     vehicle = replace(vehicle, session_id=session_id, bridges=len(ids))
                 seen.append((vehicle, age_s))
@@ -150,36 +147,9 @@ class Watch:
     def _take(self, sample: zenoh.Sample, state: Json | None) -> None:
         if state is None:
             return
-        name, made_s = vehicle_in(sample.key_expr), number(state, "time_s")
-        now = self._clock()
-        offset_s = now - (now if made_s is None else made_s)
+        name = vehicle_in(sample.key_expr)
         session_id = next(iter(self._bridges.get(name, ())), "")
-        vehicle = vehicle_of(BridgeId(name, session_id), state)
-        self._heard[name] = _heard(self._heard.get(name), vehicle, offset_s, now)
-
-
-@dataclass(frozen=True, slots=True)
-class _Heard:
-    """`made_at`: when the vehicle made the values, by our clock.
-
-    `least_s`: the least recent difference between our clock and its own. Any delay beyond that was spent in queues, so
-    a backlog is shown with its true age, even if the clocks differ. `recent_s`: the same since `since`.
-    """
-
-    vehicle: FleetVehicle
-    made_at: float
-    least_s: float
-    recent_s: float
-    since: float
-
-
-def _heard(before: _Heard | None, vehicle: FleetVehicle, offset_s: float, now: float) -> _Heard:
-    if before is None or offset_s - before.least_s > _CLOCK_WAS_SET_S:
-        return _Heard(vehicle, now, offset_s, offset_s, now)
-    least_s, recent_s, since = min(before.least_s, offset_s), min(before.recent_s, offset_s), before.since
-    if now - since > _RECENT_S:
-        least_s, recent_s, since = recent_s, offset_s, now
-    return _Heard(vehicle, now - (offset_s - least_s), least_s, recent_s, since)
+        self._heard[name] = vehicle_of(BridgeId(name, session_id), state), self._clock()
 
 
 @contextmanager

@@ -58,7 +58,6 @@ class TlogFolder:
         #: Without a buffer: written bytes survive a crash of this process.
         self._file: FileIO | None = None
         self._path = folder
-        self._own: list[Path] = []
         self._synced_at = 0.0
         self._retry_at = 0.0
         self._trouble = ""
@@ -82,11 +81,10 @@ class TlogFolder:
             if self._file is None:
                 self._path = self._new_path(datetime.fromtimestamp(first_stamp_us(records) / 1e6, UTC))
                 self._file = FileIO(self._path, "x")
-                self._own.append(self._path)
             if self._measure_free_space(self._folder) < LEFT_FREE + len(records):
                 raise _LittleSpaceError(f"less than {LEFT_FREE >> 20} MB of the disk are free")
             if is_flight and not _is_flight(self._path):
-                self._path = self._own[-1] = self._path.rename(_of_flight(self._path))
+                self._path = self._path.rename(_of_flight(self._path))
             is_first = not self._file.tell()
             rest = memoryview(records)
             while rest:
@@ -119,19 +117,16 @@ class TlogFolder:
         return path
 
     def _make_room(self, now: datetime) -> None:
-        """Remove the oldest files until another one fits, flights last. Files with other names are left alone.
+        """Remove the oldest files until another one fits, flights last, which have no age limit.
 
-        Age does not count for flights, nor for files of this run, which go after earlier ones in the order of writing:
-        until a Pi finds a network, its clock may be months behind, and dates a file too early.
+        Files with other names are left alone.
         """
         too_old = (now - timedelta(days=self._limits.days)).strftime(_NAME_FORMAT)
-        sizes = {path: path.stat().st_size for path in self._folder.iterdir() if _NAME_PATTERN.fullmatch(path.name)}
+        sizes = {path: path.stat().st_size for path in self._folder.iterdir() if is_log_name(path.name)}
         total = sum(sizes.values())
-        earlier = sorted(sizes.keys() - set(self._own))
-        self._own = [path for path in self._own if path in sizes]
-        outdated = {path for path in earlier if path.name < too_old and not _is_flight(path)}
-        for path in sorted((*earlier, *self._own), key=lambda path: (path not in outdated, _is_flight(path))):
-            if path not in outdated and total + self._limits.file_size <= self._limits.total_size:
+        for path in sorted(sizes, key=lambda path: (_is_flight(path), path.name)):
+            is_outdated = path.name < too_old and not _is_flight(path)
+            if not is_outdated and total + self._limits.file_size <= self._limits.total_size:
                 return
             path.unlink()
             total -= sizes[path]

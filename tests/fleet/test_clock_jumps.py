@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The wall clock of a vehicle, or of the watching machine, steps by hours: values and their ages stay true."""
 
-import json
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -13,7 +12,7 @@ from fleet.watch_screen import ScreenRow
 from tests.support.fleet_bench import Fleet
 from tests.support.forked import CLOCK_FILE
 from tests.support.plan import plain_plan
-from tests.support.programs import Program, until
+from tests.support.programs import until
 from tests.support.zenoh_router import client
 
 _STEPS_S = (6 * 3600.0, -6 * 3600.0, 0.0)
@@ -70,24 +69,3 @@ def test_a_vehicles_clock_steps(fleet: Fleet, clock: WallClock) -> None:
             kite.push(plain_plan(5 + number))
             until(lambda count=5 + number: fleet.listed()["kite"]["mission_count"] == count, "the mission")  # type: ignore[misc]
     assert [mission["outcome"] for mission in kite.missions()] == ["VERIFIED"] * len(_STEPS_S)
-
-
-def test_the_watching_machines_clock_steps(fleet: Fleet, clock: WallClock, monkeypatch: pytest.MonkeyPatch) -> None:
-    watch = Program(fleet.folder / "watch.log", "fleet", "watch", "--json", "--connect", fleet.router.endpoint)
-    monkeypatch.delenv(CLOCK_FILE)
-    board = fleet.board("kite")
-    fleet.start("kite", fc=board.fc)
-    try:
-        for step_s in _STEPS_S:
-            clock.step(step_s)
-            for armed in (True, False):
-                board.set(f"armed {armed:d}")
-
-                def is_printed(expected: bool = armed) -> bool:
-                    lines = [json.loads(line) for line in watch.printed.splitlines()]
-                    return bool(lines) and lines[-1]["alive"] and lines[-1]["armed"] is expected
-
-                until(is_printed, f"armed {armed} after a step of {step_s} s")
-    finally:
-        watch.end()
-    assert "Traceback" not in watch.printed

@@ -88,19 +88,6 @@ def test_files_that_are_too_old_are_deleted(tmp_path: Path) -> None:
     assert names(tmp_path) == ["2026-11-20 12-00-00.tlog", "2026-11-21 12-00-01.tlog"]
 
 
-def test_files_from_before_the_clock_was_set_are_not_old(tmp_path: Path) -> None:
-    """A Pi unused for a winter dates the flight to autumn; files are deleted in the order of writing."""
-    fill(TlogFolder(tmp_path, TlogLimits()), NOON - timedelta(days=1), 10)
-    limits = TlogLimits(file_size=1000, total_size=2000)
-    folder = TlogFolder(tmp_path, limits)
-    fill(folder, NOON - timedelta(days=90), 10)
-    assert names(tmp_path) == ["2026-08-23 12-00-00.tlog", "2026-11-20 12-00-00.tlog"]
-    fill(folder, NOON, 10)
-    assert names(tmp_path) == ["2026-08-23 12-00-00.tlog", "2026-11-21 12-00-00.tlog"]
-    fill(folder, NOON + timedelta(days=1), 10)
-    assert names(tmp_path) == ["2026-11-21 12-00-00.tlog", "2026-11-22 12-00-00.tlog"]
-
-
 def test_other_files_are_left_alone(tmp_path: Path) -> None:
     others = ["2020-01-01 00-00-00.tlog.bak", "2020-01-01 00-00-00.rlog", "flight.tlog", "notes.txt"]
     for name in others:
