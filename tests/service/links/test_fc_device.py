@@ -95,7 +95,7 @@ async def test_a_board_behind_udp_is_asked_at_its_address(form: str) -> None:
 @pytest.mark.parametrize("form", ["udpin:127.0.0.1:{}", "udp:0.0.0.0:{}", "udp://:{}", "udpin::{}"])
 async def test_a_board_that_sends_first_is_answered_where_it_sends_from(form: str) -> None:
     port = free_port(socket.SOCK_DGRAM)
-    opening = asyncio.get_running_loop().create_task(device_opener(parse_fc(form.format(port)))())
+    opening = asyncio.ensure_future(device_opener(parse_fc(form.format(port)))())
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as board, socket.socket(type=socket.SOCK_DGRAM) as other:
         board.setblocking(False)
         async with asyncio.timeout(TIMEOUT_S):

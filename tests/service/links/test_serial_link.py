@@ -42,7 +42,8 @@ class Radio:
 
     async def frames(self, last: int) -> list[MavlinkFrame]:
         """Everything up to a frame with this message id."""
-        splitter, frames, data = MavlinkSplitter(), [], b""
+        splitter, data = MavlinkSplitter(), b""
+        frames: list[MavlinkFrame] = []
         async with asyncio.timeout(TIMEOUT_S):
             while not any(frame.msgid == last for frame in frames):
                 try:
