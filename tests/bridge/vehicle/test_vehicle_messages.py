@@ -16,7 +16,7 @@ from bridge.controllers.table import PROFILES
 from bridge.fc.msp_telemetry import hear_msp
 from bridge.fc.profile import FlightController, Profile, Spoken
 from bridge.model.craft import Airframe, airframe
-from bridge.model.vehicle import FlightState, GlobalPosition, Power, Source, Vehicle
+from bridge.model.vehicle import FlightState, GlobalPosition, Power, ReadingT, Source, Vehicle
 from bridge.vehicle import vehicle_messages as make
 from bridge.vehicle.telemetry_table import TELEMETRY
 from protocols.mavlink.codec import FrameWriter, Packed, pack
@@ -142,6 +142,12 @@ def test_a_first_fix_in_motion_has_no_direction_yet() -> None:
     assert position["hdg"] == U16
 
 
+def need(state: Vehicle, kind: type[ReadingT]) -> ReadingT:
+    last = state.last(kind)
+    assert last is not None
+    return last
+
+
 def test_the_height_is_shown_without_a_fix() -> None:
     """Mission Planner shows only relative_alt of GLOBAL_POSITION_INT. ArduPilot sends the last known place, too."""
     state = with_replies(Vehicle(), HARAKIRI, STATUS=status(), ALTITUDE=struct.pack("<ih", 3000, -70))
@@ -151,13 +157,11 @@ def test_the_height_is_shown_without_a_fix() -> None:
     with_replies(state, HARAKIRI, RAW_GPS=gps())
     with_replies(state, HARAKIRI, RAW_GPS=gps(lat=453838000 + 90))
     shown = fields(make.global_position_int(at(state)))
-    last = state.last(GlobalPosition)
-    assert last is not None
-    state.hear(replace(last, heard_at=-10.0))
+    state.hear(replace(need(state, GlobalPosition), heard_at=-10.0))
     with_replies(state, HARAKIRI, ALTITUDE=struct.pack("<ih", 1000, -70), RAW_GPS=gps(fix=0))
     lost = fields(make.global_position_int(at(state)))
     assert (lost["lat"], lost["lon"]) == (shown["lat"], shown["lon"])
-    assert (lost["relative_alt"], lost["vx"], lost["vy"], lost["alt"]) == (10000, 0, 0, shown["alt"] - 20000)
+    assert (lost["relative_alt"], lost["vx"], lost["vy"], lost["alt"]) == (10000, 0, 0, 141_000)
 
 
 @pytest.mark.parametrize("height_m", [-30, 30])
@@ -373,6 +377,9 @@ def test_inavs_home_has_its_altitude_in_centimetres() -> None:
     state = with_replies(Vehicle(), INAV, STATUS=status(flags=1), RAW_GPS=gps(speed=0), ALTITUDE=height, WP=home)
     with_replies(state, INAV, WP=mission_record)
     assert make.home_position(at(state)).altitude == 131_470
+    assert make.global_position_int(at(state)).alt == make.gps_raw_int(at(state)).alt == 131_000
+    with_replies(state, INAV, RAW_GPS=gps(fix=0))
+    state.hear(replace(need(state, GlobalPosition), heard_at=-10.0))
     assert make.global_position_int(at(state)).alt == 141_590
 
 

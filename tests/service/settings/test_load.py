@@ -77,12 +77,12 @@ gcs = [
 takeof_max_m = 15
 [zenoh]
 vehicle = "a/b"
-encodings = "json"
+profiles = "metered"
 """
     lines = problems(folder, text, setup="tlog_days = 'all'")
     wanted = [
         "naze.toml:8: 'takeof_max_m' is not a setting; did you mean 'takeoff_max_m'?",
-        "naze.toml:11: 'zenoh.encodings' is not a setting; did you mean 'zenoh.encoding'?",
+        "naze.toml:11: 'zenoh.profiles' is not a setting; did you mean 'zenoh.profile'?",
         "naze.toml:4: 'tcpin:0.0.0.0' needs a host and a port: use udpin:0.0.0.0:14550",
         "setup.toml:1: tlog_days is 'all', but must be a whole number, 1..3650 (How long",
         "naze.toml:3: sysid is 300, but must be 1..255 (MAVLink system id of the vehicle",
