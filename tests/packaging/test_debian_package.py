@@ -25,7 +25,7 @@ from tests.support.bare_root import BareRoot
 
 _REPOSITORY = Path(__file__).resolve().parents[2]
 _MISSION = _REPOSITORY / "examples" / "naze-field.waypoints"
-_SCHEMA = "storage/schema/0001_missions.sql"
+_SCHEMA = "storage/schema.sql"
 _ELF_MACHINES = {"amd64": 62, "arm64": 183, "armhf": 40}
 #: `dpkg --print-architecture` of this machine must be one of them.
 _HOST = subprocess.run(["dpkg", "--print-architecture"], capture_output=True, text=True, check=True).stdout.strip()
