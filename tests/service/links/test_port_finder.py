@@ -45,6 +45,14 @@ def plug_naze(pi: Pi, name: str) -> PtyLink:
     return link
 
 
+async def test_the_port_of_a_radio_is_not_searched(pi: Pi) -> None:
+    pi.usb("ttyUSB0", "1-1")
+    pi.terminal("ttyUSB0")
+    finder = PortFinder(pi, None, ["/dev/ttyUSB0"])
+    with pytest.raises(PortError, match="there is no serial port"):
+        await finder.open()
+
+
 async def test_the_flight_controller_is_found_after_a_gps_receiver(pi: Pi, tmp_path: Path) -> None:
     pi.usb("ttyUSB0", "1-1")
     pi.usb("ttyUSB1", "1-2")
