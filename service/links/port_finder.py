@@ -158,7 +158,7 @@ class PortFinder:
 
     def _in_turn(self) -> list[SerialPort]:
         """The ports not tried in this round, the flight controller's last one first."""
-        ports = [port for port in serial_ports(self._host) if port.path not in self._radios]
+        ports = [port for port in serial_ports(self._host) if str(self._host.resolve(port.path)) not in self._radios]
         there = {port.path for port in ports}
         self._passed = {path: why for path, why in self._passed.items() if path in there}
         left = [port for port in ports if port.key not in self._tried]
