@@ -72,7 +72,7 @@ def sent_and_stored(
 ) -> list[ItemRow]:
     """One row per item sent, and one per inserted item. `stored`: empty for a list that was rejected or cleared.
 
-    `sent_seqs`: the number as sent of each stored item. Missions of older releases lack them: taken to be in order.
+    `sent_seqs`: the number as sent of each stored item; empty: in order.
     A row with no change but filled-in defaults is "same"; its `changes` still hold their reasons.
     """
     dropped = {finding.seq: finding.why for finding in findings if finding.becomes == DROPPED}
