@@ -286,10 +286,9 @@ class PollSchedule:
                 slot.followed_until = slot.followed_until if now < slot.followed_until else -inf
             self._unfollowed_at = min((slot.followed_until for slot in self._followed()), default=inf)
             self._fit()
-        has_lost, self._lost_before = link.requests_lost != self._lost_before, link.requests_lost
-        lost: list[_Slot] = []
-        if has_lost:
-            lost = [slot for slot in self._slots.values() if slot.is_asked and not link.awaits(slot.poll.command)]
+        asked = self._slots.values() if link.requests_lost != self._lost_before else ()
+        self._lost_before = link.requests_lost
+        lost = [slot for slot in asked if slot.is_asked and not link.awaits(slot.poll.command)]
         if lost or beside_missions != self._beside_missions:
             for slot in lost:
                 slot.is_asked = False

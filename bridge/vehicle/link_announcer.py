@@ -25,7 +25,7 @@ class LinkAnnouncer:
     """Reports a loss, its end and a new flight controller with `say`.
 
     `trouble` gives the cause of a loss, if known, and what the pilot must do. `was_found`: before the bridge was
-    restarted in flight. `is_wired`: False if a Wi-Fi adapter is in between.
+    restarted in flight. `is_wired`: not behind a Wi-Fi adapter.
     """
 
     def __init__(
