@@ -113,11 +113,16 @@ class Moment:
     blockers: tuple[str, ...] = ()
 
     def fresh(self, kind: type[v.ReadingT]) -> v.ReadingT | None:
-        return self.vehicle.fresh(kind, self.now)
+        reading = self.vehicle.last(kind)
+        limit_s = self.vehicle.stale_s.get(kind, v.STALE_S)
+        return reading if reading is not None and self.now <= reading.heard_at + limit_s else None
 
     def need(self, kind: type[v.ReadingT]) -> v.ReadingT:
         """The latest reading of a kind; Unknown if there is none or it is stale."""
-        return known(self.fresh(kind))
+        reading = self.vehicle.last(kind)
+        if reading is None or self.now > reading.heard_at + self.vehicle.stale_s.get(kind, v.STALE_S):
+            raise Unknown
+        return reading
 
     def made(self, *makers: "Maker") -> list[Message]:
         """The messages of these makers that are not Unknown."""

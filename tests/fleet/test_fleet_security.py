@@ -106,7 +106,7 @@ def test_only_the_pilot_may_push(secured: Fleet) -> None:
         assert push("pilot").returncode == 0
         denied = push("guest")
     assert denied.returncode == 1, denied
-    assert "the router denies access" in " ".join(denied.stdout.split())
+    assert "access is denied" in " ".join(denied.stdout.split())
 
 
 def test_a_vehicle_cannot_impersonate_another(secured: Fleet) -> None:
