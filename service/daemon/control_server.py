@@ -60,11 +60,18 @@ class ControlServer:
             if self._path.parent.stat().st_uid not in (os.getuid(), 0):
                 raise PermissionError(f"{self._path.parent} belongs to another user")
             self._path.unlink(missing_ok=True)
+            # Python 3.13's start_unix_server removes the socket at the end, and logs an error if its folder is gone.
+            listening = socket.socket(socket.AF_UNIX)
+            try:
+                listening.bind(str(self._path))
+                self._path.chmod(0o660)
+            except OSError:
+                listening.close()
+                raise
             # The backlog also limits the connections that asyncio accepts in one turn of the loop.
-            self._server = await asyncio.start_unix_server(
-                self._serve, self._path, limit=_MAX_LINE, backlog=_MAX_CLIENTS
+            self._server = await asyncio.start_server(
+                self._serve, sock=listening, limit=_MAX_LINE, backlog=_MAX_CLIENTS
             )
-            self._path.chmod(0o660)
         except OSError as error:
             text = f"the control socket {self._path} cannot be created: {reason(error)}"
             raise ControlError(f"{text}; name a writable folder with --state-dir") from error

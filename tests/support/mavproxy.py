@@ -33,7 +33,7 @@ class MavProxy:
             self._process = subprocess.Popen(
                 [*program, f"--master=udpout:127.0.0.1:{port}", modules, f"--state-basedir={directory}", *options],
                 cwd=directory,
-                env=os.environ | {"HOME": str(directory)},
+                env=os.environ | {"HOME": str(directory), "PYTHONUNBUFFERED": "1"},
                 stdin=subprocess.PIPE,
                 stdout=output,
                 stderr=output,
