@@ -18,6 +18,7 @@
 #   make release VERSION=0.3.0  cut the changelog, tag, and build everything in dist/0.3.0 with checksums; pushes nothing
 #   make deb-trial      install, use and purge it in a bare Debian with systemd (root; SUITE=trixie: Debian 13;
 #                       SUITE=bookworm-to-trixie: after an upgrade of the system)
+#   make suite-trial    all tests in a bare Debian, as root and as a user (root; SUITE=trixie: Debian 13)
 #   make lock           pin the newest packages that pyproject.toml allows (needs uv)
 #   make cli-page       regenerate docs/cli.md
 #   make rules-page     regenerate the table of docs/mission-rules.md from the rules
@@ -37,14 +38,15 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .NOTPARALLEL:
-.PHONY: rules-page rights-page demo test lint bench pictures real-board soak fuzz deb release deb-trial image-check lock config-sample cli-page inav-page zenoh-schemas clean
+.PHONY: rules-page rights-page demo test lint bench pictures real-board soak fuzz deb release deb-trial suite-trial image-check lock config-sample cli-page inav-page zenoh-schemas clean
 
-# Installed if missing and if run as root, like the compilers of firmware/; systemd checks its own unit.
-BROWSER_PACKAGES := chromium chromium-driver
-BROWSER := { command -v chromium && command -v chromedriver; } >/dev/null
+# The programs that the tests use, with their Debian packages: installed if missing and if run as root, like the compilers
+# of firmware/. Without one of the needed programs there is no test run, without one of the others its tests are skipped.
+NEEDED := cc:build-essential ssh-keygen:openssh-client
+OTHERS := chromium:chromium chromedriver:chromium-driver systemd-analyze:systemd
+missing = $$(for each in $(1); do command -v $${each%:*} >/dev/null || printf '%s ' $${each\#*:}; done)
 # For tests of the installed Debian package: needs permission to create namespaces, which some containers lack.
 BARE_ROOT := { $(BIN)/python tests/support/bare_root.py; } >/dev/null 2>&1
-IN_BARE_ROOT := tests/packaging/test_debian_package.py::test_in_a_bare_root
 INSTALL = if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
 	  echo "installing $(1)"; \
 	  apt-get update -q >/dev/null && DEBIAN_FRONTEND=noninteractive apt-get install -qy --no-install-recommends $(1) >/dev/null; \
@@ -56,14 +58,14 @@ demo: $(VENV)/.demo-ready
 # Each program that a test starts would compile all its modules again.
 test: export PYTHONDONTWRITEBYTECODE =
 test: $(VENV)/.test-ready
-	@$(BROWSER) || { $(call INSTALL,$(BROWSER_PACKAGES)); } || true
-	@$(BROWSER) || echo 'The status page: NOT TESTED in a browser: none here (apt-get install $(BROWSER_PACKAGES))'
-	@command -v systemd-analyze >/dev/null || { $(call INSTALL,systemd); } || true
+	@packages=$(call missing,$(NEEDED) $(OTHERS)); test -z "$$packages" || { $(call INSTALL,$$packages); } || true
+	@packages=$(call missing,$(NEEDED)); test -z "$$packages" || { \
+	    echo "make test needs more programs: sudo apt-get install $$packages" >&2; exit 1; }
+	@packages=$(call missing,$(OTHERS)); test -z "$$packages" || \
+	    echo "NOT TESTED is what needs these packages: sudo apt-get install $$packages"
 	@$(MAKE) -s -C firmware tools
 	@$(BARE_ROOT) || echo 'The Debian package: NOT INSTALLED anywhere: no namespaces can be made here'
-	$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile --no-loadscope-reorder \
-	    $$($(BROWSER) || echo --ignore=tests/service/web/test_web_page.py) \
-	    $$($(BARE_ROOT) || echo --deselect=$(IN_BARE_ROOT)) $(ARGS)
+	$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile --no-loadscope-reorder $(ARGS)
 
 # Turns of phrase that are not English, or say again what a name says; CONTRIBUTING.md has the rule.
 UN_ENGLISH := whoever|whomever|anew|amidst|somebody|anybody|everybody|hung up on|at the most|stands (still|in the way)|patience|(is|are|was|were|be) taken for|looked for on
@@ -112,9 +114,12 @@ deb-trial: deb
 image-check: deb
 	deb/trial dist/naze-bridge_*_$(ARCH).deb deb/first-hour-inside $(SUITE)
 
+suite-trial:
+	deb/suite-trial $(or $(SUITE),bookworm) '$(ARGS)'
+
 # The project itself is installed editable, so that edits take effect. Its build backend comes from the lock, too;
 # --no-deps because pip would complain about packages deliberately left out of the lock (pyproject.toml, tool.uv).
-PIP_INSTALL = $(BIN)/python -m pip --disable-pip-version-check install --quiet --no-deps
+PIP_INSTALL = $(BIN)/python -m pip --disable-pip-version-check install --quiet --quiet --no-deps
 define set_up
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
 	    echo 'naze-bridge needs Python 3.11 or newer as $(PYTHON); name another one: make PYTHON=python3.12' >&2; exit 1; }
@@ -122,7 +127,8 @@ define set_up
 	    echo 'naze-bridge needs the venv module of $(PYTHON); on Debian: apt-get install python3-venv' >&2; exit 1; }
 	@echo 'Installing $< in $(VENV)'
 	@test -x $(BIN)/pip || $(PYTHON) -m venv $(VENV)
-	@$(PIP_INSTALL) --require-hashes --only-binary=:all: -r $<
+	@$(PIP_INSTALL) --require-hashes --only-binary=:all: -r $< || { \
+	    echo 'The packages could not be fetched. Is there a network? Then repeat: make $(MAKECMDGOALS)' >&2; exit 1; }
 	@$(PIP_INSTALL) --no-build-isolation --editable .
 	@touch $@
 endef
