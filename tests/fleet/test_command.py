@@ -2,6 +2,7 @@
 """`naze-bridge fleet` as used by a person and by a script: three daemons behind a router."""
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -185,6 +186,20 @@ def test_the_example_programs_work(fleet: Fleet, tmp_path: Path) -> None:
         )
     try:
         until(lambda: {"kite:", "swift:"} <= set(output.read_text().split()), "positions of two vehicles")
+    finally:
+        positions.kill()
+        positions.wait()
+
+
+@pytest.mark.skipif("EXAMPLE_IN_RUST" not in os.environ, reason="minutes to build: EXAMPLE_IN_RUST=1, with cargo")
+def test_the_example_in_rust_works(fleet: Fleet, tmp_path: Path) -> None:
+    folder = ["--manifest-path", str(EXAMPLES / "rust" / "Cargo.toml"), "--target-dir", str(tmp_path)]
+    subprocess.run(["cargo", "build", "--quiet", "--locked", *folder], check=True)
+    output = tmp_path / "positions.txt"
+    with output.open("w") as log:
+        positions = subprocess.Popen([tmp_path / "debug" / "positions", fleet.router.endpoint], stdout=log, stderr=log)
+    try:
+        until(lambda: "fleet/kite/v1/telemetry/position: {" in output.read_text(), "a position")
     finally:
         positions.kill()
         positions.wait()
