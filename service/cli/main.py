@@ -16,6 +16,7 @@ from terminal.sentences import INTERRUPTED, complain
 _COMMANDS = {
     "setup": LazyCommand("service.cli.setup.command:setup", "Set this Raspberry Pi up: UART, Wi-Fi, page, service."),
     "card": LazyCommand("service.cli.card:card", "Prepare a card that sets itself up at its first start."),
+    "token": LazyCommand("service.cli.setup.command:token", "Show the status page's token and its QR code."),
     "run": LazyCommand("service.cli.run:run", "Run the bridge in the foreground."),
     "status": LazyCommand("service.cli.status:status", "Show the state of the bridge and the vehicle."),
     "doctor": LazyCommand("service.cli.doctor.command:doctor", "Diagnose setup problems."),
@@ -92,8 +93,8 @@ def _show_version(context: click.Context, _option: click.Parameter, is_given: bo
     from service.machine.package import address, version  # reads files: not at every start
 
     click.echo(f"naze-bridge, version {version()}")
-    if (issues := address("Issues")) is not None:
-        click.echo(f"Problems, questions, recordings: {issues}")
+    issues = address("Issues") or "ask where you got this copy from, because it names no address"
+    click.echo(f"Problems, questions, recordings: {issues}")
     context.exit()
 
 

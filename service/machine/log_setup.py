@@ -10,8 +10,8 @@ import select
 import sys
 import time
 from collections import deque
+from collections.abc import Mapping
 from contextlib import suppress
-from datetime import UTC, datetime
 from typing import NamedTuple
 
 import structlog
@@ -30,12 +30,47 @@ _KEPT, _MOST_TEXT = 300, 1000
 _log = structlog.get_logger()
 
 
-class LogLine(NamedTuple):
-    """`at`: HH:MM:SS, UTC. `text`: the event as JSON, shortened."""
+#: What an event is about, by the first part of its name.
+_SUBJECTS = {
+    "config": "Settings",
+    "daemon": "Bridge",
+    "fc": "Flight controller",
+    "gcs": "Ground station",
+    "store": "Mission store",
+    "tlog": "Telemetry log",
+    "uart": "UART recording",
+    "vehicle": "Craft",
+    "web": "Status page",
+}
+_UNITS = {"baud": "baud", "s": "s", "m": "m", "mb": "MB"}
+#: Facts that need no name, in this order before the others.
+_PLAIN_FACTS = ("text", "detail", "why", "what")
+_UNSAID = (*_PLAIN_FACTS, "event", "level", "incident", "exception")
 
-    at: str
+
+class LogLine(NamedTuple):
+    """`at_s`: seconds since 1970. `text`: the event as a sentence, shortened."""
+
+    at_s: float
     level: str
     text: str
+
+
+def sentence(event: Mapping[str, object]) -> str:
+    """An event for a person.
+
+    >>> sentence({"event": "fc.lost", "why": "silence", "speed_baud": 9600, "incident": "link-3"})
+    'Flight controller lost: silence, speed 9600 baud'
+    """
+    about, _, happened = str(event["event"]).partition(".")
+    facts = [str(event[name]) for name in _PLAIN_FACTS if event.get(name)]
+    for name, value in event.items():
+        if name not in _UNSAID and value not in (None, "", [], {}):
+            words, _, unit = name.rpartition("_")
+            shown = ", ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
+            facts.append(f"{words} {shown} {_UNITS[unit]}" if unit in _UNITS and words else f"{name} {shown}")
+    subject = f"{_SUBJECTS.get(about, about.capitalize())} {happened}".strip()
+    return f"{subject}{': ' if facts else ''}{', '.join(facts)}".replace("_", " ")
 
 
 class _StandardError:
@@ -100,10 +135,9 @@ class _Recent:
         self.count = 0
         self.lines: deque[LogLine] = deque(maxlen=_KEPT)
 
-    def __call__(self, logger: object, method: str, event: EventDict) -> EventDict:
+    def __call__(self, _logger: object, method: str, event: EventDict) -> EventDict:
         self.count += 1
-        at = datetime.fromtimestamp(time.time(), UTC).strftime("%H:%M:%S")
-        self.lines.append(LogLine(at, method, str(_render_json(logger, method, dict(event)))[:_MOST_TEXT]))
+        self.lines.append(LogLine(round(time.time(), 1), method, str(printable(sentence(event)))[:_MOST_TEXT]))
         return event
 
 

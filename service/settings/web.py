@@ -68,6 +68,12 @@ def _host_name(entry: object, _folder: Path) -> str:
     return entry.lower()
 
 
+def _origin(entry: object, _folder: Path) -> str:
+    if not isinstance(entry, str) or re.fullmatch(r"https?://[A-Za-z0-9.-]+(:[0-9]{1,5})?", entry) is None:
+        raise Unfit(f'holds {entry!r}, which is not an origin: write one like "https://fleet.example.org"')
+    return entry.lower()
+
+
 @dataclass(frozen=True, slots=True)
 class WebSettings:
     """The settings of the status page."""
@@ -101,3 +107,8 @@ class WebSettings:
         " server's name.",
         Example('"Example Survey, CC BY 4.0"'),
     ] = None
+    origins: Annotated[
+        tuple[str, ...],
+        several('as in ["https://fleet.example.org"]', _origin),
+        "Origins of other web applications whose scripts may use this page's interface, each with scheme and port.",
+    ] = ()

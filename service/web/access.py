@@ -29,18 +29,13 @@ from storage.store_error import StoreError
 Handler = Callable[[Request], Awaitable[Response]]
 
 
-def content_policy(image_origin: str = "") -> str:
-    """The origins that a page may load from; `image_origin`: another origin, from which it may also load pictures."""
-    sources = f"'self' {image_origin}".strip()
-    return (
-        f"default-src 'none'; script-src 'self'; style-src 'self'; img-src {sources};"
-        " connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-    )
-
-
+#: With the origin of map tiles.
+_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' {};"
+    " connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
 #: The connection carries no second request (service.web.connection_limit).
 _HEADERS = {
-    b"content-security-policy": content_policy().encode(),
     b"x-content-type-options": b"nosniff",
     b"referrer-policy": b"no-referrer",
     b"cross-origin-resource-policy": b"same-origin",
@@ -57,7 +52,7 @@ _WRONG_NAME = (
     "Open this page by the Pi's address in numbers or its local name, or add this name to the setting web.hosts."
 )
 #: Without the file's name: anyone on the network can ask.
-_REFUSED = "Wrong token. On the Pi, `sudo naze-bridge setup` shows it."
+_REFUSED = "Wrong token. On the Pi, `sudo naze-bridge token` shows it."
 _READ_ONLY = "This page is read-only: the bridge has no token for it. Its log (web.no_token) says why."
 _FAILED = "The daemon failed to answer; see its log."
 #: The response to an error, whose text is one sentence.
@@ -89,7 +84,7 @@ def check_token(request: Request) -> None:
     if not token.is_shown_by(request.headers.get("authorization")):
         peer = None if request.client is None else request.client.host
         _log.warning("web.wrong_token", peer=peer, path=request.url.path)
-        raise HTTPException(HTTPStatus.FORBIDDEN, _REFUSED)
+        raise HTTPException(HTTPStatus.UNAUTHORIZED, _REFUSED, {"WWW-Authenticate": "Bearer"})
 
 
 def route(method: str, path: str, handler: Handler, *checks: Callable[[Request], None], max_body: int = 0) -> Route:
@@ -139,16 +134,17 @@ EXCEPTION_HANDLERS = {Exception: _failed, **dict.fromkeys((HTTPException, *_STAT
 
 
 class SafeHeaders:
-    """Adds the security headers to every response."""
+    """Adds the security headers to every response. `image_origin`: from where the page may also load pictures."""
 
-    def __init__(self, app: ASGIApp) -> None:
+    def __init__(self, app: ASGIApp, image_origin: str) -> None:
         self._app = app
+        self._headers = _HEADERS | {b"content-security-policy": _POLICY.format(image_origin).encode()}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         async def send_safely(message: Message) -> None:
             if message["type"] == "http.response.start":
                 given = {name for name, _ in message["headers"]}
-                message["headers"] += [each for each in _HEADERS.items() if each[0] not in given]
+                message["headers"] += [each for each in self._headers.items() if each[0] not in given]
             await send(message)
 
         await self._app(scope, receive, send_safely)

@@ -15,8 +15,6 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
-from bridge.missions.mission_service import HeldMission
-from bridge.model.missions import Outcome
 from payloads.comparison import shown, stored_mission
 from payloads.mission_data import to_json
 from service.daemon.api import DaemonApi
@@ -28,10 +26,9 @@ from service.recording.tlog_recorder import TLOG_FOLDER
 from service.settings.web import WebSettings
 from service.web.access import check_token, refusing, route
 from service.web.connect_help import connect_help, page_urls, qr_code
-from service.web.flown_track import FlownTrack
 from service.web.metrics import CONTENT_TYPE, Metrics
 from service.web.pi_control import PiControl
-from service.web.replies import ResponseCache, begun, json_reply, path_number, text_reply, whole
+from service.web.replies import Turns, begun, json_reply, path_number, text_reply, whole
 from service.web.sent_files import MissionWriter, SentFiles
 from service.web.settings_history import SettingsHistory
 from storage.store_error import StoreError
@@ -48,27 +45,17 @@ class Api:
         self._listen = settings.listen
         self._api = DaemonApi(daemon)
         self._metrics = Metrics(daemon)
-        self._cache = ResponseCache()
-        self._held_text: tuple[HeldMission, str] | None = None
+        self._turns = Turns()
         self._writer = MissionWriter()
         self._files = SentFiles(self._api, self._writer)
-        self._settings = SettingsHistory(self._api.settings, self._writer, self._cache)
+        self._settings = SettingsHistory(self._api.settings, self._writer, self._turns)
         self._pi = PiControl(daemon, self._writer)
         self._map = {"tiles": str(settings.map_tiles), "credit": settings.map_credit}
-        self._track = FlownTrack(daemon)
-        self._sampling: asyncio.TimerHandle | None = None
         state_dir = daemon.settings.state_dir
         self._logs = TelemetryLogs(None if state_dir is None else state_dir / TLOG_FOLDER)
         self._host = Host()
 
-    def start(self) -> None:
-        """Take the first sample; more follow every second until `close`."""
-        self._sampling = asyncio.get_running_loop().call_later(1, self.start)
-        self._track.sample()
-
     async def close(self) -> None:
-        if self._sampling is not None:
-            self._sampling.cancel()
         await self._writer.close()
         await self._pi.close()
         self._logs.close()
@@ -77,7 +64,6 @@ class Api:
         return [
             route("GET", "/api/state", self._state),
             route("GET", "/api/held", self._held),
-            route("GET", "/api/track", self._flown_track),
             route("GET", "/api/connect", self._connect),
             route("GET", "/connect.svg", self._connect_code),
             route("GET", "/api/missions", self._missions),
@@ -112,7 +98,6 @@ class Api:
                 "port": {"address": daemon.fc.where, "trouble": daemon.fc.trouble},
                 "refused": [f"{count} x {why} ({link})" for (link, why), count in refused.items()],
                 "recording": daemon.recording,
-                "track": self._track.state,
                 "newest_mission": newest,
                 "newest_backup": newest_backup,
                 "store_trouble": store,
@@ -128,13 +113,8 @@ class Api:
         held = self._daemon.bridge.missions.held
         if held is None:
             return json_reply({"count": None, "checksum": None, "items": []})
-        if self._held_text is None or self._held_text[0] is not held:
-            self._held_text = held, _held_text(held)
-        return text_reply(self._held_text[1])
-
-    async def _flown_track(self, request: Request) -> Response:
-        """The track of this flight or the last one, from place `first` on."""
-        return json_reply(self._track.to_json(whole(request.query_params.get("first", "0"))))
+        identity, items = held.identity, [shown(item) for item in held.items]
+        return json_reply({"count": identity.count, "checksum": f"{identity.checksum:08x}", "items": items})
 
     async def _connect(self, _request: Request) -> Response:
         return json_reply(connect_help(self._listen, self._daemon.settings.gcs, self._host.ipv4_addresses()))
@@ -153,13 +133,9 @@ class Api:
     async def _mission(self, request: Request) -> Response:
         """A mission as sent and as stored."""
         number = path_number(request, "number")
-
-        async def make() -> tuple[str, bool]:
+        async with self._turns.take():
             mission = await self._api.show_mission(number)
-            text = await asyncio.to_thread(lambda: to_json(stored_mission(mission)))
-            return text, mission["outcome"] != Outcome.PENDING.value
-
-        return text_reply(await self._cache.get(str(number), make))
+            return text_reply(await asyncio.to_thread(lambda: to_json(stored_mission(mission))))
 
     async def _restore(self, request: Request) -> Response:
         number = path_number(request, "number")
@@ -185,8 +161,3 @@ class Api:
 
 def _refusing_logs() -> AbstractContextManager[None]:
     return refusing(OSError, HTTPStatus.SERVICE_UNAVAILABLE, lambda why: f"The logs cannot be read: {why}.")
-
-
-def _held_text(held: HeldMission) -> str:
-    identity, items = held.identity, [shown(item) for item in held.items]
-    return to_json({"count": identity.count, "checksum": f"{identity.checksum:08x}", "items": items})

@@ -15,8 +15,6 @@ from uvicorn.config import Config
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.server import ServerState
 
-from service.machine.log_setup import warn_once
-
 #: Responses are a few kilobytes and quick to make.
 LIFETIME_S = 15.0
 #: A waiting connection has a few kilobytes. A browser opens six at once.
@@ -39,8 +37,6 @@ class ConnectionLimit:
         #: When the turns taken so far are used up, at the highest rate.
         self._used_until = 0.0
         self._timer: asyncio.TimerHandle | None = None
-        self._malformed = 0
-        self._warned: set[str] = set()
 
     def enter(self, address: str, connection: "BoundedConnection") -> None:
         """Take a connection; if there are too many, the oldest one of the host with the most is closed."""
@@ -79,10 +75,6 @@ class ConnectionLimit:
 
     def leave(self, address: str, connection: "BoundedConnection") -> None:
         self._remove(_host(address), connection)
-
-    def count_malformed(self, address: str) -> None:
-        self._malformed += 1
-        warn_once(self._warned, "web.malformed", peer=address, count=self._malformed)
 
     def close(self) -> None:
         if self._timer is not None:
@@ -145,7 +137,6 @@ class BoundedConnection(H11Protocol):
 
     def send_400_response(self, msg: str) -> None:
         """Refuse a request that is not HTTP. Its head may have been: then its handler already runs, or has answered."""
-        self._limit.count_malformed(self._address)
         if self.cycle is not None:
             self.cycle.disconnected = True
             self.cycle.message_event.set()

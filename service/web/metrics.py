@@ -99,12 +99,9 @@ class _State(Collector):
     def _links(self) -> Iterator[Metric]:
         for way in ("received", "sent"):
             sizes = _counters(f"link_{way}_bytes", f"Bytes {way}, by link; fc: the flight controller's port.", "link")
-            pieces = _counters(f"link_{way}_pieces", f"Reads, writes or datagrams {way}, by link.", "link")
             for name, traffic in self._daemon.traffic.items():
                 sizes.add_metric([name], getattr(traffic, f"bytes_{way}"))
-                pieces.add_metric([name], getattr(traffic, f"pieces_{way}"))
             yield sizes
-            yield pieces
         counters = self._daemon.bridge.counters()
         yield _gauge("ground_stations", "Ground stations currently heard.", {}, counters.ground_stations)
         damaged = counters.bad_frames

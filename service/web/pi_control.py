@@ -26,7 +26,7 @@ from service.daemon.daemon import Daemon
 from service.machine.helper_socket import MAX_PACKAGE, HelperError, ask_helper, unit_of
 from service.machine.log_setup import recent_lines
 from service.web.access import MAX_FILE, check_token, refusing, route
-from service.web.replies import begun, json_reply, received_body, whole
+from service.web.replies import JSON, begun, json_reply, received_body, whole
 from service.web.sent_files import MissionWriter
 from storage.os_error import reason
 
@@ -90,7 +90,7 @@ class PiControl:
     async def _begin(self, request: Request) -> Response:
         """The body is a request to the helper."""
         try:
-            asked = json.loads(await received_body(request))
+            asked = json.loads(await received_body(request, JSON))
             action, unit = asked["action"], unit_of(asked["action"])
         except (ValueError, TypeError, KeyError, RecursionError):
             unit = None

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bodies of requests, numbers in them, JSON responses, and a cache of long ones."""
+"""Bodies of requests, numbers in them, JSON responses, and the turns of long ones."""
 
 import asyncio
-from collections import OrderedDict
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from http import HTTPStatus
 
 from starlette.exceptions import HTTPException
@@ -12,17 +12,14 @@ from starlette.responses import Response
 
 from payloads.mission_data import MOST, Json, to_json
 
-#: A page of another site cannot send this type without a preflight request, which is refused.
-_CONTENT_TYPE = "application/octet-stream"
-#: The last upload, which each open page shows, and a few that are being looked at.
-_KEPT = 8
-_PAUSE_S = 0.05
+#: A page of another site cannot send these types without a preflight request, which only `web.origins` allow.
+DATA, JSON = "application/octet-stream", "application/json"
 
 
-async def received_body(request: Request) -> bytes:
+async def received_body(request: Request, kind: str = DATA) -> bytes:
     """The body. A slow phone takes seconds to send it."""
-    if request.headers.get("content-type") != _CONTENT_TYPE:
-        raise HTTPException(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, f"Send the data as {_CONTENT_TYPE}.")
+    if request.headers.get("content-type", "").partition(";")[0] != kind:
+        raise HTTPException(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, f"Send the data as {kind}.")
     try:
         return await request.body()
     except ClientDisconnect as error:
@@ -52,26 +49,19 @@ def text_reply(json: str, status: HTTPStatus = HTTPStatus.OK) -> Response:
     return Response(json, status, media_type="application/json")
 
 
-class ResponseCache:
-    """Caches responses that are final. Long ones are made in a thread, one at a time.
+class Turns:
+    """Long responses are made one at a time, in a thread.
 
     That thread holds the interpreter for some milliseconds. So there is a pause after each response, however many
     connections ask for one, so that the loop can serve the links.
     """
 
-    def __init__(self) -> None:
-        self._turn = asyncio.Lock()
-        self._kept: OrderedDict[str, str] = OrderedDict()
+    def __init__(self, pause_s: float = 0.05) -> None:
+        self._lock = asyncio.Lock()
+        self._pause_s = pause_s
 
-    async def get(self, question: str, make: Callable[[], Awaitable[tuple[str, bool]]]) -> str:
-        """The response; `make` returns it, and True if it is final."""
-        async with self._turn:
-            answer = self._kept.get(question)
-            if answer is None:
-                answer, is_final = await make()
-                if is_final:
-                    self._kept[question] = answer
-                    while len(self._kept) > _KEPT:
-                        self._kept.popitem(last=False)
-                await asyncio.sleep(_PAUSE_S)
-        return answer
+    @asynccontextmanager
+    async def take(self) -> AsyncIterator[None]:
+        async with self._lock:
+            yield
+            await asyncio.sleep(self._pause_s)

@@ -25,7 +25,7 @@ from protocols.mission_item import MissionItem
 from service.daemon.api import DaemonApi
 from service.daemon.client import ControlError
 from service.web.access import MAX_FILE, check_token, refusing, route
-from service.web.replies import begun, received_body, text_reply
+from service.web.replies import Turns, begun, received_body, text_reply
 from storage.store_error import StoreError
 
 _PAUSE_S = 0.25
@@ -88,7 +88,7 @@ class SentFiles:
     def __init__(self, api: DaemonApi, writer: MissionWriter) -> None:
         self._api = api
         self._writer = writer
-        self._turn = asyncio.Lock()
+        self._turns = Turns(_PAUSE_S)
 
     def routes(self) -> list[Route]:
         return [
@@ -100,13 +100,11 @@ class SentFiles:
     async def check(self, request: Request) -> Json:
         """The mission as the flight controller would hold it."""
         name, body = await _received(request)
-        async with self._turn:
+        async with self._turns.take():
             items = await _parsed(name, body)
             with refusing(ControlError, HTTPStatus.SERVICE_UNAVAILABLE):
                 verdict = await self._api.check(items)
-            answer = await asyncio.to_thread(checked_mission, items, verdict)
-            await asyncio.sleep(_PAUSE_S)
-        return answer
+            return await asyncio.to_thread(checked_mission, items, verdict)
 
     async def _check(self, request: Request) -> Response:
         return text_reply(await asyncio.to_thread(to_json, await self.check(request)))

@@ -7,6 +7,7 @@ from contextlib import suppress
 
 import structlog
 from starlette.applications import Starlette
+from starlette.middleware.cors import CORSMiddleware
 from uvicorn.config import Config
 from uvicorn.server import ServerState
 
@@ -42,7 +43,6 @@ class WebServer:
         self._server: asyncio.Server | None = None
 
     def start(self) -> None:
-        self._api.start()
         self._listening = asyncio.get_running_loop().create_task(self._listen())
 
     async def close(self) -> None:
@@ -80,12 +80,13 @@ class WebServer:
 
 
 def _config(api: Api, settings: WebSettings, token: Token | TokenError) -> Config:
-    routes = [*api.routes(), *(route("GET", *each) for each in static_files(settings.map_tiles.origin))]
+    routes = [*api.routes(), *(route("GET", *each) for each in static_files())]
     app = Starlette(routes=routes, exception_handlers=EXCEPTION_HANDLERS)
     app.state.hosts, app.state.token = settings.hosts, token
     # uvicorn would log only the errors of browsers; ours are logged by `failed`.
+    open_app = CORSMiddleware(app, settings.origins, ("GET", "POST"), ("Authorization", "Content-Type"), max_age=600)
     return Config(
-        SafeHeaders(app),
+        SafeHeaders(open_app if settings.origins else app, settings.map_tiles.origin),
         lifespan="off",
         ws="none",
         proxy_headers=False,

@@ -8,12 +8,12 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from bridge.settings.local_settings import by_parameter
-from payloads.mission_data import ACCEPTED, Json, to_json
+from payloads.mission_data import ACCEPTED, Json
 from protocols.param_file import write_param_file
 from service.daemon.client import ControlError
 from service.daemon.settings_api import SettingsApi
 from service.web.access import check_token, route
-from service.web.replies import ResponseCache, begun, json_reply, path_number, text_reply
+from service.web.replies import Turns, begun, json_reply, path_number
 from service.web.sent_files import MissionWriter, Progress
 
 _LISTED = 50
@@ -22,10 +22,10 @@ _LISTED = 50
 class SettingsHistory:
     """Answers from SettingsApi. An unauthenticated request never uses the flight controller's line."""
 
-    def __init__(self, api: SettingsApi, writer: MissionWriter, cache: ResponseCache) -> None:
+    def __init__(self, api: SettingsApi, writer: MissionWriter, turns: Turns) -> None:
         self._api = api
         self._writer = writer
-        self._cache = cache
+        self._turns = turns
 
     def routes(self) -> list[Route]:
         return [
@@ -40,18 +40,14 @@ class SettingsHistory:
 
     async def _show(self, request: Request) -> Response:
         """The changes in a backup, and the changes that restoring it would make now."""
-
-        async def make() -> tuple[str, bool]:
+        async with self._turns.take():
             backup = await self._find(request)
             try:
                 plan: Json = await self._api.plan(backup["values"], backup["kind"], is_checked=False)
             except ControlError as error:
                 plan = {"refused": str(error)}
             del backup["values"]
-            return to_json(backup | {"plan": plan}), False
-
-        question = f"settings {path_number(request, 'number')}"
-        return text_reply(await self._cache.get(question, make))
+            return json_reply(backup | {"plan": plan})
 
     async def _file(self, request: Request) -> Response:
         backup = await self._find(request)

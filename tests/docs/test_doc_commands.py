@@ -56,7 +56,7 @@ NOT_RUN = {
     "naze-bridge firmware restore": "needs a backup: tests/e2e/test_firmware.py runs it",
     "apt": "changes the machine: `make deb-trial` runs it",
     "nano": "needs a person; the file is checked",
-    "cat": "needs the service; the file is checked",
+    "naze-bridge token": "needs the service: tests/service/cli/setup/test_command.py runs it",
     "install": "changes the machine; the folder and user are checked",
     "usermod": "changes the machine",
     "nmcli": "changes the machine; the connection's name is checked",

@@ -194,7 +194,7 @@ def test_the_example_programs_work(fleet: Fleet, tmp_path: Path) -> None:
 @pytest.mark.skipif("EXAMPLE_IN_RUST" not in os.environ, reason="minutes to build: EXAMPLE_IN_RUST=1, with cargo")
 def test_the_example_in_rust_works(fleet: Fleet, tmp_path: Path) -> None:
     folder = ["--manifest-path", str(EXAMPLES / "rust" / "Cargo.toml"), "--target-dir", str(tmp_path)]
-    subprocess.run(["cargo", "build", "--quiet", "--locked", *folder], check=True)
+    subprocess.run(["cargo", "build", "--quiet", *folder], check=True)
     output = tmp_path / "positions.txt"
     with output.open("w") as log:
         positions = subprocess.Popen([tmp_path / "debug" / "positions", fleet.router.endpoint], stdout=log, stderr=log)

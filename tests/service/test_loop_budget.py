@@ -72,7 +72,7 @@ async def control_socket(doors: Doors) -> None:
 
 async def page(doors: Doors) -> None:
     await _fill(doors, 1000)
-    paths = ("state", "held", "track", "connect", "missions", "missions/1", "settings", "settings/1", "settings/1/file")
+    paths = ("state", "held", "connect", "missions", "missions/1", "settings", "settings/1", "settings/1/file")
     for path in (*(f"/api/{each}" for each in paths), "/metrics", "/", "/map.js"):
         assert b"HTTP/1.1 200" in await doors.http("GET", path), path
     lines = "".join(f"{number},51.5,0.1,20\n" for number in range(LARGEST // 20))

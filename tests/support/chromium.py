@@ -8,14 +8,16 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import pytest
 from selenium.webdriver import Chrome, ChromeOptions, ChromeService
 from selenium.webdriver.common.by import By
 from selenium.webdriver.remote.webelement import WebElement
 
 from tests.support.programs import TIMEOUT_S, happens, until
 
-PHONE = (360, 740)
+PHONE = (390, 844)
 LAPTOP = (1280, 900)
+TASKS = ("fly", "mission", "check", "pi")
 _WATCH_CLICK = """
     const wanted = document.querySelector(arguments[0]);
     window.missed = true;
@@ -32,10 +34,25 @@ class Browser:
         self.driver = driver
         self.url = f"http://127.0.0.1:{port}/"
 
-    def open(self) -> None:
-        """Load the page and wait until it shows the daemon's state."""
-        self.driver.get(self.url)
+    def open(self, task: str = "fly", token: str = "") -> None:
+        """Load the page, with a token as from its QR code, and wait until it shows the daemon's state in this task."""
+        self.driver.get("about:blank")  # a new address that differs only in its fragment would load nothing
+        self.driver.get(f"{self.url}#token={token}" if token else self.url)
+        self.show(task)
+
+    def show(self, task: str) -> None:
+        """Change to another task, and wait for the next state."""
+        self.run("location.hash = arguments[0]", task)
         self.wait_for_updates(1)
+
+    def unfold(self, selector: str) -> None:
+        self.run("document.querySelector(arguments[0]).open = true", selector)
+
+    def enter_token(self, token: str) -> None:
+        """Answer the page's question for its token."""
+        until(lambda: self.run("return document.getElementById('token-dialog').open"), "the question for the token")
+        self.find("#token").send_keys(token)
+        self.press("#token-dialog button")
 
     def wait_for_updates(self, more: int) -> None:
         """Wait until the page has requested the state this many more times."""
@@ -135,7 +152,8 @@ class Browsers:
 
 def _start(*, dark: bool) -> Chrome:
     programs = {name: shutil.which(name) for name in ("chromium", "chromedriver")}
-    assert all(programs.values()), "install Debian's packages: apt-get install chromium chromium-driver"
+    if not all(programs.values()):
+        pytest.skip("no browser here: apt-get install chromium chromium-driver")
     options = ChromeOptions()
     options.binary_location = str(programs["chromium"])
     for argument in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--hide-scrollbars", "--disable-gpu"):

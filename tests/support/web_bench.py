@@ -85,13 +85,14 @@ class WebBench:
         assert ended.returncode == 0, ended.stderr
 
 
-def web_daemon(start: Starter, fc: str = "sim:", web: str = "") -> WebBench:
-    """Start a daemon with a page; `web`: further lines of its table."""
+def web_daemon(start: Starter, fc: str = "sim:", web: str = "", *, has_board: bool = True) -> WebBench:
+    """Start a daemon with a page; `web`: further lines of its table. Waits for the board, if any."""
     port = free_port(socket.SOCK_STREAM)
     config = start.directory / "naze-bridge.toml"
     config.write_text(f'[web]\nlisten = "127.0.0.1:{port}"\n{web}')
     daemon = start.daemon(fc, options=("--config", str(config)))
-    daemon.wait()
+    if has_board:
+        daemon.wait()
     until(lambda: daemon.has_logged("web.listening"), "the page")
     return WebBench(daemon, None, port)
 

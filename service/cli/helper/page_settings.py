@@ -23,12 +23,21 @@ from service.settings.table import KEYS
 _FILE = str(SERVICE_CONFIG.with_name(PAGE_FILE))
 _HEAD = "# Written by the status page. setup.toml and config.toml, in this folder, override this.\n"
 _RELOAD = ("systemctl", "reload", "naze-bridge.service")
-_NAMES = ("sysid", "takeoff_max_m", "record_tlog", "tlog_file_mb", "tlog_total_mb", "tlog_days", "log_level")
-_KEYS: Mapping[str, Key] = {key.name: key for key in KEYS if key.name in _NAMES}
+#: The label and the unit on the page.
+_LABELS = {
+    "sysid": ("MAVLink system id", ""),
+    "takeoff_max_m": ("Highest take-off", "m"),
+    "record_tlog": ("Record telemetry", ""),
+    "tlog_file_mb": ("Size of a telemetry log", "MB"),
+    "tlog_total_mb": ("Size of all of them", "MB"),
+    "tlog_days": ("Keep those without a flight", "days"),
+    "log_level": ("Log from severity", ""),
+}
+_KEYS: Mapping[str, Key] = {key.name: key for key in KEYS if key.name in _LABELS}
 
 
 def page_settings(host: Host) -> list[Json]:
-    """Each setting with its choices, the value in force (None: the default), and the other file that decides it."""
+    """Each setting: label, choices, the value in force (None: the default), and the other file that decides it."""
     given = _given(host)
     return [_page_setting(key, *given.get(key.name, (None, _FILE))) for key in _KEYS.values()]
 
@@ -37,6 +46,8 @@ def _page_setting(key: Key, value: object, where: str) -> Json:
     choices = key.reader.choices
     return {
         "name": key.name,
+        "label": _LABELS[key.name][0],
+        "unit": _LABELS[key.name][1],
         "meaning": key.meaning,
         "default": json.loads(key.default),
         "choices": {"least": choices[0], "most": choices[-1]} if isinstance(choices, range) else list(choices),
@@ -57,11 +68,13 @@ def change_settings(pi: ThisPi, *, values: dict) -> Json:  # type: ignore[type-a
         if name not in _KEYS:
             raise HelperRefusal("The page cannot change this setting.")
         if name in given and name not in chosen:
-            raise HelperRefusal(f"{name} is set in {given[name][1]}, which overrides the page: change it there.")
+            raise HelperRefusal(
+                f"{_LABELS[name][0]} is set in {given[name][1]}, which overrides the page: change it there."
+            )
         chosen[name] = value
     kept = {name: value for name, value in chosen.items() if value is not None}
     if odd := [name for name, value in kept.items() if not _is_choice(_KEYS[name], value)]:
-        raise HelperRefusal(f"{odd[0]} cannot have this value. {_KEYS[odd[0]].meaning}")
+        raise HelperRefusal(f"{_LABELS[odd[0]][0]} cannot have this value. {_KEYS[odd[0]].meaning}")
     text = _HEAD + "".join(f"{name} = {json.dumps(value)}\n" for name, value in sorted(kept.items()))
     if text == before or (not kept and not before):
         return pi.shown([])

@@ -228,12 +228,15 @@ def _print_addresses(host: Host, answers: SetupChoices) -> None:
     local = [f"{name}.local"] if name and host.path("/etc/avahi").exists() else []
     where = " or ".join([*local, *addresses]) or "this machine's address"
     click.echo(f"\nMission Planner: choose UDPCl, Connect, host {where}, port {GCS_PORT}")
-    if not answers.page:
-        return
-    url = f"http://{(addresses or local or ['localhost'])[0]}:{PAGE_PORT}/"
+    if answers.page:
+        _print_page(host, (addresses or local or ["localhost"])[0])
+
+
+def _print_page(host: Host, address: str) -> None:
+    url = f"http://{address}:{PAGE_PORT}/"
     click.echo(f"Status page: {url}")
-    if token := page_token(host):
-        show_secret("Its token, for changes", token, f"{SERVICE_STATE}/{DEFAULT_NAME}", f"{url}#token={token}")
+    if secret := page_token(host):
+        show_secret("Its token, for changes", secret, f"{SERVICE_STATE}/{DEFAULT_NAME}", f"{url}#token={secret}")
     else:
         print_code(url)
 
@@ -246,6 +249,18 @@ def page_token(host: Host) -> str:
     except (OSError, ValueError):
         return ""
     return token if _TOKEN.fullmatch(token) else ""
+
+
+@click.command()
+@click.option("--root", type=PATH, default="/", hidden=True)
+def token(root: Path) -> None:
+    """Show the status page's token, and a QR code that opens the page with it."""
+    host = Host(root)
+    if not is_root():
+        fail("only root can read the token: sudo naze-bridge token")
+    if not page_token(host):
+        fail("the status page has no token yet: switch it on with `sudo naze-bridge setup --page`")
+    _print_page(host, next(iter(host.ipv4_addresses()), "localhost"))
 
 
 def check_answers(ssid: str | None, password: str | None, country: str | None, name: str | None) -> None:

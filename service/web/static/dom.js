@@ -32,6 +32,54 @@ export const form = (attributes, submit, ...children) => make("form", { ...attri
   submit();
 } }, ...children);
 
+// A place for the result of an action.
+export const resultPlace = () => make("p", { class: "result", role: "status" });
+
+// Does `work` with the button disabled. The sentence it returns, or its error, appears in `result`.
+export async function pressed(button, result, work) {
+  button.disabled = true;
+  say(result, "", "Working …");
+  try {
+    say(result, "good", (await work()) ?? "");
+  } catch (error) {
+    say(result, "bad", error.message);
+  }
+  button.disabled = false;
+}
+
+// A button that does `work`.
+export function action(text, result, work, kind = "") {
+  const button = make("button", { type: "button", class: kind || null, onclick: () => pressed(button, result, work) }, text);
+  return button;
+}
+
+// Numbered entries that open in place, the newest first in `entries`. Those already there stay, with what is open in them.
+export function showEntries(container, entries, { name, summary, contents }) {
+  const there = new Map([...container.querySelectorAll(":scope > details")].map((each) => [Number(each.dataset.number), each]));
+  const numbers = new Set(entries.map(({ number }) => number));
+  for (const [number, element] of there) if (!numbers.has(number)) element.remove();
+  if (!there.size) container.replaceChildren();
+  for (const entry of [...entries].reverse()) {
+    const element = there.get(entry.number) ?? newEntry(entry.number, name, contents);
+    if (!there.has(entry.number)) container.prepend(element);
+    const parts = summary(entry), shown = parts.map((part) => part.outerHTML ?? part).join("");
+    if (element.dataset.shown !== shown) element.firstElementChild.replaceChildren(...parts);
+    element.dataset.shown = shown;
+  }
+}
+
+function newEntry(number, name, contents) {
+  const place = make("div", { role: "group", "aria-label": `${name} ${number}` });
+  return make("details", { "data-number": number, ontoggle: async ({ target }) => {
+    if (!target.open || target !== place.parentElement) return;
+    try {
+      place.replaceChildren(...await contents(number));
+    } catch (error) {
+      place.replaceChildren(make("p", { class: "bad" }, error.message));
+    }
+  } }, make("summary"), place);
+}
+
 // setText for a parent of simple elements: only those with changed text are updated.
 export function setList(parent, name, texts) {
   while (parent.children.length > texts.length) parent.lastElementChild.remove();

@@ -20,7 +20,7 @@ export function drawMap({ items, flown, position, attitude, trail }, width, came
   const home = craftHome(position) ?? (items.length && isPlaced(items[0]) ? placeOf(items[0]) : null);
   const middle = home ?? craft ?? (placed.length ? placeOf(placed[0]) : null);
   if (middle === null) return null;
-  const height = Math.round(Math.min(Math.max(width * 0.6, 260), 520));
+  const height = Math.round(Math.max(Math.min(width * 0.72, innerHeight * 0.6, 640), 260));
   const near = (place) => place !== null && distance(middle, place) < FARTHEST_M;
   const view = projection([...placed.map(placeOf), home, craft].filter(near), middle, width, height, camera);
   const svg = draw("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": inWords(items, flown, home, craft) });

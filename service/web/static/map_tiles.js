@@ -12,7 +12,7 @@ choice.addEventListener("change", () => localStorage.setItem("tiles", choice.che
 
 export function followTiles(state) {
   source = state.map;
-  setText(byId("tiles-about"), `This browser fetches them from ${host()}, for the places that you view.`);
+  setText(byId("tiles-about"), `from ${host()}, which then sees the places that you view`);
 }
 
 const host = () => new URL(source.tiles).host;

@@ -45,7 +45,7 @@ export class MapView {
     this.#drawn = wanted;
     const map = drawMap(this.#contents, width, this.#camera);
     this.#tools.hidden = map === null;
-    this.#canvas.replaceChildren(map?.svg ?? "Neither a mission nor a position is known yet.");
+    this.#canvas.replaceChildren(map?.svg ?? make("p", { class: "soft" }, "Neither a mission nor a position is known yet."));
     this.#canvas.classList.toggle("on-tiles", this.#tiles.draw(map));
     // Until it is zoomed, one finger scrolls the page.
     this.#canvas.classList.toggle("zoomed", this.#camera.zoom > 1);

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A dropped or chosen mission file: checked by the Pi, drawn, its changes listed first, then written.
-import { post } from "./daemon.js";
+import { post, postWithToken } from "./daemon.js";
 import { byId, make } from "./dom.js";
 import { MapView } from "./map_view.js";
-import { comparison } from "./mission_detail.js";
+import { comparison } from "./mission_tables.js";
 import { showProfile } from "./profile.js";
 import { writeForm } from "./write_form.js";
 
-const MOST_BYTES = 256 * 1024;
-const result = byId("checked"), drop = byId("drop"), chooser = byId("file");
+const result = byId("checked"), chooser = byId("file");
 let preview = null; // { map, items } of the file that is shown
 let latest = 0; // the check of an earlier file is ignored once a later one was chosen
 
@@ -24,7 +23,7 @@ document.addEventListener("drop", (event) => {
 function over(event, isOver) {
   if (![...event.dataTransfer.types].includes("Files")) return;
   event.preventDefault(); // otherwise the browser leaves the page and opens the file
-  drop.classList.toggle("over", isOver);
+  document.body.classList.toggle("over", isOver);
 }
 
 // The craft moves on the preview's map, too.
@@ -35,29 +34,41 @@ export function followFile({ position, attitude }) {
 async function check(file) {
   const turn = ++latest;
   preview = null;
-  result.replaceChildren(make("p", { role: "status" }, `Checking ${file.name} …`));
-  result.scrollIntoView({ block: "nearest" });
+  show(make("p", { role: "status" }, `Checking ${file.name} …`));
   const contents = await checked(file);
   if (turn !== latest) return;
-  result.replaceChildren(...contents);
+  show(...contents);
   result.focus({ preventScroll: true });
   if (preview !== null) showProfile(byId("file-profile"), preview.items);
 }
 
+// The result takes the place of the held mission, until it is closed.
+function show(...contents) {
+  result.replaceChildren(...contents);
+  document.dispatchEvent(new Event("filechecked"));
+}
+
+function close() {
+  latest += 1;
+  preview = null;
+  show();
+}
+
 async function checked(file) {
+  const closing = make("button", { type: "button", onclick: close }, "Close");
   try {
-    if (file.size > MOST_BYTES) throw new Error(`${file.name} is larger than ${MOST_BYTES / 1024} KiB, so it is not a mission that fits a flight controller.`);
     const body = await file.arrayBuffer();
     const query = `name=${encodeURIComponent(file.name)}`;
-    const list = await post(`/api/check?${query}`, "", body);
+    const list = await post(`/api/check?${query}`, body);
     const container = make("div", { id: "file-map", class: "map" });
     preview = { map: new MapView(container), items: list.items };
     const isRejected = list.verdict === "REJECTED";
     const verdict = make("p", { class: isRejected ? "bad" : "good" }, verdictText(file.name, list));
-    const write = isRejected ? [] : [writeForm(`Write ${file.name} to the flight controller`, (token) => post(`/api/write?${query}`, token, body))];
-    return [verdict, ...comparison(list), container, make("h3", {}, "Altitude profile"), make("div", { id: "file-profile" }), ...write];
+    const write = isRejected ? [] : [writeForm("Write this mission", () => postWithToken(`/api/write?${query}`, body))];
+    const buttons = make("div", { class: "row" }, ...write, closing);
+    return [verdict, buttons, make("div", { class: "side-by-side" }, make("div", {}, container, make("div", { id: "file-profile" })), make("div", {}, ...comparison(list)))];
   } catch (error) {
-    return [make("p", { class: "bad" }, error.message)];
+    return [make("p", { class: "bad" }, error.message), closing];
   }
 }
 

@@ -1,31 +1,45 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Asks for the state once a second while the page is visible, and for the rest when the state shows a change.
-import { showConnect } from "./connect.js";
+// The tasks, and the loop: asks for the state once a second while the page is visible, and for the rest when it changes.
+import { followWires } from "./check.js";
 import { ask } from "./daemon.js";
 import { byId, setText } from "./dom.js";
-import "./firmware.js";
-import { FlownTrack } from "./flown_track.js";
-import "./logs.js";
+import { showConnect, showValues } from "./fly.js";
+import { HeldMission } from "./held_mission.js";
 import { followTiles } from "./map_tiles.js";
-import { MapView } from "./map_view.js";
 import { followFile } from "./mission_file.js";
 import { showMissions } from "./missions.js";
-import { showOverview } from "./overview.js";
-import "./pi.js";
-import { showWires } from "./pi_doctor.js";
-import { showProfile } from "./profile.js";
+import { openPi } from "./pi.js";
 import { showSettings } from "./settings.js";
 import { showStateBar } from "./state_bar.js";
-import { listTable, markFlown } from "./tables.js";
 import { followWrites } from "./write_form.js";
 
 const INTERVAL_MS = 800, TRANSFER_INTERVAL_MS = 250;
 const STALE_MS = 1500, WATCH_MS = 100;
-const map = new MapView(byId("map"));
-const shown = { mission: undefined, newest: undefined, backup: undefined };
-const track = new FlownTrack();
-let held = { count: null, items: [] };
+const held = new HeldMission();
+const shown = { mission: undefined, backup: undefined };
 let last = null, lastAt = performance.now();
+
+function showTask() {
+  const links = [...document.querySelectorAll("nav a")];
+  const task = (links.find((link) => link.hash === location.hash) ?? links[0]).hash.slice(1);
+  document.body.dataset.task = task;
+  for (const link of links) {
+    if (link.hash === `#${task}`) link.setAttribute("aria-current", "page");
+    else link.removeAttribute("aria-current");
+  }
+  showParts();
+  scrollTo(0, 0);
+  if (task === "pi") openPi();
+}
+
+// Before a board was ever heard, the first task is to connect it; a checked file takes the place of the held mission.
+function showParts() {
+  const { task } = document.body.dataset, isNew = last !== null && last.link.flight_controller === null && last.lost_s === null;
+  const hasFile = byId("checked").hasChildNodes();
+  for (const part of document.querySelectorAll("main > section")) part.hidden = !part.dataset.task.split(" ").includes(task);
+  if (task === "fly") for (const [id, isShown] of [["no-board", isNew], ["held", !isNew], ["values", !isNew]]) byId(id).hidden = !isShown;
+  if (task === "mission") for (const [id, isShown] of [["checked", hasFile], ["held", !hasFile], ["held-mission", !hasFile]]) byId(id).hidden = !isShown;
+}
 
 async function look() {
   const askedAt = performance.now();
@@ -35,15 +49,15 @@ async function look() {
     last = state;
     lastAt = performance.now();
     document.body.classList.remove("stale");
+    showParts();
     showStateBar(state, null);
-    showOverview(state);
-    showWires(state);
+    showValues(state);
+    followWires(state);
     followTiles(state);
     followWrites(state, askedAt);
     followFile(state);
-    await showHeld(state);
-    await showNewest(state);
-    await showBackups(state);
+    await held.show(state);
+    await showStored(state);
     await showConnect();
     showTrouble(state.store_trouble);
   } catch (error) {
@@ -73,35 +87,11 @@ function onceVisible() {
   else document.addEventListener("visibilitychange", onceVisible, { once: true });
 }
 
-async function showHeld(state) {
-  const isLost = state.lost_s !== null, mission = JSON.stringify([state.mission?.count, state.mission?.checksum, isLost]);
-  if (mission !== shown.mission) {
-    const now = await ask("/api/held");
-    shown.mission = mission;
-    const isOld = isLost && now.count === null && held.count > 0; // the lost craft may still fly it
-    if (!isOld) held = now;
-    const text = held.count ? `${held.count} records, checksum ${held.checksum}${isOld ? ", as last read" : ""}` : "No mission.";
-    setText(byId("held-text"), held.count === null ? "The mission has not been read yet." : text);
-    byId("held-list").replaceChildren(listTable(held.items));
-    showProfile(byId("profile"), held.items);
-  }
-  const flown = state.mission?.item ?? null, trail = await track.follow(state);
-  markFlown(byId("held-list"), flown);
-  const { lat_deg, lon_deg } = state.last_heard; // the map also shows where the craft was lost
-  map.show({ items: held.items, flown, position: { ...state.position, lat_deg, lon_deg }, attitude: state.attitude, trail });
-}
-
-async function showNewest(state) {
-  const newest = JSON.stringify(state.newest_mission);
-  if (newest === shown.newest || state.store_trouble) return;
-  await showMissions(state.newest_mission);
-  shown.newest = newest;
-}
-
-async function showBackups(state) {
-  if (state.newest_backup === shown.backup || state.store_trouble) return;
-  await showSettings();
-  shown.backup = state.newest_backup;
+async function showStored({ newest_mission: mission, newest_backup: backup, store_trouble: trouble }) {
+  if (trouble) return;
+  if (shown.mission !== JSON.stringify(mission)) await showMissions(mission);
+  if (shown.backup !== backup) await showSettings();
+  Object.assign(shown, { mission: JSON.stringify(mission), backup });
 }
 
 function showTrouble(text) {
@@ -109,5 +99,12 @@ function showTrouble(text) {
   setText(byId("trouble"), text);
 }
 
+addEventListener("hashchange", showTask);
+document.addEventListener("filechecked", () => {
+  if (location.hash === "#mission") showTask();
+  else location.hash = "#mission";
+});
+for (const block of document.querySelectorAll(".on-a-desk")) block.open = matchMedia("(min-width: 48rem)").matches;
 setInterval(watch, WATCH_MS);
+showTask();
 look();

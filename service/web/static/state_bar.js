@@ -45,7 +45,7 @@ function headline(state) {
   if (state === null) return "";
   if (state.port.trouble) return state.port.trouble;
   if (state.link.flight_controller === null) return `Looking for a flight controller on ${state.port.address}: ${evidence(state.traffic.fc)}`;
-  return [state.link.flight_controller, state.last_heard.mode, state.battery.voltage_v && `${state.battery.voltage_v.toFixed(1)} V`].filter(Boolean).join(", ");
+  return [state.last_heard.mode, state.battery.voltage_v && `${state.battery.voltage_v.toFixed(1)} V`, state.link.flight_controller].filter(Boolean).join(", ");
 }
 
 // The state of the wires while no frame arrives. Between two states the search listens at one or two speeds.

@@ -1,18 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The form that writes a mission or settings: token, button, and next to it the result of this press, never of another write.
-import { form as makeForm, make, say, setText } from "./dom.js";
-import { currentToken, tokenField } from "./token.js";
+// The button that writes a mission, settings or firmware; next to it the result of this press, never of another write.
+import { postWithToken } from "./daemon.js";
+import { byId, make, resultPlace, say, setText } from "./dom.js";
 
 const forms = new Set();
 let armed = null;
 
-// start: posts the request with a token and resolves to {id}.
+// start: posts the request and resolves to {id}.
 export function writeForm(label, start) {
-  const button = make("button", { class: "write" }, label);
-  const result = make("p", { class: "result", role: "status" }), hint = make("p", { class: "why" });
-  const bar = make("progress", { hidden: "", "aria-label": "Records written" });
-  const form = { id: null, begunAt: 0, button, hint, result, bar, element: null };
-  form.element = makeForm({ class: "row" }, () => press(form, start), tokenField(), button, hint, bar, result);
+  const button = make("button", { type: "button", class: "write primary", onclick: () => press(form, start) }, label);
+  const hint = make("p", { class: "why" }), bar = make("progress", { hidden: "", "aria-label": "Records written" });
+  const form = { id: null, begunAt: 0, button, hint, result: resultPlace(), bar, element: null };
+  form.element = make("div", { class: "row write-form" }, button, hint, bar, form.result);
   forms.add(form);
   block(form);
   return form.element;
@@ -23,7 +22,7 @@ async function press(form, start) {
   say(form.result, "", "Sending …");
   form.button.disabled = true;
   try {
-    form.id = (await start(currentToken())).id;
+    form.id = (await start()).id;
     form.begunAt = performance.now();
     say(form.result, "", "Writing …");
   } catch (error) {
@@ -60,3 +59,15 @@ function block(form) {
   form.button.disabled = armed === true;
   setText(form.hint, armed === true ? "Armed: disarm to write." : "");
 }
+
+// A firmware image is chosen, then flashed by the Pi. The form stays: one press resumes an interrupted flash.
+const chooser = byId("image");
+chooser.addEventListener("click", () => { chooser.value = ""; }); // the same file again, after another build
+chooser.addEventListener("change", () => {
+  if (!chooser.files.length) return;
+  const [file] = chooser.files, battery = make("input", { type: "checkbox" });
+  byId("firmware").replaceChildren(
+    make("p", {}, "Propellers off. Settings and missions are kept, and the present flash is backed up on the Pi."),
+    make("label", { class: "check" }, battery, " A battery stays connected"),
+    writeForm(`Flash ${file.name}`, () => postWithToken(`/api/firmware?name=${encodeURIComponent(file.name)}&battery=${battery.checked ? 1 : 0}`, file)));
+});

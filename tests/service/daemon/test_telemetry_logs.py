@@ -21,7 +21,7 @@ def test_logs_need_the_token(shared_web: WebBench) -> None:
     (folder / "secret").write_bytes(b"other")
     path = "/api/logs/2026-01-02%2003-04-05.tlog"
     for url in ("/api/logs", path):
-        assert shared_web.ask(url).status == 403
+        assert shared_web.ask(url).status == 401
     proof = {"Authorization": f"Bearer {shared_web.token}"}
     listed = shared_web.ask("/api/logs", **proof).data["logs"]
     assert {"name": "2026-01-02 03-04-05.tlog", "size": len(contents)} in listed

@@ -8,6 +8,7 @@ import sys
 
 import pytest
 
+from service.machine.log_setup import sentence
 from tests.support.programs import REPOSITORY, TIMEOUT_S
 
 BEGIN = """
@@ -93,3 +94,25 @@ log.info("fc.found")
 def test_a_program_whose_standard_error_is_closed_continues() -> None:
     ended = run('log.error("fc.lost")\nprint("went on")', "sh", "-c", 'exec "$@" 2>&-', "sh")
     assert ended.stdout == "went on\n"
+
+
+@pytest.mark.parametrize(
+    ("event", "words"),
+    [
+        ({"event": "vehicle.armed"}, "Craft armed"),
+        (
+            {"event": "fc.lost", "why": "no answer for 3 s", "speed_baud": 115200, "incident": "link-3"},
+            "Flight controller lost: no answer for 3 s, speed 115200 baud",
+        ),
+        (
+            {"event": "settings.read", "settings": 201, "changed": ["p", "i"]},
+            "Settings read: settings 201, changed p, i",
+        ),
+        (
+            {"event": "store.failed", "why": "disk full", "what": "", "level": "error"},
+            "Mission store failed: disk full",
+        ),
+    ],
+)
+def test_the_page_shows_events_as_sentences(event: dict[str, object], words: str) -> None:
+    assert sentence(event) == words

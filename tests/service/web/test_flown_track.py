@@ -46,17 +46,7 @@ def test_the_item_in_flight_and_the_track_are_shown(browsers: Browsers, flying: 
         assert "is flown now" in page.run("return document.querySelector('#map svg').getAttribute('aria-label')")
         until(lambda: page.run(TRAIL) >= 4, "the track")
         flown = page.run(TRAIL)
-        page.open()
-        until(lambda: page.run(TRAIL) >= flown, "the same track after a reload")
         assert violations(page) == []
         flying.board.set("armed 0")
         until(lambda: page.run(FLOWN) == page.run(ROWS) == [], "the end of the flight")
         assert page.run(TRAIL) >= flown, "the last flight's track stays"
-
-
-def test_places_that_the_page_has_are_not_sent_again(flying: WebBench) -> None:
-    track = until(lambda: (now := flying.state()["track"])["length"] > 3 and now, "a track")
-    answer = flying.ask("/api/track?first=2").data
-    assert answer["version"] == track["version"]
-    assert len(answer["places"]) >= track["length"] - 2
-    assert flying.ask("/api/track?first=x").status == 404

@@ -69,10 +69,8 @@ async def test_prometheus_reads_the_counters_of_a_daemon(tmp_path: Path) -> None
     assert answered >= after["fc_round_trip_seconds_bucket", ("0.1",)]
     assert 0 <= after["fc_round_trip_seconds_sum", ()] < answered
     assert after["fc_dropped_bytes_total", ()] == 0
-    # Twelve items, three counts, and the heartbeat.
-    assert after["link_received_pieces_total", (str(link),)] >= 15
     for way in ("received", "sent"):
         for name in ("fc", str(link)):
-            assert after[f"link_{way}_bytes_total", (name,)] > after[f"link_{way}_pieces_total", (name,)] > 0
+            assert after[f"link_{way}_bytes_total", (name,)] > 0
     running.cancel()
     await asyncio.gather(running, return_exceptions=True)

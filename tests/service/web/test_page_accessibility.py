@@ -4,7 +4,7 @@
 import pytest
 
 from tests.support.axe import violations
-from tests.support.chromium import LAPTOP, PHONE, Browsers
+from tests.support.chromium import LAPTOP, PHONE, TASKS, Browsers
 from tests.support.plan import plain_plan
 from tests.support.programs import until
 from tests.support.web_bench import EXAMPLE, WebBench
@@ -18,27 +18,36 @@ def test_axe_finds_no_violation_in_any_state(
 ) -> None:
     assert web.board is not None
     with browsers.tab(web.port, size, dark=dark) as page:
-        page.open()
-        assert violations(page) == []  # without a mission
+        for task in TASKS:  # without a mission
+            page.open(task)
+            assert violations(page) == []
+        page.show("mission")
         web.daemon.push(plain_plan(9))
         web.push_example()
         page.wait_text("#held-text", "13 records")
         page.find("#file").send_keys(str(EXAMPLE))
         page.wait_text("#checked", "14 items")
-        page.press("button[aria-label='Show mission 1']")
-        page.wait_text("tr.detail h3", "Mission 1")
-        page.find("#logs input").send_keys("wrong")
-        page.press("#logs button")
-        page.wait_text("#logs", "Wrong token")
         assert violations(page) == []
+        page.press("#checked button.write")
+        page.enter_token("wrong")
+        page.wait_text("#token-why", "This token is wrong.")
+        assert violations(page) == []
+        page.press("#token-dialog button[formnovalidate]")
+        page.wait_text("#checked", "This needs the page's token.")
         web.board.set("armed 1")
         until(lambda: page.text("#badges") == "ARMED", "the armed craft")
-        page.wait_text("#checked form", "disarm to write")
+        page.wait_text("#checked", "disarm to write")
         assert violations(page) == []
         web.board.set("unplug")
         page.wait_text("#badges", "LOST")
+        page.press("#checked .row > button")
         page.wait_text("#held-text", "13 records, checksum 068b9e81, as last read")  # it may still fly it
-        assert violations(page) == []
+        for block in ("#profile-block", "#upload-block", "#missions-block", "#missions details"):
+            page.unfold(block)
+        page.wait_text("#missions", "Write mission 2 again")
+        for task in ("mission", "fly"):
+            page.show(task)
+            assert violations(page) == []
         web.daemon.end()
         page.wait_text("#badges", "NO REPLY")
         assert violations(page) == []

@@ -28,17 +28,14 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Web
 
 def opened(page: Browser, web: WebBench) -> None:
     """Open the part for the Pi with the token from the address."""
-    page.driver.get("about:blank")  # otherwise another token in the address loads nothing
-    page.driver.get(f"{page.url}#token={web.token}")
-    page.wait_for_updates(1)
-    page.press("#pi form button")
+    page.open("pi", web.token)
     page.wait_text("#pi", "Raspberry Pi 4 Model B, kite")
 
 
 def press(page: Browser, text: str) -> None:
     """Press the button with this text once it can be pressed."""
     find = """
-        const button = [...document.querySelectorAll("#pi button")].find((each) => each.textContent === arguments[0]);
+        const button = [...document.querySelectorAll("main button")].find((each) => each.textContent === arguments[0]);
         if (!button || button.disabled) return false;
         button.scrollIntoView({ block: "center" });
         button.click();
@@ -81,36 +78,37 @@ def test_first_questions_remedies_settings_and_log(browsers: Browsers, bench: tu
 
         opened(page, web)
         console(pi)
-        unfold(page, "Check")
+        page.show("check")
         page.wait_text("#wires", "answers at 115200 baud")
-        press(page, "Check now")
-        page.wait_text("#pi .findings", "problem console")
+        press(page, "Check everything")
+        page.wait_text("#findings", "Problem console")
         assert fits_a_phone(page)
         assert violations(page) == []
         press(page, "Fix it: free the UART from the login console")
-        page.wait_text("#pi", "Switch the Pi off and on for this to take effect")
-        page.wait_text("#pi .findings", "ok console")
+        page.wait_text("#doctor", "Switch the Pi off and on for this to take effect")
+        page.unfold("#findings details")
+        page.wait_text("#findings", "Fine console")
         assert "console=serial0" not in pi.read("/boot/firmware/cmdline.txt")
 
+        page.unfold("#log-block")
+        page.wait_text("#log", "Status page pi request: action doctor")
+        assert violations(page) == []
+        assert fits_a_phone(page)
+
+        page.show("pi")
         unfold(page, "Settings of the bridge")
         fill(page, "sysid", "900")
-        press(page, "Save the settings")
+        press(page, "Save")
         assert page.run("return document.querySelector('#pi [name=sysid]').validity.rangeOverflow")
         fill(page, "sysid", "9")
         assert violations(page) == []
-        press(page, "Save the settings")
+        press(page, "Save")
         until(lambda: "sysid = 9" in pi.read("/etc/naze-bridge/page.toml"), "the saved setting")
-        until(lambda: page.run("return !document.querySelector('#pi details[open]')"), "the refreshed panels")
+        until(lambda: len(page.all("#pi details[open]")) == 1, "the refreshed panels")
         assert page.run("return [...document.querySelector('#pi [name=fc]').options].map((each) => each.value)") == [
             *("auto", "/dev/ttyAMA0")
         ]
 
-        unfold(page, "Log")
-        page.wait_text("#pi .log", "web.pi_request")
-        assert violations(page) == []
-        assert fits_a_phone(page)
-
-        unfold(page, "Setup")
         page.press("#pi [name='new_key']")
         press(page, "Show the changes")
         press(page, "Make these changes")
@@ -123,15 +121,13 @@ def test_first_questions_remedies_settings_and_log(browsers: Browsers, bench: tu
         assert page.errors() == []
 
 
-def test_a_setting_of_another_file_is_shown_with_its_place(
-    browsers: Browsers, bench: tuple[WebBench, FixablePi]
-) -> None:
+def test_a_setting_made_by_hand_cannot_be_changed(browsers: Browsers, bench: tuple[WebBench, FixablePi]) -> None:
     web, pi = bench
     pi.write("/etc/naze-bridge/config.toml", "sysid = 3\n")
     with browsers.tab(web.port, PHONE) as page:
         opened(page, web)
         unfold(page, "Settings of the bridge")
-        page.wait_text("#pi", "Set in /etc/naze-bridge/config.toml:1: change it there.")
+        page.wait_text("#pi", "Set by hand on the Pi: change it there.")
         assert page.find("#pi [name='sysid']").get_property("disabled")
 
 
@@ -167,8 +163,10 @@ def test_an_update_from_a_file(
 def test_a_wrong_token(browsers: Browsers, bench: tuple[WebBench, FixablePi]) -> None:
     web, _ = bench
     with browsers.tab(web.port, PHONE) as page:
-        page.open()
-        page.find("#pi input").send_keys("wrong")
-        page.press("#pi form button")
-        page.wait_text("#pi", "Wrong token")
-        assert violations(page) == []
+        page.open("pi")
+        press(page, "Unlock with the token")
+        page.enter_token("wrong")
+        page.wait_text("#token-why", "This token is wrong.")
+        page.find("#token").send_keys(web.token)
+        page.press("#token-dialog button")
+        page.wait_text("#pi", "Raspberry Pi 4 Model B, kite")

@@ -23,7 +23,7 @@ def test_the_state_bar_stays_visible(browsers: Browsers, web: WebBench) -> None:
         page.wait_text("#badges", "DISARMED")
         page.run("scrollTo(0, document.body.scrollHeight)")
         assert page.run("return document.getElementById('badges').getBoundingClientRect().top") >= 0
-        assert page.run("return document.querySelector('header').offsetHeight") < PHONE[1] / 5
+        assert page.run("return document.querySelector('header').offsetHeight") < PHONE[1] / 10
 
         web.board.set("armed 1")
         until(lambda: page.text("#badges") == "ARMED", "the armed craft")
@@ -127,6 +127,7 @@ def test_only_changes_are_announced_to_screen_readers(shared_web: WebBench, page
 
 
 def test_a_selection_survives_updates(shared_web: WebBench, page: Browser) -> None:
+    page.show("check")
     page.run("""
         const all = [...document.querySelectorAll('dt')].find((e) => e.innerText === 'Firmware').nextElementSibling;
         getSelection().selectAllChildren(all);""")

@@ -53,9 +53,9 @@ def test_a_log_is_downloaded(browsers: Browsers, shared_web: WebBench, tmp_path:
     with browsers.tab(shared_web.port, PHONE) as page:
         allow = {"behavior": "allow", "downloadPath": str(downloads)}
         page.driver.execute_cdp_cmd("Browser.setDownloadBehavior", allow)
-        page.open()
-        page.find("#logs input").send_keys(shared_web.token)
-        page.press("#logs button")
+        page.open("check")
+        page.unfold("#logs-block")
+        page.enter_token(shared_web.token)
         page.wait_text("#logs", name)
         page.press(f"button[aria-label='Download {name}']")
         until(lambda: (downloads / name).exists() and (downloads / name).read_bytes() == contents, "the log")
@@ -64,13 +64,10 @@ def test_a_log_is_downloaded(browsers: Browsers, shared_web: WebBench, tmp_path:
         assert page.errors() == []
 
 
-def test_on_a_phone_the_map_comes_first_and_a_finger_reads_heights(browsers: Browsers, shared_web: WebBench) -> None:
+def test_a_finger_reads_heights_on_the_map(browsers: Browsers, shared_web: WebBench) -> None:
     with browsers.tab(shared_web.port, PHONE) as page:
         page.open()
         until(lambda: len(page.all("#map .point")) > 2, "the waypoints")
-        assert page.run("""
-            const top = (id) => document.getElementById(id).getBoundingClientRect().top;
-            return top("map") < top("vehicle")""")
         page.run("""
             const mark = document.querySelectorAll("#map .point")[1], box = mark.getBoundingClientRect();
             const at = { clientX: box.left + box.width / 2 + 9, clientY: box.top - 5, bubbles: true };
@@ -81,9 +78,13 @@ def test_on_a_phone_the_map_comes_first_and_a_finger_reads_heights(browsers: Bro
         assert page.text("#map .map-note").endswith(" m")
 
 
-def test_the_token_in_the_address_is_filled_in_and_hidden(browsers: Browsers, shared_web: WebBench) -> None:
+def test_the_token_in_the_address_is_used_and_hidden(browsers: Browsers, shared_web: WebBench) -> None:
     with browsers.tab(shared_web.port, PHONE) as page:
         page.driver.get(f"{page.url}#token={shared_web.token}")
         page.wait_for_updates(1)
-        assert page.run("return document.querySelector('input.token').value") == shared_web.token
         assert page.run("return location.href") == page.url
+        page.driver.refresh()  # kept until the tab is closed
+        page.show("check")
+        page.unfold("#logs-block")
+        page.wait_text("#logs", "logs")
+        assert not page.run("return document.getElementById('token-dialog').open")

@@ -12,8 +12,9 @@ from tests.support.web_bench import EXAMPLE, WebBench
 
 pytest_plugins = ("tests.support.web_fixtures",)
 
-DETAIL = "tr.detail .result"
-FILE_RESULT = "#checked form .result"
+ENTRY = "#missions details[data-number='1']"
+DETAIL = f"{ENTRY} .result"
+FILE_RESULT = "#checked .result"
 
 
 @pytest.fixture
@@ -35,41 +36,45 @@ def test_a_stored_mission_is_written_with_the_token(browsers: Browsers, bench: W
     first = bench.board.records()
     bench.push_example()
     with browsers.tab(bench.port, PHONE) as page:
-        page.open()
-        page.press("button[aria-label='Show mission 1']")
-        page.wait_text("tr.detail h3", "Mission 1")
-        page.find("tr.detail input").send_keys("not the token")
-        page.press("tr.detail button.write")
-        page.wait_text(DETAIL, "Wrong token. On the Pi")
+        page.open("mission")
+        page.unfold("#missions-block")
+        page.unfold(ENTRY)
+        page.wait_text(ENTRY, "Write mission 1 again")
+        page.press(f"{ENTRY} button.write")
+        page.enter_token("not the token")
+        page.wait_text("#token-why", "This token is wrong.")
+        page.press("#token-dialog button[formnovalidate]")
+        page.wait_text(DETAIL, "This needs the page's token.")
         assert is_visible(page, DETAIL)
         assert page.run("return window.innerWidth") == PHONE[0]
         assert bench.board.records() != first
 
         bench.restore(1)  # another client's success must not replace the error
-        page.wait_text("#upload", "restore of mission 1")
+        upload = "return document.getElementById('upload').textContent"
+        until(lambda: "restore of mission 1" in page.run(upload), "the other client's upload")
         page.wait_for_updates(2)
-        assert page.text(DETAIL).startswith("Wrong token.")
+        assert page.text(DETAIL) == "This needs the page's token."
         bench.push_example()
 
-        page.find("tr.detail input").clear()
-        page.find("tr.detail input").send_keys(bench.token)
-        page.press("tr.detail button.write")
+        page.press(f"{ENTRY} button.write")
+        page.enter_token(bench.token)
         page.wait_text(DETAIL, "9 of 9 stored: ")
         assert is_visible(page, DETAIL)
         assert bench.board.records() == first
         page.wait_text("#held-text", "9 records")
-        page.wait_text("tr.detail h3", "Mission 1")  # still open, although the list has grown
+        # It is still open, although the list has grown.
+        assert page.run("return document.querySelector(arguments[0]).open", ENTRY)
 
         bench.board.set("armed 1")
         until(lambda: page.text("#badges") == "ARMED", "the armed craft")
-        assert not page.find("tr.detail button.write").is_enabled()
+        assert not page.find(f"{ENTRY} button.write").is_enabled()
 
 
 def test_a_file_is_checked_drawn_and_written(browsers: Browsers, bench: WebBench) -> None:
     assert bench.board is not None
     before = bench.board.records()
     with browsers.tab(bench.port, PHONE) as page:
-        page.open()
+        page.open("mission")
         page.find("#file").send_keys(str(EXAMPLE))
         page.wait_text("#checked", "naze-field.waypoints: 14 items, 6 changed, 1 dropped.")
         shown = page.run("return [...document.querySelectorAll('#checked tbody tr')].filter(e => e.offsetHeight)"
@@ -80,11 +85,13 @@ def test_a_file_is_checked_drawn_and_written(browsers: Browsers, bench: WebBench
         page.wait_text("#file-map svg", "H")
         assert len(page.all("#file-profile .point")) == 12  # home, and all items but the ROI
         assert bench.board.records() == before
-        page.find("#checked input.token").send_keys(bench.token)
         page.press("#checked button.write")
+        page.enter_token(bench.token)
         page.wait_text(FILE_RESULT, "13 of 14 stored: 1 danger, 1 dropped")
         assert bench.board.records() != before
         page.wait_text("#upload", "naze-field.waypoints, from the page")
+        page.press("#checked .row > button")
+        page.wait_text("#held-text", "13 records")
         assert page.errors() == []
 
 

@@ -22,7 +22,7 @@ from tests.support.programs import until
 from tests.support.web_bench import Answer, WebBench
 
 _RESTART = b'{"action": "fix", "fix": "restart the bridge"}'
-_TYPE = {"Content-Type": "application/octet-stream"}
+_JSON, _DATA = ({"Content-Type": f"application/{kind}"} for kind in ("json", "octet-stream"))
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,7 @@ def pi(bench: tuple[WebBench, FixablePi]) -> FixablePi:
 
 def post(web: WebBench, path: str, body: bytes, token: str | None = None) -> Answer:
     authorization = {"Authorization": f"Bearer {web.token if token is None else token}"}
-    return web.post(path, body, **_TYPE, **authorization)
+    return web.post(path, body, **(_JSON if path == "/api/pi" else _DATA), **authorization)
 
 
 def result(web: WebBench, request: dict[str, Any]) -> dict[str, Any]:
@@ -71,7 +71,7 @@ def test_a_request_is_carried_out_by_the_helper(web: WebBench, pi: FixablePi) ->
     [
         ({"action": "overview", "command": "id"}, "The arguments of this action"),
         ({"action": "fix", "fix": "rm -rf /"}, "nothing to change"),
-        ({"action": "settings", "values": {"sysid": "seven"}}, "sysid cannot have this value"),
+        ({"action": "settings", "values": {"sysid": "seven"}}, "MAVLink system id cannot have this value"),
     ],
 )
 def test_a_refusal_of_the_helper_is_shown(web: WebBench, pi: FixablePi, request_: dict[str, Any], why: str) -> None:
@@ -81,14 +81,14 @@ def test_a_refusal_of_the_helper_is_shown(web: WebBench, pi: FixablePi, request_
 
 @pytest.mark.parametrize("path", ["/api/pi", "/api/log"])
 def test_reading_needs_the_token(web: WebBench, path: str) -> None:
-    assert web.ask(path).status == 403
-    assert web.ask(path, Authorization="Bearer wrong").status == 403
+    assert web.ask(path).status == 401
+    assert web.ask(path, Authorization="Bearer wrong").status == 401
 
 
 @pytest.mark.parametrize("path", ["/api/pi", "/api/pi/package?start=0"])
 def test_changing_needs_the_token_and_its_header(web: WebBench, path: str) -> None:
     for authorization in ({}, {"Authorization": "Bearer wrong"}, {"Cookie": f"token={web.token}"}):
-        assert web.post(path, _RESTART, **_TYPE, **authorization).status == 403
+        assert web.post(path, _RESTART, **_JSON, **authorization).status == 401
 
 
 def test_a_form_of_another_site_is_refused(web: WebBench) -> None:
@@ -128,7 +128,7 @@ def test_nothing_is_changed_while_firmware_is_flashed(tmp_path: Path) -> None:
     )
     body = _RESTART
     head = {"host": "10.42.0.1", "authorization": f"Bearer {token.path.read_text()}", "content-length": str(len(body))}
-    head["content-type"] = _TYPE["Content-Type"]
+    head["content-type"] = _JSON["Content-Type"]
     scope = {
         "type": "http",
         "method": "POST",
@@ -180,10 +180,12 @@ def test_the_log_continues_where_it_was_read(web: WebBench) -> None:
         return log
 
     first = read(0)
-    assert any("web.listening" in line["text"] for line in first["lines"])
+    assert any("Status page listening" in line["text"] for line in first["lines"])
     assert first["count"] >= len(first["lines"])
     result(web, {"action": "overview"})
-    assert [json.loads(line["text"])["event"] for line in read(first["count"])["lines"]] == ["web.pi_request"]
+    later = [line["text"] for line in read(first["count"])["lines"]]
+    assert "Status page pi request: action overview, peer 127.0.0.1" in later
+    assert not any("Status page listening" in text for text in later)
 
 
 @pytest.mark.parametrize(

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Numbers in paths."""
 
+import asyncio
+
 import pytest
 from starlette.exceptions import HTTPException
 
-from service.web.replies import begun, whole
+from service.web.replies import Turns, begun, whole
 
 
 @pytest.mark.parametrize("text", ["", "-1", "1.5", "x", "9" * 30, "2147483648", "²"])
@@ -21,3 +23,16 @@ def test_a_number_is_read() -> None:
 def test_a_write_that_was_begun_has_an_id() -> None:
     reply = begun("abc")
     assert (reply.status_code, reply.body) == (202, b'{"id": "abc"}')
+
+
+async def test_long_responses_are_made_one_at_a_time() -> None:
+    turns, steps = Turns(pause_s=0), list[str]()
+
+    async def make(name: str) -> None:
+        async with turns.take():
+            steps.append(f"{name} begins")
+            await asyncio.sleep(0)
+            steps.append(f"{name} ends")
+
+    await asyncio.gather(make("a"), make("b"))
+    assert steps == ["a begins", "a ends", "b begins", "b ends"]

@@ -47,8 +47,8 @@ def test_a_backup_shows_its_changes_and_what_restoring_it_would_change(tuned: We
 
 
 def test_a_restore_needs_the_token(tuned: WebBench) -> None:
-    assert tuned.ask("/api/settings/1/restore", "POST").status == 403
-    assert tuned.ask("/api/settings/1/restore", "POST", Authorization="Bearer wrong").status == 403
+    assert tuned.ask("/api/settings/1/restore", "POST").status == 401
+    assert tuned.ask("/api/settings/1/restore", "POST", Authorization="Bearer wrong").status == 401
     assert tuned.ask("/api/settings/1/restore").status == 405
     for wrong in ("99", "x", "-1", "9" * 30):
         answer = tuned.ask(f"/api/settings/{wrong}/restore", "POST", Authorization=f"Bearer {tuned.token}")
@@ -56,21 +56,24 @@ def test_a_restore_needs_the_token(tuned: WebBench) -> None:
     assert command(tuned, "get", "p_roll") == "44"
 
 
+_FIRST = "#settings details[data-number='1']"
+
+
 def test_a_backup_is_restored_from_the_page(browsers: Browsers, tuned: WebBench) -> None:
     with browsers.tab(tuned.port, PHONE) as page:
-        page.open()
+        page.open("check", tuned.token)
+        page.unfold("#settings-block")
         page.wait_text("#settings", "connected")
-        page.press("button[aria-label='Show settings 1']")
-        page.wait_text("#settings tr.detail", "Restoring would change")
-        page.wait_text("#settings tr.detail", "p_roll")
+        page.unfold(_FIRST)
+        page.wait_text(_FIRST, "Restoring would change")
+        page.wait_text(_FIRST, "p_roll")
         assert page.run("return window.innerWidth") == PHONE[0]
-        page.find("#settings tr.detail input").send_keys(tuned.token)
-        page.press("#settings tr.detail button.write")
-        page.wait_text("#settings tr.detail .result", "1 setting restored, saved and verified")
+        page.press(f"{_FIRST} button.write")
+        page.wait_text(f"{_FIRST} .result", "1 setting restored, saved and verified")
         until(lambda: len(backups(tuned)) == 3, "the backup after the restore")
         assert command(tuned, "get", "p_roll") == "35"
         page.wait_text("#settings", "1 of 201")
         assert tuned.board is not None
         tuned.board.set("armed 1")
         until(lambda: page.text("#badges") == "ARMED", "the armed craft")
-        assert not page.find("#settings tr.detail button.write").is_enabled()
+        assert not page.find(f"{_FIRST} button.write").is_enabled()

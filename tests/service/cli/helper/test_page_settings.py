@@ -86,7 +86,9 @@ def test_settings_that_cannot_be_used_together_leave_the_file(pi: FixablePi, mon
 def test_what_was_written_by_hand_wins(pi: FixablePi) -> None:
     pi.write(str(SERVICE_CONFIG), "\nsysid = 3\n")
     assert shown(pi, "sysid")["elsewhere"] == "/etc/naze-bridge/config.toml:2"
-    with pytest.raises(HelperRefusal, match=r"sysid is set in /etc/naze-bridge/config.toml:2, which overrides"):
+    with pytest.raises(
+        HelperRefusal, match=r"MAVLink system id is set in /etc/naze-bridge/config.toml:2, which overrides"
+    ):
         pi.ask("settings", values={"sysid": 7})
     pi.write(_PAGE, "sysid = 7\n")
     assert load_settings(pi.path(SERVICE_CONFIG), state_dir=pi.root).sysid == 3

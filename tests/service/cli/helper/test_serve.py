@@ -57,7 +57,7 @@ def test_another_user_is_refused(pi: FixablePi, lock: Path) -> None:
         (b'{"action": "answer", "hotspot": "a", "password": "12345678\\u0000"}', "a Wi-Fi password"),
         (b'{"action": "answer", "name": "a\\n"}', "not a host name"),
         (b'{"action": "answer", "country": "Germany"}', "'Germany' is not a country code"),
-        (b'{"action": "settings", "values": {"sysid": 0}}', "sysid cannot have this value"),
+        (b'{"action": "settings", "values": {"sysid": 0}}', "MAVLink system id cannot have this value"),
     ],
 )
 def test_every_refusal_is_a_sentence(pi: FixablePi, lock: Path, request_line: bytes, why: str) -> None:

@@ -9,8 +9,9 @@ from pathlib import Path
 import click
 import pytest
 import segno
-from click.testing import Result
+from click.testing import CliRunner, Result
 
+from service.cli.main import main
 from service.cli.setup import command
 from service.cli.setup.answers import KEY_FILE, SETTINGS_FILE
 from service.cli.setup.command import check_answers, page_token
@@ -82,6 +83,16 @@ def test_captured_output_has_no_secrets(pi: Pi, tmp_path: Path, monkeypatch: pyt
     assert [secret for secret in secrets if secret in done.output] == []
     assert f"The key, for ground stations that may make changes: in {KEY_FILE}" in done.output
     assert "Its token, for changes: in /var/lib/naze-bridge/web-token" in done.output
+
+
+def test_the_token_is_shown_with_its_code(pi: Pi) -> None:
+    root = ["token", "--root", str(pi.root)]
+    assert "no token yet" in CliRunner().invoke(main, root).output
+    (pi.root / "var/lib/naze-bridge").mkdir(parents=True)
+    (pi.root / "var/lib/naze-bridge/web-token").write_text("2345-6789-abcd\n")
+    shown = CliRunner().invoke(main, root).output
+    assert "Its token, for changes: 2345-6789-abcd" in shown
+    assert "▄" in shown
 
 
 def test_a_dry_run_shows_and_makes_no_key(pi: Pi) -> None:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Mission lists as tables: one list, or as sent and as stored.
+// Missions as tables: one list, or as sent and as stored with the outcome and the notes.
 import { make } from "./dom.js";
 
 const PARAMS = ["p1", "p2", "p3", "p4"], NAMES = { alt_m: "Alt", frame: "frame", lat_e7: "Lat", lon_e7: "Long" };
@@ -22,7 +22,7 @@ export function markFlown(container, seq) {
 }
 
 // rows: of /api/missions/N; titles: of the left and the right column. Equal rows are shown on request.
-export function pairTable(rows, titles) {
+function pairTable(rows, titles) {
   const whole = table(["No.", ...titles], rows.map((row) => pairRow(row, titles)));
   whole.className = "pairs";
   const equal = rows.filter((row) => row.kind === "same").length;
@@ -39,7 +39,7 @@ export function pairTable(rows, titles) {
   return [whole, make("p", {}, button)];
 }
 
-export function pairKey(rows) {
+function pairKey(rows) {
   const kinds = Object.keys(KINDS).filter((kind) => rows.some((row) => row.kind === kind));
   return make("p", {}, ...kinds.flatMap((kind) => [make("span", { class: `key ${kind}` }, KINDS[kind]), " "]));
 }
@@ -77,4 +77,23 @@ function text(name, value) {
 function table(titles, rows) {
   const head = make("tr", {}, ...titles.map((title) => make("th", { scope: "col" }, title)));
   return make("table", {}, make("thead", {}, head), make("tbody", {}, ...rows));
+}
+
+export const outcomeClass = (outcome) => (outcome === "VERIFIED" ? "good" : outcome === "PENDING" ? "soft" : "bad");
+export const when = (seconds) => new Date(seconds * 1000).toLocaleString();
+
+// mission: of /api/missions/N.
+export function missionDetail(mission) {
+  const head = make("p", {}, make("b", { class: outcomeClass(mission.outcome) }, mission.outcome),
+    ` Mission ${mission.number}, ${when(mission.received_at)}, from ${mission.source}. ${mission.detail}`);
+  return [head, ...comparison(mission)];
+}
+
+// list: findings and rows, of a stored mission or of a checked file; defaults that were filled in are no findings.
+export function comparison(list) {
+  const { findings, rows, rows_left_out: leftOut } = list;
+  const notes = findings.length ? make("details", {}, make("summary", {}, `${findings.length} ${findings.length === 1 ? "note" : "notes"}`),
+    make("ul", {}, ...findings.map((text) => make("li", {}, text)))) : make("p", {}, "No item was changed or dropped.");
+  const more = leftOut ? [make("p", {}, `${leftOut} more items are not shown.`)] : [];
+  return [notes, pairKey(rows), ...pairTable(rows, ["As sent", "As stored"]), ...more];
 }

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The current values of /api/state, as words; the way to connect a board, and ground stations.
+import { ask, postWithToken } from "./daemon.js";
+import { action, byId, make, resultPlace, setClass, setList, setText } from "./dom.js";
+import { STALE_S, age, evidence } from "./state_bar.js";
+
+const PAUSE_MS = 30000; // addresses change when a network comes up
+const known = (value, unit = "", digits = 0) => (value === null || value === undefined ? "–" : `${value.toFixed(digits)}${unit}`);
+let before = null; // the byte counts of the previous state, and the time of its request
+let connectDue = 0, connectShown = "";
+
+export function showValues(state) {
+  setText(byId("version"), state.version);
+  const { armed, armed_age_s, mode } = state.last_heard;
+  const isOld = armed_age_s > STALE_S, rates = ratesOf(state.traffic);
+  byId("vehicle-age").hidden = !isOld;
+  if (isOld) setText(byId("vehicle-age"), `Last heard ${age(armed_age_s)} ago.`);
+  setClass(byId("values"), isOld ? "old" : "");
+  const { voltage_v: volts, current_a: amperes, drawn_mah: drawn, remaining_percent: percent } = state.battery;
+  pairs("instruments", [
+    ["Battery", known(volts, " V", 1)],
+    ["Height", known(state.position.height_m, " m", 1)],
+    ["Speed", known(state.gps.ground_speed_m_s, " m/s", 1)],
+    ["Home", known(state.position.home_distance_m, " m")],
+    ["Satellites", known(state.gps.satellites)],
+    ["Radio", known(state.rc.rssi_percent, " %")],
+  ]);
+  pairs("vehicle", [
+    ["State", armed === null ? "unknown" : armed ? "ARMED" : "disarmed", armed ? "bad" : ""],
+    ["Mode", mode ?? "–"],
+    ["Battery left", percent === null ? "–" : `about ${percent} %`],
+    ["Current", known(amperes, " A", 1)],
+    ["Drawn", known(drawn, " mAh")],
+    ["GPS fix", state.gps.fix ?? "–"],
+    ["Heading", known(state.attitude.heading_deg, "°")],
+    ["Sensors", state.status.sensors?.join(", ") || "–"],
+    ["Sensor errors", known(state.status.i2c_errors), state.status.i2c_errors ? "bad" : ""],
+    ...[...rates].filter(([name]) => name !== "fc").map(([name, rate]) => [name, rate]),
+  ]);
+  pairs("link", [
+    ["Firmware", state.link.flight_controller ?? "not found yet"],
+    ["Protocol", state.link.state],
+    ["Port", state.link.speed_baud ? `${state.port.address.replace(/,\d+$/, "")}, ${state.link.speed_baud} baud` : state.port.address],
+    ["Line", rates.get("fc") ?? "–"],
+    ["Round trip", known(state.link.round_trip_ms, " ms", 1)],
+    ["Unanswered", known(state.link.requests_lost)],
+    ["Damaged", known(state.link.bad_checksums)],
+    ["Mission", mission(state.mission)],
+    ["Settings", state.settings === null ? "not read yet" : state.settings.changed ?? `seal ${state.settings.seal}`, state.settings?.changed ? "bad" : ""],
+  ]);
+  const refused = state.refused.map((text) => `refused: ${text}`);
+  byId("signing").hidden = !state.refused.some((text) => /behind our clock|a day ahead/.test(text));
+  list("ground", [...state.link.ground_stations, ...refused], "None connected.");
+  setText(byId("recording"), state.recording.join("; ") || "Recording is off.");
+  if (state.link.flight_controller === null) showEvidence(state);
+}
+
+// The way to a first flight controller, and how far it is.
+function showEvidence({ port, traffic: { fc } }) {
+  const steps = [[!port.trouble, "The serial port is open"], [fc.bytes_received > 0, "Bytes arrive"], [false, "A flight controller answers"]];
+  const next = steps.findIndex(([isDone]) => !isDone);
+  setList(byId("evidence"), "li", steps.map(([, text]) => text));
+  [...byId("evidence").children].forEach((item, index) => setClass(item, index < next ? "good" : index === next ? "bad" : "soft"));
+  setText(byId("evidence-hint"), `Now: ${port.trouble || evidence(fc)}`);
+}
+
+const result = resultPlace();
+byId("signing").append(action("Forget wrong clocks", result, async () => (await postWithToken("/api/signing/reset")).text), result);
+
+function mission(held) {
+  if (held === null) return "not read yet";
+  if (!held.count) return "none";
+  return `${held.count} records, ${held.checksum}${held.item === null ? "" : `, ${held.state} at item ${held.item}`}`;
+}
+
+// Bytes per second in and out, by link, since the previous state.
+function ratesOf(traffic) {
+  const last = before;
+  before = { traffic, at: performance.now() };
+  if (last === null) return new Map();
+  const seconds = (before.at - last.at) / 1000;
+  const rate = (name, way) => Math.max(traffic[name][way] - (last.traffic[name]?.[way] ?? 0), 0) / seconds;
+  return new Map(Object.keys(traffic).map((name) => [name, `${size(rate(name, "bytes_received"))} in, ${size(rate(name, "bytes_sent"))} out`]));
+}
+
+const size = (bytes) => (bytes < 1000 ? `${Math.round(bytes)} B/s` : `${(bytes / 1000).toFixed(1)} kB/s`);
+
+// rows: [name, value, class]. Their number may grow.
+function pairs(id, rows) {
+  const all = byId(id);
+  while (all.children.length > rows.length) all.lastElementChild.remove();
+  rows.forEach(([name, value, kind = ""], index) => {
+    if (index >= all.children.length) all.append(make("div", {}, make("dt"), make("dd")));
+    const [title, shown] = all.children[index].children;
+    setText(title, name);
+    setText(shown, value);
+    setClass(shown, kind);
+  });
+}
+
+const list = (id, texts, otherwise) => setList(byId(id), "li", texts.length ? texts : [otherwise]);
+
+// The connection data for a ground station, and the page's address for another phone.
+export async function showConnect() {
+  if (performance.now() < connectDue) return;
+  connectDue = performance.now() + PAUSE_MS;
+  const help = await ask("/api/connect"), text = JSON.stringify(help);
+  if (text === connectShown) return;
+  connectShown = text;
+  const links = help.stations.map(({ connection, hosts, port }) => make("li", {}, make("b", {}, connection), `: host ${hosts.join(" or ")}, port ${port}`));
+  const others = help.called.map((address) => make("li", {}, `The Pi itself calls ${address}`));
+  const code = ([address]) => make("img", { src: `connect.svg?${encodeURIComponent(address)}`, class: "qr", width: 164, height: 164, alt: `QR code of ${address}` });
+  const page = help.pages.length ? [make("p", {}, `This page: ${help.pages.join(" or ")}`), code(help.pages)]
+    : [make("p", {}, "Only this machine can open this page: run setup to open it to the network.")];
+  byId("connect").replaceChildren(make("p", {}, "In Mission Planner choose the connection at the top right:"), make("ul", {}, ...links, ...others), ...page);
+}
