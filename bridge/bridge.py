@@ -34,7 +34,7 @@ from bridge.missions.mission_service import NO_LINK, MissionService
 from bridge.model.events import Armed, Disarmed
 from bridge.model.missions import ARMED, Refusal
 from bridge.model.settings import SettingsState
-from bridge.model.vehicle import FlightState, Health, Readiness
+from bridge.model.vehicle import FlightState, GlobalPosition, Health, Readiness
 from bridge.settings.board_settings import BoardSettings
 from bridge.settings.local_settings import LocalSettings
 from bridge.settings.parameters import OwnParameters, Parameters
@@ -46,6 +46,7 @@ from bridge.transfers.mission_watch import MissionWatch
 from bridge.transfers.uploads import FC_LOST, STOPPED
 from bridge.vehicle.calibration import Calibration
 from bridge.vehicle.commands import CommandService
+from bridge.vehicle.compass_check import CompassCheck
 from bridge.vehicle.incoming import Incoming
 from bridge.vehicle.link_announcer import LinkAnnouncer
 from bridge.vehicle.message_router import MessageRouter
@@ -156,6 +157,7 @@ class Bridge:
         own_parameters = OwnParameters(port.vehicle, owner.sysid)
         parameters = self._parameters = Parameters(own_parameters, settings, ground)
         calibration = self._calibration = Calibration(ground, session, missions, announcer, settings)
+        self._compass_check = CompassCheck(port.vehicle, ground)
         waypoint = SetWaypoint(missions, own, ground)
         commands = CommandService(ground, own, session, calibration, settings, parameters, waypoint, config.version)
         router = MessageRouter(ground, types.by_type, parameters, commands, own)
@@ -386,6 +388,9 @@ class Bridge:
                 self._reporter.heard(news, now)
             if not self.is_passing_through:
                 self._own_vehicle.heard(news, now)
+                settings = self._board_settings
+                if GlobalPosition in news and settings.is_checked and settings.known.table is not None:
+                    self._compass_check.follow(settings.known.table)
                 if Health in news or Readiness in news:
                     self._parameters.follow()
             if FlightState in news:
