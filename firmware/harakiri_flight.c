@@ -13,7 +13,8 @@
 /* The settings are in gaps of config_t, so that a build without them reads the same configuration. */
 typedef char settings_fill_gaps[offsetof(config_t, gps_ins_vel) == offsetof(config_t, gps_type) + 4 &&
                                         offsetof(config_t, serial_baudrate) == offsetof(config_t, rtl_cr) + 3 &&
-                                        offsetof(config_t, nav_ctrkgain) == offsetof(config_t, nav_tiltcomp) + 3
+                                        offsetof(config_t, nav_ctrkgain) == offsetof(config_t, nav_tiltcomp) + 3 &&
+                                        offsetof(config_t, nav_speed_max) == offsetof(config_t, nav_speed_min) + 2
                                     ? 1
                                     : -1];
 
@@ -50,7 +51,10 @@ void FlightDefaults(void)
     set_default(&cfg.mission_first, 10, 250, 200);
     set_default(&cfg.mission_height, 5, 250, 100);
     set_default(&cfg.mission_climb, 20, 250, 100);
-    set_default(&cfg.mission_fix, 5, 120, 20);
+    set_default(&cfg.mission_fix, 5, 50, 20);
+    set_default(&cfg.mission_battery, 0, 2, 0);
+    if (cfg.mission_radius > 2000)
+        cfg.mission_radius = 0;
 }
 
 void FlightFailsafe(void)
@@ -69,6 +73,7 @@ static void get_settings(nf_settings_t *settings)
     settings->radius_cm = cfg.gps_wp_radius;
     settings->first_m = cfg.mission_first;
     settings->height_m = cfg.mission_height;
+    settings->fence_m = cfg.mission_radius;
     settings->climb_cm_s = cfg.mission_climb;
     settings->launch_cm_s = cfg.as_clmbr;
     settings->landing_cm_s = cfg.al_barolr;
@@ -77,6 +82,7 @@ static void get_settings(nf_settings_t *settings)
     settings->home_m = cfg.rtl_mnh;
     settings->lean_cd = (uint16_t)(cfg.gps_maxangle * 100);
     settings->failsafe_lands = cfg.fs_jstph != 0;
+    settings->battery = (nf_battery_t)cfg.mission_battery;
 }
 
 static void get_motion(nf_input_t *in)

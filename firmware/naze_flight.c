@@ -22,7 +22,7 @@ enum {
     STANDS_CM_S = 60,      /* a craft that brakes has come to a stop */
     SETTLED_CM_S = 50,
     GROWS_CM = 50,         /* the distance grows: by this ... */
-    JUMP_CM = 600,         /* between two fixes, and what the craft flies in a second */
+    JUMP_CM = 600,         /* a fix this far, and half a second's flight, from where the craft can be has jumped */
     GROWS_MS = 1000,       /* ... within this time */
     WINDOW_MS = 4000,
     WINDOWS = NF_SLOW_MS / WINDOW_MS
@@ -338,6 +338,8 @@ static nf_reason_t cannot_start(const nf_t *f, const nf_input_t *in)
         return NF_FIX_MISSING;
     if (!in->home_known)
         return NF_HOME_MISSING;
+    if (in->battery_low && f->settings.battery != NF_BATTERY_TOLD)
+        return NF_BATTERY;
     return in->instruments ? NF_OK : NF_NOT_READY;
 }
 
@@ -350,6 +352,7 @@ static void start(nf_t *f, const nf_input_t *in)
     }
     f->reason = NF_OK;
     f->used = true;
+    f->battery_acts = false;
     f->unsteered = false;
     st_begin(&f->steer, in->lean_cd);
     brake(f, in);
@@ -375,13 +378,21 @@ static void start(nf_t *f, const nf_input_t *in)
         stop(f, in, NF_LIST_EMPTY);
 }
 
+/* Farther from home than the cylinder's radius and a margin. */
+static bool is_outside(const nf_t *f, const nf_input_t *in, const nf_place_t *place, uint32_t margin_m)
+{
+    return f->settings.fence_m && nf_distance(&in->home, place, NULL) / 100u > f->settings.fence_m + margin_m;
+}
+
 /* The place that a record leads to from f->last is within its limits. */
-static nf_reason_t check_distance(nf_t *f, const nf_place_t *place)
+static nf_reason_t check_distance(nf_t *f, const nf_input_t *in, const nf_place_t *place)
 {
     const bool first = f->first;
     const uint32_t distance_m = nf_distance(&f->last, place, NULL) / 100u;
     f->last = *place;
     f->first = false;
+    if (is_outside(f, in, place, 0))
+        return NF_FENCE;
     if (distance_m > NF_MAX_LEG_M)
         return NF_LEG_LONG;
     return first && distance_m > f->settings.first_m ? NF_FIRST_FAR : NF_OK;
@@ -410,12 +421,12 @@ static nf_reason_t check_record(nf_t *f, const nf_input_t *in, uint16_t number, 
     case LAND:
         return NF_OK;
     case RETURN_TO_LAUNCH:
-        return check_distance(f, &in->home);
+        return check_distance(f, in, &in->home);
     case TAKEOFF: /* airborne it leads to the mission's home point */
-        return in->flying && read_record(f, 0, &home) && has_place(&home.place) ? check_distance(f, &home.place)
+        return in->flying && read_record(f, 0, &home) && has_place(&home.place) ? check_distance(f, in, &home.place)
                                                                                 : NF_OK;
     default:
-        return check_distance(f, &record->place);
+        return check_distance(f, in, &record->place);
     }
 }
 
@@ -524,16 +535,26 @@ static bool lands(const nf_t *f)
     return f->state == NF_DESCENT || f->state == NF_SINK;
 }
 
-/* On the way home, or landing there, for failsafe or return-to-launch. */
+/* On the way home, or landing there, for failsafe, return-to-launch or the battery. */
 static bool homing(const nf_t *f)
 {
-    return f->state != NF_HELD && (f->reason == NF_FAILSAFE || f->reason == NF_RTL);
+    return f->state != NF_HELD && (f->reason == NF_FAILSAFE || f->reason == NF_RTL || f->reason == NF_BATTERY);
 }
 
-/* Failsafe and return-to-launch: home, or down if that is impossible. True if it has changed the state. */
+/* What calls the craft home. A pilot who has taken it over decides about a low battery. */
+static nf_reason_t caller(const nf_t *f, const nf_input_t *in)
+{
+    if (in->failsafe)
+        return NF_FAILSAFE;
+    if (in->rtl)
+        return NF_RTL;
+    return f->battery_acts && !(f->state == NF_HELD && f->reason == NF_STICKS) ? NF_BATTERY : NF_OK;
+}
+
+/* Home, or down if that is impossible or set. True if it has changed the state. */
 static bool called_home(nf_t *f, const nf_input_t *in)
 {
-    const nf_reason_t why = in->failsafe ? NF_FAILSAFE : in->rtl ? NF_RTL : NF_OK;
+    const nf_reason_t why = caller(f, in);
     if (why == NF_OK && homing(f) && in->fix) {
         stop(f, in, f->reason);
         return true;
@@ -544,7 +565,8 @@ static bool called_home(nf_t *f, const nf_input_t *in)
         end(f, in, why);
         return true;
     }
-    if (!in->fix || !in->home_known || (in->failsafe && f->settings.failsafe_lands)) {
+    if (!in->fix || !in->home_known || (in->failsafe && f->settings.failsafe_lands) ||
+        (why == NF_BATTERY && f->settings.battery == NF_BATTERY_LANDS)) {
         land(f, in, why);
         return true;
     }
@@ -621,6 +643,11 @@ static bool interrupted(nf_t *f, const nf_input_t *in)
             land(f, in, state == NF_HELD ? NF_HOLD_LOST : f->reason);
         else
             stop(f, in, NF_AWAY);
+    } else if (f->jumped && steered && state != NF_HOME) {
+        if (lands(f) || state == NF_HELD)
+            brake(f, in);
+        else
+            stop(f, in, NF_JUMP);
     } else if (state == NF_HELD)
         return false;
     else if (in->stick)
@@ -633,6 +660,9 @@ static bool interrupted(nf_t *f, const nf_input_t *in)
         return false;
     else if (in->list.count != f->list.count || in->list.checksum != f->list.checksum)
         stop(f, in, NF_LIST_CHANGED);
+    else if (is_outside(f, in, &in->place, NF_OUTSIDE_M) ||
+             in->height_cm > (f->settings.height_m + NF_OUTSIDE_M) * 100)
+        stop(f, in, NF_FENCE);
     else if (in->now_ms - f->compass_ms >= NF_COMPASS_MS)
         stop(f, in, NF_COMPASS);
     return f->state != state;
@@ -854,11 +884,45 @@ static void measure(nf_t *f, const nf_input_t *in)
         f->distance_cm = 0;
     if (has_height(f))
         f->height_error_cm = f->height_cm - in->height_cm;
-    if (!in->new_fix)
+    if (f->jumped)
+        f->nearest_cm = f->far_cm = f->distance_cm;
+}
+
+/* The place where the craft is by its speed since the last fix that was believed. */
+static nf_place_t flown_to(const nf_t *f)
+{
+    nf_place_t place = f->place;
+    place.lat += (int32_t)(f->flown_cm.n / CM_PER_UNIT);
+    place.lon += (int32_t)(f->flown_cm.e / (CM_PER_UNIT * cosf((float)f->place.lat * (PI_F / 180.0f * 1e-7f))));
+    return place;
+}
+
+/* Replace the place of a fix that has jumped. */
+static void believe(nf_t *f, nf_input_t *in)
+{
+    nf_place_t expected;
+    f->jumped = false;
+    if (f->state == NF_OFF || !in->fix || !in->flying) {
+        f->placed = f->jumping = false;
         return;
-    if (nf_distance(&f->place, &in->place, NULL) > JUMP_CM + (uint32_t)st_speed(&f->steer))
-        f->nearest_cm = f->far_cm = f->distance_cm; /* the GPS has jumped, not the craft */
-    f->place = in->place;
+    }
+    f->flown_cm.n += f->steer.velocity.n * 0.02f;
+    f->flown_cm.e += f->steer.velocity.e * 0.02f;
+    expected = flown_to(f);
+    if (in->new_fix) {
+        const bool jumps = f->placed && nf_distance(&expected, &in->place, NULL) > JUMP_CM + (uint32_t)st_speed(&f->steer) / 2u;
+        if (jumps && !f->jumping)
+            f->jump_ms = in->now_ms;
+        f->jumped = jumps && f->jumping && in->now_ms - f->jump_ms >= NF_JUMP_MS;
+        f->jumping = jumps && !f->jumped;
+        if (!f->jumping) {
+            f->place = in->place;
+            f->flown_cm.n = f->flown_cm.e = 0.0f;
+            f->placed = true;
+        }
+    }
+    if (f->jumping)
+        in->place = expected;
 }
 
 static nf_reason_t ending(const nf_input_t *in)
@@ -897,7 +961,17 @@ void nf_start(nf_t *f, nf_read_t read, void *self)
     f->record = f->reached = NF_NO_RECORD;
 }
 
-void nf_step(nf_t *f, const nf_settings_t *settings, const nf_input_t *in, nf_output_t *out)
+/* A load can lower the voltage for a moment. */
+static void watch_battery(nf_t *f, const nf_input_t *in)
+{
+    f->battery_low = in->battery_low;
+    if (!in->battery_low)
+        f->charged_ms = in->now_ms;
+    else if (in->now_ms - f->charged_ms >= NF_BATTERY_MS && f->settings.battery != NF_BATTERY_TOLD)
+        f->battery_acts = true;
+}
+
+void nf_step(nf_t *f, const nf_settings_t *settings, nf_input_t *in, nf_output_t *out)
 {
     const nf_reason_t ends = ending(in);
     const bool switched_on = in->switch_on && !f->switch_on;
@@ -907,8 +981,9 @@ void nf_step(nf_t *f, const nf_settings_t *settings, const nf_input_t *in, nf_ou
         f->count = in->list.count;
         f->begun = f->used = false;
     }
-    f->battery_low = in->battery_low;
+    watch_battery(f, in);
     sense(f, in);
+    believe(f, in);
     measure(f, in);
     if (ends != NF_OK) {
         if (f->state != NF_OFF)

@@ -22,7 +22,11 @@
  *   a smaller error is corrected.
  *
  *   Without a fix the craft keeps its height and its lean into the wind; the pilot's sticks steer. A fix that returns is held.
- *   Without a fix for `fix_s`, sticks untouched, it lands; a landing that has begun goes on without a fix.
+ *   Without a fix for `fix_s`, sticks untouched, it lands; a landing that has begun goes on without a fix. A place that the
+ *   craft cannot have flown to is not believed: it flies on by its speed, and after NF_JUMP_MS holds where it is.
+ *
+ *   No mission leaves the cylinder of `fence_m` and `height_m` around home: a list that would is not flown, and a craft that
+ *   is outside by NF_OUTSIDE_M is held.
  *
  *   A slot of the list can be written by any client: heights, take-off heights and turns are limited as they are read.
  *
@@ -63,6 +67,9 @@
 #define NF_STOP_MS 8000u    /* the longest time to brake to a standstill */
 #define NF_SLOW_CM_S 50     /* a leg that closes in more slowly ... */
 #define NF_SLOW_MS 20000u   /* ... for so long is stalled */
+#define NF_JUMP_MS 2000u    /* a place that jumps is not believed for so long */
+#define NF_OUTSIDE_M 10     /* outside the cylinder by more is held */
+#define NF_BATTERY_MS 5000u /* the battery is low: for so long */
 #define NF_LEAD_CD 4500     /* the heading asked for is at most this far from the present one, 1/100 degree */
 
 /* A place, degrees * 1e7. */
@@ -139,6 +146,9 @@ typedef enum {
     NF_COMPASS,       /* ... the compass is off by more than NF_MAX_COMPASS_CD */
     NF_HOLD_LOST,     /* landing: the hold did not hold */
     NF_BLIND,         /* landing: no fix for too long */
+    NF_FENCE,         /* list refused, or stopped: outside the cylinder */
+    NF_BATTERY,       /* did not start, ends or lands: the battery is low */
+    NF_JUMP,          /* stopped: the GPS's place has jumped */
     NF_REASONS
 } nf_reason_t;
 
@@ -164,12 +174,16 @@ typedef struct {
 
 extern const nf_row_t nf_states[NF_STATES];
 
+/* What a low battery does. */
+typedef enum { NF_BATTERY_TOLD, NF_BATTERY_HOME, NF_BATTERY_LANDS } nf_battery_t;
+
 /* The pilot's settings. Copied when the craft is armed. */
 typedef struct {
     bool enabled;
     uint16_t radius_cm;       /* smallest hit radius: gps_wp_radius */
     uint16_t first_m;         /* farthest first place */
     uint16_t height_m;        /* greatest height */
+    uint16_t fence_m;         /* greatest distance from home; 0: any */
     uint16_t climb_cm_s;      /* climb and descent between records */
     uint16_t launch_cm_s;     /* climb of the firmware's take-off */
     uint16_t landing_cm_s;
@@ -178,6 +192,7 @@ typedef struct {
     uint16_t home_m;          /* least height of the way home */
     uint16_t lean_cd;         /* greatest lean, 1/100 degree */
     bool failsafe_lands;      /* failsafe lands at once instead of flying home */
+    nf_battery_t battery;
 } nf_settings_t;
 
 /* The state of the craft at one call. */
@@ -244,7 +259,7 @@ typedef struct {
     uint32_t distance_cm;     /* to the target; 0 without one */
     int32_t bearing_cd;       /* ... */
     int32_t height_error_cm;  /* target height minus height; 0 without a target height */
-    bool battery_low;         /* reported, nothing more */
+    bool battery_low;
 
     nf_read_t read;
     void *self;
@@ -264,9 +279,13 @@ typedef struct {
     uint8_t slow;             /* windows without progress */
     nf_record_t now;          /* the record in flight */
     nf_place_t target, roi, last;
-    nf_place_t place;         /* at the last fix */
+    nf_place_t place;         /* at the last fix that was believed, ... */
+    st_vector_t flown_cm;     /* ... and what was flown since */
+    bool placed;              /* `place` is known */
+    bool jumping, jumped;     /* the fixes are not believed; since this call they are again */
+    bool battery_acts;
     st_t steer;
-    uint32_t entered_ms, allowed_ms, mark_ms, braking_ms, nearer_ms, grown_ms, calm_ms, near_turn_ms, compass_ms;
+    uint32_t entered_ms, allowed_ms, mark_ms, braking_ms, nearer_ms, grown_ms, calm_ms, near_turn_ms, compass_ms, jump_ms, charged_ms;
     uint32_t mark_cm, far_cm, nearest_cm;
     int32_t ground_cm;        /* height at take-off */
     int32_t height_cm;        /* target height */
@@ -284,8 +303,8 @@ typedef struct {
 /* Prepare `f`. The list is read with `read`, which is passed `self`. */
 void nf_start(nf_t *f, nf_read_t read, void *self);
 
-/* One control loop. `settings` are taken over while disarmed. */
-void nf_step(nf_t *f, const nf_settings_t *settings, const nf_input_t *in, nf_output_t *out);
+/* One control loop. `settings` are taken over while disarmed. The place in `in` is replaced if it is not believed. */
+void nf_step(nf_t *f, const nf_settings_t *settings, nf_input_t *in, nf_output_t *out);
 
 /* Distance in cm and bearing in 1/100 degree (0..35999) between places that are a few kilometres apart. */
 uint32_t nf_distance(const nf_place_t *from, const nf_place_t *to, int32_t *bearing_cd);

@@ -21,7 +21,9 @@ from reports.vehicle_groups import Progress
 #: A build without mission flight refuses it, and is not asked again.
 FLIGHT_POLL = Poll(Msp.FLIGHT, FLIGHT_REQUEST, FLIGHT_SIZE, 0.5)
 #: The craft does something else than its list: flies home, or lands where it is.
-_EMERGENCIES = frozenset((FlightReason.RTL, FlightReason.FAILSAFE, FlightReason.HOLD_LOST, FlightReason.BLIND))
+_EMERGENCIES = frozenset(
+    (FlightReason.RTL, FlightReason.FAILSAFE, FlightReason.HOLD_LOST, FlightReason.BLIND, FlightReason.BATTERY)
+)
 _PAUSED = frozenset((FlightPhase.HELD, FlightPhase.NO_FIX))
 #: In the other phases the height decides.
 _STAGES: Mapping[FlightPhase, Stage] = {
@@ -74,6 +76,9 @@ _WHY: Mapping[FlightReason, str] = {
     FlightReason.COMPASS: "Mission stopped: the compass is wrong",
     FlightReason.HOLD_LOST: "Landing: it cannot hold its place",
     FlightReason.BLIND: "Landing: no GPS fix for too long",
+    FlightReason.FENCE: "Mission stopped: outside mission_radius or _height",
+    FlightReason.BATTERY: "Mission ended: battery low",
+    FlightReason.JUMP: "Mission stopped: the GPS has jumped",
 }
 
 

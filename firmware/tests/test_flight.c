@@ -368,7 +368,7 @@ static void measure(const nf_output_t *out)
 
 /* ---- a flight --------------------------------------------------------------------------------------------------------- */
 
-static const nf_settings_t settings = {true, RADIUS_CM, 250, 100, 100, 100, 50, CRUISE_CM_S, 20, 8, LEAN_CD, false};
+static nf_settings_t settings = {true, RADIUS_CM, 250, 100, 0, 100, 100, 50, CRUISE_CM_S, 20, 8, LEAN_CD, false, NF_BATTERY_TOLD};
 
 typedef struct {
     nf_t core;
@@ -434,7 +434,7 @@ static void check_leave(flight_t *flight, const nf_record_t *record, uint32_t no
                                   : record->command == TAKEOFF        ? &list.record[0].place
                                                                       : &record->place;
         const unsigned radius = record->command <= LOITER_TIME && record->radius_m * 100 > RADIUS_CM ? record->radius_m * 100u : RADIUS_CM;
-        CHECK(nf_distance(&flight->in.place, place, NULL) <= radius + 1);
+        CHECK(nf_distance(&flight->in.place, place, NULL) <= radius + 1); /* as believed */
         CHECK(core->reached == flight->record || core->state == NF_DONE || list.record[core->reached].command == SETROI);
     }
 }
@@ -464,9 +464,11 @@ static void check_step(flight_t *flight)
     if (out->mode == NF_GO && core->record > 0 && core->state == NF_LEG)
         CHECK(is_known_place(&out->target, in));
     if (in->rtl || in->failsafe)
-        CHECK(core->state == NF_OFF || core->reason == NF_RTL || core->reason == NF_FAILSAFE || in->stick || core->reason >= NF_AWAY || core->reason == NF_LAND_SLOW || core->state == NF_DESCENT || core->state == NF_SINK || before == NF_DESCENT || before == NF_SINK || flight->toggled);
+        CHECK(core->state == NF_OFF || core->reason == NF_RTL || core->reason == NF_FAILSAFE || core->reason == NF_BATTERY || in->stick || core->reason >= NF_AWAY || core->reason == NF_LAND_SLOW || core->state == NF_DESCENT || core->state == NF_SINK || before == NF_DESCENT || before == NF_SINK || flight->toggled);
     if (core->state == NF_DESCENT || core->state == NF_SINK)
         CHECK(out->mode == NF_LAND);
+    if (settings.fence_m && core->state >= NF_NEXT && core->state <= NF_STAY && craft.lies.jump_cm == 0 && craft.lies.drift_cm_s == 0)
+        CHECK(hypot(craft.at.n, craft.at.e) < (settings.fence_m + NF_OUTSIDE_M) * 100 + 600);
     if (in->stick && !in->failsafe && before != NF_OFF)
         CHECK(core->state == NF_OFF || core->state == NF_HELD || core->state == NF_NO_FIX || core->state == NF_HOME);
     if (!in->fix)
@@ -474,7 +476,7 @@ static void check_step(flight_t *flight)
     if (before == NF_OFF && core->state != NF_OFF)
         CHECK(flight->toggled);
     if (before == NF_HELD && core->state != NF_OFF)
-        CHECK(core->state == NF_HELD || core->state == NF_NO_FIX || core->state == NF_SINK || in->rtl || in->failsafe || flight->toggled);
+        CHECK(core->state == NF_HELD || core->state == NF_NO_FIX || core->state == NF_SINK || in->rtl || in->failsafe || core->battery_acts || flight->toggled);
     if (nf_states[core->state].rule != NF_FOREVER && core->state == before)
         CHECK(in->now_ms - core->entered_ms <= core->allowed_ms);
     if (core->state == NF_LEG && before == NF_LEG && number == core->record && !flight->toggled) {
@@ -521,6 +523,8 @@ static void happen(flight_t *flight, uint32_t rate)
     in->switch_on = in->switch_on ? !one_in(rate) : one_in(100);
     if (one_in(rate * 20))
         in->list.checksum++;
+    if (one_in(rate * 10))
+        in->battery_low = true;
     flight->toggled = in->switch_on && !was_on;
     if (in->stick || in->yaw_stick || !in->throttle_middle || !in->fix || flight->toggled)
         flight->touched = true;
@@ -600,6 +604,8 @@ static void fly_undisturbed(void)
     const bool takes_off = one_in(2);
     make_list(takes_off);
     const lies_t lies = random_lies();
+    settings.battery = NF_BATTERY_TOLD;
+    settings.fence_m = 0;
     prepare_with(&flight, !takes_off, &lies);
     flight.in.switch_on = flight.toggled = true;
     step(&flight);
@@ -630,6 +636,8 @@ static void fly_disturbed(void)
     lies.drift_cm_s = one_in(8) ? between(-50, 50) : 0;
     if (one_in(8))
         lies.compass = between(-180, 180);
+    settings.battery = (nf_battery_t)between(0, 2);
+    settings.fence_m = one_in(4) ? (uint16_t)between(30, 80) : 0;
     prepare_with(&flight, !takes_off || one_in(3), &lies);
     for (int i = 0; i < 180 * 1000 / STEP_MS && craft.armed; i++) {
         happen(&flight, rate);
@@ -687,6 +695,8 @@ static void unknown(flight_t *flight) { list.record[2].command = 8; encode(list.
 static void landing_first(flight_t *flight) { list.record[1].command = LAND; encode(list.bytes[1], &list.record[1]); rearm(flight); }
 static void late_takeoff(flight_t *flight) { list.record[2].command = TAKEOFF; encode(list.bytes[2], &list.record[2]); rearm(flight); }
 static void roi_last(flight_t *flight) { list.record[2].command = SETROI; encode(list.bytes[2], &list.record[2]); rearm(flight); }
+
+static void beyond_the_fence(flight_t *flight) { list.record[2].place = place_at(6200, 0); encode(list.bytes[2], &list.record[2]); rearm(flight); }
 
 static void test_refusals(void)
 {
@@ -774,6 +784,116 @@ static void test_stall(void)
         craft.v.n = craft.mislevel.n = 0;
     }
     CHECK(flight.core.state == NF_HELD && flight.core.reason == NF_STALLED && flight.out.mode == NF_HOLD);
+}
+
+/* A flight of one leg to the north, 8 s after it began. */
+static void fly_north(flight_t *flight, const lies_t *lies)
+{
+    nf_record_t record = random_record(WAYPOINT);
+    list.count = 0;
+    record.seconds = 1;
+    add(&record);
+    record.place = place_at(8000, 0);
+    record.height_m = 10;
+    add(&record);
+    prepare_with(flight, true, lies);
+    craft.height = 1000;
+    craft.at = craft.wind = (vector_t){0, 0};
+    for (int i = 0; i < HISTORY; i++)
+        step(flight);
+    flight->in.switch_on = flight->toggled = true;
+    step(flight);
+    flight->toggled = false;
+    for (int i = 0; i < 8000 / STEP_MS; i++)
+        step(flight);
+    CHECK(flight->core.state == NF_LEG);
+}
+
+static void go_on(flight_t *flight, int seconds)
+{
+    for (int i = 0; i < seconds * 1000 / STEP_MS && craft.armed; i++)
+        step(flight);
+}
+
+/* A place that jumps for a moment has no effect; one that goes on ends the leg in a hold where the craft is. */
+static void test_jump(void)
+{
+    flight_t flight;
+    lies_t lies = honest;
+    fly_north(&flight, &lies);
+    craft.lies.jump_cm = 3000;
+    go_on(&flight, 1);
+    CHECK(flight.core.jumping && flight.core.state == NF_LEG);
+    craft.lies.jump_cm = 0;
+    go_on(&flight, 1);
+    CHECK(!flight.core.jumping && flight.core.state == NF_LEG);
+    craft.lies.jump_cm = -3000;
+    go_on(&flight, 1);
+    const double begun = craft.at.n;
+    go_on(&flight, 20);
+    CHECK(flight.core.state == NF_HELD && flight.core.reason == NF_JUMP);
+    CHECK(craft.at.n > begun && craft.at.n < begun + 1000);
+}
+
+/* Blown out of the cylinder, or lifted out of it: held. */
+static void test_fence(void)
+{
+    flight_t flight;
+    settings.fence_m = 90;
+    fly_north(&flight, &honest);
+    craft.at.e = 9000; /* farther than any wind takes it in a moment, so the fix has jumped, too */
+    craft.lies.jump_s = 1e9;
+    go_on(&flight, 5);
+    CHECK(flight.core.state == NF_HELD && flight.core.reason == NF_JUMP);
+    settings.height_m = 20;
+    fly_north(&flight, &honest);
+    craft.height = 3200;
+    step(&flight);
+    CHECK(flight.core.state == NF_HELD && flight.core.reason == NF_FENCE);
+    settings.height_m = 100;
+    settings.fence_m = 60;
+    CHECK(refusal(beyond_the_fence) == NF_FENCE);
+    settings.fence_m = 0;
+}
+
+/* A low battery ends the mission if the pilot has set it: at home, or where the craft is. The pilot's stick has priority. */
+static void test_battery(void)
+{
+    flight_t flight;
+    settings.battery = NF_BATTERY_TOLD;
+    fly_north(&flight, &honest);
+    flight.in.battery_low = true;
+    go_on(&flight, 6);
+    CHECK(flight.core.state == NF_LEG && flight.core.battery_low);
+    settings.battery = NF_BATTERY_LANDS;
+    fly_north(&flight, &honest);
+    flight.in.battery_low = true;
+    go_on(&flight, 4);
+    CHECK(flight.core.state == NF_LEG);
+    go_on(&flight, 2);
+    CHECK(flight.core.state == NF_SINK && flight.core.reason == NF_BATTERY);
+    settings.battery = NF_BATTERY_HOME;
+    fly_north(&flight, &honest);
+    flight.in.battery_low = true;
+    go_on(&flight, 6);
+    CHECK(flight.core.state == NF_HOME && flight.core.reason == NF_BATTERY);
+    flight.in.battery_low = false; /* with less load */
+    go_on(&flight, 90);
+    CHECK(!craft.armed && hypot(craft.at.n, craft.at.e) < 500);
+    fly_north(&flight, &honest);
+    flight.in.battery_low = true;
+    go_on(&flight, 6);
+    flight.in.stick = true;
+    step(&flight);
+    flight.in.stick = false;
+    go_on(&flight, 10);
+    CHECK(flight.core.state == NF_HELD && flight.core.reason == NF_STICKS);
+    flight.in.switch_on = false;
+    step(&flight);
+    flight.in.switch_on = flight.toggled = true;
+    step(&flight);
+    CHECK(flight.core.state == NF_OFF && flight.core.reason == NF_BATTERY);
+    settings.battery = NF_BATTERY_TOLD;
 }
 
 /* The farthest from a place in the last half minute of two, m, or the fastest, m/s, with a compass that is off and not corrected. */
@@ -893,6 +1013,9 @@ int main(int argc, char **argv)
     test_refusals();
     test_switch();
     test_stall();
+    test_jump();
+    test_fence();
+    test_battery();
     test_margin();
     test_braking();
     for (seed = first; seed < first + lists; seed++) {

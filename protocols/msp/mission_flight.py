@@ -79,6 +79,9 @@ class FlightReason(IntEnum):
     COMPASS = 30
     HOLD_LOST = 31
     BLIND = 32
+    FENCE = 33
+    BATTERY = 34
+    JUMP = 35
 
 
 @dataclass(frozen=True, slots=True)

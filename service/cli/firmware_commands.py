@@ -75,8 +75,7 @@ def restore(client: BridgeClient, backup: Path, battery: bool) -> None:
 
 @firmware.command()
 @click.argument("checkout", type=PATH)
-@click.option("--flight", is_flag=True, help="With mission flight (experimental, TestCode3 only).")
-def build(checkout: Path, flight: bool) -> None:
+def build(checkout: Path) -> None:
     """Patch Harakiri's sources in the folder CHECKOUT, and build them.
 
     Exit code 1: something is missing, or the build failed; else that of firmware/apply.
@@ -89,7 +88,7 @@ def build(checkout: Path, flight: bool) -> None:
     patch = shipped("firmware/apply")
     if not patch.exists():
         fail(f"{patch} is missing: install the Debian package, or use a clone of the repository")
-    _run(sys.executable, str(patch), *(["--flight"] if flight else []), str(checkout))
+    _run(sys.executable, str(patch), str(checkout))
     # Everything: the Makefile does not know which files include a changed header.
     _run("make", "--always-make", "-C", str(checkout))
     image = checkout / _BUILT

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Judges by the craft's true track whether a mission was flown as its list says.
 
-The limits: a place within its radius + 2 m, 3 m of overshoot where it brakes, 1.5 s of a time, 15 degrees of a turn, a
+The limits: a place within its radius + 2 m, 3 m of overshoot where it brakes, 1.5 s of a time, 10 degrees of a turn, a
 place that is held within its radius + 4 m and its height within 1.5 m, a landing within 6 m of where the descent began.
 They include the GPS module's error of 1 m.
 
@@ -19,7 +19,7 @@ from simulator.flights.track import Track
 from simulator.sky.earth import Place
 
 _PLACE_M, _OVERSHOOT_M, _HELD_M, _LANDED_M = 2.0, 3.0, 4.0, 6.0
-_SECONDS, _TURN_DEG, _TAKEOFF_M, _HOLD_HEIGHT_M = 1.5, 15.0, 1.0, 1.5
+_SECONDS, _TURN_DEG, _TAKEOFF_M, _HOLD_HEIGHT_M = 1.5, 10.0, 1.0, 1.5
 _OVERSHOOT_S = 10.0
 _FLYAWAY_M, _FASTEST, _STEEPEST_DEG = 40.0, 12.0, 50.0
 #: The board is asked this often, so a turn began up to this long before it was seen.

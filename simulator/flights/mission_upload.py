@@ -40,7 +40,7 @@ def require_mission_flight(console: Console, name: str) -> None:
     progress = progress_of(console)
     if progress is None:
         raise UnfitImageError(
-            f"{name} stores missions, but does not fly them: build it with firmware/apply --flight (firmware/README.md)"
+            f"{name} stores missions, but does not fly them: build it from TestCode3 (firmware/README.md)"
         )
     if not progress.is_enabled:
         raise UnfitImageError(f"mission flight is off in the settings of {name}: type `set mission_fly = 1` in its CLI")

@@ -194,15 +194,16 @@ _ROWS = (
 )
 #: In the board's order.
 SETTINGS = tuple(HeldSetting(Setting(*row[:4]), row[4]) for row in _ROWS)
-#: Those of a build with mission flight (firmware/patches/TestCode3-flight.patch).
+#: Those of a TestCode3 with mission flight.
 FLIGHT_SETTINGS = tuple(
-    HeldSetting(Setting(name, _U8, low, high), value)
-    for name, low, high, value in (
-        ("mission_fly", 0, 1, 0),
-        ("mission_first", 10, 250, 200),
-        ("mission_height", 5, 250, 100),
-        ("mission_climb", 20, 250, 100),
-        ("mission_nav_p", 5, 200, 70),
-        ("mission_nav_i", 1, 200, 60),
+    HeldSetting(Setting(name, kind, low, high), value)
+    for name, kind, low, high, value in (
+        ("mission_fly", _U8, 0, 1, 0),
+        ("mission_first", _U8, 10, 250, 200),
+        ("mission_height", _U8, 5, 250, 100),
+        ("mission_climb", _U8, 20, 250, 100),
+        ("mission_fix", _U8, 5, 50, 20),
+        ("mission_radius", _U16, 0, 2000, 0),
+        ("mission_battery", _U8, 0, 2, 0),
     )
 )

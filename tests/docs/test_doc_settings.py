@@ -28,7 +28,7 @@ IN_A_TABLE = {
 }
 OPTIONS = sorted({(span, place_of(page)) for page in PAGES for span in spans(page) if span.startswith("--")})
 #: Options of other programs: MAVProxy, and firmware/apply.
-OTHER_PROGRAMS = {"--master", "--flight", "--remove"}
+OTHER_PROGRAMS = {"--master", "--remove"}
 
 
 def load(folder: Path, text: str) -> Settings:

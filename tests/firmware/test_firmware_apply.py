@@ -37,21 +37,19 @@ CORE = (
     "harakiri_settings.h",
     "harakiri_settings.c",
 )
-FLIGHT_CORE = (
-    "naze_steer.h",
-    "naze_steer.c",
-    "naze_flight.h",
-    "naze_flight.c",
-    "harakiri_flight.h",
-    "harakiri_flight.c",
-)
-
 PATCH = """\
 The mission extension for a tree of our own, commit 0123abc, for tests.
+base {makefile} Makefile
 base {main} src/main.c
 base {mw} src/mw.h
 base {util} src/util.c
 
+diff --git a/Makefile b/Makefile
+--- a/Makefile
++++ b/Makefile
+@@ -1,0 +2,2 @@
++SOURCES += naze_slots.c naze_mission.c harakiri_mission.c harakiri_guard.c
++SOURCES += harakiri_config.c harakiri_flash.c harakiri_settings.c
 diff --git a/src/main.c b/src/main.c
 --- a/src/main.c
 +++ b/src/main.c
@@ -66,22 +64,7 @@ diff --git a/src/util.c b/src/util.c
 @@ -1,0 +2 @@
 +int three(void);
 """
-FLIGHT = """\
-Mission flight for the same tree, commit 0123abc.
-base {other} src/other.c
-
-diff --git a/src/main.c b/src/main.c
---- a/src/main.c
-+++ b/src/main.c
-@@ -4,0 +5 @@
-+    fly();
-diff --git a/src/other.c b/src/other.c
---- a/src/other.c
-+++ b/src/other.c
-@@ -1,0 +2 @@
-+int fly(void);
-"""
-OTHER = b"int five(void);\n"
+MAKEFILE = b"SOURCES = main.c util.c\n"
 MAIN = b"int main(void)\n{\n    loop();\n}\n"
 PATCHED = b'#include "naze_mission.h"\nint main(void)\n{\n    one();\n    two();\n    loop();\n}\n'
 MW = b"void loop(void);\n"
@@ -97,20 +80,13 @@ class Workshop:
         (self.tree / "src").mkdir(parents=True)
         for name in (*CORE, "apply"):
             shutil.copy(FIRMWARE / name, self.firmware)
+        (self.tree / "Makefile").write_bytes(MAKEFILE)
         (self.tree / "src" / "main.c").write_bytes(MAIN)
         (self.tree / "src" / "mw.h").write_bytes(MW)
         (self.tree / "src" / "util.c").write_bytes(UTIL)
-        files = {"main": MAIN, "mw": MW, "util": UTIL}
+        files = {"makefile": MAKEFILE, "main": MAIN, "mw": MW, "util": UTIL}
         hashes = {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
         (self.firmware / "patches" / "Tree.patch").write_text(PATCH.format(**hashes))
-
-    def add_flight(self) -> None:
-        """Let this firmware/ have mission flight for the tree."""
-        for name in FLIGHT_CORE:
-            shutil.copy(FIRMWARE / name, self.firmware)
-        (self.tree / "src" / "other.c").write_bytes(OTHER)
-        patch = FLIGHT.format(other=hashlib.sha256(OTHER).hexdigest())
-        (self.firmware / "patches" / "Tree-flight.patch").write_text(patch)
 
     def run(self, *arguments: str) -> tuple[int, str]:
         command = [str(self.firmware / "apply"), *arguments, str(self.tree)]
@@ -210,64 +186,6 @@ def test_dos_line_ends_of_one_file_are_reported_with_other_differences(workshop:
     assert code == 1
     assert "src/main.c: has CRLF line ends" in printed
     assert "src/mw.h: has SHA-256" in printed
-
-
-FLYING = PATCHED.replace(b"    one();\n", b"    one();\n    fly();\n")
-
-
-def test_mission_flight_goes_on_top_and_comes_off_again(workshop: Workshop) -> None:
-    workshop.add_flight()
-    before = workshop.files()
-    workshop.run()
-    listed = workshop.files()
-    done = "Tree: brought up to date, with mission flight (experimental); build it with make\n"
-    assert workshop.run("--flight") == (0, done)
-    flying = workshop.files()
-    assert flying["src/main.c"] == FLYING
-    assert flying["src/other.c"] == OTHER + b"int fly(void);\n"
-    assert all(flying[f"src/{name}"] == (FIRMWARE / name).read_bytes() for name in FLIGHT_CORE)
-    assert workshop.run("--flight") == (0, done)
-    assert workshop.files() == flying
-    assert workshop.run() == (0, "Tree: brought up to date, without mission flight; build it with make\n")
-    assert workshop.files() == listed
-    workshop.run("--flight")
-    workshop.run("--remove")
-    assert workshop.files() == before
-
-
-def test_mission_flight_applies_to_a_plain_tree_at_once(workshop: Workshop) -> None:
-    workshop.add_flight()
-    assert workshop.run("--flight") == (
-        0,
-        "Tree: patched, with mission flight (experimental); build it with make\n",
-    )
-    assert workshop.files()["src/main.c"] == FLYING
-
-
-def test_a_tree_without_gps_code_refuses_mission_flight(workshop: Workshop) -> None:
-    before = workshop.files()
-    code, printed = workshop.run("--flight")
-    assert code == 1
-    assert printed.startswith("apply: Tree has no GPS code that could fly a mission; nothing was changed.\n")
-    assert workshop.files() == before
-
-
-def test_mission_flight_keeps_changes_of_the_trees_own(clone: Workshop) -> None:
-    clone.add_flight()
-    clone.git("add", "-A")
-    clone.git("commit", "-qm", "other.c")
-    commit = f"commit {clone.git('rev-parse', 'HEAD').strip()}"
-    for patch in (clone.firmware / "patches").glob("*.patch"):
-        patch.write_text(re.sub(r"commit [0-9a-f]+", commit, patch.read_text()))
-    main = clone.tree / "src" / "main.c"
-    main.write_bytes(main.read_bytes().replace(b"line(30)", b"line(31)"))
-    mine = clone.files()
-    changed = LONG.replace(b"line(30)", b"line(31)")
-    for arguments, expected in (((), PATCHED), (("--flight",), FLYING), ((), PATCHED), (("--flight",), FLYING)):
-        assert clone.run(*arguments)[0] == 0
-        assert main.read_bytes() == expected + changed
-    assert clone.run("--remove")[0] == 0
-    assert clone.files() == mine
 
 
 LONG = b"".join(b"    line(%d);\n" % number for number in range(40))
@@ -441,10 +359,10 @@ def test_all_files_change_or_none(
                 break
         failed += 1
         assert workshop.files() == before
-    # Of the two patched files old and new contents are written, and of the core's files one of them.
+    # Of the three patched files old and new contents are written, and of the core's files one of them.
     times = {
-        "write_bytes": (len(CORE) + 4, len(CORE) + 4),
-        "replace": (len(CORE) + 2, 2),
+        "write_bytes": (len(CORE) + 6, len(CORE) + 6),
+        "replace": (len(CORE) + 3, 3),
         "unlink": (0, len(CORE)),
     }
     assert failed == times[operation][remove]
@@ -462,7 +380,7 @@ def test_shipped_patches_have_only_our_own_lines(path: Path) -> None:
     """No context, no removed line, no function name of Harakiri after a hunk header."""
     header, _, body = path.read_text().partition("diff --git")
     bases = re.findall(r"^base [0-9a-f]{64} \S+$", header, re.MULTILINE)
-    assert len(bases) == (2 if path.stem.endswith("-flight") else 13)
+    assert len(bases) == (15 if path.stem == "TestCode3" else 13)
     for line in body.splitlines()[1:]:
         assert re.match(r"\+|--- a/|diff --git a/|index [0-9a-f]+\.\.[0-9a-f]+ 100644$|@@ -\d+,0 \+[\d,]+ @@$", line), (
             line
@@ -470,4 +388,4 @@ def test_shipped_patches_have_only_our_own_lines(path: Path) -> None:
 
 
 def test_each_known_tree_has_a_patch() -> None:
-    assert [path.stem for path in PATCHES] == ["HarakiriWebstore1", "TestCode3-flight", "TestCode3"]
+    assert [path.stem for path in PATCHES] == ["HarakiriWebstore1", "TestCode3"]

@@ -10,10 +10,11 @@ static bool read_list(void *self, uint16_t number, uint8_t *record)
     return true;
 }
 
-int check_list(uint8_t *records, uint16_t count, int32_t lat, int32_t lon, uint16_t first_m, uint16_t height_m)
+int check_list(uint8_t *records, uint16_t count, int32_t lat, int32_t lon, uint16_t first_m, uint16_t height_m,
+               uint16_t fence_m)
 {
     const bool takes_off = count > 1 && records[NM_RECORD_SIZE + 15] == 6;
-    const nf_settings_t settings = {true, 200, first_m, height_m, 100, 100, 100, 300};
+    const nf_settings_t settings = {true, 200, first_m, height_m, fence_m, 100, 100, 100, 300};
     nf_input_t in = {0};
     nf_output_t out;
     nf_t f;

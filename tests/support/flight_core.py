@@ -14,7 +14,7 @@ from protocols.msp.mission_flight import FlightReason
 from simulator.naze.compiled_core import open_library
 from tests.support.c_core import FIRMWARE
 
-_ARGUMENTS = [c_char_p, c_uint16, c_int32, c_int32, c_uint16, c_uint16]
+_ARGUMENTS = [c_char_p, c_uint16, c_int32, c_int32, c_uint16, c_uint16, c_uint16]
 
 
 class FlightCore:
@@ -31,6 +31,6 @@ class FlightCore:
 
     def refusal(self, records: Sequence[WpRecord], place: tuple[int, int], limits: FlightLimits) -> FlightReason | None:
         """Why the core does not fly this list from a place (lat_e7, lon_e7); None if it does."""
-        settings = limits.mission_first, limits.mission_height
+        settings = limits.mission_first, limits.mission_height, limits.mission_radius
         reason = self._library.check_list(pack_records(records), len(records), *place, *settings)
         return FlightReason(reason) if reason else None

@@ -21,12 +21,19 @@ class FlightLimits:
 
     mission_first: int = 200
     mission_height: int = 100
+    #: 0: any distance from home.
+    mission_radius: int = 0
 
     def judge(self, records: Sequence[WpRecord], path: FlownPath, departure: Departure) -> Iterable[Judgement]:
         """The core compares whole metres, rounded down."""
-        long, high, limited = [], [], []
+        long, high, limited, outside = [], [], [], []
+        home = departure.place or departure.home
         for leg in path.legs:
-            if leg.is_first and int(leg.length_m) > self.mission_first:
+            off_m = 0.0 if home is None else distance_m(home, leg.end)
+            if 0 < self.mission_radius < int(off_m):
+                why = f"not flown: {in_metres(off_m)} off, mission_radius {self.mission_radius} m"
+                outside.append((leg.target, why))
+            elif leg.is_first and int(leg.length_m) > self.mission_first:
                 why = f"not flown: {in_metres(leg.length_m)} off, mission_first {self.mission_first} m"
                 if departure.home is not None and int(distance_m(departure.home, leg.end)) <= self.mission_first:
                     why = f"starts only at the list's home, {in_metres(leg.length_m)} off"
@@ -42,6 +49,7 @@ class FlightLimits:
                 limited.append((place, f"{record.height_m} m is flown at {flown_m} m"))
         yield from first_of(limited, "alt_m", News.WARNING)
         yield from first_of(long, "lat_e7")
+        yield from first_of(outside, "lat_e7")
         yield from first_of(high, "alt_m")
 
 

@@ -118,7 +118,7 @@ class HarakiriMissions(HarakiriStore):
         """The settings that decide about a list in flight; None for a board that does not fly it."""
         if self._vehicle.last_flight is None:
             return None
-        values = yield from read_by_name(self._places, "mission_first", "mission_height")
+        values = yield from read_by_name(self._places, "mission_first", "mission_height", "mission_radius")
         return USUAL_FLIGHT if values is None else FlightLimits(*map(int, values))
 
     def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Conversation[PushResult]:

@@ -13,14 +13,17 @@ typedef union {
 } wp_t;
 
 typedef struct {
-    uint8_t gps_type, mission_fly, mission_first, mission_height;
+    uint8_t gps_type, mission_fly;
+    uint16_t mission_radius;
     float gps_ins_vel, bar_dscl;
-    uint16_t gps_wp_radius, nav_speed_max, rc_mid, rc_minchk, rc_maxchk;
+    uint16_t gps_wp_radius, rc_mid, rc_minchk, rc_maxchk;
+    uint8_t nav_speed_min, mission_battery; /* in the gaps of Harakiri's own struct */
+    uint16_t nav_speed_max;
     uint8_t as_clmbr, al_barolr, fs_jstph, gps_maxangle, rtl_mnh, rc_dbah, rc_dbgps, mag_calibrated, vbatmincellvoltage;
     uint32_t aligned;
-    uint8_t one, nav_tiltcomp, mission_fix; /* in the gaps of Harakiri's own struct */
+    uint8_t one, nav_tiltcomp, mission_fix, mission_first;
     float nav_ctrkgain;
-    uint8_t another, rtl_cr, mission_climb;
+    uint8_t another, rtl_cr, mission_climb, mission_height;
     uint32_t serial_baudrate;
 } config_t;
 

@@ -76,9 +76,18 @@ MIDDLE = st.sampled_from([WAYPOINT, WAYPOINT, WAYPOINT, TIME, TURNS, RTL, ROI])
 
 
 @settings(max_examples=200, deadline=None)
-@given(st.booleans(), st.lists(st.tuples(MIDDLE, steps), min_size=1, max_size=8), st.sampled_from([None, LAND, RTL]))
+@given(
+    st.booleans(),
+    st.lists(st.tuples(MIDDLE, steps), min_size=1, max_size=8),
+    st.sampled_from([None, LAND, RTL]),
+    st.sampled_from([0, 150, 1000]),
+)
 def test_every_refusal_of_the_core_is_told_and_no_other(
-    flight_core: FlightCore, takes_off: bool, legs: list[tuple[int, tuple[float, float, int]]], last: int | None
+    flight_core: FlightCore,
+    takes_off: bool,
+    legs: list[tuple[int, tuple[float, float, int]]],
+    last: int | None,
+    mission_radius: int,
 ) -> None:
     items = [item(TAKEOFF)] if takes_off else []
     north_m = east_m = 0.0
@@ -88,11 +97,12 @@ def test_every_refusal_of_the_core_is_told_and_no_other(
         place = {"lat_e7": LAT + round(north_m * 89.83), "lon_e7": LON + round(east_m * 127.9)}
         items.append(item(command, alt_m=float(alt_m or 1), **({} if command == RTL else place)))
     items += [item(WAYPOINT)] if last is None else [item(last)]
-    verdict = check_list([HOME, *items], HarakiriRules())
+    limits = FlightLimits(mission_radius=mission_radius)
+    verdict = check_list([HOME, *items], HarakiriRules(flight=limits))
     if verdict.result is not Result.ACCEPTED:
         return
     told = any(finding.why.startswith(("not flown", "starts only")) for finding in verdict.findings)
-    refused = flight_core.refusal(verdict.records, (LAT, LON), USUAL_FLIGHT)
+    refused = flight_core.refusal(verdict.records, (LAT, LON), limits)
     assert (refused is not None) == told, (refused, [finding.text() for finding in verdict.findings])
 
 
@@ -100,6 +110,9 @@ def test_the_settings_of_the_board_count() -> None:
     assert warnings(north(2.4), limits=FlightLimits(mission_first=250)) == []
     assert warnings(north(1, alt_m=60.0), limits=FlightLimits(mission_height=50)) == [
         "WP 1: not flown: 60 m, mission_height 50"
+    ]
+    assert warnings(north(1), north(2), limits=FlightLimits(mission_radius=150)) == [
+        "WP 2: not flown: 200 m off, mission_radius 150 m"
     ]
 
 
