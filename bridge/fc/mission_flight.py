@@ -30,16 +30,8 @@ _STAGES: Mapping[FlightPhase, Stage] = {
     FlightPhase.WAIT: Stage.ON_GROUND,
     FlightPhase.LIFT: Stage.TAKEOFF,
     FlightPhase.RISE: Stage.TAKEOFF,
-    FlightPhase.CLIMB: Stage.IN_AIR,
-    FlightPhase.LEG: Stage.IN_AIR,
-    FlightPhase.LOITER: Stage.IN_AIR,
-    FlightPhase.TURN: Stage.IN_AIR,
-    FlightPhase.STAY: Stage.IN_AIR,
-    FlightPhase.SETTLE: Stage.IN_AIR,
     FlightPhase.DESCENT: Stage.LANDING,
     FlightPhase.SINK: Stage.LANDING,
-    FlightPhase.DONE: Stage.IN_AIR,
-    FlightPhase.HOME: Stage.IN_AIR,
 }
 _FLOWN = "Mission flown"
 _COMPASS_OFF_DEG = 20

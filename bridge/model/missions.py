@@ -115,7 +115,6 @@ class Stage(IntEnum):
     """MAVLink's MAV_LANDED_STATE."""
 
     ON_GROUND = 1
-    IN_AIR = 2
     TAKEOFF = 3
     LANDING = 4
 

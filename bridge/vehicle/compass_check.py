@@ -8,7 +8,7 @@ import math
 
 from bridge.gcs.ground import Ground
 from bridge.gcs.station import Severity
-from bridge.model.board_setting import SettingTable
+from bridge.model.settings import SettingTable
 from bridge.model.vehicle import GlobalPosition, Health, Vehicle
 from protocols.msp.telemetry import Sensor
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A mission that the real image flies in the simulated sky, as a ground station sees it through the bridge.
 
-make real-board IMAGE=X.elf FLY=1. The image must be built with apply --flight.
+make real-board IMAGE=X.elf FLY=1. The image must be of TestCode3.
 """
 
 import os

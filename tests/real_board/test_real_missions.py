@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Missions flown by the real image with mission flight in a sky that lies, whole and interrupted.
 
-make real-board IMAGE=X.elf FLY=1. The image must be built with apply --flight. It boots once; between two flights
+make real-board IMAGE=X.elf FLY=1. The image must be of TestCode3. It boots once; between two flights
 another craft is set out at the launch place.
 """
 
