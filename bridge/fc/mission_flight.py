@@ -2,6 +2,7 @@
 """Harakiri's reports on a mission that it flies (docs/mission-flight.md), from FLIGHT."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from bridge.fc.profile import Decoder, FlightController
 from bridge.line.poll_schedule import Poll
@@ -77,7 +78,8 @@ _WHY: Mapping[FlightReason, str] = {
 def _flight(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
     progress = decode_flight(payload)
     if progress is not None:
-        vehicle.hear(MissionLeg(now, Source.MSP, flight_report(progress, vehicle.last_flight)))
+        report = replace(flight_report(progress, vehicle.last_flight), summary=progress.summary)
+        vehicle.hear(MissionLeg(now, Source.MSP, report))
 
 
 FLIGHT_DECODERS: Mapping[int, Decoder] = {Msp.FLIGHT: _flight}

@@ -134,7 +134,7 @@ class FlightReport:
 
     number: the record in flight, or at which the flight has stopped, from 1; 0: none. reached: the last one reached, in
     this flight or the one before. is_flown: the mission flies the craft. way, stage: None if not reported. why: the
-    reason for a stop or a delay, for the pilot.
+    reason for a stop or a delay, for the pilot. summary: see FlightProgress, for the log.
     """
 
     number: int
@@ -144,6 +144,7 @@ class FlightReport:
     way: Way | None = None
     stage: Stage | None = None
     why: str = ""
+    summary: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,8 +41,9 @@ class FlyStatus(IntEnum):
 @click.command()
 @click.argument("file", type=PATH)
 @click.option(
-    "--image", required=True, type=click.Path(exists=True, dir_okay=False, path_type=Path), help="The firmware."
+    "--image", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="The firmware, unless there is a log."
 )
+@click.option("--log", type=PATH, help="Judge the mission's real flight in this telemetry log instead.")
 @click.option(
     "--flash",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
@@ -65,7 +66,8 @@ class FlyStatus(IntEnum):
 def fly(
     ctx: click.Context,
     file: Path,
-    image: Path,
+    image: Path | None,
+    log: Path | None,
     flash: Path | None,
     wind: float,
     wind_from: float,
@@ -75,26 +77,31 @@ def fly(
     svg: Path | None,
     as_json: bool,
 ) -> None:
-    """Fly a mission file in a simulated sky, with your own firmware.
+    """Fly a mission file in a simulated sky, with your own firmware, or judge a real flight of it.
 
     Needs a TestCode3 with mission flight (docs/howto/try-a-mission.md). Nothing is sent to a real craft.
 
     Exit code 1: the mission was not flown as in the file, or the craft crashed or went out of bounds.
     """
     records = _records(file)
-    try:
-        firmware = read_image(image)
-    except click.ClickException as error:
-        _refuse(error.message)
+    from simulator.flights.logged_flight import logged_sortie
     from simulator.flights.sortie import SortieError, fly_sortie
 
-    weather = Weather(wind=wind, wind_from=wind_from, seed=seed)
-    contents = _flash(flash) if flash else None
-    progress = (lambda _: None) if as_json else say
     try:
-        flight = fly_sortie(firmware, image.name, records, weather, mass, lies, contents, progress)
-    except SortieError as error:
+        if log is not None:
+            flight, title = logged_sortie(read_file(log, FileError), records), shown_path(log)
+        elif image is None:
+            _refuse("fly needs a firmware, --image FILE, or the telemetry log of a flight, --log FILE")
+        else:
+            weather = Weather(wind=wind, wind_from=wind_from, seed=seed)
+            contents = _flash(flash) if flash else None
+            progress = (lambda _: None) if as_json else say
+            flight = fly_sortie(read_image(image), image.name, records, weather, mass, lies, contents, progress)
+            title = f"{shown_path(file)}, wind {wind:g} m/s, seed {seed}"
+    except (SortieError, FileError) as error:
         _refuse(str(error))
+    except click.ClickException as error:
+        _refuse(error.message)
     if as_json:
         print_json({"file": shown_path(file), **flight.to_json()})
     else:
@@ -102,7 +109,6 @@ def fly(
         say(flight.summary())
     if svg:
         try:
-            title = f"{shown_path(file)}, wind {wind:g} m/s, seed {seed}"
             write_file(svg, flight.svg(title), FileError)
         except FileError as error:
             _refuse(str(error))

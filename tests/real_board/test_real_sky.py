@@ -5,12 +5,15 @@ Needs TestCode3, patched or not: HarakiriWebstore1 has no GPS code. make real-bo
 """
 
 import os
+from contextlib import suppress
 
 import pytest
 
 from protocols.firmware_image import Image
+from protocols.msp.commands import Msp
 from simulator.emulated_naze.flying_naze import FlyingNaze
 from simulator.emulated_naze.prepared_flash import prepare, prepared_flash
+from simulator.flights.mission_upload import UnfitImageError, require_mission_flight
 from simulator.flights.pilot import HIGH, Pilot
 from simulator.sky.body import Airframe
 from simulator.sky.sky import Weather
@@ -101,3 +104,29 @@ def test_a_lost_transmitter_brings_it_down(image: Image, figure: Figure) -> None
     pilot.wait_until(lambda: not pilot.naze.armed, "failsafe's landing", 120.0)
     figure("failsafe from 8 m", f"disarmed after {pilot.now - begun:.0f} s")
     assert pilot.height == 0.0
+
+
+def test_the_main_loop_has_time(image: Image, figure: Figure) -> None:
+    """At full speed, by the board's own measurement: the emulator counts the code's bytes, so single loops differ."""
+    pilot = ready(image, 5.0, 1, 1.0, "set looptime=1000", "set mission_fly=1")
+
+    def loops(what: str, seconds: float) -> None:
+        times = []
+        for _ in range(round(seconds / 0.1)):
+            pilot.wait(0.1)
+            if (reply := pilot.console.ask(Msp.STATUS)) is not None:
+                times.append(int.from_bytes(reply[:2], "little"))
+        figure(f"main loop, {what}", f"mean {sum(times) / len(times):.0f} us, longest {max(times)} us")
+        assert max(times) < 3000
+
+    pilot.arm()
+    pilot.take_off(10.0)
+    pilot.wait(8.0)
+    loops("place hold in 5 m/s", 10.0)
+    with suppress(UnfitImageError):
+        require_mission_flight(pilot.console, "the image")
+        pilot.fly_mission()  # the list is empty, so the flight steers a hold
+        loops("mission flight holds its place in 5 m/s", 10.0)
+        pilot.fly_mission(False)
+    pilot.return_home()
+    loops("way home", 10.0)

@@ -303,3 +303,13 @@ def test_the_limits_of_the_flight_are_read_from_the_board_by_name() -> None:
     client.change("mission_height", 10)
     assert Upload(station, low).run() is MissionResult.ACCEPTED
     assert "WP 1: not flown: 20 m, mission_height 10 (+3)" in station.texts()
+
+
+@pytest.mark.parametrize("tele_prot", [MSP, MAVLINK])
+def test_what_the_core_decides_is_logged(tele_prot: TelemetryProtocol) -> None:
+    flight = Flight(tele_prot)
+    held = replace(LEG, state=FlightPhase.HELD, reason=FlightReason.FIX_LOST, record=2)
+    flight.reports(held)
+    messages = [message for message in flight.station.messages("NAMED_VALUE_INT") if message.name == "flight"]
+    assert messages[-1].value == held.summary
+    assert 3 <= len(messages) <= 12

@@ -87,7 +87,7 @@ class HarakiriReadings(MavlinkReadings):
             return
         before = self.vehicle.last_flight
         reached = before.reached if before is not None and before.number else max((progress.record or 0) - 1, 0)
-        report = replace(flight_report(replace(progress, reached=reached), before), way=None)
+        report = replace(flight_report(replace(progress, reached=reached), before), way=None, summary=message.value)
         self.vehicle.hear(v.MissionLeg(now, v.Source.MAVLINK, report))
 
     def _mission_item_reached(self, message: Message, _now: float) -> None:
