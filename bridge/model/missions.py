@@ -144,7 +144,7 @@ class FlightReport:
     way: Way | None = None
     stage: Stage | None = None
     why: str = ""
-    summary: int | None = None
+    summary: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,6 +28,7 @@ from bridge.vehicle.vehicle_messages import Moment
 from protocols.mavlink.codec import pack
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.commands import Msp
+from protocols.msp.mission_flight import SUMMARY
 from protocols.msp.nav import NavStatus
 from reports.vehicle_groups import Progress
 from reports.verdict import SentSeqs
@@ -92,6 +93,8 @@ class OwnVehicle:
         self._asked_current: list[Sender] = []
         self._nav_words = NavWords()
         #: The last reason for the stop of a mission flight.
+        #: What a Harakiri's flight has decided, as it was last sent.
+        self._summary = 0
         self._said_why = ""
 
     def newcomer(self, station: GroundStation, now: float) -> None:
@@ -325,6 +328,10 @@ class OwnVehicle:
         leg = self._session.vehicle.last(MissionLeg)
         if leg is None:
             return
+        if isinstance(leg.report, FlightReport) and leg.report.summary != self._summary:
+            self._summary = leg.report.summary
+            boot_ms = self._moment(now).boot_ms
+            self._ground.broadcast(messages.MAVLink_named_value_int_message(boot_ms, SUMMARY.encode(), self._summary))
         if isinstance(leg.report, FlightReport) and leg.report.why != self._said_why:
             self._said_why = leg.report.why
             if self._said_why:

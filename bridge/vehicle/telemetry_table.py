@@ -58,6 +58,5 @@ TELEMETRY = (
     Row(m.MAVLINK_MSG_ID_RAW_IMU, v.ImuSample, inf, RAW_SENSORS, make.raw_imu),
     Row(m.MAVLINK_MSG_ID_MISSION_CURRENT, None, 1.0, EXTENDED_STATUS, make.mission_current),
     Row(m.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT, None, 1.0, EXTENDED_STATUS, make.nav_controller_output),
-    Row(m.MAVLINK_MSG_ID_NAMED_VALUE_INT, v.MissionLeg, 0.2, EXTRA3, make.flight_summary),
     Row(m.MAVLINK_MSG_ID_SYSTEM_TIME, None, 1.0, EXTRA3, make.system_time),
 )

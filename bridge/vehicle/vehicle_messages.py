@@ -13,11 +13,10 @@ from bridge.fc.mavlink_telemetry import SENSORS
 from bridge.model import vehicle as v
 from bridge.model.craft import Airframe, FlightMode, Home
 from bridge.model.ground_track import bearing_deg, distance_m, north_east_m
-from bridge.model.missions import FlightReport, FlownMission, Way
+from bridge.model.missions import FlownMission, Way
 from protocols.mavlink.codec import pack_attitude
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import Command
-from protocols.msp.mission_flight import SUMMARY
 from reports.vehicle_groups import Progress
 from reports.verdict import SentSeqs
 
@@ -234,13 +233,6 @@ def mission_current(at: Moment) -> Message:
     seq, last = mission.counted(at.sent_seqs)
     total = _NO_MISSION if mission.progress is Progress.NO_MISSION else last
     return messages.MAVLink_mission_current_message(seq, total, mission.progress.value, 0)
-
-
-def flight_summary(at: Moment) -> Message:
-    """NAMED_VALUE_INT of a Harakiri that flies its mission, as in its own MAVLink."""
-    report = at.need(v.MissionLeg).report
-    summary = known(report.summary if isinstance(report, FlightReport) else None)
-    return messages.MAVLink_named_value_int_message(at.boot_ms, SUMMARY.encode(), summary)
 
 
 def mission_item_reached(seq: int) -> Message:

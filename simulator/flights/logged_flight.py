@@ -59,6 +59,8 @@ class _Log:
         position = north, west, message.relative_alt / 1000
         velocity = message.vx / 100, -message.vy / 100, -message.vz / 100
         self.track.samples.append(Sample(at_s, position, velocity, self.heading, self.tilt, self.is_armed))
+        if self.reports:  # they are sent when they change
+            self.reports.append(Report(at_s, replace(self.reports[-1].progress, reached=self.reached)))
 
     def _report(self, at_s: float, progress: FlightProgress | None) -> None:
         if progress is None or not (self.is_armed or self.reports):

@@ -46,7 +46,7 @@ def test_a_reason_of_the_past_is_not_given() -> None:
 def test_the_way_is_the_boards() -> None:
     report = flight_report(replace(FLYING, height_error=-1.5), None)
     assert report.way == Way(3.0, 9.0, -1.5)
-    assert report.stage is Stage.IN_AIR
+    assert report.stage is None  # by its height
 
 
 def test_without_a_target_no_bearing_is_left_over() -> None:

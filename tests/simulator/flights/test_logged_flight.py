@@ -36,6 +36,8 @@ def flight(speed: float, last: FlightProgress) -> Iterator[tuple[float, Message]
         if north == 40.0 and last.reason is FlightReason.FLOWN:
             yield at_s, m.MAVLink_mission_item_reached_message(1)
         progress = last if at_s > 20 else leg
+        if at_s and at_s != 20.2:  # reported when it changes
+            continue
         yield at_s, m.MAVLink_named_value_int_message(step * 200, SUMMARY.encode(), progress.summary)
 
 
