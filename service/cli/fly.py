@@ -3,7 +3,7 @@
 
 from enum import IntEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import NoReturn
 
 import click
 from rich.table import Table
@@ -11,7 +11,6 @@ from rich.table import Table
 from bridge.controllers.table import PROFILES
 from bridge.fc.profile import RuleSettings
 from bridge.missions.list_check import check_list
-from protocols.firmware_image import FLASH_SIZE
 from protocols.mission_file import MissionFileError
 from protocols.msp.mission import WpRecord
 from protocols.plain_text import FileError
@@ -25,9 +24,6 @@ from terminal.mission_source import load_mission
 from terminal.options import PATH
 from terminal.printing import print_json, print_table
 from terminal.sentences import fail, say
-
-if TYPE_CHECKING:
-    from simulator.flights.judgement import ItemResult
 
 
 class FlyStatus(IntEnum):
@@ -94,7 +90,7 @@ def fly(
             _refuse("fly needs a firmware, --image FILE, or the telemetry log of a flight, --log FILE")
         else:
             weather = Weather(wind=wind, wind_from=wind_from, seed=seed)
-            contents = _flash(flash) if flash else None
+            contents = read_file(flash, FileError) if flash else None
             progress = (lambda _: None) if as_json else say
             flight = fly_sortie(read_image(image), image.name, records, weather, mass, lies, contents, progress)
             title = f"{shown_path(file)}, wind {wind:g} m/s, seed {seed}"
@@ -105,7 +101,12 @@ def fly(
     if as_json:
         print_json({"file": shown_path(file), **flight.to_json()})
     else:
-        print_table(_table(flight.items))
+        table = Table(box=None, pad_edge=False)
+        for title in flight.titles:
+            table.add_column(title, justify="left" if title in ("command", "problems") else "right")
+        for row in flight.rows():
+            table.add_row(*row)
+        print_table(table)
         say(flight.summary())
     if svg:
         try:
@@ -132,39 +133,3 @@ def _records(file: Path) -> tuple[WpRecord, ...]:
             f"{shown_path(file)} is no mission to fly: {verdict.findings[-1].text() if verdict.findings else 'empty'}"
         )
     return verdict.records
-
-
-def _flash(path: Path) -> bytes:
-    try:
-        contents = read_file(path, FileError)
-    except FileError as error:
-        _refuse(str(error))
-    if len(contents) != FLASH_SIZE:
-        _refuse(
-            f"{shown_path(path)} has {len(contents)} bytes instead of {FLASH_SIZE}: make it with sim --image --flash"
-        )
-    return contents
-
-
-def _table(results: "list[ItemResult]") -> Table:
-    table = Table(box=None, pad_edge=False)
-    for title in ("WP", "command", "reached s", "near m", "high m", "held s", "turned", "problems"):
-        table.add_column(title, justify="left" if title in ("command", "problems") else "right")
-    for result in results:
-        high = "" if result.height_m is None else f"{result.height_m:.1f}"
-        planned = "" if result.planned_height_m is None else f" of {result.planned_height_m:.0f}"
-        table.add_row(
-            str(result.number),
-            result.command,
-            _number(result.reached_s, 0),
-            _number(result.distance_m, 1),
-            f"{high}{planned}" if high else "",
-            _number(result.held_s, 1),
-            _number(result.turned_deg, 0),
-            "; ".join(result.problems) or "-",
-        )
-    return table
-
-
-def _number(value: float | None, digits: int) -> str:
-    return "" if value is None else f"{value:.{digits}f}"

@@ -3,9 +3,9 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, ClassVar
 
-from protocols.firmware_image import Image
+from protocols.firmware_image import FLASH_SIZE, Image
 from protocols.msp.mission import WpRecord
 from simulator.emulated_naze.console import ConsoleError
 from simulator.emulated_naze.flying_naze import FlyingNaze
@@ -53,6 +53,27 @@ class Sortie:
             "items": [asdict(item) for item in self.items],
         }
 
+    titles: ClassVar = ("WP", "command", "reached s", "near m", "high m", "held s", "turned", "problems")
+
+    def rows(self) -> list[list[str]]:
+        """A table of the commands, for people."""
+        rows = []
+        for item in self.items:
+            planned = "" if item.planned_height_m is None else f" of {item.planned_height_m:.0f}"
+            rows.append(
+                [
+                    str(item.number),
+                    item.command,
+                    _number(item.reached_s, 0),
+                    _number(item.distance_m, 1),
+                    "" if item.height_m is None else f"{item.height_m:.1f}{planned}",
+                    _number(item.held_s, 1),
+                    _number(item.turned_deg, 0),
+                    "; ".join(item.problems) or "-",
+                ]
+            )
+        return rows
+
     def summary(self) -> str:
         """Two sentences, a line each."""
         found = self.extremes
@@ -67,6 +88,10 @@ class Sortie:
         return track_svg(self.run.track, self.run.records, self.place, title)
 
 
+def _number(value: float | None, digits: int) -> str:
+    return "" if value is None else f"{value:.{digits}f}"
+
+
 def fly_sortie(
     image: Image,
     name: str,
@@ -79,6 +104,8 @@ def fly_sortie(
 ) -> Sortie:
     """Fly the list with a prepared board, or with this flash. lies: NAME=VALUE, as Wrongs reads them. SortieError."""
     place = Place(lat=records[0].lat_e7 / 1e7, lon=records[0].lon_e7 / 1e7)
+    if flash is not None and len(flash) != FLASH_SIZE:
+        raise SortieError(f"a flash has {FLASH_SIZE} bytes, not {len(flash)} bytes: make it with sim --image --flash")
     try:
         wrongs = Wrongs(lies)
         contents = flash or prepared_flash(image, say, ("set mission_fly=1",))

@@ -16,9 +16,9 @@ from simulator.flights.sortie import SortieError
 from simulator.sky.earth import Place
 
 PLACE = Place()
-NORTH = tuple(round(each * 1e7) for each in PLACE.coordinates((40.0, 0.0, 0.0)))
+NORTH_LAT, NORTH_LON = PLACE.coordinates((40.0, 0.0, 0.0))
 HOME = WpRecord(round(PLACE.lat * 1e7), round(PLACE.lon * 1e7), 0, 0, 0, 2, 0, WpCommand.WAYPOINT)
-RECORDS = (HOME, WpRecord(*NORTH, 10, 0, 1, 2, 0, WpCommand.WAYPOINT))
+RECORDS = (HOME, WpRecord(round(NORTH_LAT * 1e7), round(NORTH_LON * 1e7), 10, 0, 1, 2, 0, WpCommand.WAYPOINT))
 
 
 def flight(speed: float, last: FlightProgress) -> Iterator[tuple[float, Message]]:
