@@ -12,7 +12,7 @@ fleet, but gives rights only to the names in its configuration, and an expelled 
 import json
 import secrets
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from enum import Enum
 from pathlib import Path
 from typing import Any
@@ -91,19 +91,11 @@ class FleetFolder:
 
     path: Path
 
-    def members(self) -> dict[str, Member]:
-        """By name, including expelled ones. A vehicle without a system id gets one."""
-        try:
-            found = json.loads(self._read(_MEMBERS) or "{}")
-            return _with_sysids({name: _member(data) for name, data in found.items()})
-        except (ValueError, AttributeError, LookupError) as error:
-            raise EnrolmentError(f"{self.path / _MEMBERS} is not a list of members: {error}") from error
-
     def enroll(self, name: str, role: Role, router: FleetRouter) -> Enrolled:
         """Add a member and write the router's configuration. ZenohSettingsError."""
         _check_member(name)
         check_name("--prefix", router.prefix)
-        members = self.members()
+        members, _ = self._load()
         former = members.get(name, Member(role))
         if former.role is Role.EXPELLED and router.is_tls:
             raise EnrolmentError(f"{name} was expelled, and its certificate is still valid: choose another name")
@@ -111,41 +103,40 @@ class FleetFolder:
             raise EnrolmentError(f"{name} is a {former.role.value} already: choose another name")
         members = _with_sysids(members | {name: Member(role, former.sysid)})
         own = self._write(f"{name}.json5", self._session(name, router), 0o600)
-        self._write(_ROUTER, self._router_config(members, router), 0o644)
-        self._write_members(members)
+        self._save(members, router)
         files = [own, *(self.path / file for file in (_CA, f"{name}.pem", f"{name}.key") if router.is_tls)]
         return Enrolled(members[name], files)
 
     def expel(self, name: str) -> None:
         """Remove a member's rights, password and login. May be repeated, for example after the disk was full."""
-        members = self.members()
-        if name not in members:
+        members, router = self._load()
+        if router is None or name not in members:
             present = sorted(each for each, member in members.items() if member.role is not Role.EXPELLED)
             raise EnrolmentError(f"{name} is not a member; there are: {', '.join(present) or 'none'}")
-        self._write_members(members | {name: Member(Role.EXPELLED)})
         passwords = self._passwords()
         if passwords.pop(name, None) is not None:
             self._write_passwords(passwords)
-        if name not in _RESERVED:
-            (self.path / f"{name}.json5").unlink(missing_ok=True)
-        self._write(_ROUTER, self._without(name), 0o644)
+        self._save(members | {name: Member(Role.EXPELLED)}, router)
+        (self.path / f"{name}.json5").unlink(missing_ok=True)
 
-    def _without(self, name: str) -> Json:
-        """The router's configuration without a member. The rest stays: it may have been edited."""
-        by_hand = (
-            f"{self.path / _ROUTER} is not as `fleet enroll` writes it: remove {name} from its access_control by hand"
-        )
+    def _load(self) -> tuple[dict[str, Member], FleetRouter | None]:
+        """The members by name, including expelled ones, and the router; none of both in a new folder."""
         try:
-            config: Json = json.loads(self._read(_ROUTER))
-            control = config["access_control"]
-            control["subjects"] = [each for each in control["subjects"] if each["id"] != name]
-            control["policies"] = [each for each in control["policies"] if each["subjects"] != [name]]
-            control["rules"] = [each for each in control["rules"] if each["id"] != _own_rule(name)]
-        except (ValueError, LookupError, TypeError) as error:
-            raise EnrolmentError(by_hand) from error
-        if json.dumps(name) in json.dumps([control["subjects"], control["policies"]]):
-            raise EnrolmentError(by_hand)
-        return config
+            found = json.loads(self._read(_MEMBERS) or '{"members": {}, "router": null}')
+            router = found["router"]
+            members = _with_sysids({name: _member(data) for name, data in found["members"].items()})
+            return members, router and FleetRouter(str(router["endpoint"]), str(router["prefix"]))
+        except (ValueError, AttributeError, LookupError, TypeError) as error:
+            raise EnrolmentError(f"{self.path / _MEMBERS} is not a list of members: {error}") from error
+
+    def _save(self, members: Mapping[str, Member], router: FleetRouter) -> None:
+        """Write the list of members and the router's configuration."""
+        listed = {
+            name: {"role": each.role.value} | ({} if each.sysid is None else {"sysid": each.sysid})
+            for name, each in members.items()
+        }
+        self._write(_MEMBERS, {"router": asdict(router), "members": listed}, 0o644)
+        self._write(_ROUTER, self._router_config(members, router), 0o644)
 
     def _router_config(self, members: Mapping[str, Member], router: FleetRouter) -> Json:
         """Rules for each vehicle, nothing for unknown sessions."""
@@ -197,13 +188,6 @@ class FleetFolder:
 
     def _write_passwords(self, passwords: Mapping[str, str]) -> None:
         self._write_text(_PASSWORDS, "".join(f"{name}:{password}\n" for name, password in passwords.items()), 0o600)
-
-    def _write_members(self, members: Mapping[str, Member]) -> None:
-        data = {
-            name: {"role": each.role.value} | ({} if each.sysid is None else {"sysid": each.sysid})
-            for name, each in members.items()
-        }
-        self._write(_MEMBERS, data, 0o644)
 
     def _write(self, name: str, content: Json, mode: int) -> Path:
         return self._write_text(name, json.dumps(content, indent=2) + "\n", mode)

@@ -27,7 +27,8 @@ from service.daemon.telemetry_logs import TelemetryLogs
 from service.zenoh_link.liveliness import RENAME
 from service.zenoh_link.queries import Answerer, QueryRefused, Question
 
-_USUAL_LIMIT, _MAX_LIMIT = 20, 200
+#: Missions in a list, the newest.
+_LISTED = 50
 _TIMES = ("received_at", "concluded_at")
 _PAYLOAD = "the query's payload"
 #: Larger files are read by the command line only, not alongside a running link. A mission that fits has about 20 KB,
@@ -62,9 +63,8 @@ class Answers:
     async def _mission_current(self, _: Question) -> Json:
         return mission_current(self._bridge.missions.held)
 
-    async def _mission_list(self, question: Question) -> Json:
-        limit = question.whole_number("limit", _USUAL_LIMIT, _MAX_LIMIT)
-        found = (await self._api.list_missions(limit))["missions"]
+    async def _mission_list(self, _: Question) -> Json:
+        found = (await self._api.list_missions(_LISTED))["missions"]
         return {"missions": [_with_units(mission) for mission in found]}
 
 

@@ -53,19 +53,6 @@ class Question:
         payload = self._query.payload
         return b"" if payload is None else payload.to_bytes()
 
-    def parameter(self, name: str) -> str | None:
-        """A parameter of the selector; None if it is not given."""
-        return self._query.parameters.get(name)
-
-    def whole_number(self, name: str, usual: int, most: int) -> int:
-        """A parameter's number, greater than 0; `usual` if it is not given. QueryRefused."""
-        text = self.parameter(name)
-        if text is None:
-            return usual
-        if not (text.isascii() and text.isdigit() and 0 < int(text) <= most):
-            raise QueryRefused(f"{name} must be a whole number from 1 to {most}")
-        return int(text)
-
     def send(self, body: Json) -> None:
         """Send one reply; more may follow."""
         data, encoding = self._payloads.reply(self._key, body), encoding_of(self._key)

@@ -14,13 +14,17 @@ def test_a_vehicle_with_any_name_has_a_rule_of_its_own(tmp_path: Path) -> None:
     assert len(set(rules)) == len(rules)
 
 
+def has_members(folder: Path, **members: dict[str, str]) -> None:
+    (folder / "members.json").write_text(json.dumps({"router": None, "members": members}))
+
+
 def test_each_vehicle_gets_a_system_id_that_no_other_has(tmp_path: Path) -> None:
     """Also those that were members before; the id of an expelled member is free again."""
 
     def enroll(name: str, *more: str) -> str:
         return run_naze_bridge("fleet", "enroll", name, "--folder", tmp_path, *more).stdout
 
-    (tmp_path / "members.json").write_text(json.dumps({"anna": {"role": "pilot"}, "kite": {"role": "vehicle"}}))
+    has_members(tmp_path, anna={"role": "pilot"}, kite={"role": "vehicle"})
     assert "\nsysid = 2\n\n[zenoh]\n" in enroll("owl")
     assert "\nsysid = 1\n" in enroll("kite")
     assert "sysid" not in enroll("anna", "--role", "pilot")
@@ -34,6 +38,6 @@ def test_each_vehicle_gets_a_system_id_that_no_other_has(tmp_path: Path) -> None
 
 
 def test_beyond_250_vehicles_there_is_no_system_id(tmp_path: Path) -> None:
-    (tmp_path / "members.json").write_text(json.dumps({f"kite-{number}": {"role": "vehicle"} for number in range(250)}))
+    has_members(tmp_path, **{f"kite-{number}": {"role": "vehicle"} for number in range(250)})
     enrolled = run_naze_bridge("fleet", "enroll", "owl", "--folder", tmp_path)
     assert (enrolled.returncode, "No system id is left" in enrolled.stdout) == (0, True)
