@@ -2,10 +2,9 @@
 """The parts common to all fleet commands: the fleet's address, the choice of vehicles, and the session."""
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import click
 import zenoh
@@ -19,17 +18,6 @@ from terminal.sentences import INTERRUPTED, fail
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-class FleetAddress(NamedTuple):
-    """The fleet's address in a daemon's settings. `connect`: endpoints; `config_file`: a zenoh configuration.
-
-    The `obj` of the command group is the function that reads it from a file; it raises ZenohSettingsError.
-    """
-
-    prefix: str = DEFAULT_PREFIX
-    connect: Sequence[str] = ()
-    config_file: Path | None = None
-
-
 def check_endpoint(_context: click.Context, option: click.Parameter, value: Any) -> Any:
     """An option's callback: BadParameter if an endpoint does not have zenoh's form."""
     for endpoint in value if option.multiple else [value]:
@@ -40,10 +28,7 @@ def check_endpoint(_context: click.Context, option: click.Parameter, value: Any)
 
 def address_options(command: F) -> F:
     for option in (
-        click.option(
-            "--config", type=PATH, help="The daemon's configuration file; its [zenoh] table has the defaults."
-        ),
-        click.option("--prefix", help="First part of the vehicles' keys.", show_default="fleet"),
+        click.option("--prefix", help="First part of the vehicles' keys.", default=DEFAULT_PREFIX, show_default=True),
         click.option("--zenoh-config", type=PATH, help="zenoh configuration file, for TLS, passwords and the like."),
         click.option(
             "--connect",
@@ -99,16 +84,14 @@ staged_option = click.option(
 def fleet_session(where: dict[str, Any]) -> Iterator[tuple[zenoh.Session, str]]:
     """Join the fleet for one command. An error ends the program with one sentence, Ctrl-C silently.
 
-    `where`: the options for the fleet's address, which override the daemon's file.
+    `where`: the options for the fleet's address.
     """
-    read: Callable[[Path], FleetAddress] = click.get_current_context().obj
     try:
-        usual = FleetAddress() if where["config"] is None else read(where["config"])
-        prefix = check_name("--prefix", where["prefix"] or usual.prefix)
+        prefix = check_name("--prefix", where["prefix"])
     except ZenohSettingsError as error:
         raise click.UsageError(str(error)) from error
     try:
-        with open_session(where["connect"] or usual.connect, where["zenoh_config"] or usual.config_file) as session:
+        with open_session(where["connect"], where["zenoh_config"]) as session:
             yield session, prefix
     except FleetError as error:
         fail(error)

@@ -1,34 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`naze-bridge fleet` with its parts that need the service: a daemon's settings, and links to ground stations."""
+"""`naze-bridge fleet` with the command that needs the service: links to ground stations."""
 
 import asyncio
-from pathlib import Path
 from typing import Any
 
 import click
 
 from fleet.command import fleet
-from fleet.options import FleetAddress, address_options, all_option, fleet_session, vehicle_option
+from fleet.options import address_options, all_option, fleet_session, vehicle_option
 from fleet.push_command import require_choice
 from fleet.roll_call import alive, chosen
-from payloads.names import ZenohSettingsError
 from terminal.sentences import INTERRUPTED, fail
-
-
-def _daemon_address(config: Path) -> FleetAddress:
-    from service.settings import SettingsError, load_settings
-
-    try:
-        # The flight controller does not matter here, and a file need not name one.
-        found = load_settings(config, fc="sim:").zenoh
-    except SettingsError as error:
-        raise ZenohSettingsError(str(error)) from error
-    if found is None:
-        raise ZenohSettingsError(f"{config} has no [zenoh] table")
-    return FleetAddress(found.prefix, found.connect, found.config_file)
-
-
-fleet.context_settings["obj"] = _daemon_address
 
 
 @fleet.command(short_help="Connect a ground station with vehicles, until Ctrl-C.")

@@ -146,8 +146,6 @@ class FcConnection:
         self._report_search()
 
     def _received(self, data: bytes, now: float) -> None:
-        if self._finder is not None:
-            self._finder.received(data)
         if self._bridge.fc_received(data, now):
             self._flush()
 

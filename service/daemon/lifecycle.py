@@ -9,15 +9,13 @@ from dataclasses import fields, replace
 
 import structlog
 
-from reports.vehicle_groups import Group, Link, Status
 from service.daemon.daemon import Daemon
 from service.machine.log_setup import set_log_level
 from service.machine.notify import Notifier
 from service.machine.threads import BackgroundThread
 from service.settings import Settings, SettingsError
 
-#: The interval of status updates, and the minimum number of watchdog messages per watchdog timeout.
-_INTERVAL_S = 2.0
+#: The number of watchdog messages per watchdog timeout.
 _FEEDS = 3
 
 _log = structlog.get_logger()
@@ -52,53 +50,27 @@ async def run_until_signal(daemon: Daemon, notifier: Notifier, load: Callable[[]
     reload_requested = asyncio.Event()
     loop.add_signal_handler(signal.SIGHUP, reload_requested.set)
     reloading = loop.create_task(_reload_on_request(reload_requested, daemon, notifier, load))
-    reporting = _Reporting(daemon, notifier)
+    feeding = None
+    if notifier.watchdog_s is not None:
+        feeding = loop.create_task(_feed_watchdog(daemon, notifier, notifier.watchdog_s))
     try:
         with suppress(asyncio.CancelledError):
             await running
     finally:
-        reporting.end()
+        if feeding is not None:
+            feeding.cancel()
         reloading.cancel()
         if stopping is not None:
             stopping.cancel()
         notifier.close()
 
 
-class _Reporting:
-    """Feeds the watchdog and reports the status from the links' own event loop: a thread would hide a hung loop."""
-
-    def __init__(self, daemon: Daemon, notifier: Notifier) -> None:
-        self._daemon = daemon
-        self._notifier = notifier
-        watchdog_s = notifier.watchdog_s
-        self._interval_s = _INTERVAL_S if watchdog_s is None else min(_INTERVAL_S, watchdog_s / _FEEDS)
-        self._timer: asyncio.Handle = asyncio.get_running_loop().call_soon(self._report)
-
-    def end(self) -> None:
-        self._timer.cancel()
-
-    def _report(self) -> None:
-        if self._daemon.is_ticking:
-            self._notifier.alive()
-        loop = asyncio.get_running_loop()
-        self._notifier.status(_link_line(self._daemon, loop.time()))
-        self._timer = loop.call_later(self._interval_s, self._report)
-
-
-def _link_line(daemon: Daemon, now: float) -> str:
-    """The flight controller and the ground stations in one line."""
-    link: Link = daemon.bridge.group(Group.LINK, now)
-    status: Status = daemon.bridge.group(Group.STATUS, now)
-    if daemon.fc.trouble:
-        where = daemon.fc.trouble
-    elif link.flight_controller is None:
-        where = f"looking for a flight controller on {daemon.fc.where}"
-    else:
-        speed = "" if link.speed_baud is None else f", {link.speed_baud} baud"
-        armed = {None: "", True: ", armed", False: ", disarmed"}[status.armed]
-        where = f"{link.flight_controller} ({link.state}{speed}{armed})"
-    count = len(link.ground_stations)
-    return f"{where}; {count} ground station{'' if count == 1 else 's'}"
+async def _feed_watchdog(daemon: Daemon, notifier: Notifier, watchdog_s: float) -> None:
+    """On the links' own event loop: a thread would hide a hung loop."""
+    while True:
+        if daemon.is_ticking:
+            notifier.alive()
+        await asyncio.sleep(watchdog_s / _FEEDS)
 
 
 async def _reload_on_request(

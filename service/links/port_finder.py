@@ -15,7 +15,7 @@ from typing import Any
 import serial
 import structlog
 
-from bridge.fc.port_listener import OtherDeviceWatch, PortListener
+from bridge.fc.port_listener import PortListener
 from bridge.model.events import BridgeEvent, FcFound, FcInCommandLine, FcLost
 from service.links.fc_device import DEVICE_ERRORS, PortError, open_serial
 from service.links.port_holder import find_user
@@ -81,7 +81,6 @@ class PortFinder:
         self._memory = PortMemory(state_dir)
         self._present: SerialPort | None = None
         self._tried: set[str] = set()
-        self._watch: OtherDeviceWatch | None = None
         self._timer: asyncio.TimerHandle | None = None
         #: Why each port was skipped, by its path.
         self._passed: dict[str, str] = {}
@@ -103,7 +102,6 @@ class PortFinder:
                 self._pass_over(port, str(error))
                 continue
             self._present = port
-            self._watch = OtherDeviceWatch()
             self._wait(_RETURN_S if port.key == self._memory.flight_controller else _SEARCH_S)
             return device
         self._tried.clear()
@@ -124,15 +122,6 @@ class PortFinder:
             raise PortError(f"it is not known which port the flight controller is on ({which}): name it (fc)")
         return found[0]
 
-    def received(self, data: bytes) -> None:
-        """Examine bytes while the port is unidentified: a GPS receiver may just have been switched on."""
-        if self._watch is not None:
-            self._watch.feed(data)
-            if self._watch.what and self._present is not None:
-                self._memory.found_other(self._present.key, self._watch.what)
-                self._pass_over(self._present, f"{self._watch.what} was heard there")
-                self.move_on()
-
     def close(self) -> None:
         self._leave()
         self._memory.close()
@@ -143,11 +132,9 @@ class PortFinder:
             return
         if isinstance(event, FcFound | FcInCommandLine):
             self._stop_waiting()
-            self._watch = None
             self._passed.pop(self._present.path, None)
             self._memory.found_flight_controller(self._present.key)
         elif isinstance(event, FcLost):
-            self._watch = OtherDeviceWatch()
             self._wait(_RETURN_S)
 
     def status(self) -> dict[str, Any]:
@@ -235,7 +222,6 @@ class PortFinder:
     def _leave(self) -> None:
         self._stop_waiting()
         self._present = None
-        self._watch = None
 
 
 def _read(device: serial.Serial) -> bytes:

@@ -21,7 +21,6 @@ class Notifier:
         self._address = "\0" + address[1:] if address.startswith("@") else address
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK) if address else None
         self.watchdog_s = _watchdog_s(environment)
-        self._status = ""
 
     def ready(self) -> None:
         """The daemon is ready, or ready again after a reload."""
@@ -37,12 +36,6 @@ class Notifier:
     def alive(self) -> None:
         """The loop is alive: restarts the watchdog's `watchdog_s`."""
         self._say("WATCHDOG=1")
-
-    def status(self, text: str) -> None:
-        """Set the line shown by `systemctl status`; an unchanged line is not sent again."""
-        if text != self._status:
-            self._status = text
-            self._say(f"STATUS={text}")
 
     def close(self) -> None:
         if self._socket is not None:

@@ -39,15 +39,6 @@ def test_the_first_endpoint_to_answer_is_used(router: Router) -> None:
     assert listed.returncode == 0, listed
 
 
-def test_the_endpoint_comes_from_the_daemons_configuration(router: Router, tmp_path: Path) -> None:
-    config = tmp_path / "naze.toml"
-    config.write_text(f'[zenoh]\nprefix = "flock"\nconnect = ["{router.endpoint}"]\n')
-    listed = run_naze_bridge("fleet", "list", "--config", config)
-    assert listed.stdout == "No vehicle is alive under 'flock'.\n", listed
-    config.write_text("sysid = 3\n")
-    assert "has no [zenoh] table" in sentence_of("list", "--config", config, code=2)
-
-
 def test_a_missing_router_is_one_sentence() -> None:
     endpoint = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
     reason = f"{endpoint}: no router is running there (connection refused)"
