@@ -24,32 +24,6 @@ _GROUND_STATION = 6  # MAV_TYPE_GCS
 _SIK_SENDER = (51, 68)
 
 
-class OtherDeviceWatch:
-    """Feed bytes; `what` names the device once it has shown that it is not a flight controller."""
-
-    def __init__(self) -> None:
-        self.what = ""
-        #: A MAVLink vehicle was heard: a flight controller.
-        self.is_vehicle = False
-        self._gps = GpsWatch()
-        self._mavlink = MavlinkSplitter()
-
-    def feed(self, data: bytes) -> None:
-        self._gps.feed(data)
-        if self._gps.heard:
-            self.what = f"a GPS receiver ({self._gps.heard})"
-        for frame in self._mavlink.feed(data):
-            self._mavlink_frame(frame)
-
-    def _mavlink_frame(self, frame: MavlinkFrame) -> None:
-        if frame.msgid == _RADIO_STATUS and (frame.sysid, frame.compid) == _SIK_SENDER:
-            self.what = "a SiK telemetry radio"
-        elif frame.msgid == _HEARTBEAT and frame.payload[4:5] == bytes((_GROUND_STATION,)):
-            self.what = "a telemetry radio with a ground station at its other end"
-        elif frame.msgid == _HEARTBEAT:
-            self.is_vehicle = True
-
-
 class PortListener:
     """One port. Set it to `speed`, feed bytes and time until `is_done`; `what` is empty if it may be probed."""
 
@@ -57,26 +31,40 @@ class PortListener:
         self._speeds = iter(LISTENING_SPEEDS)
         self.speed = next(self._speeds)
         self.is_done = False
+        #: The device, once it has shown that it is not a flight controller.
         self.what = ""
         self._begin(now)
 
     def _begin(self, now: float) -> None:
-        self._watch = OtherDeviceWatch()
+        self._gps = GpsWatch()
+        self._mavlink = MavlinkSplitter()
+        self._hears_vehicle = False
         self._size = 0
         self.ends = now + _LISTEN_S
 
     def receive(self, data: bytes) -> None:
-        self._watch.feed(data)
         self._size += len(data)
-        self.what = self._watch.what
+        self._gps.feed(data)
+        if self._gps.heard:
+            self.what = f"a GPS receiver ({self._gps.heard})"
+        for frame in self._mavlink.feed(data):
+            self._mavlink_frame(frame)
         # A SiK radio also passes on the heartbeats of a vehicle at its other end: so the whole time is used.
         self.is_done = bool(self.what)
+
+    def _mavlink_frame(self, frame: MavlinkFrame) -> None:
+        if frame.msgid == _RADIO_STATUS and (frame.sysid, frame.compid) == _SIK_SENDER:
+            self.what = "a SiK telemetry radio"
+        elif frame.msgid == _HEARTBEAT and frame.payload[4:5] == bytes((_GROUND_STATION,)):
+            self.what = "a telemetry radio with a ground station at its other end"
+        elif frame.msgid == _HEARTBEAT:
+            self._hears_vehicle = True
 
     def tick(self, now: float) -> None:
         """Move on to the next speed, or end."""
         if self.is_done or now < self.ends:
             return
-        speed = None if self._size < _NOISE_SIZE or self._watch.is_vehicle else next(self._speeds, None)
+        speed = None if self._size < _NOISE_SIZE or self._hears_vehicle else next(self._speeds, None)
         if speed is None:
             self.is_done = True
         else:

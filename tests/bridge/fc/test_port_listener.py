@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as m
 
-from bridge.fc.port_listener import LISTENING_SPEEDS, GpsWatch, OtherDeviceWatch, PortListener
+from bridge.fc.port_listener import LISTENING_SPEEDS, GpsWatch, PortListener
 from protocols.mavlink.codec import FrameWriter
 from protocols.msp.commands import Msp
 from protocols.msp.frame import request
@@ -40,31 +40,31 @@ def ubx(payload: bytes) -> bytes:
 )
 @pytest.mark.parametrize("size", [1, 7, 1000])
 def test_gps_receivers_and_radios_are_recognised(sent: bytes, named: str, size: int) -> None:
-    watch = OtherDeviceWatch()
+    watch = PortListener(0.0)
     data = b"\x00\xff" + sent + sent
     for start in range(0, len(data), size):
-        watch.feed(data[start : start + size])
+        watch.receive(data[start : start + size])
     assert named in watch.what
 
 
 @pytest.mark.parametrize("sent", [heartbeat(2, 3), request(Msp.IDENT), b"$M>\x07\x64\xd3\x03\x00\x00\x00\x00\x80\x37"])
 def test_a_flight_controller_is_not_mistaken_for_another_device(sent: bytes) -> None:
-    watch = OtherDeviceWatch()
-    watch.feed(sent * 3)
+    watch = PortListener(0.0)
+    watch.receive(sent * 3)
     assert not watch.what
 
 
 def test_a_damaged_sentence_is_not_enough() -> None:
-    watch = OtherDeviceWatch()
-    watch.feed(NMEA.replace(b"123519", b"123518") + ubx(bytes(92))[:-1] + b"\x00")
+    watch = PortListener(0.0)
+    watch.receive(NMEA.replace(b"123519", b"123518") + ubx(bytes(92))[:-1] + b"\x00")
     assert not watch.what
 
 
 @given(st.lists(st.binary(max_size=64), max_size=20))
 def test_noise_neither_raises_nor_is_a_radio(chunks: list[bytes]) -> None:
-    watch = OtherDeviceWatch()
+    watch = PortListener(0.0)
     for chunk in chunks:
-        watch.feed(chunk)
+        watch.receive(chunk)
     assert "radio" not in watch.what
 
 
