@@ -304,6 +304,7 @@ def test_a_request_that_inav_does_not_answer_blanks_no_other_value(number: int) 
     """Without a ground station, so that polls are due once a second. 20 is asked before each mission list."""
     world = World(peer=MutedBoard(make_board("inav")))
     world.wait_ready(30)
+    world.run(5)
     world.naze.muted = frozenset([number])
     for _ in range(600):
         world.run(STEP_S)
