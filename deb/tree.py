@@ -19,6 +19,7 @@ _LIB = Path("usr/lib/naze-bridge")
 #: Pages outside docs/ that the docs link to.
 _PAGES = (
     *("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md", "LICENSE"),
+    *("benchmarks/README.md", "service/web/static/wiring.svg"),
     *("systemd/naze-bridge.service", "systemd/60-naze-bridge.rules"),
 )
 _NOT_THE_PATCH = ("__pycache__", "build", "tests", "sim", "Makefile")

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Floods of the disk and the control socket, and a disk that is missing or hangs."""
 
-import ctypes
 import os
 import shutil
 import signal
@@ -123,7 +122,8 @@ def test_the_daemon_works_and_stops_while_the_disk_hangs(start: Starter, stack: 
     assert "store.hangs" in daemon.printed
 
 
-_PR_CAPBSET_DROP, _CAP_DAC_OVERRIDE = 24, 1
+#: Without root's right to ignore the modes of files.
+_OBEYING_MODES = ("setpriv", "--bounding-set=-dac_override", "--inh-caps=-dac_override") if os.geteuid() == 0 else ()
 _SAVED_NOTHING = {
     "read-only": ("signing.json", "Permission denied"),
     "removed": ("signing.json", "No such file or directory", "missions.db was removed while the bridge ran"),
@@ -131,20 +131,13 @@ _SAVED_NOTHING = {
 }
 
 
-def _obey_modes() -> None:
-    """Make even root unable to write to a read-only folder."""
-    if os.geteuid() == 0:
-        assert ctypes.CDLL(None).prctl(_PR_CAPBSET_DROP, _CAP_DAC_OVERRIDE, 0, 0, 0) == 0
-
-
 class DaemonThatObeysModes(Daemon):
     """Runs in a new interpreter without root's right to ignore the modes of files."""
 
     def _start(self) -> subprocess.Popen[bytes]:
+        command = [*_OBEYING_MODES, *NAZE_BRIDGE, *self._arguments]
         with self._output.open("ab") as output:
-            return subprocess.Popen(
-                [*NAZE_BRIDGE, *self._arguments], cwd=REPOSITORY, stdout=output, stderr=output, preexec_fn=_obey_modes
-            )
+            return subprocess.Popen(command, cwd=REPOSITORY, stdout=output, stderr=output)
 
 
 @pytest.mark.parametrize("becomes", _SAVED_NOTHING)

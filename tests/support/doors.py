@@ -50,7 +50,10 @@ class Doors:
         line = request if isinstance(request, bytes) else to_json(request).encode()
         reader, writer = await asyncio.open_unix_connection(self.control, limit=_MOST)
         writer.write(line + b"\n")
-        answer = await reader.read(-1)
+        answer = b""
+        with suppress(ConnectionResetError):  # a request that is too long is answered before it was read
+            while block := await reader.read(_MOST):
+                answer += block
         writer.close()
         return json.loads(answer.splitlines()[-1])
 
