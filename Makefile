@@ -119,7 +119,7 @@ suite-trial:
 
 # The project itself is installed editable, so that edits take effect. Its build backend comes from the lock, too;
 # --no-deps because pip would complain about packages deliberately left out of the lock (pyproject.toml, tool.uv).
-PIP_INSTALL = $(BIN)/python -m pip --disable-pip-version-check install --quiet --quiet --no-deps
+PIP_INSTALL = $(BIN)/python -m pip --disable-pip-version-check install --quiet --no-deps
 define set_up
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
 	    echo 'naze-bridge needs Python 3.11 or newer as $(PYTHON); name another one: make PYTHON=python3.12' >&2; exit 1; }
@@ -127,8 +127,9 @@ define set_up
 	    echo 'naze-bridge needs the venv module of $(PYTHON); on Debian: apt-get install python3-venv' >&2; exit 1; }
 	@echo 'Installing $< in $(VENV)'
 	@test -x $(BIN)/pip || $(PYTHON) -m venv $(VENV)
-	@$(PIP_INSTALL) --require-hashes --only-binary=:all: -r $< || { \
-	    echo 'The packages could not be fetched. Is there a network? Then repeat: make $(MAKECMDGOALS)' >&2; exit 1; }
+	@$(PIP_INSTALL) --require-hashes --only-binary=:all: --retries 2 -r $< 2>$(VENV)/pip.log || { \
+	    if grep -q ConnectionError $(VENV)/pip.log; then echo 'The packages cannot be fetched: is there a network?' >&2; \
+	    else cat $(VENV)/pip.log >&2; fi; exit 1; }
 	@$(PIP_INSTALL) --no-build-isolation --editable .
 	@touch $@
 endef
