@@ -255,6 +255,6 @@ def missing_coordinate(item: MissionItem) -> tuple[str, int | None] | None:
     return ("lon_e7", item.lon_e7) if item.lat_e7 else ("lat_e7", item.lat_e7)
 
 
-def given(value: float) -> float | None:
-    """The value; None for NaN, "not given"."""
-    return None if math.isnan(value) else value
+def given(value: float | None) -> float | None:
+    """The value; None for NaN or an omitted coordinate, "not given"."""
+    return None if value is None or math.isnan(value) else value

@@ -5,7 +5,7 @@ import json
 import math
 from dataclasses import asdict, replace
 
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from bridge.controllers.harakiri.check import HarakiriRules
@@ -31,6 +31,7 @@ items = st.builds(
     lon_e7=places,
     alt_m=st.one_of(st.sampled_from([0.0, 12.0, 18.5]), numbers),
 )
+FAR = MissionItem(0, 16, 0, 0.0, 0.0, 0.0, 0.0, 453838000, 453838000, 0.0)
 HOME = MissionItem(0, 16, 0, 0.0, 2.0, 0.0, 0.0, 453838000, 84733000, 131.0)
 lists = st.lists(items, min_size=1, max_size=20).map(lambda each: [HOME, *each])
 #: Without the frame, which is a change only where the height is used.
@@ -39,6 +40,7 @@ COMPARED = ("p1", "p2", "p3", "p4", "lat_e7", "lon_e7", "alt_m")
 
 @settings(deadline=None)
 @given(lists)
+@example([HOME, FAR, FAR, FAR, FAR, replace(FAR, command=20, lat_e7=None)])
 def test_every_difference_has_a_reason(sent: list[MissionItem]) -> None:
     verdict = check_list(sent, RULES)
     rows = [row.to_json() for row in sent_and_stored(sent, verdict.items, verdict.findings, verdict.sent_seqs)]
