@@ -77,16 +77,6 @@ def test_a_damaged_backup_is_not_shown_as_intact(tmp_path: Path) -> None:
             store.backups.get(numbers[1])
 
 
-def test_a_store_of_an_earlier_release_gets_the_table(tmp_path: Path) -> None:
-    path = tmp_path / "missions.db"
-    with open_store(path, 0.0).store:
-        pass
-    with closing(sqlite3.connect(path)) as connection:
-        connection.executescript("DROP TABLE settings_backups; PRAGMA user_version = 3")
-    with open_store(path, 0.0).store as store:
-        assert store.backups.add("a", "1", TABLE, 1.0, "first met") == 1
-
-
 def test_backups_are_salvaged_from_a_damaged_store(tmp_path: Path) -> None:
     path = tmp_path / "missions.db"
     with open_store(path, 0.0).store as store:
