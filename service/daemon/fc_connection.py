@@ -138,7 +138,7 @@ class FcConnection:
             self.found_at, self.lost_at = None, self._loop.time()
             if isinstance(self._address, UdpFc):
                 # A Wi-Fi bridge that restarted may have another address or port.
-                self._port.move_on()
+                self._loop.call_soon(self._port.move_on)
 
     def _opened(self) -> None:
         self._bridge.fc_opened(self._loop.time())
