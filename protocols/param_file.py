@@ -18,7 +18,7 @@ from protocols.plain_text import FileError, PlainText, file_text, plain_text, sh
 _NAME = re.compile(r"[!$-+\--~]{1,64}")
 # float() also accepts underscores and digits of any script.
 _NUMBER = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:e[-+]?\d+)?", re.ASCII | re.IGNORECASE)
-_BOARD, _TEXT = "# board: ", "# text: "
+BOARD, _TEXT = "# board: ", "# text: "
 _QGC_FIELDS = 5
 _MISSION = "QGC WPL"
 #: Digits that show any single-precision number exactly.
@@ -47,8 +47,8 @@ def read_param_file(data: bytes, name: str) -> ParamFile:
     seen_at: dict[str, int] = {}
     board = ""
     for number, line in enumerate(text.split("\n"), start=1):
-        if line.startswith(_BOARD):
-            board = plain_text(line.removeprefix(_BOARD)).strip()
+        if line.startswith(BOARD):
+            board = plain_text(line.removeprefix(BOARD)).strip()
         if line.startswith(_TEXT):
             fields = line.removeprefix(_TEXT).rstrip("\r").split(",", 1)
         else:
@@ -73,7 +73,7 @@ def write_param_file(values: Mapping[str, float | str], board: str = "", comment
 
     NaN, as a board with damaged settings may have, is left out.
     """
-    heading = [_BOARD + board] if board else []
+    heading = [BOARD + board] if board else []
     heading += [f"# {comment}" for comment in comments]
     lines = (
         f"{_TEXT if isinstance(value, str) else ''}{name},{shown_value(value)}"

@@ -19,7 +19,6 @@ from bridge.missions.place_lists import NO_PLACES
 from bridge.model.craft import ARM_BOX, Airframe
 from bridge.model.missions import Refusal
 from bridge.model.vehicle import Vehicle
-from protocols.inav_dump import SavedSettings
 from protocols.mission_item import MissionResult
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame, request
@@ -27,6 +26,7 @@ from protocols.msp.mission import Info
 from protocols.msp.telemetry import Ident, decode_box_names, decode_ident
 from protocols.plain_text import plain_text
 from protocols.rights.msp import Firmware
+from protocols.settings_file import SavedSettings
 
 _IDENT_SIZE = 7
 _VARIANT_SIZE, _VERSION_SIZE = 4, 3

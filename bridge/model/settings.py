@@ -55,6 +55,25 @@ class BoardSetting:
         unit = f" {self.unit}" if self.unit else ""
         return f"{shown(self.minimum)}..{shown(self.maximum)}{unit}"
 
+    @property
+    def wanted_text(self) -> str:
+        """What a text must be, for a refusal."""
+        return f"it is one of {', '.join(self.choices)}" if self.choices else f"it must be {self.range_text}"
+
+    def parse(self, given: Value) -> Value | None:
+        """The value of this kind that a file or a person means: a number, or the name of a choice; None for neither."""
+        if self.kind is ValueKind.TEXT:
+            return shown(given)
+        if not isinstance(given, str):
+            return given
+        for number, choice in enumerate(self.choices):
+            if choice.lower() == given.lower():
+                return self.minimum + number
+        try:
+            return float(given)
+        except ValueError:
+            return None
+
     def accepts(self, value: Value) -> bool:
         """True if the value is of this kind and in range."""
         if isinstance(value, str):

@@ -12,11 +12,11 @@ from typing import Any
 
 from bridge.fc.fc_settings import Cause, SettingRefusal
 from bridge.fc.session import FcSession
-from bridge.model.settings import BoardSetting, SettingTable, Value, ValueKind
+from bridge.model.settings import BoardSetting, SettingTable, Value
 from bridge.settings.board_settings import READ_WITHIN_S, BoardSettings, OnTable
-from bridge.settings.parameter_names import parameter_names
+from bridge.settings.parameter_names import LONGEST, parameter_names
 from bridge.settings.setting_work import Answer
-from protocols.param_file import is_equal, shown_value
+from protocols.param_file import is_equal
 
 _MOST_NAMES = 8
 _NO_BOARD = SettingRefusal(Cause.NO_LINK, "The flight controller is not connected")
@@ -70,10 +70,12 @@ def plan_restore(
         if setting is None:
             left_out.append(LeftOut(name, value, None, "the board has no such setting"))
             continue
-        becomes = _of_kind(setting, value)
-        if is_equal(setting.value, becomes):
+        becomes = setting.parse(value)
+        if becomes is None:
+            left_out.append(LeftOut(setting.name, value, setting.value, setting.wanted_text))
+        elif is_equal(setting.value, becomes):
             continue
-        if why := _refusal(setting, becomes):
+        elif why := _refusal(setting, becomes):
             left_out.append(LeftOut(setting.name, becomes, setting.value, why))
         else:
             changes.append(PlannedChange(setting.name, setting.value, becomes))
@@ -93,11 +95,6 @@ def _refusal(setting: BoardSetting, value: Value) -> str:
     return setting.raised if setting.raised and float(value) > float(setting.value) else ""
 
 
-def _of_kind(setting: BoardSetting, value: Value) -> Value:
-    """The value as the setting's kind: a file may have the text "5" as a number."""
-    return shown_value(value) if setting.kind is ValueKind.TEXT else value
-
-
 @dataclass(frozen=True, slots=True)
 class RestoreResult:
     """is_saved: the board has saved the planned settings, and they were read from it again. changed: in its RAM."""
@@ -113,9 +110,17 @@ OnRestored = Callable[[RestoreResult | SettingRefusal, float], None]
 
 
 def by_setting(values: Mapping[str, Value], known: Collection[str]) -> dict[str, Value]:
-    """The values by the names of known settings, where a ground station's file has a parameter's shorter name."""
-    names = parameter_names(known)
-    return {name if name in known else names.get(name.upper(), name): value for name, value in values.items()}
+    """The values by the names of known settings, for files with the names of parameters or of a command line.
+
+    The command lines of Betaflight and Cleanflight have p_roll for the first number of the PID ROLL.
+    """
+    names = {**parameter_names(known), **{name.upper(): name for name in known if len(name) > LONGEST}}
+
+    def setting(name: str) -> str:
+        upper = name.upper()
+        return names.get(upper) or (names.get(f"{upper[2:]}_{upper[0]}") if upper[1:2] == "_" else None) or name
+
+    return {name if name in known else setting(name): value for name, value in values.items()}
 
 
 def by_parameter(values: Mapping[str, Value]) -> dict[str, Value]:

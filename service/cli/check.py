@@ -18,10 +18,10 @@ from bridge.fc.profile import RuleSettings
 from bridge.missions.list_check import MissionRules, check_list
 from bridge.settings.parameter_names import parameter_names
 from payloads.mission_data import verdict_data
-from protocols.inav_dump import InavDumpError, SavedSettings, read_inav_settings
 from protocols.mission_file import MissionFileError
 from protocols.mission_item import MissionItem, MissionResult, identify
-from protocols.plain_text import FileError
+from protocols.param_file import ParamFileError
+from protocols.settings_file import SavedSettings, read_settings_file, unread_text
 from reports.finding import DROPPED, without_defaults
 from reports.verdict import Result, Verdict
 from service.settings import SettingsError, takeoff_limit_m
@@ -146,9 +146,11 @@ def _saved_settings(path: Path, kind: str) -> SavedSettings:
     if kind != "inav":
         raise click.UsageError("--settings is for --kind inav: no others' settings are needed")
     try:
-        saved = read_inav_settings(read_file(path, InavDumpError), shown_path(path))
-    except FileError as error:
+        saved = read_settings_file(read_file(path, ParamFileError), shown_path(path))
+    except ParamFileError as error:
         raise click.UsageError(str(error)) from error
+    if saved.unread:
+        complain(f"{shown_path(path)}, lines that are not settings: {unread_text(saved.unread)}")
     names = parameter_names(SETTING_NAMES)
     return saved._replace(values={names.get(name.upper(), name): value for name, value in saved.values.items()})
 

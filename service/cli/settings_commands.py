@@ -12,7 +12,8 @@ from rich.text import Text
 
 from payloads.mission_data import MOST, Json
 from payloads.settings_comparison import SettingRow, SettingValues, setting_values, settings_difference
-from protocols.param_file import ParamFileError, read_param_file, shown_value, write_param_file
+from protocols.param_file import ParamFileError, shown_value, write_param_file
+from protocols.settings_file import read_settings_file, unread_text, write_dump
 from service.cli.daemon_client import BridgeClient, bridge_options, daemon_options
 from terminal.command_group import CommandGroup
 from terminal.files import read_file, shown_path, write_file
@@ -22,6 +23,10 @@ from terminal.sentences import UNREADABLE, complain, fail, say
 
 _STANDARD_OUTPUT = Path("-")
 _BOARD = "board"
+_NO_BOARD: Json = {"settings": []}
+_DUMP = ".txt"
+#: Their settings have the names of the board's command line.
+_WITH_DUMPS = ("INAV", "Harakiri")
 
 
 @click.group(cls=CommandGroup)
@@ -79,14 +84,22 @@ def save_settings(client: BridgeClient) -> None:
 @click.argument("file", type=PATH)
 @bridge_options
 def backup(client: BridgeClient, file: Path) -> None:
-    """Write the settings to FILE in Mission Planner's .param format; - is standard output."""
+    """Write the settings to FILE, in Mission Planner's .param format; - is standard output.
+
+    A FILE that ends with .txt becomes a dump, the commands that set them on the command line of an INAV or a Harakiri.
+    """
     if client.as_json and file == _STANDARD_OUTPUT:
         raise click.UsageError("the file and --json cannot both go to standard output: omit one of them")
     from bridge.settings.local_settings import by_parameter
 
     held = _held(client)
-    now = datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %z")
-    text = write_param_file(by_parameter(_values(held)), held["board"], [f"taken: {now}, by naze-bridge"])
+    comment = f"taken: {datetime.now().astimezone().strftime('%Y-%m-%d %H:%M %z')}, by naze-bridge"
+    if file.suffix.lower() != _DUMP:
+        text = write_param_file(by_parameter(_values(held)), held["board"], [comment])
+    elif held["board"].startswith(_WITH_DUMPS):
+        text = write_dump({each["name"]: each["shown"] for each in held["settings"]}, held["board"], [comment])
+    else:
+        fail(f"the command line of {held['board']} has other names for these settings: name the file .param")
     if file == _STANDARD_OUTPUT:
         click.echo(text, nl=False)
         return
@@ -105,7 +118,8 @@ def backup(client: BridgeClient, file: Path) -> None:
 def restore(client: BridgeClient, source: str, dry_run: bool) -> None:
     """Write the settings of SOURCE to the flight controller, save them, and verify them.
 
-    SOURCE is a .param file or the number of a backup. All differences are shown first, and in a
+    SOURCE is a .param file, a dump (`dump` or `diff all` of INAV, Betaflight, Cleanflight or Harakiri) or the number
+    of a backup. Lines of a dump that are not settings are listed. All differences are shown first, and in a
     terminal the command asks before it writes. Exit code 1: the flight controller does not hold all settings of SOURCE.
     """
     values, board = _source(client, source)
@@ -138,14 +152,16 @@ def restore(client: BridgeClient, source: str, dry_run: bool) -> None:
 def diff(client: BridgeClient, first: str, second: str) -> None:
     """Compare the settings of FIRST and SECOND. Exit code 1 if they differ.
 
-    Each is a .param file, a backup's number, or `board` for the flight controller's present settings (the default of
-    SECOND).
+    Each is a .param file, a dump, a backup's number, or `board` for the flight controller's present settings (the
+    default of SECOND).
     """
     from bridge.settings.local_settings import by_setting  # other commands do without the bridge
 
-    (left, _), (right, _) = (_source(client, each) for each in (first, second))
+    held = _held(client) if _BOARD in (first, second) else _NO_BOARD
+    (left, _), (right, _) = (_source(client, each, held) for each in (first, second))
     left = by_setting(left, right)
-    rows = settings_difference(left, by_setting(right, left))
+    right = by_setting(right, left)
+    rows = settings_difference(_like(left, right, held), _like(right, left, held))
     if client.as_json:
         print_json({"equal": not rows, "changes": [asdict(row) for row in rows]})
     elif rows:
@@ -191,10 +207,33 @@ def rows_table(rows: list[SettingRow], first: str, second: str) -> Table:
     return table
 
 
-def _source(client: BridgeClient, name: str) -> tuple[SettingValues, str]:
-    """The settings that a word on the command line names, and the board they are from; "" if it is unknown."""
+def _like(values: SettingValues, other: SettingValues, held: Json) -> SettingValues:
+    """The values of a dump, which are texts, as numbers where the other side has numbers."""
+    choices = {
+        (each["name"], choice.lower()): each["minimum"] + number
+        for each in held["settings"]
+        for number, choice in enumerate(each["choices"])
+    }
+
+    def number(name: str, text: str) -> float | str:
+        try:
+            return float(choices.get((name, text.lower()), text))
+        except ValueError:
+            return text
+
+    return {
+        name: number(name, value) if isinstance(value, str) and isinstance(other.get(name), float) else value
+        for name, value in values.items()
+    }
+
+
+def _source(client: BridgeClient, name: str, held: Json | None = None) -> tuple[SettingValues, str]:
+    """The settings that a word on the command line names, and the board they are from; "" if it is unknown.
+
+    held: the present board's, if they are known already.
+    """
     if name == _BOARD:
-        held = _held(client)
+        held = held or _held(client)
         return _values(held), held["board"]
     if name.isascii() and name.isdecimal() and not Path(name).exists():
         if int(name) > MOST:
@@ -202,9 +241,11 @@ def _source(client: BridgeClient, name: str) -> tuple[SettingValues, str]:
         stored = replace(client, fc=None).ask({"do": "backup", "number": int(name)})
         return setting_values(stored["values"]), stored["kind"]
     try:
-        found = read_param_file(read_file(Path(name), ParamFileError), shown_path(Path(name)))
+        found = read_settings_file(read_file(Path(name), ParamFileError), shown_path(Path(name)))
     except ParamFileError as error:
         fail(error, UNREADABLE)
+    if found.unread:
+        complain(f"{shown_path(Path(name))}, lines that are not settings: {unread_text(found.unread)}")
     return found.values, found.board
 
 
@@ -234,6 +275,9 @@ def _show_plan(plan: Json) -> None:
 
 
 def _show_left_out(settings: list[Json]) -> None:
+    names: dict[str, list[str]] = {}
     for each in settings:
         held = "" if each["held"] is None else f" stays {shown_value(each['held'])}"
-        say(f"{each['name']}{held}: {each['why']}", prefix="Left out: ", indent=10)
+        names.setdefault(each["why"], []).append(f"{each['name']}{held}")
+    for why, which in names.items():
+        say(f"{', '.join(which)}: {why}", prefix="Left out: ", indent=10)

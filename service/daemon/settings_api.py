@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The requests about the flight controller's settings, as part of DaemonApi."""
 
+import asyncio
 from collections.abc import Callable
 from dataclasses import asdict
+from difflib import get_close_matches
 from functools import partial
 from typing import TypeVar
 
 from bridge.fc.fc_settings import SettingRefusal
-from bridge.model.settings import BoardSetting, Value, ValueKind, shown
+from bridge.model.settings import BoardSetting, shown
 from payloads.mission_data import MOST, Json, plain, whole_number
 from payloads.settings_comparison import SettingValues, setting_values, settings_difference
 from service.daemon.client import ControlError
@@ -92,15 +94,20 @@ class SettingsApi:
 
     async def _setting(self, request: Json) -> BoardSetting:
         name = str(request.get("name"))[:_LONGEST_NAME]
-        setting = (await self._answer(self._daemon.bridge.settings.read)).find(name)
+        table = await self._answer(self._daemon.bridge.settings.read)
+        setting = table.find(name)
         if setting is None:
-            raise ControlError(f"this flight controller has no setting {name}: see `naze-bridge settings list`")
+            # Not on the event loop: INAV has 800 names.
+            near = await asyncio.to_thread(get_close_matches, name.lower(), [*table.settings], n=1)
+            hint = f"did you mean {near[0]}?" if near else "see `naze-bridge settings list`"
+            raise ControlError(f"this flight controller has no setting {name}: {hint}")
         return setting
 
     async def _change(self, request: Json) -> Json:
         setting = await self._setting(request)
-        value = _value(setting, str(request.get("value")))
-
+        given = str(request.get("value"))
+        if (value := setting.parse(given)) is None:
+            raise ControlError(f"{setting.name} cannot be {given[:_LONGEST_NAME]}: {setting.wanted_text}")
         change = partial(self._daemon.bridge.settings.change, setting.name, value, client="command line")
         (after,) = await self._answer(change)
         if after.value == setting.value:
@@ -142,20 +149,6 @@ def backup_shown(store: MissionStore, number: int) -> Json:
 
 def _wanted(request: Json) -> tuple[SettingValues, str]:
     return setting_values(request.get("values")), str(request.get("board") or "")
-
-
-def _value(setting: BoardSetting, text: str) -> Value:
-    """The value as typed: a number, or the name of one of the setting's choices."""
-    if setting.kind is ValueKind.TEXT:
-        return text
-    for number, choice in enumerate(setting.choices):
-        if choice.lower() == text.lower():
-            return setting.minimum + number
-    try:
-        return float(text)
-    except ValueError:
-        choices = f": it is one of {', '.join(setting.choices)}" if setting.choices else ", and it must be a number"
-        raise ControlError(f"{setting.name} cannot be {text[:_LONGEST_NAME]}{choices}") from None
 
 
 def _data(setting: BoardSetting) -> Json:

@@ -15,10 +15,10 @@ from bridge.controllers.inav.zone_check import judge_zones
 from bridge.controllers.nav.flown_path import above_home_cm
 from bridge.missions.flown_legs import Departure, FlownPath, Judgement, beyond_plain_limits, first_of, in_metres
 from bridge.model.ground_track import Place, distance_m
-from protocols.inav_dump import SavedSettings
 from protocols.msp.inav_places import FwApproach, Geozone, Safehome
 from protocols.msp.nav import FLY_HOME, LEGS, TURNS, NavAction, NavRecord
 from protocols.msp.nav_items import leg_speed
+from protocols.settings_file import SavedSettings
 from reports.finding import News
 
 

@@ -227,6 +227,7 @@ TABLE = table_of(
     BoardSetting("name", TEXT, 0, 8, "kite"),
     BoardSetting("gbl_flg", INTEGER, 0, 255, 1, fixed="it can crash"),
     BoardSetting("esc_moff", INTEGER, 0, 2000, 1000, raised="motors"),
+    BoardSetting("mode", INTEGER, 0, 1, 0, choices=("AUTO", "115200")),
 )
 BOARD = "Harakiri 2.1.1"
 NAMES = [setting.name for setting in TABLE]
@@ -250,7 +251,8 @@ def test_only_what_differs_is_written() -> None:
     [
         ("p_roll", 201.0, "it must be 0..200"),
         ("p_roll", 40.5, "it must be 0..200"),
-        ("p_roll", "40", "it must be 0..200"),
+        ("p_roll", "high", "it must be 0..200"),
+        ("mode", "NEVER", "it is one of AUTO, 115200"),
         ("name", "too long a name", "it must be 0 to 8 characters"),
         ("gbl_flg", 2.0, "it can crash"),
         ("esc_moff", 1001.0, "motors"),
@@ -260,6 +262,17 @@ def test_a_setting_that_cannot_be_written_is_left_out_with_the_reason(name: str,
     found = plan({name: value})
     assert found.changes == ()
     assert found.left_out == (LeftOut(name, value, TABLE.settings[name].value, why),)
+
+
+def test_the_texts_of_a_dump_are_numbers_and_choices() -> None:
+    found = plan({"p_roll": "40", "cf": "0.100", "mode": "115200", "MODE": "auto"})
+    assert found.changes == (PlannedChange("p_roll", 35, 40.0), PlannedChange("mode", 0, 1))
+
+
+def test_the_pids_of_a_betaflight_dump() -> None:
+    known = ("ROLL_P", "ROLL_I", "MIN_THROTTLE", "x")
+    given: dict[str, Value] = {"p_roll": "44", "min_throttle": "1070", "d_roll": "20", "x": "1"}
+    assert by_setting(given, known) == {"ROLL_P": "44", "MIN_THROTTLE": "1070", "d_roll": "20", "x": "1"}
 
 
 def test_a_setting_that_can_only_be_lowered_is_lowered() -> None:

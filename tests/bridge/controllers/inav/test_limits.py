@@ -11,9 +11,9 @@ from bridge.controllers.inav.limits import InavLimits, RthAltMode, SafehomeUsage
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile
 from bridge.missions.list_check import check_list
-from protocols.inav_dump import read_inav_settings
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.msp.inav_places import FW_APPROACH, MISSION_APPROACH, SET_FW_APPROACH, FwApproach, Safehome
+from protocols.settings_file import read_settings_file
 from reports.finding import News, without_defaults
 from tests.bridge.controllers.inav.test_mission_store import ACCEPTED, board_with
 from tests.support.conversations import Upload
@@ -258,17 +258,17 @@ set vbat_warning_cell_voltage = 300
 
 
 def test_settings_are_read_from_a_dump_and_from_a_param_file() -> None:
-    limits = saved_limits(read_inav_settings(DUMP.encode(), "dump.txt"))
+    limits = saved_limits(read_settings_file(DUMP.encode(), "dump.txt"))
     assert limits == InavLimits(
         nav_wp_max_safe_distance=1500,
         nav_rth_alt_mode=RthAltMode.FIXED,
         nav_rth_altitude=2000,
         safehomes=(Safehome(0, True, LAT + NORTH, LON), Safehome(1, False, 0, 0)),
     )
-    params = read_inav_settings(b"# board: INAV 9.1.0\nnav_max_altitude,12000\nnav_rth_alt_mode,2\n", "a.param")
+    params = read_settings_file(b"# board: INAV 9.1.0\nnav_max_altitude,12000\nnav_rth_alt_mode,2\n", "a.param")
     assert saved_limits(params) == InavLimits(nav_max_altitude=12000, nav_rth_alt_mode=RthAltMode.FIXED)
 
 
 def test_a_value_that_no_inav_has_is_refused() -> None:
     with pytest.raises(ValueError, match="nav_rth_alt_mode cannot be SOMETIMES"):
-        saved_limits(read_inav_settings(b"set nav_rth_alt_mode = SOMETIMES\n", "dump.txt"))
+        saved_limits(read_settings_file(b"set nav_rth_alt_mode = SOMETIMES\n", "dump.txt"))
