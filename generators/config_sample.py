@@ -10,7 +10,7 @@ _HEAD = (
     "All settings of naze-bridge. Commented-out lines show the default, or an example.",
     "Copy what you change to config.toml (the service's is /etc/naze-bridge/config.toml).",
     "It overrides setup.toml, the answers to `naze-bridge setup`.",
-    "Environment variables (NAZE_BRIDGE_SYSID, NAZE_BRIDGE_ZENOH_PREFIX) and flags override all files.",
+    "Flags of `naze-bridge run` override all files.",
     "`naze-bridge run --check-config --config FILE` checks the settings.",
     '`systemctl reload naze-bridge` applies settings marked "live"; the others need a restart.',
 )

@@ -5,9 +5,12 @@ import errno
 import os
 from pathlib import Path
 
+from protocols.mission_file import MissionFileError, read_mission_file
+from protocols.mission_item import MissionItem
 from protocols.plain_text import FileError, plain_text
 from storage.os_error import reason
 from storage.small_files import read_bounded
+from terminal.sentences import complain
 
 MAX_BYTES = 8 * 2**20  # 65,535 items, the most that MAVLink can count, are about 5 MB of text
 
@@ -23,6 +26,19 @@ def read_file(path: Path, failure: type[FileError]) -> bytes:
         return read_bounded(path, MAX_BYTES)
     except (OSError, ValueError) as error:
         raise _failed(path, error, failure) from None
+
+
+def load_mission(path: Path, alt_m: float | None = None) -> list[MissionItem]:
+    """Read the mission file at `path`; MissionFileError if it or the disk is damaged. Notes go to standard error.
+
+    alt_m: the height above home of all points of a path (KML, GPX or CSV).
+    """
+    name = shown_path(path)
+
+    def note(text: str) -> None:
+        complain(f"{name}, {text}")
+
+    return read_mission_file(read_file(path, MissionFileError), name, note, alt_m)
 
 
 def write_file(path: Path, text: str, failure: type[FileError]) -> None:

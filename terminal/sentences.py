@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sentences on the terminal: wrapped between words there, whole lines in a file or pipe."""
+"""Sentences and secrets on the terminal: sentences are wrapped there, and whole lines in a file or pipe."""
 
 import shutil
 import sys
@@ -32,3 +32,23 @@ def fail(text: object, status: int = 1) -> NoReturn:
     """End the program with one sentence and this status."""
     complain(text)
     raise SystemExit(status)
+
+
+def show_secret(what: str, secret: str, kept_in: str, code: str) -> None:
+    """Print a secret and the QR code of `code` to a terminal, else the name of the file that has the secret."""
+    if not is_terminal():
+        click.echo(f"{what}: in {kept_in}")
+        return
+    click.echo(f"{what}: {secret}")
+    print_code(code)
+
+
+def is_terminal() -> bool:
+    return sys.stdout.isatty()
+
+
+def print_code(text: str) -> None:
+    """Print a QR code."""
+    import segno  # imported here: few commands need it
+
+    segno.make(text, error="l").terminal(compact=True)

@@ -114,13 +114,9 @@ def by_setting(values: Mapping[str, Value], known: Collection[str]) -> dict[str,
 
     The command lines of Betaflight and Cleanflight have p_roll for the first number of the PID ROLL.
     """
-    names = {**parameter_names(known), **{name.upper(): name for name in known if len(name) > LONGEST}}
-
-    def setting(name: str) -> str:
-        upper = name.upper()
-        return names.get(upper) or (names.get(f"{upper[2:]}_{upper[0]}") if upper[1:2] == "_" else None) or name
-
-    return {name if name in known else setting(name): value for name, value in values.items()}
+    pids = {f"{name[-1]}_{name[:-2]}".upper(): name for name in known if name[-2:-1] == "_"}
+    names = {**pids, **parameter_names(known), **{name.upper(): name for name in known if len(name) > LONGEST}}
+    return {name if name in known else names.get(name.upper(), name): value for name, value in values.items()}
 
 
 def by_parameter(values: Mapping[str, Value]) -> dict[str, Value]:

@@ -6,11 +6,10 @@ from pathlib import PurePath
 
 from protocols.mission_file.error import MissionFileError, Note, no_note
 from protocols.mission_file.nav_mission import has_wp_lines, read_nav_xml, read_wp_lines
-from protocols.mission_file.path_file import is_path_table, read_csv, read_gpx, read_kml, read_kmz
+from protocols.mission_file.path_file import is_path_table, parse_xml, read_csv, read_gpx, read_kml, read_kmz
 from protocols.mission_file.qgc_plan import read_qgc_plan, write_qgc_plan
 from protocols.mission_file.qgc_wpl import read_qgc_wpl, write_qgc_wpl
 from protocols.mission_file.strangers import refuse_binary, refuse_text
-from protocols.mission_file.xml_text import parse_xml
 from protocols.mission_item import MissionItem
 from protocols.plain_text import file_text, plain_text
 

@@ -13,13 +13,14 @@ import zipfile
 import zlib
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
-from xml.etree.ElementTree import Element
+from xml.etree.ElementTree import Element, ParseError, fromstring
 
 from protocols.mission_file.error import NO_HOME, MissionFileError, Note, file_degrees_to_e7
-from protocols.mission_file.xml_text import MAX_SIZE, parse_xml
 from protocols.mission_item import Command, Frame, MissionItem
 from protocols.plain_text import file_text, shown
 
+#: Characters. The parsed tree takes up to forty times the memory of the text.
+_MAX_SIZE = 2 * 2**20
 _FEET = 0.3048
 #: The frame of a height, by KML's altitudeMode; heights of paths on the ground have no meaning.
 _KML_MODES = {"relativetoground": Frame.GLOBAL_TERRAIN_ALT, "absolute": Frame.GLOBAL}
@@ -39,6 +40,26 @@ class _Point(NamedTuple):
     frame: Frame = Frame.GLOBAL_RELATIVE_ALT
 
 
+def parse_xml(text: str, name: str) -> Element:
+    """The root element. Names of elements and attributes lose their namespace and become lower-case.
+
+    A document type is refused, because the entities in it can grow without limit or name other files.
+    """
+    if len(text) > _MAX_SIZE:
+        raise MissionFileError(name, "", "this XML is longer than 2 MB", "save only the path to be flown")
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise MissionFileError(name, "", "this XML has a document type", "delete the line that begins with <!DOCTYPE")
+    try:
+        root = fromstring(text)  # noqa: S314 - without a document type it has no entities
+    except ParseError as error:
+        line, _ = error.position
+        raise MissionFileError(name, f"line {line}", "this XML is damaged", "save the file again") from None
+    for element in root.iter():
+        element.tag = element.tag.rpartition("}")[2].lower()
+        element.attrib = {key.rpartition("}")[2].lower(): value for key, value in element.attrib.items()}
+    return root
+
+
 def read_kml(root: Element, name: str, note: Note, alt_m: float | None) -> list[MissionItem]:
     """The only line of the file, or else its single points, in order."""
     lines = [element for element in root.iter() if element.tag == "linestring"]
@@ -55,7 +76,7 @@ def read_kmz(data: bytes, name: str, note: Note, alt_m: float | None) -> list[Mi
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             inside = next(each for each in archive.namelist() if each.lower().endswith(".kml"))
             with archive.open(inside) as file:
-                kml = file.read(MAX_SIZE + 1)
+                kml = file.read(_MAX_SIZE + 1)
     except StopIteration:
         raise MissionFileError(name, "", "this zip archive holds no KML", "unpack it and give the mission") from None
     except (OSError, zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, NotImplementedError):

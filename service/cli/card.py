@@ -24,8 +24,7 @@ from service.web.token import new_token
 from storage.os_error import reason
 from storage.small_files import read_bounded
 from terminal.options import PATH
-from terminal.secret_text import show_secret
-from terminal.sentences import complain, fail
+from terminal.sentences import complain, fail, show_secret
 
 FOLDER = "naze-bridge"
 _LOG = "/var/log/naze-bridge-card.log"

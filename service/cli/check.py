@@ -25,8 +25,7 @@ from protocols.settings_file import SavedSettings, read_settings_file, unread_te
 from reports.finding import DROPPED, without_defaults
 from reports.verdict import Result, Verdict
 from service.settings import SettingsError, takeoff_limit_m
-from terminal.files import read_file, shown_path
-from terminal.mission_source import load_mission
+from terminal.files import load_mission, read_file, shown_path
 from terminal.mission_table import mission_table
 from terminal.options import PATH, position
 from terminal.printing import print_json, print_table

@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Connects a command to a bridge: the running daemon's, or its own with `--fc`."""
 
-import signal
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
@@ -21,7 +19,6 @@ from terminal.options import PATH
 from terminal.printing import console, print_json, progress_bars
 from terminal.sentences import INTERRUPTED, complain, fail
 
-_GOES_ON = "the daemon continues, and the result follows; to exit now, press Ctrl-C again"
 _LEFT = "interrupted; the daemon continues: see `naze-bridge missions list`, or `settings history`"
 _WRITES = ("push", "restore", "restore-settings")
 _FLASHES_ON = "interrupted; the daemon continues, do not switch the board off: see `naze-bridge status`"
@@ -72,9 +69,7 @@ class BridgeClient:
                 else:
                     on.out(f"naze-bridge: {progress['step']}")
 
-            goes_on = _first_interrupt(lambda: on.out(f"naze-bridge: {_GOES_ON}"))
-            with goes_on if self.fc is None else nullcontext():
-                return self.ask(request, show)
+            return self.ask(request, show)
 
     def show(self, answer: object, show_people: Callable[[], object]) -> None:
         if self.as_json:
@@ -110,22 +105,3 @@ def _interruption(request: Json, why: str, *, is_own: bool) -> str:
     if request["do"] in FIRMWARE_REQUESTS:
         return _FLASH_BROKEN if is_own else _FLASHES_ON
     return _LEFT if not is_own and request["do"] in _WRITES else why or "interrupted"
-
-
-@contextmanager
-def _first_interrupt(say: Callable[[], None]) -> Iterator[None]:
-    """On the first Ctrl-C only call `say`; the second one raises KeyboardInterrupt, as usual."""
-    usual = signal.getsignal(signal.SIGINT)
-    if usual is not signal.default_int_handler:  # it is ignored, as for a shell's background jobs
-        yield
-        return
-
-    def interrupted(_number: int, _frame: object) -> None:
-        signal.signal(signal.SIGINT, usual)
-        say()
-
-    signal.signal(signal.SIGINT, interrupted)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, usual)

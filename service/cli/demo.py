@@ -19,7 +19,7 @@ from protocols.mission_item import MissionItem, MissionResult
 from service.cli.mission_client import ClientError, connect
 from service.daemon.client import ControlError, ask_daemon
 from service.machine.host import Host
-from terminal.mission_source import load_mission
+from terminal.files import load_mission
 from terminal.mission_table import mission_table
 from terminal.options import PATH
 from terminal.printing import console, print_table, progress_bars

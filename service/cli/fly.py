@@ -19,8 +19,7 @@ from service.settings import SettingsError, takeoff_limit_m
 from simulator.commands.image import read_image
 from simulator.sky.lies import NAMES
 from simulator.sky.sky import Weather
-from terminal.files import read_file, shown_path, write_file
-from terminal.mission_source import load_mission
+from terminal.files import load_mission, read_file, shown_path, write_file
 from terminal.options import PATH
 from terminal.printing import print_json, print_table
 from terminal.sentences import fail, say

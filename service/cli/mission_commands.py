@@ -10,8 +10,7 @@ import click
 from payloads.mission_data import ACCEPTED, Json, mission_findings, mission_items
 from protocols.mission_file import MissionFileError, write_mission_file, write_qgc_wpl
 from service.cli.daemon_client import BridgeClient, bridge_options
-from terminal.files import shown_path, write_file
-from terminal.mission_source import load_mission
+from terminal.files import load_mission, shown_path, write_file
 from terminal.mission_table import mission_table
 from terminal.options import PATH
 from terminal.printing import print_json, print_table

@@ -8,9 +8,7 @@ import click
 
 from service.settings import DEFAULT_GCS, SettingsError, load_settings
 from service.settings.load import CONFIG_VARIABLE
-from service.settings.passphrase import STRONGER
 from terminal.options import PATH
-from terminal.sentences import complain
 
 
 @click.command()
@@ -38,9 +36,6 @@ def run(config: Path | None, gcs: tuple[str, ...], verbose: bool, check_config: 
         raise click.UsageError(str(error)) from error
     if check_config:
         click.echo("The settings are valid.")
-        for link, access in settings.access.items():
-            if access.weak_key is not None:
-                complain(f"warning: {link}: {access.weak_key}; {STRONGER}")
         return
     from service.cli.serve import serve  # the whole daemon: --help does without
 

@@ -40,15 +40,20 @@ def settings() -> None:
 @settings.command("list")
 @bridge_options
 def list_settings(client: BridgeClient) -> None:
-    """List all settings with their values and ranges."""
+    """List all settings with their values and ranges. Long ones have a shorter name as MAVLink parameters."""
     held = _held(client)
     client.show(held, lambda: _print_settings(held))
 
 
 def _print_settings(held: Json) -> None:
-    table = Table("Name", Column("Value", justify="right"), "Range", box=None, pad_edge=False)
+    from bridge.settings.parameter_names import parameter_names
+
+    parameters = {name: parameter for parameter, name in parameter_names(_values(held)).items()}
+    table = Table("Name", "MAVLink", Column("Value", justify="right"), "Range", box=None, pad_edge=False)
     for each in held["settings"]:
-        table.add_row(each["name"], each["shown"], Text(each["fixed"] or each["range"]))
+        parameter = parameters.get(each["name"], "")
+        row = "" if parameter == each["name"].upper() else parameter, each["shown"], each["fixed"] or each["range"]
+        table.add_row(each["name"], *map(Text, row))
     print_table(table)
     click.echo(f"\n{len(held['settings'])} settings of {held['board']}")
 

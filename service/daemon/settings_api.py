@@ -10,6 +10,7 @@ from typing import TypeVar
 
 from bridge.fc.fc_settings import SettingRefusal
 from bridge.model.settings import BoardSetting, shown
+from bridge.settings.local_settings import by_setting
 from payloads.mission_data import MOST, Json, plain, whole_number
 from payloads.settings_comparison import SettingValues, setting_values, settings_difference
 from service.daemon.client import ControlError
@@ -95,7 +96,7 @@ class SettingsApi:
     async def _setting(self, request: Json) -> BoardSetting:
         name = str(request.get("name"))[:_LONGEST_NAME]
         table = await self._answer(self._daemon.bridge.settings.read)
-        setting = table.find(name)
+        setting = table.find(name) or table.find(*by_setting({name: name}, table.settings))
         if setting is None:
             # Not on the event loop: INAV has 800 names.
             near = await asyncio.to_thread(get_close_matches, name.lower(), [*table.settings], n=1)

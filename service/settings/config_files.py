@@ -19,8 +19,6 @@ SETUP_FILE = "setup.toml"
 #: Settings made on the status page: before setup's, so that a page cannot override an answer given on the Pi.
 PAGE_FILE = "page.toml"
 _MAX_BYTES = 1 << 20
-#: Reported per file, in case another program's file was named by mistake.
-_MOST_UNKNOWN = 20
 _NAMES = frozenset(key.name for key in KEYS)
 #: A line with a table's header, or a key and the beginning of its value.
 _NAMING = re.compile(r"\s*(?:\[\s*(?P<table>[\w.-]+)\s*\]|(?P<key>[\w.-]+)\s*=)")
@@ -73,7 +71,6 @@ def _read_file(path: Path, problems: list[Problem], text: str | None = None) -> 
         return {}
     lines = key_lines(text)
     found: dict[str, Given] = {}
-    unknown: list[tuple[str, str]] = []
     for keys, value in _flat(tables):
         # A quoted dot belongs to the name, and no setting has one.
         name = ".".join(f'"{key}"' if "." in key else key for key in keys)
@@ -84,12 +81,7 @@ def _read_file(path: Path, problems: list[Problem], text: str | None = None) -> 
         elif name in TABLES:
             problems.append(Problem(where, f"{name} must be a table: begin it with [{name}]"))
         else:
-            unknown.append((where, name))
-    for where, name in unknown[:_MOST_UNKNOWN]:
-        problems.append(Problem(where, f"{short(name)} is not a setting; {nearest(name, (*_NAMES, *TABLES))}"))
-    if len(unknown) > _MOST_UNKNOWN:
-        text = f"{len(unknown) - _MOST_UNKNOWN} more are not settings: is this naze-bridge's file?"
-        problems.append(Problem(str(path), text))
+            problems.append(Problem(where, f"{short(name)} is not a setting; {nearest(name, (*_NAMES, *TABLES))}"))
     return found
 
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from reprlib import Repr
 from typing import NamedTuple
 
-ENVIRONMENT_PREFIX = "NAZE_BRIDGE_"
 #: In a field's annotation: a reload applies the setting.
 LIVE = object()
 _repr = Repr()
@@ -33,7 +32,7 @@ class Unfit(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """`where`: file and line, environment variable or flag; may be empty. `text`: the problem, and the remedy."""
+    """`where`: file and line, or flag; may be empty. `text`: the problem, and the remedy."""
 
     where: str
     text: str
@@ -53,12 +52,11 @@ class SettingsError(ValueError):
 class Reader(NamedTuple):
     """Converts a given value to the one used. `read` gets the value, and the folder of its file.
 
-    It raises Unfit, or another ValueError with a whole sentence. `from_text` converts text from the environment or a
-    flag to the form of the file. `choices`: all values, as in the file, if they can be listed.
+    It raises Unfit, or another ValueError with a whole sentence. `choices`: all values, as in the file, if they can be
+    listed.
     """
 
     read: Callable[[object, Path], object]
-    from_text: Callable[[str], object] = str
     choices: Sequence[object] = ()
 
 
@@ -75,10 +73,6 @@ class Key:
     default: str = ""
     example: str = ""
     is_live: bool = False
-
-    @property
-    def variable(self) -> str:
-        return ENVIRONMENT_PREFIX + self.name.upper().replace(".", "_")
 
 
 def short(value: object) -> str:
@@ -124,10 +118,7 @@ def whole(least: int, most: int) -> Reader:
             raise _wrong(value, f"{least}..{most}")
         return value
 
-    def from_text(digits: str) -> object:
-        return int(digits) if digits.isascii() and digits.isdecimal() and len(digits) < len(str(most)) + 2 else digits
-
-    return Reader(read, from_text, range(least, most + 1))
+    return Reader(read, range(least, most + 1))
 
 
 def yes_no() -> Reader:
@@ -136,7 +127,7 @@ def yes_no() -> Reader:
             raise _wrong(value, "true or false")
         return value
 
-    return Reader(read, lambda word: {"true": True, "false": False}.get(word.lower(), word), (True, False))
+    return Reader(read, (True, False))
 
 
 def choice(kind: type[Enum]) -> Reader:
@@ -161,4 +152,4 @@ def several(wanted: str, parse: Callable[[object, Path], object], *, may_be_empt
             raise Unfit(f"is empty: give at least one, {wanted}, or omit it")
         return tuple(parse(entry, folder) for entry in value)
 
-    return Reader(read, str.split)
+    return Reader(read)

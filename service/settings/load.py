@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from service.settings.addresses import GcsAddress, parse_gcs, split_gcs
-from service.settings.config_files import Given, nearest, read_files
-from service.settings.key import ENVIRONMENT_PREFIX, Problem, SettingsError, Unfit
+from service.settings.config_files import Given, read_files
+from service.settings.key import Problem, SettingsError, Unfit
 from service.settings.settings import DEFAULT_GCS, Settings
 from service.settings.table import KEYS
 from service.settings.web import WebSettings
@@ -47,7 +47,6 @@ def load_settings(
     given, values = _read(config, flags, problems, page)
     links: Sequence[tuple[GcsAddress, WriteAccess]] = values.get("gcs", ())
     addresses = _named_links(gcs, problems) or [address for address, _ in links] or [parse_gcs(DEFAULT_GCS)]
-    problems += _tlog_problems(values, given)
     zenoh = ZenohSettings(**_table("zenoh", values)) if "zenoh" in given else None
     web = WebSettings(**_table("web", values)) if "web" in given else None
     if zenoh is not None:
@@ -91,27 +90,11 @@ def takeoff_limit_m() -> int:
 def _read(
     config: Path | None, flags: Mapping[str, object], problems: list[Problem], page: str | None = None
 ) -> tuple[dict[str, Given], dict[str, Any]]:
-    """The settings given in files, environment and flags, and their values."""
+    """The settings given in files and flags, and their values."""
     given = {} if config is None else read_files(config, problems, page)
-    given |= _read_environment(os.environ, problems)
     named = {name: str(value) for name, value in flags.items() if value is not None}
     given |= {name: Given(value, f"--{name.replace('_', '-')}") for name, value in named.items()}
     return given, _read_values(given, problems)
-
-
-def _read_environment(environment: Mapping[str, str], problems: list[Problem]) -> dict[str, Given]:
-    keys = {key.variable: key for key in KEYS}
-    given: dict[str, Given] = {}
-    for variable, text in environment.items():
-        if variable in keys:
-            key = keys[variable]
-            given[key.name] = Given(key.reader.from_text(text), variable)
-            table, dot, _ = key.name.partition(".")
-            if dot:
-                given[table] = Given(True, variable)
-        elif variable.startswith(ENVIRONMENT_PREFIX) and variable != CONFIG_VARIABLE:
-            problems.append(Problem(variable, f"this is not a setting; {nearest(variable, keys)}"))
-    return given
 
 
 def _read_values(given: Mapping[str, Given], problems: list[Problem]) -> dict[str, Any]:
@@ -143,13 +126,6 @@ def _named_links(gcs: Sequence[str], problems: list[Problem]) -> list[GcsAddress
         with _noting(problems, "--gcs"):
             links.append(parse_gcs(text))
     return links
-
-
-def _tlog_problems(values: Mapping[str, Any], given: Mapping[str, Given]) -> Iterator[Problem]:
-    total_mb, least_mb = values.get("tlog_total_mb"), 2 * values.get("tlog_file_mb", Settings().tlog_file_mb)
-    if total_mb is not None and total_mb < least_mb:
-        text = f"tlog_total_mb is {total_mb}, but must be {least_mb} or more: twice tlog_file_mb"
-        yield Problem(given["tlog_total_mb"].where, text)
 
 
 def _table(table: str, values: Mapping[str, Any]) -> dict[str, Any]:

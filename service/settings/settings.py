@@ -63,7 +63,7 @@ class Settings(BridgeSettings):
     """The settings of a daemon. Without `state_dir` nothing is stored.
 
     `access`: write permission per link, by its address as text; links not in it are open. `sources`: where each given
-    key was found ("FILE:LINE", a variable or a flag). `zenoh` None: not used. `web` None: no status page.
+    key was found ("FILE:LINE", or a flag). `zenoh` None: not used. `web` None: no status page.
     """
 
     fc: Annotated[

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The table of all settings, made from the dataclasses: for the reader, the environment and the docs."""
+"""The table of all settings, made from the dataclasses: for the reader and the docs."""
 
 from collections.abc import Iterator
 from dataclasses import Field, fields, is_dataclass

@@ -166,8 +166,8 @@ def test_a_command_of_naze_bridge_works(sandbox: Sandbox, command: Command, monk
     if words[0] == "run":
         # A second daemon has its own folder and ports.
         monkeypatch.setenv("XDG_STATE_HOME", str(sandbox.folder / "second"))
-        monkeypatch.setenv("NAZE_BRIDGE_FC", str(sandbox.folder / "naze"))
-        monkeypatch.setenv("NAZE_BRIDGE_GCS", f"udpin:127.0.0.1:{free_port()}")
+        words += [] if "--fc" in words else ["--fc", str(sandbox.folder / "naze")]
+        words += [] if "--gcs" in words else ["--gcs", f"udpin:127.0.0.1:{free_port()}"]
     code, output = sandbox.run(*words)
     # Exit status 1: doctor found a problem of this machine, or the settings differ.
     assert code == 0 or (code == 1 and {"doctor", "diff"} & {*words}), f"{command.place}: {output}"

@@ -3,15 +3,15 @@
 
 import pytest
 
-from terminal import secret_text
-from terminal.secret_text import show_secret
+from terminal import sentences
+from terminal.sentences import show_secret
 
 
 @pytest.mark.parametrize("is_terminal", [True, False])
 def test_only_a_terminal_gets_the_secret(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], is_terminal: bool
 ) -> None:
-    monkeypatch.setattr(secret_text, "is_terminal", lambda: is_terminal)
+    monkeypatch.setattr(sentences, "is_terminal", lambda: is_terminal)
     show_secret("Its token", "hush", "/var/lib/x/token", "http://x/#hush")
     printed = capsys.readouterr().out
     assert ("hush" in printed) is is_terminal

@@ -13,7 +13,7 @@ from payloads.mission_data import Json
 from service.cli.doctor.checked import Checked, Grade
 from service.cli.doctor.flight_controller import check_flight_controller
 from service.cli.doctor.machine import check_clock, check_database, check_disk, check_power, check_versions
-from service.cli.doctor.network import check_keys, check_ports, check_wifi
+from service.cli.doctor.network import check_keys, check_ports, check_wifi, check_zenoh
 from service.cli.doctor.port import (
     check_candidates,
     check_console,
@@ -24,7 +24,6 @@ from service.cli.doctor.port import (
     check_port,
     holder_of_port,
 )
-from service.cli.doctor.zenoh import check_zenoh
 from service.daemon.client import ControlError
 from service.machine.host import Host
 from service.settings import Settings

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Checks of the network: the bridge's address for ground stations, its free ports, and the keys of its links."""
+"""Checks of the network: the address for ground stations, listening ports, keys of the links, routers of zenoh."""
 
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
+from payloads.names import ZenohSettingsError
 from service.cli.doctor.checked import Checked, note, ok, problem
 from service.cli.doctor.fixes import UNBLOCK_WIFI
 from service.machine.host import Host
@@ -12,10 +14,12 @@ from service.machine.package import page
 from service.settings.addresses import GcsAddress
 from service.settings.passphrase import STRONGER
 from service.settings.write_access import WriteAccess
+from service.settings.zenoh import ZenohSettings
 
 #: The state of listening sockets in /proc/net/tcp.
 _LISTENS = "0A"
 _LOOPBACK = ("127.", "::1", "localhost")
+_CONNECT_TIMEOUT_MS = 2000
 
 
 def check_wifi(host: Host, gcs: Sequence[GcsAddress]) -> list[Checked]:
@@ -92,3 +96,39 @@ def check_keys(gcs: Sequence[GcsAddress], access_by_link: Mapping[str, WriteAcce
             yield note("key", f"{link}: {access.weak_key}", STRONGER)
         elif access.key is not None:
             yield ok("key", f"required for changes on {link}")
+
+
+def check_zenoh(settings: ZenohSettings | None) -> Checked:
+    """Check the configuration, and try to connect to its endpoints."""
+    if settings is None:
+        return ok("zenoh", "off")
+    # Importing zenoh takes half a second.
+    from payloads.endpoints import connect_endpoints, endpoint_trouble, tls_files
+    from service.settings.zenoh_config import make_config
+
+    try:
+        config = make_config(settings)
+    except ZenohSettingsError as error:
+        return problem("zenoh", str(error), "correct the [zenoh] table or its config_file")
+    me = f"{settings.prefix}/{settings.vehicle}"
+    endpoints = connect_endpoints(config)
+    if not endpoints:
+        return ok("zenoh", f"{me}, opens no connections")
+    if _joins(config):
+        return ok("zenoh", f"{me}, accepted by {', '.join(endpoints)}")
+    trouble = endpoint_trouble(endpoints, tls_files(config))
+    return note("zenoh", f"{me}: {trouble}", "start the router there, or correct zenoh.connect")
+
+
+def _joins(config: Any) -> bool:
+    """True if a router accepts the session: a client that does not listen, so that it does not disturb a daemon."""
+    import zenoh
+
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("listen/endpoints", "[]")
+    config.insert_json5("connect/timeout_ms", str(_CONNECT_TIMEOUT_MS))
+    try:
+        zenoh.open(config).close()  # type: ignore[no-untyped-call]
+    except zenoh.ZError:
+        return False
+    return True

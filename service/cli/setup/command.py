@@ -33,8 +33,7 @@ from service.web.token import DEFAULT_NAME
 from storage.os_error import reason
 from storage.small_files import read_bounded
 from terminal.options import PATH
-from terminal.secret_text import print_code, show_secret
-from terminal.sentences import complain, fail, say
+from terminal.sentences import complain, fail, print_code, say, show_secret
 
 _MOST_SSID = 32
 #: A passphrase by IEEE 802.11.

@@ -11,7 +11,7 @@ from protocols.msp.frame import Direction, MspParser
 from simulator.board.msp_options import MspOptions
 from simulator.board.options import SimOptions
 from simulator.commands.fc_kinds import make_board
-from terminal.mission_source import load_mission
+from terminal.files import load_mission
 from tests.support.fake_inav import FakeInav
 from tests.support.share_program import ShareProgram
 from tests.support.world import GroundStation, World

@@ -13,7 +13,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from service.cli.main import main
-from terminal import secret_text
+from terminal import sentences
 from tests.service.cli.helper.test_packages import packed
 
 _SYSTEMD_RUN = "systemd.run=/boot/firstrun.sh systemd.run_success_action=reboot systemd.unit=kernel-command-line.target"
@@ -106,7 +106,7 @@ def test_it_may_be_prepared_again(card: Card, system: object) -> None:
 
 def test_the_folder_has_the_package_the_answers_and_valid_scripts(card: Card, monkeypatch: pytest.MonkeyPatch) -> None:
     card.trixie()
-    monkeypatch.setattr(secret_text, "is_terminal", lambda: True)
+    monkeypatch.setattr(sentences, "is_terminal", lambda: True)
     done = card.prepare("--new-key", "--name", "kite")
     folder = card.boot / "naze-bridge"
     assert (folder / "naze-bridge.deb").read_bytes() == card.package.read_bytes()
@@ -115,7 +115,7 @@ def test_the_folder_has_the_package_the_answers_and_valid_scripts(card: Card, mo
     assert f": {key}" in done.output
     assert f": {token}" in done.output
     assert ": long-enough" in done.output
-    monkeypatch.setattr(secret_text, "is_terminal", lambda: False)
+    monkeypatch.setattr(sentences, "is_terminal", lambda: False)
     captured = card.prepare("--new-key").output
     secrets = [(folder / name).read_text().strip() for name in ("key", "web-token", "password")]
     assert [secret for secret in secrets if secret in captured] == []

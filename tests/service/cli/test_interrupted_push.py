@@ -12,7 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from tests.support.benches import Starter
-from tests.support.programs import NAZE_BRIDGE, REPOSITORY, TIMEOUT_S, Board, run_naze_bridge
+from tests.support.programs import NAZE_BRIDGE, REPOSITORY, TIMEOUT_S, Board, run_naze_bridge, until
 
 EXAMPLES = REPOSITORY / "examples"
 LONG = EXAMPLES / "long-146.waypoints"
@@ -77,28 +77,13 @@ def test_without_a_daemon_the_old_mission_is_kept(start: Starter) -> None:
     board.assert_unharmed()
 
 
-def interrupted_push(start: Starter) -> tuple[Board, Terminal]:
-    """A push through a daemon, after the first Ctrl-C."""
+def test_a_daemon_continues_after_the_command_has_ended(start: Starter) -> None:
     board = slow_board(start)
     daemon = start.daemon(f"{board.link},9600")
     daemon.wait()
     terminal = Terminal("push", LONG, "--state-dir", daemon.state_dir)
     terminal.wait_for(UNDER_WAY)
     terminal.type(CTRL_C)
-    return board, terminal
-
-
-def test_a_daemon_continues_and_its_result_is_shown(start: Starter) -> None:
-    board, terminal = interrupted_push(start)
-    terminal.wait_for("naze-bridge: the daemon continues")
-    assert terminal.end() == 0
-    assert "ACCEPTED" in terminal.printed
-    assert len(board.records()) == 146
-
-
-def test_a_second_ctrl_c_exits_at_once(start: Starter) -> None:
-    _, terminal = interrupted_push(start)
-    terminal.wait_for("press Ctrl-C again")
-    terminal.type(CTRL_C)
     assert terminal.end() == 130
     assert "naze-bridge: interrupted; the daemon continues" in terminal.printed
+    until(lambda: daemon.has_logged("mission.push_ended") and len(board.records()) == 146, "the whole mission")

@@ -18,7 +18,7 @@ from service.settings.addresses import SimulatedFc, parse_gcs
 from service.settings.settings import ShareSettings, parse_share
 from simulator.board.options import Faults
 from simulator.naze.board import SimulatedNaze
-from terminal.mission_source import load_mission
+from terminal.files import load_mission
 from tests.support.inside import inside
 from tests.support.programs import TIMEOUT_S, free_port
 

@@ -32,7 +32,6 @@ def test_the_limits_are_settings(tmp_path: Path) -> None:
         ("tlog_days = true", "tlog_days is True, but must be a whole number"),
         ("tlog_days = 0", "tlog_days is 0, but must be 1..3650"),
         ("tlog_file_mb = 2000", "tlog_file_mb is 2000, but must be 1..1024"),
-        ("tlog_total_mb = 20", "tlog_total_mb is 20, but must be 32 or more"),
         ("tlog_day = 20", "did you mean 'tlog_days'"),
         ("key_file = true", "key_file is True, but must be text in quotes"),
     ],

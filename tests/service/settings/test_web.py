@@ -23,11 +23,6 @@ def test_the_table_has_defaults_and_is_read(tmp_path: Path) -> None:
     assert str(given.listen) == "[::]:80"
 
 
-def test_the_environment_variable_is_enough(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("NAZE_BRIDGE_WEB_LISTEN", "0.0.0.0:8080")
-    assert load(tmp_path, "") == WebSettings(ListenAddress("0.0.0.0", 8080))  # noqa: S104 - only read
-
-
 @pytest.mark.parametrize(
     ("text", "reason"),
     [

@@ -3,7 +3,7 @@
 
 from pathlib import Path
 
-from service.cli.doctor.zenoh import check_zenoh
+from service.cli.doctor.network import check_zenoh
 from service.settings.zenoh import ZenohSettings
 from tests.support.doctor import assert_note, assert_ok, assert_problem
 

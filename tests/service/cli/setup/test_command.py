@@ -16,7 +16,7 @@ from service.cli.setup import command
 from service.cli.setup.answers import KEY_FILE, SETTINGS_FILE
 from service.cli.setup.command import check_answers, page_token
 from service.settings.passphrase import weakness
-from terminal import secret_text
+from terminal import sentences
 from tests.service.cli.setup.test_steps import FreshPi
 from tests.support.setup_pi import Pi
 
@@ -26,7 +26,7 @@ _WANTED_BY = "etc/systemd/system/multi-user.target.wants"
 
 @pytest.fixture(autouse=True)
 def at_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(secret_text, "is_terminal", lambda: True)
+    monkeypatch.setattr(sentences, "is_terminal", lambda: True)
 
 
 def shown_key(done: Result) -> str:
@@ -72,7 +72,7 @@ def test_a_new_key_replaces_the_present_one_and_the_service_takes_it(pi: Pi) -> 
 
 
 def test_captured_output_has_no_secrets(pi: Pi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(secret_text, "is_terminal", lambda: False)
+    monkeypatch.setattr(sentences, "is_terminal", lambda: False)
     state, password = pi.root / "var/lib/naze-bridge", tmp_path / "password"
     state.mkdir(parents=True)
     (state / "web-token").write_text("2345-6789-abcd\n")
