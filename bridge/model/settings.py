@@ -2,7 +2,7 @@
 """Settings of the flight controller: one, the table of all, what is remembered of it, and changes made elsewhere."""
 
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any, Protocol
@@ -110,16 +110,8 @@ class SettingTable:
 
     def find(self, name: str) -> BoardSetting | None:
         """The setting of this name; letters of the other case are accepted if they leave no doubt."""
-        return self.settings.get(name) or self.find_all((name,)).get(name)
-
-    def find_all(self, names: Collection[str]) -> Mapping[str, BoardSetting]:
-        """The settings that `find` finds, by the names given, in one pass over the table."""
-        alike: dict[str, list[BoardSetting]] = {}
-        for setting in self:
-            alike.setdefault(setting.name.lower(), []).append(setting)
-        doubtless = {lower: found[0] for lower, found in alike.items() if len(found) == 1}
-        found = {name: self.settings.get(name) or doubtless.get(name.lower()) for name in names}
-        return {name: setting for name, setting in found.items() if setting is not None}
+        alike = [setting for setting in self if setting.name.lower() == name.lower()]
+        return self.settings.get(name) or (alike[0] if len(alike) == 1 else None)
 
     def updated(self, *settings: BoardSetting) -> "SettingTable":
         return replace(self, settings={**self.settings, **{setting.name: setting for setting in settings}})

@@ -64,9 +64,8 @@ def plan_restore(
         return SettingRefusal(Cause.REFUSED, f"These settings are from {source}, but the board has {board}")
     changes: list[PlannedChange] = []
     left_out: list[LeftOut] = []
-    settings = table.find_all(wanted)
     for name, value in wanted.items():
-        setting = settings.get(name)
+        setting = table.settings.get(name)
         if setting is None:
             left_out.append(LeftOut(name, value, None, "the board has no such setting"))
             continue
@@ -79,7 +78,7 @@ def plan_restore(
             left_out.append(LeftOut(setting.name, becomes, setting.value, why))
         else:
             changes.append(PlannedChange(setting.name, setting.value, becomes))
-    if not settings:
+    if not wanted.keys() & table.settings.keys():
         return SettingRefusal(Cause.REFUSED, f"The board ({board}) has none of these settings")
     is_other = source not in ("", board)
     notice = f"The settings are from {source}, the board has {board}: some may mean something else there"
@@ -110,10 +109,7 @@ OnRestored = Callable[[RestoreResult | SettingRefusal, float], None]
 
 
 def by_setting(values: Mapping[str, Value], known: Collection[str]) -> dict[str, Value]:
-    """The values by the names of known settings, for files with the names of parameters or of a command line.
-
-    The command lines of Betaflight and Cleanflight have p_roll for the first number of the PID ROLL.
-    """
+    """The values by known settings, for files with names of parameters, or of Betaflight's command line (p_roll)."""
     pids = {f"{name[-1]}_{name[:-2]}".upper(): name for name in known if name[-2:-1] == "_"}
     names = {**pids, **parameter_names(known), **{name.upper(): name for name in known if len(name) > LONGEST}}
     return {name if name in known else names.get(name.upper(), name): value for name, value in values.items()}

@@ -265,7 +265,7 @@ def test_a_setting_that_cannot_be_written_is_left_out_with_the_reason(name: str,
 
 
 def test_the_texts_of_a_dump_are_numbers_and_choices() -> None:
-    found = plan({"p_roll": "40", "cf": "0.100", "mode": "115200", "MODE": "auto"})
+    found = plan({"p_roll": "40", "cf": "0.100", "mode": "115200"})
     assert found.changes == (PlannedChange("p_roll", 35, 40.0), PlannedChange("mode", 0, 1))
 
 
