@@ -28,12 +28,11 @@ from bridge.gcs.rights import LinkAccess
 from bridge.gcs.routes import Routes
 from bridge.gcs.station import Peer, Severity
 from bridge.line.conversation import StoreEffect
-from bridge.line.msp_link import RoundTrips
 from bridge.line.runner import Runner
 from bridge.missions.mission_service import NO_LINK, MissionService
 from bridge.model.events import Armed, Disarmed
 from bridge.model.missions import ARMED, Refusal
-from bridge.model.settings import SettingsState
+from bridge.model.settings import SettingsState, SettingTable
 from bridge.model.vehicle import FlightState, GlobalPosition, Health, Readiness
 from bridge.settings.board_settings import BoardSettings
 from bridge.settings.local_settings import LocalSettings
@@ -70,7 +69,7 @@ class Counters:
     refused_by_share: Mapping[str, int]
     fc_bad_checksums: int
     fc_requests_lost: int | None
-    fc_round_trips: RoundTrips | None
+    fc_round_trip_s: float | None
     firmware_version: tuple[int, int, int] | None
     settings: SettingsState | None
 
@@ -144,8 +143,8 @@ class Bridge:
             ground,
             emit,
             config.settings_memory,
-            lambda: self.missions.transfer is not None,
             lambda: sharing.due < inf,
+            self._table_changed,
         )
         #: Settings, for the command line, the page and zenoh.
         self.settings = LocalSettings(settings, session)
@@ -190,7 +189,7 @@ class Bridge:
                     due = part_due
             self.due = due
         if recorded := self._ground.outbox.recorded:
-            effects.append(RecordFrames(tuple(recorded)))
+            effects.append(RecordFrames(recorded))
             recorded.clear()
         if fresh := self._reporter.fresh:
             effects.append(PublishGroups(frozenset(fresh)))
@@ -311,7 +310,7 @@ class Bridge:
             refused_by_share=self._sharing.refused,
             fc_bad_checksums=state.bad_checksums or 0,
             fc_requests_lost=None if state.link is None else state.link.requests_lost,
-            fc_round_trips=None if state.link is None else state.link.round_trips,
+            fc_round_trip_s=None if state.link is None else state.link.round_trip_s,
             firmware_version=self.vehicle.version,
             settings=self._board_settings.known.state,
         )
@@ -345,6 +344,9 @@ class Bridge:
 
     def _trouble(self) -> str:
         return self._session.state.trouble
+
+    def _table_changed(self, table: SettingTable) -> None:
+        self._parameters.take(table)
 
     def _settings_may_have_changed(self, now: float) -> None:
         self._board_settings.may_have_changed(now)

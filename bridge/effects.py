@@ -28,11 +28,10 @@ class SendToBoard(NamedTuple):
     complete_at: float
 
 
-@dataclass(frozen=True, slots=True)
-class RecordFrames:
-    """Write frames to and from ground stations to the telemetry log."""
+class RecordFrames(list[bytes]):  # made for each wake-up in pass-through: as a list, in C
+    """Frames to and from ground stations, to be written to the telemetry log."""
 
-    frames: Sequence[bytes]
+    __slots__ = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,8 +18,7 @@ from protocols.mavlink.frame import MavlinkFrame
 from protocols.msp.telemetry import Sensor
 
 _HEARTBEAT = m.MAVLINK_MSG_ID_HEARTBEAT
-#: Five lost heartbeats. Only then is a new system id followed, if its component id is the same, from its second
-#: heartbeat on: after a stall the frames of two autopilots arrive in any order.
+#: Five lost heartbeats. Only then is a new system id followed, if its component id is the same.
 _GONE_S = 5.0
 #: The autopilot field of a heartbeat's payload, and its value from cameras and gimbals. MAVLink 2 may omit it.
 _AUTOPILOT_AT, _NO_AUTOPILOT = 5, bytes((m.MAV_AUTOPILOT_INVALID,))
@@ -153,8 +152,6 @@ class MavlinkTelemetry:
         self._known: dict[bytes, int] = {}
         self._beats: set[bytes] = set()
         self._compid: int | None = None
-        #: The sender of a heartbeat since then.
-        self._successor: tuple[int, int] | None = None
         #: When the autopilot counts as gone if no heartbeat of it is heard; a represented board never does.
         self._gone_at = -math.inf
 
@@ -164,7 +161,6 @@ class MavlinkTelemetry:
             self._recognise(frames, now)
         self._unread.update(zip(kinds, zip(frames, repeat(now)), strict=False))
         if not self._beats.isdisjoint(kinds):
-            self._successor = None
             self._gone_at = max(self._gone_at, now + _GONE_S)
             for beat in self._beats.intersection(kinds):
                 self._read(beat, *self._unread.pop(beat))
@@ -186,9 +182,6 @@ class MavlinkTelemetry:
                 msgids = self._readings.readers
                 keys = {sender + msgid.to_bytes(size, "little"): msgid for msgid in msgids for size in (1, 3)}
                 if self._known and keys != self._known:
-                    former, self._successor = self._successor, frame.sender
-                    if former != frame.sender:
-                        continue
                     # The values of two autopilots must not mix.
                     self._readings.vehicle.forget()
                 self._unread.clear()

@@ -8,10 +8,9 @@ from collections.abc import Callable, Iterator, Mapping
 
 from bridge.fc.profile import FlightController, Spoken
 from bridge.fc.states.base import Closed, Event, Found, Identified, Lost, Port, PortClosed, PortOpened, State
-from bridge.fc.states.cli import Cli
-from bridge.fc.states.frsky import Frsky
 from bridge.fc.states.mavlink import HarakiriMavlink, PassThrough
 from bridge.fc.states.msp import Identifying, Polling
+from bridge.fc.states.mute import Cli, Frsky
 from bridge.fc.states.searching import Searching
 from bridge.model.craft import FlightMemory
 from bridge.model.events import Emit, FcFound, FcInCommandLine, FcLost, FcSensed, PortLost
@@ -26,8 +25,8 @@ TRANSITIONS: Mapping[type[State], _Next] = {
     Searching: {Spoken.MSP: Identifying, Spoken.FRSKY: Frsky, **_MAVLINK, Spoken.CLI: Cli, **_LOST},
     Identifying: _MSP,
     Polling: _MSP,
-    HarakiriMavlink: {Spoken.OTHER_MAVLINK: PassThrough, **_LOST},
-    PassThrough: {Spoken.MAVLINK: HarakiriMavlink, **_LOST},
+    HarakiriMavlink: _LOST,
+    PassThrough: _LOST,
     Frsky: _LOST,
     Cli: _LOST,
 }

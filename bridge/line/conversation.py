@@ -48,8 +48,7 @@ class Send:
     """Send a request frame. `reply_size`: the size of the whole reply frame, bytes, for the bound on pending replies.
 
     While an `exclusive` request is pending nothing else is sent: the flight controller may be writing flash.
-    `is_kept`: its reply goes into the link's LastReplies. `is_shared`: another program asked; if it gets no reply, that
-    says nothing about the line. `may_wait`: its reply may be read a few ms late.
+    `is_kept`: its reply goes into the link's LastReplies. `may_wait`: its reply may be read a few ms late.
     """
 
     frame: bytes
@@ -57,7 +56,6 @@ class Send:
     reply_size: int
     exclusive: bool = False
     is_kept: bool = False
-    is_shared: bool = False
     may_wait: bool = False
 
 

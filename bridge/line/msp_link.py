@@ -7,7 +7,6 @@ later one is answered. The timeout follows the measured round trip, as in TCP: 7
 loss.
 """
 
-from bisect import bisect_left
 from collections import deque
 from dataclasses import dataclass
 from enum import Enum, auto
@@ -65,8 +64,12 @@ RESYNC_REPLY_SIZE = sum(_REPLY_SIZES[command] for command in _RESYNC_COMMANDS)
 #: Replies come in order: the reply to this shows that earlier ones are lost. No other code may use this command.
 #: Harakiri answers with an error frame; a board that ignores unknown commands is never identified.
 _QUESTION = Send(request(Msp.API_VERSION), Msp.API_VERSION, FRAME_OVERHEAD)
-#: Upper ends of the classes of round trips, seconds: a reply takes 2 ms over TCP, 10 ms at 115200 baud, 300 ms at 2400.
-BOUNDS_S = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
+
+#: Constant while the same board is connected: API_VERSION, FC_VARIANT, FC_VERSION, BOARD_INFO, BUILD_INFO, IDENT,
+#: BOXNAMES, PIDNAMES, BOXIDS, UID.
+_CONSTANT = frozenset(map(request, (1, 2, 3, 4, 5, 100, 116, 117, 119, 160)))
+#: More than a board has commands; the rest are requests with an index, whose replies are current for a moment only.
+_MOST_REPLIES = 256
 
 
 def byte_time_s(baud: int | None) -> float:
@@ -118,6 +121,35 @@ class PendingReplies:
         return owed
 
 
+class LastReplies:
+    """The last reply to each request, including errors, by the request's frame."""
+
+    def __init__(self) -> None:
+        self._replies: dict[bytes, tuple[MspFrame, float]] = {}  # the one heard least recently first
+        #: Constant replies that were heard twice: MSP's 8-bit checksum misses some damage.
+        self._confirmed: dict[bytes, MspFrame] = {}
+
+    def heard(self, asked: bytes, reply: MspFrame, now: float) -> None:
+        before = self._replies.pop(asked, None)
+        if asked in _CONSTANT and before is not None and before[0] == reply:
+            self._confirmed[asked] = reply
+        elif len(self._replies) >= _MOST_REPLIES:
+            del self._replies[next(iter(self._replies))]
+        self._replies[asked] = reply, now
+
+    def get(self, asked: bytes, max_age_s: float, now: float) -> MspFrame | None:
+        """The reply to a request if it is at most this old, or constant."""
+        if (constant := self._confirmed.get(asked)) is not None:
+            return constant
+        reply, heard_at = self._replies.get(asked, (None, now))
+        return reply if now <= heard_at + max_age_s else None
+
+    def forget(self) -> None:
+        """Forget all replies, because the board was changed."""
+        self._replies.clear()
+        self._confirmed.clear()
+
+
 class _Reply(Enum):
     """The state of a request's reply. In the last two it may still arrive, until the deadline."""
 
@@ -138,7 +170,6 @@ class _Request:
     reply: _Reply = _Reply.AWAITED
     #: The frame, if its reply is kept.
     kept: bytes | None = None
-    is_shared: bool = False
     may_wait: bool = False
 
     @property
@@ -184,8 +215,6 @@ class MspLink:
         self._follow_up_at = inf
         self._risky: int | None = None  # the command of the frame that is followed up
         self.requests_lost = 0
-        #: From a request's last byte on the wire to its reply.
-        self.round_trips = RoundTrips()
         self.replies = LastReplies()
         #: Knows the requests that were sent.
         self.echo = EchoWatch()
@@ -244,7 +273,7 @@ class MspLink:
         for sent in lost:
             sent.reply, sent.deadline = _Reply.LOST, sent.sent_at + _LONGEST_STALL_S
         if lost:
-            self.requests_lost += sum([not sent.is_shared for sent in lost])
+            self.requests_lost += len(lost)
             self._losses_in_a_row += 1
             self._backoff = min(self._backoff * 2, 8.0)
             if self._losses_in_a_row % 2 == 0 and not self.receiver_timeout_s:
@@ -330,7 +359,7 @@ class MspLink:
         deadline = self._line_free_at + reply_time + timeout_s
         sent = _Request(message.command, message.reply_size, self._line_free_at, deadline, message.exclusive)
         sent.kept = message.frame if message.is_kept else None
-        sent.is_shared, sent.may_wait = message.is_shared, message.may_wait
+        sent.may_wait = message.may_wait
         self._sent.append(sent)
 
     def _resync(self, now: float) -> None:
@@ -377,7 +406,7 @@ class MspLink:
             self._follow_up_at = inf
         if earlier:
             overtaken = self._sent[:earlier]
-            self.requests_lost += sum([sent.reply is _Reply.AWAITED and not sent.is_shared for sent in overtaken])
+            self.requests_lost += sum([sent.reply is _Reply.AWAITED for sent in overtaken])
         del self._sent[: earlier + 1]
         answered: _Request | None = oldest
         if oldest.reply is not _Reply.AWAITED:
@@ -394,57 +423,8 @@ class MspLink:
             answered.deadline = min(answered.deadline, now + self.outstanding_bytes * self.byte_s + self.round_trip_s)
         elif not answered.exclusive:
             measured = max(now - answered.sent_at, 0.0)
-            self.round_trips.counts[bisect_left(BOUNDS_S, measured)] += 1
-            self.round_trips.sum_s += measured
             self.round_trip_s += (measured - self.round_trip_s) / 8
 
     def _is_certain(self, answered: _Request) -> bool:
         """False if the reply may be to a later request of the same command, with another index."""
         return not any(sent.command == answered.command and sent.kept != answered.kept for sent in self._sent)
-
-
-class RoundTrips:
-    """A histogram of the times to a reply.
-
-    `counts`: one per bound, and a last one for longer times. `sum_s`: the total, seconds.
-    """
-
-    def __init__(self) -> None:
-        self.counts = [0] * (len(BOUNDS_S) + 1)
-        self.sum_s = 0.0
-
-
-#: Constant while the same board is connected: API_VERSION, FC_VARIANT, FC_VERSION, BOARD_INFO, BUILD_INFO, IDENT,
-#: BOXNAMES, PIDNAMES, BOXIDS, UID.
-_CONSTANT = frozenset(map(request, (1, 2, 3, 4, 5, 100, 116, 117, 119, 160)))
-#: More than a board has commands; the rest are requests with an index, whose replies are current for a moment only.
-_MOST = 256
-
-
-class LastReplies:
-    """The last reply to each request, including errors, by the request's frame."""
-
-    def __init__(self) -> None:
-        self._replies: dict[bytes, tuple[MspFrame, float]] = {}  # the one heard least recently first
-        #: Constant replies that were heard twice: MSP's 8-bit checksum misses some damage.
-        self._confirmed: dict[bytes, MspFrame] = {}
-
-    def heard(self, asked: bytes, reply: MspFrame, now: float) -> None:
-        before = self._replies.pop(asked, None)
-        if asked in _CONSTANT and before is not None and before[0] == reply:
-            self._confirmed[asked] = reply
-        elif len(self._replies) >= _MOST:
-            del self._replies[next(iter(self._replies))]
-        self._replies[asked] = reply, now
-
-    def get(self, asked: bytes, max_age_s: float, now: float) -> MspFrame | None:
-        """The reply to a request if it is at most this old, or constant."""
-        if (constant := self._confirmed.get(asked)) is not None:
-            return constant
-        reply, heard_at = self._replies.get(asked, (None, now))
-        return reply if now <= heard_at + max_age_s else None
-
-    def forget(self) -> None:
-        """Forget all replies, because the board was changed."""
-        self._replies.clear()
-        self._confirmed.clear()

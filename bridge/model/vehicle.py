@@ -58,12 +58,11 @@ class Reading:
 class Orientation(Reading):
     """Right wing down and nose up are positive; heading 0 up to 360. rates_deg_s: roll, pitch, yaw.
 
-    roll_deg, pitch_deg: None in FrSky telemetry, which has only the heading.
     is_north_known: False if the heading does not come from a compass (Harakiri then reports 0).
     """
 
-    roll_deg: float | None
-    pitch_deg: float | None
+    roll_deg: float
+    pitch_deg: float
     heading_deg: float
     is_north_known: bool = True
     rates_deg_s: tuple[float, float, float] | None = None

@@ -51,7 +51,7 @@ OnTable = Callable[[SettingTable | SettingRefusal, float], None]
 
 
 class BoardSettings:
-    """`is_transferring`: True while a mission is received or written. `others_wait`: for a reply from the board."""
+    """`others_wait`: True while others wait for a reply. `on_table`: called when the table has changed."""
 
     def __init__(
         self,
@@ -60,15 +60,15 @@ class BoardSettings:
         ground: Ground,
         emit: Callable[[BridgeEvent | TakenBackup], None],
         memory: SettingsMemory,
-        is_transferring: Callable[[], bool],
         others_wait: Callable[[], bool],
+        on_table: Callable[[SettingTable], None],
     ) -> None:
         self._session = session
         self._missions = missions
         self._ground = ground
         self._emit = emit
-        self._is_transferring = is_transferring
         self._others_wait = others_wait
+        self._on_table = on_table
         self.known = KnownSettings(memory)
         self._controller: FlightController | None = None
         self._fc_settings: FcSettings | None = None
@@ -81,8 +81,6 @@ class BoardSettings:
         self._read_at, self._retry_s = inf, _RETRY_S
         #: The text for ground stations that connect later.
         self._told = ""
-        #: Called when the table has changed.
-        self.on_table: Callable[[SettingTable], None] = lambda _table: None
         self.due = inf
 
     @property
@@ -97,7 +95,7 @@ class BoardSettings:
             return ARMED
         if self._fc_settings is None:
             return _NO_BOARD
-        if self._missions.occupied() is not None or self._is_transferring():
+        if self._missions.occupied() is not None:
             return _OCCUPIED
         return None if armed is False else _UNREAD
 
@@ -249,7 +247,7 @@ class BoardSettings:
                 self.known.unsaved[before.name] = work.value
             return result
         if table := self.known.changed(result):
-            self.on_table(table)
+            self._on_table(table)
         after = next((each for each in result if each.name == before.name), before)
         if not after.holds(work.value):
             text = f"{before.name} stays {shown(after.value)}: the flight controller refused it"
@@ -301,7 +299,7 @@ class BoardSettings:
         if known.board is None and controller is not None and controller.profile.spoken is Spoken.MSP:
             remembered = known.identified((yield from _identify(controller)))
             if remembered is not None:
-                self.on_table(remembered)
+                self._on_table(remembered)
         is_doubtful = known.freshness <= Freshness.DOUBTFUL
         return (yield from fc_settings.read(known.table, TableReading(self._pace, is_doubtful)))
 
@@ -322,7 +320,7 @@ class BoardSettings:
         if is_first or reading.changed:
             names = ", ".join(reading.changed[:_MOST_NAMED])
             self._emit(SettingsRead(settings=len(table), changed=names, left_out=table.left_out))
-            self.on_table(table)
+            self._on_table(table)
         if reading.elsewhere is not None:
             self._report(reading.elsewhere)
         if reading.backup is not None:

@@ -122,7 +122,6 @@ class Parameters:
         self._told: dict[str, float] = {}
         self._files = ParameterFiles()
         self._dialogues: WeakKeyDictionary[Sender, _Dialogue] = WeakKeyDictionary()
-        settings.on_table = self._take
         #: The time of the next `tick`; infinity while no list is sent.
         self.due = inf
         #: True if the last PARAM_SET was refused: Mission Planner then asks for a save all the same.
@@ -255,7 +254,7 @@ class Parameters:
             self._dialogues[sender] = _Dialogue(FtpSession(self._files.find))
         return self._dialogues[sender]
 
-    def _take(self, table: SettingTable) -> None:
+    def take(self, table: SettingTable) -> None:
         """The settings were read, or some have changed."""
         numbers = {setting.name: setting for setting in table if setting.kind is not ValueKind.TEXT}
         if numbers.keys() != {*self._names.values()}:

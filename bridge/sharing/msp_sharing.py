@@ -33,14 +33,14 @@ from protocols.rights.msp import MSP_RIGHTS, MspRight, msp_right
 _TOTAL = Rate(1000, 1000)
 #: For this long a reply also answers the same request of other programs.
 _CURRENT_S = 0.2
-#: An unanswered request occupies the line longer than any other: its program pauses.
+#: An unanswered request occupies the line longer than any other: then no program uses it for a while.
 _PAUSE_AFTER_LOSS_S = 0.5
 #: The interval at which waiting requests are checked if nothing happens on the line.
 _LOOK_AGAIN_S = 0.1
-#: A program that repeats its attempts is reported this often; all together at this rate.
-_REPORT_INTERVAL_S = 30.0
-_REPORTS = Rate(0.2, 5)
-_MAX_REPORTED = 64
+#: Refused changes, and requests without a reply, are reported this often: programs repeat their attempts.
+_REPORTS = Rate(1 / 30, 1)
+#: Reasons that are counted apart.
+_MAX_REASONS = 64
 #: SET_RTC and COMMON_SET_TZ: mwp sets an INAV's clock each time it connects, and continues after an error.
 _CLOCK = frozenset((247, 0x1002))
 _ARMED, _NO_REPLY = "armed", "no reply from the flight controller"
@@ -64,8 +64,8 @@ class MspSharing:
     #: When the line has carried the last forwarded request and its reply.
     _free_at: float = 0.0
     _stopped: bool = False
-    _reported: dict[tuple[str, bool], float] = field(default_factory=dict)  # by host and kind, the oldest first
-    _reports: TokenBucket = field(default_factory=partial(TokenBucket, _REPORTS))
+    _refusals: TokenBucket = field(default_factory=partial(TokenBucket, _REPORTS))
+    _losses: TokenBucket = field(default_factory=partial(TokenBucket, _REPORTS))
     refused: Counter[str] = field(default_factory=Counter)
     #: The time of the next `tick`; infinity while no request waits.
     due: float = inf
@@ -153,7 +153,7 @@ class MspSharing:
         if self._session.polls.due(link) <= now:
             return  # telemetry first
         for program in self._programs:
-            request = None if now < program.blocked_until else _first_unknown(program.waiting)
+            request = _first_unknown(program.waiting)
             if request is None or (request.frame.payload and link.owes(request.frame.command)):
                 continue
             if request.is_change and self._missions.occupied() is not None:
@@ -184,7 +184,7 @@ class MspSharing:
             size = len(request.asked) + (len(reply.encode()) if isinstance(reply, MspFrame) else 0)
             self._free_at = now + self._session.polls.rest_s(size)
             if not isinstance(reply, MspFrame):
-                program.blocked_until = at + _PAUSE_AFTER_LOSS_S
+                self._free_at = at + _PAUSE_AFTER_LOSS_S
             if request.is_change:
                 self._on_change(at)
                 if (link := self._session.state.link) is not None:
@@ -206,7 +206,7 @@ class MspSharing:
         if request.frame.command in _CLOCK:
             program.answer(request, MspFrame(Direction.ERROR, request.frame.command))
             return
-        level = self._level(program, name, why, now, is_change=True)
+        level = self._level(self._refusals, name, why, now)
         self._emit(ShareRefused(level=level, program=program.name, command=name, why=why))
         if level == "warning":
             # In flight a warning would cover the texts that concern the craft.
@@ -219,7 +219,7 @@ class MspSharing:
         controller = self._session.state.controller
         right = None if controller is None else right_of(request.frame, controller)
         name = f"command {request.frame.command}" if right is None else right.name
-        level = self._level(program, name, why, now, is_change=False)
+        level = self._level(self._losses, name, why, now)
         self._emit(ShareUnanswered(level=level, program=program.name, command=name, why=why))
         self._disconnect(program, request)
 
@@ -231,20 +231,13 @@ class MspSharing:
             program.waiting.clear()
             program.close()
 
-    def _level(self, program: Program, command: str, why: str, now: float, *, is_change: bool) -> Level:
+    def _level(self, reports: TokenBucket, command: str, why: str, now: float) -> Level:
         """Count a request that got no reply; the level of its log line."""
-        kind = program.host, is_change
         self._count(f"{command}: {why}")
-        if now < self._reported.get(kind, -inf) + _REPORT_INTERVAL_S or not self._reports.take(now):
-            return "debug"
-        if len(self._reported) >= _MAX_REPORTED:
-            del self._reported[next(iter(self._reported))]
-        self._reported.pop(kind, None)
-        self._reported[kind] = now
-        return "warning"
+        return "warning" if reports.take(now) else "debug"
 
     def _count(self, what: str) -> None:
-        self.refused[what if what in self.refused or len(self.refused) < _MAX_REPORTED else "other requests"] += 1
+        self.refused[what if what in self.refused or len(self.refused) < _MAX_REASONS else "other requests"] += 1
 
 
 def _first_unknown(waiting: list[WaitingRequest]) -> WaitingRequest | None:
@@ -265,7 +258,7 @@ def _carry(request: WaitingRequest, reply_size: int, arm_bit: int | None) -> Con
         if armed is not False:
             return _ARMED if armed else _NO_REPLY
     is_read = not request.is_change
-    asked = Send(request.asked, command, reply_size, exclusive=not is_read, is_kept=is_read, is_shared=True)
+    asked = Send(request.asked, command, reply_size, exclusive=not is_read, is_kept=is_read)
     reply: MspFrame | None = yield Receive(frozenset((command,)), asked)
     return reply or _NO_REPLY
 

@@ -40,7 +40,7 @@ class Program:
     """A connected program. `name`: its address, `host`: the part of it without the port.
 
     `send` carries a frame to it, `close` its connection; None over UDP, which has none. `may_write`: it may change
-    something on the flight controller. `blocked_until`: nothing is forwarded for it until then.
+    something on the flight controller.
     """
 
     name: str
@@ -50,7 +50,6 @@ class Program:
     _: KW_ONLY
     may_write: bool
     waiting: list[WaitingRequest] = field(default_factory=list)
-    blocked_until: float = 0.0
 
     def __post_init__(self) -> None:
         self._parser = MspParser(takes_low_v2=True)

@@ -242,8 +242,6 @@ def mission_item_reached(seq: int) -> Message:
 def attitude(at: Moment) -> Message:
     """ATTITUDE: radians, radians a second."""
     now = at.need(v.Orientation)
-    if now.roll_deg is None or now.pitch_deg is None:
-        raise Unknown
     heading_deg = (now.heading_deg + 180) % 360 - 180
     angles = map(math.radians, (now.roll_deg, now.pitch_deg, heading_deg))
     rates = _UNKNOWN_RATES if now.rates_deg_s is None else map(math.radians, now.rates_deg_s)
@@ -428,7 +426,7 @@ def scaled_pressure(at: Moment) -> Message:
 def attitude_quaternion(at: Moment) -> Message:
     """ATTITUDE_QUATERNION: w, x, y, z."""
     now = at.need(v.Orientation)
-    halves = [math.radians(angle) / 2 for angle in (known(now.roll_deg), known(now.pitch_deg), now.heading_deg)]
+    halves = [math.radians(angle) / 2 for angle in (now.roll_deg, now.pitch_deg, now.heading_deg)]
     (sin_r, sin_p, sin_y), (cos_r, cos_p, cos_y) = map(math.sin, halves), map(math.cos, halves)
     roll_rate, pitch_rate, yaw_rate = _rates(now)
     return messages.MAVLink_attitude_quaternion_message(
@@ -489,7 +487,7 @@ def _nav_controller_output(now: v.Orientation, way: Way) -> Message:
     bearing = round((way.bearing_deg + 180) % 360 - 180)
     distance = min(round(way.distance_m), _UNKNOWN_U16)
     return messages.MAVLink_nav_controller_output_message(
-        known(now.roll_deg), known(now.pitch_deg), bearing, bearing, distance, way.climb_m, 0.0, 0.0
+        now.roll_deg, now.pitch_deg, bearing, bearing, distance, way.climb_m, 0.0, 0.0
     )
 
 

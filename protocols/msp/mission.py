@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Harakiri's mission extension: its records and messages, both directions (docs/msp-mission.md)."""
+"""Harakiri's mission extension: its records, requests and replies (docs/msp-mission.md)."""
 
 import struct
 from collections.abc import Sequence
@@ -8,12 +8,11 @@ from enum import IntEnum, IntFlag
 from itertools import filterfalse
 from typing import Any, NamedTuple
 
-from protocols.mission_item import ListIdentity, pack_records
+from protocols.mission_item import ListIdentity
 from protocols.msp.command_line import HAZARDS, is_clean
 from protocols.msp.frame import request
 
 VERSION = 1
-MAX_RADIUS_CM = 2000
 #: Mask, place and records of a CHUNK must fit a frame's 255 bytes.
 MAX_CHUNK_RECORDS = 15
 
@@ -65,7 +64,7 @@ _INFO = struct.Struct("<BBBBBBHHIHHHI")
 #: Replies to BEGIN, CHUNK and COMMIT.
 _PROGRESS = struct.Struct("<BHI")
 _LIST = struct.Struct("<HI")
-#: Reply to READ, before the records: the first one's number. Reply to RADIUS: the radius.
+#: Reply to READ, before the records: the first one's number.
 _SHORT = struct.Struct("<BH")
 
 #: Payload size of an INFO reply of version 1.
@@ -129,9 +128,6 @@ class Info(NamedTuple):
     staged: int
     flash_writes: int
 
-    def encode(self) -> bytes:
-        return _INFO.pack(ReplyStatus.OK, *self[:6], self.stored.count, self.stored.checksum, *self[7:])
-
 
 class Staged(NamedTuple):
     """Reply to BEGIN and CHUNK: the next expected record, and the checksum of those staged before it."""
@@ -140,18 +136,12 @@ class Staged(NamedTuple):
     next: int
     checksum: int
 
-    def encode(self) -> bytes:
-        return _PROGRESS.pack(*self)
-
 
 class Stored(NamedTuple):
     """Reply to COMMIT: the list now in flash."""
 
     status: ReplyStatus
     stored: ListIdentity
-
-    def encode(self) -> bytes:
-        return _PROGRESS.pack(self.status, self.stored.count, self.stored.checksum)
 
 
 class Records(NamedTuple):
@@ -160,19 +150,6 @@ class Records(NamedTuple):
     status: ReplyStatus
     first: int
     records: Sequence[WpRecord]
-
-    def encode(self) -> bytes:
-        return _SHORT.pack(self.status, self.first) + pack_records(self.records)
-
-
-class Radius(NamedTuple):
-    """Reply to RADIUS: the gps_wp_radius in force, cm."""
-
-    status: ReplyStatus
-    wp_radius_cm: int
-
-    def encode(self) -> bytes:
-        return _SHORT.pack(*self)
 
 
 def decode_info(payload: bytes) -> Info | None:
@@ -200,11 +177,6 @@ def decode_stored(payload: bytes) -> Stored | None:
 def decode_records(payload: bytes) -> Records | None:
     reply = _reply(_SHORT, payload)
     return None if reply is None else Records(reply[0], reply[1], unpack_records(payload[_SHORT.size :]))
-
-
-def decode_radius(payload: bytes) -> Radius | None:
-    reply = _reply(_SHORT, payload)
-    return None if reply is None else Radius(*reply)
 
 
 def _reply(layout: struct.Struct, payload: bytes) -> tuple[Any, ...] | None:
@@ -266,11 +238,6 @@ def encode_read(first: int, count: int) -> bytes:
     return masked_request(MissionCommand.READ, struct.pack("<HBB", first, count, 0))
 
 
-def encode_radius(wp_radius_cm: int) -> bytes:
-    """Encode RADIUS, 0..2000 cm."""
-    return masked_request(MissionCommand.RADIUS, struct.pack("<HH", wp_radius_cm, wp_radius_cm ^ 0xFFFF))
-
-
 @dataclass(frozen=True, slots=True)
 class Chunk:
     """An encoded CHUNK request, and the records in it."""
@@ -292,10 +259,3 @@ def encode_chunk(packed: bytes, first: int, most: int) -> Chunk:
 
 INFO_REQUEST = request(MissionCommand.INFO)
 ABORT_REQUEST = request(MissionCommand.ABORT)
-
-
-def unmask(payload: bytes) -> bytes | None:
-    """Unmask a request's payload (the flight controller's side); None if it is not masked."""
-    if len(payload) % 2 == 0:
-        return None
-    return apply_mask(payload[1:], payload[0])

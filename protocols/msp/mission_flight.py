@@ -105,30 +105,13 @@ class FlightProgress:
     compass: float | None = None
 
     @property
-    def _flags(self) -> int:
-        return (
-            self.is_enabled * _ENABLED
-            | self.switch_on * _SWITCH_ON
-            | self.in_command * _IN_COMMAND
-            | self.battery_low * _BATTERY_LOW
-            | (self.compass is not None) * _COMPASS_KNOWN
-        )
-
-    @property
     def summary(self) -> int:
         """The value of Harakiri's MAVLink message SUMMARY."""
+        flags = self.is_enabled, self.switch_on, self.in_command, self.battery_low, self.compass is not None
         record = _NO_SHORT_RECORD if self.record is None else self.record
-        (summary,) = _SIGNED.unpack(bytes((self.state, self.reason, self._flags, record)))
+        flag_bits = sum(1 << bit for bit, is_set in enumerate(flags) if is_set)
+        (summary,) = _SIGNED.unpack(bytes((self.state, self.reason, flag_bits, record)))
         return int(summary)
-
-    def encode(self) -> bytes:
-        """The reply's payload."""
-        records = (_NO_RECORD if record is None else record for record in (self.record, self.reached))
-        target = (round(self.distance * 100), round(self.bearing * 100), round(self.height_error * 100))
-        state_ms, compass = round(self.state_s * 1000), round((self.compass or 0) * 100)
-        return _REPLY.pack(
-            0, _VERSION, self._flags, self.state, self.reason, 0, *records, self.count, *target, state_ms, compass
-        )
 
 
 def decode_flight(payload: bytes) -> FlightProgress | None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All settings of a patched Harakiri: the commands SETTING and SET_SETTING, both directions (docs/msp-mission.md)."""
+"""All settings of a patched Harakiri: the commands SETTING and SET_SETTING (docs/msp-mission.md)."""
 
 import struct
 from collections.abc import Iterable, Sequence
@@ -11,8 +11,6 @@ from protocols.msp.mission import ReplyStatus, masked_request
 
 #: The index that means all settings: their checksum, or a save.
 WHOLE_TABLE = 0xFFFF
-#: The largest payload of a reply, bytes.
-REPLY_SIZE = 218
 _VALUES = ("<B", "<b", "<H", "<h", "<I", "<f")
 _DESCRIPTION = struct.Struct("<BiiB")
 _HEADER = struct.Struct("<BH")
@@ -57,11 +55,6 @@ class Setting(NamedTuple):
         """The hash that a request to set it must have, so that it reaches no other build's setting."""
         return crc32(self.description)
 
-    def accepts(self, value: float) -> bool:
-        """True if the value is in range, and whole unless the setting is a float."""
-        is_of_type = self.type is SettingType.FLOAT or value == value // 1
-        return self.minimum <= value <= self.maximum and is_of_type
-
     def pack(self, value: float) -> bytes:
         """The four bytes on the wire; struct.error for a value that the type cannot hold."""
         if self.type is SettingType.FLOAT:
@@ -91,8 +84,10 @@ class SettingsReply(NamedTuple):
     first: int
     settings: Sequence[HeldSetting] = ()
 
-    def encode(self) -> bytes:
-        return _HEADER.pack(self.status, self.first) + b"".join(held.encode() for held in self.settings)
+    @property
+    def size(self) -> int:
+        """The size of its payload, bytes."""
+        return _HEADER.size + sum(len(held.encode()) for held in self.settings)
 
 
 class TableReply(NamedTuple):
@@ -101,9 +96,6 @@ class TableReply(NamedTuple):
     status: ReplyStatus
     total: int
     checksum: int
-
-    def encode(self) -> bytes:
-        return _TABLE.pack(self.status, WHOLE_TABLE, self.total, self.checksum)
 
 
 def table_checksum(settings: Iterable[HeldSetting]) -> int:

@@ -43,13 +43,13 @@ def firmware() -> None:
 @click.option("--battery", is_flag=True, help="Flash even if the board measures a battery.")
 @bridge_options
 def flash(client: BridgeClient, image: Path, battery: bool) -> None:
-    """Flash IMAGE (.hex, .bin or .elf): a Harakiri with the mission patch, for a Naze32.
+    """Flash IMAGE (.hex or .bin): a Harakiri with the mission patch, for a Naze32.
 
     The previous flash is stored as a backup first. Everything written is read back, and the new firmware must answer.
     After an interruption run the same command again.
     """
     try:
-        program = parse_image(read_file(image, FirmwareFileError), shown_path(image)).program
+        program = parse_image(read_file(image, FirmwareFileError), shown_path(image))
     except (FirmwareFileError, ImageError) as error:
         fail(error, UNREADABLE)
     try:
@@ -93,7 +93,7 @@ def build(checkout: Path) -> None:
     _run("make", "--always-make", "-C", str(checkout))
     image = checkout / _BUILT
     try:
-        check_patched(parse_image(read_file(image, FirmwareFileError), shown_path(image)).program)
+        check_patched(parse_image(read_file(image, FirmwareFileError), shown_path(image)))
     except (FirmwareFileError, ImageError) as error:
         fail(f"the build has no usable result: {error}")
     say(f"{shown_path(image)} is ready: naze-bridge firmware flash {shown_path(image)}")

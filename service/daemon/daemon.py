@@ -182,9 +182,9 @@ class Daemon:
                     self.gcs.send(effect)
                 case SendToBoard():
                     self.fc.carry_out(effect)
-                case RecordFrames(frames):
+                case RecordFrames():
                     assert self._tlog is not None
-                    self._tlog.record(frames)
+                    self._tlog.record(effect)
                 case PublishGroups(groups):
                     for follower in self._followers:
                         follower.telemetry(groups)

@@ -5,14 +5,12 @@ Imported only if it is used: the client library takes several megabytes.
 """
 
 from collections.abc import Iterator, Mapping
-from itertools import accumulate
 
 from prometheus_client import CollectorRegistry, Counter, ProcessCollector, generate_latest
-from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
 from bridge.fc.session import TRANSITIONS
-from bridge.line.msp_link import BOUNDS_S, RoundTrips
 from bridge.missions.mission_service import DeliveryResult
 from bridge.model.events import BridgeEvent
 from bridge.model.missions import ArrivedMission
@@ -124,10 +122,11 @@ class _State(Collector):
         # These restart at 0 with each flight controller found, which Prometheus permits for counters.
         damaged = counters.fc_bad_checksums
         yield _counted("fc_damaged_frames", "Frames of the flight controller with a wrong checksum.", damaged)
-        if counters.fc_requests_lost is not None and counters.fc_round_trips is not None:
+        if counters.fc_requests_lost is not None and counters.fc_round_trip_s is not None:
             lost = counters.fc_requests_lost
             yield _counted("fc_lost_requests", "MSP requests that were not answered in time.", lost)
-            yield _round_trips(counters.fc_round_trips)
+            meaning = "From an MSP request to its reply, as read, smoothed."
+            yield _gauge("fc_round_trip_seconds", meaning, {}, counters.fc_round_trip_s)
 
     def _vehicle(self) -> Iterator[Metric]:
         for name, (meaning, value) in vehicle_gauges(self._daemon.report()).items():
@@ -150,14 +149,6 @@ def vehicle_gauges(report: VehicleReport) -> Mapping[str, tuple[str, float | Non
             None if report.mission is None else report.mission.count,
         ),
     }
-
-
-def _round_trips(measured: RoundTrips) -> Metric:
-    bounds = [*map(str, BOUNDS_S), "+Inf"]
-    classes = list(zip(bounds, accumulate(map(float, measured.counts)), strict=True))
-    name = f"{_PREFIX}fc_round_trip_seconds"
-    meaning = "MSP request to reply, as read: replies to several polls are read together."
-    return HistogramMetricFamily(name, meaning, buckets=classes, sum_value=measured.sum_s)
 
 
 def _gauge(name: str, meaning: str, labels: Mapping[str, str], value: float) -> Metric:

@@ -118,7 +118,7 @@ class SentFiles:
         """With `battery=1` flash even with a battery connected."""
         name, body = await _received(request)
         with refusing(ImageError, HTTPStatus.UNPROCESSABLE_ENTITY, lambda why: f"{name}: {why}"):
-            image = (await asyncio.to_thread(parse_image, body, name)).program
+            image = await asyncio.to_thread(parse_image, body, name)
             check_patched(image)
         with_battery = request.query_params.get("battery") == "1"
         return begun(self._writer.begin(name, partial(self._write_firmware, image, with_battery)))

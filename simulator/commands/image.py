@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from protocols.firmware_image import FLASH_SIZE, Image, ImageError, parse_image
+from protocols.firmware_image import FLASH_SIZE, ImageError
 from simulator.board.memory_file import open_memory
 from simulator.board.options import Faults
 from simulator.commands.run_board import RunOptions, run_board
+from simulator.emulated_naze.image import Image, load_image
 from simulator.emulated_naze.switches import EmulatedFaults
 from simulator.sky.sky import Weather
 
@@ -35,7 +36,7 @@ def read_image(path: Path) -> Image:
     except NativeChipError as error:
         raise click.ClickException(str(error)) from error
     try:
-        return parse_image(path.read_bytes(), str(path))
+        return load_image(path.read_bytes(), str(path))
     except (ImageError, OSError) as error:
         raise click.ClickException(f"the image cannot be run: {error}") from error
 

@@ -8,13 +8,14 @@ import logging
 from collections.abc import Callable
 from math import inf
 
-from protocols.firmware_image import FLASH_SIZE, PROGRAM_END, Image
+from protocols.firmware_image import FLASH_SIZE, PROGRAM_END
 from simulator.board.boot_loader import BootLoader
 from simulator.board.flash import PowerCutError
 from simulator.board.simulated_board import Power, SimulatedBoard
 from simulator.emulated_naze.chip import Chip, CpuFaultError
 from simulator.emulated_naze.controlled_flash import ControlledFlash
 from simulator.emulated_naze.harakiri_memory import HarakiriMemory, SpokenProtocol
+from simulator.emulated_naze.image import Image
 from simulator.emulated_naze.switches import EmulatedCounters, EmulatedFaults
 
 #: From power on to the main loop, without a GPS module.

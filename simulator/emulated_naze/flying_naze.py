@@ -5,12 +5,12 @@ import random
 from dataclasses import dataclass
 from math import asin, atan2, degrees, inf
 
-from protocols.firmware_image import Image
 from simulator.board.flight import Craft, FlightState
 from simulator.board.simulated_board import Power
 from simulator.emulated_naze import hmc5883l, mpu6050, ms5611
 from simulator.emulated_naze.board import EmulatedNaze
 from simulator.emulated_naze.chip import Chip, I2cDevice
+from simulator.emulated_naze.image import Image
 from simulator.emulated_naze.sky_sensors import SkyBarometer, SkyCompass, SkyImu
 from simulator.emulated_naze.switches import EmulatedFaults
 from simulator.sky.body import Airframe

@@ -4,9 +4,9 @@
 from enum import Enum
 from typing import Protocol
 
-from protocols.firmware_image import Image
 from simulator.board.flash import PAGE_SIZE, NorFlash
 from simulator.board.options import Faults, SimOptions
+from simulator.emulated_naze.image import Image
 from simulator.naze.mission_slots import MissionSlots, slot_pages
 
 #: In the struct of flags `f` (mw.h of both trees), ARMED is the second.

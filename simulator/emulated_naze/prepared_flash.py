@@ -7,9 +7,10 @@ It is done on the emulated board itself, once per image, and kept in the user's 
 import hashlib
 from collections.abc import Callable
 
-from protocols.firmware_image import FLASH_SIZE, Image
+from protocols.firmware_image import FLASH_SIZE
 from simulator.emulated_naze.console import Console, ConsoleError
 from simulator.emulated_naze.flying_naze import FlyingNaze
+from simulator.emulated_naze.image import Image
 from simulator.emulated_naze.native_chip import cache_folder
 
 #: Box numbers (mw.h) and the switch that turns each on: AUX1 high level flight, AUX2 middle height hold, AUX2 high

@@ -5,10 +5,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
 
-from protocols.firmware_image import FLASH_SIZE, Image
+from protocols.firmware_image import FLASH_SIZE
 from protocols.msp.mission import WpRecord
 from simulator.emulated_naze.console import ConsoleError
 from simulator.emulated_naze.flying_naze import FlyingNaze
+from simulator.emulated_naze.image import Image
 from simulator.emulated_naze.prepared_flash import prepared_flash
 from simulator.flights.judgement import Extremes, ItemResult, extremes, is_flown, judge
 from simulator.flights.mission_run import MissionRun, fly_mission

@@ -6,22 +6,20 @@ from dataclasses import dataclass
 
 from protocols.mission_item import ListIdentity
 from protocols.msp.mission import (
-    MAX_RADIUS_CM,
     RECORD_SIZE,
     VERSION,
     Info,
     InfoFlag,
     MissionCommand,
-    Radius,
     ReplyStatus,
     Staged,
     Stored,
     WpCommand,
-    unmask,
 )
 from simulator.board.flash import FlashError, NorFlash
 from simulator.naze.mission_slots import MissionSlots
 from simulator.naze.missions import Board
+from simulator.naze.replies import MAX_RADIUS_CM, Radius, encode_reply, unmask
 
 _LIST = struct.Struct("<HI")
 _READ = struct.Struct("<HBB")
@@ -58,19 +56,19 @@ class MissionCommands:
         body = unmask(payload)
         match command:
             case MissionCommand.INFO:
-                return self._info().encode()
+                return encode_reply(self._info())
             case MissionCommand.BEGIN:
-                return self._progress(self._begin(body, now)).encode()
+                return encode_reply(self._progress(self._begin(body, now)))
             case MissionCommand.CHUNK:
-                return self._progress(self._chunk(body, now)).encode()
+                return encode_reply(self._progress(self._chunk(body, now)))
             case MissionCommand.COMMIT:
-                return Stored(self._commit(body, now), self._slots.stored).encode()
+                return encode_reply(Stored(self._commit(body, now), self._slots.stored))
             case MissionCommand.ABORT:
                 return bytes((self._abort(payload),))
             case MissionCommand.READ:
                 return self._read(body)
             case MissionCommand.RADIUS:
-                return Radius(self._radius(body, now), self._board.wp_radius_cm).encode()
+                return encode_reply(Radius(self._radius(body, now), self._board.wp_radius_cm))
         return None
 
     def drop_stale(self, now: float) -> None:

@@ -5,6 +5,7 @@ from protocols.mavlink.codec import Packed, pack
 from protocols.mavlink.dialect import messages
 from protocols.msp.mission_flight import FLIGHT, SUMMARY
 from simulator.board.options import Faults
+from simulator.naze.replies import encode_flight
 
 #: In slots of the MAVLink stream.
 _CURRENT_EVERY, _REACHED_EVERY, _SUMMARY_EVERY = 97, 7, 37
@@ -19,7 +20,7 @@ class MissionFlight:
 
     def answer(self, command: int, payload: bytes) -> bytes | None:
         flight = self._faults.flight
-        return None if command != FLIGHT or payload or flight is None else flight.encode()
+        return None if command != FLIGHT or payload or flight is None else encode_flight(flight)
 
     def message(self, slot: int) -> Packed | None:
         """FlightCurrent(), FlightReached() and FlightSummary()."""

@@ -4,17 +4,18 @@
 import struct
 from collections.abc import Callable
 
-from protocols.msp.mission import ReplyStatus, unmask
+from protocols.msp.mission import ReplyStatus
 from protocols.msp.setting_table import (
-    REPLY_SIZE,
     WHOLE_TABLE,
     HeldSetting,
     SettingCommand,
     SettingsReply,
+    SettingType,
     TableReply,
     table_checksum,
 )
 from simulator.naze.missions import Board
+from simulator.naze.replies import SETTINGS_SIZE, encode_reply, unmask
 from simulator.naze.setting_table import FLIGHT_SETTINGS, SETTINGS
 
 _READ = struct.Struct("<HH")
@@ -53,9 +54,9 @@ class SettingsCommands:
         body = unmask(payload) or b""
         match command:
             case SettingCommand.SETTING:
-                return self._read(body).encode()
+                return encode_reply(self._read(body))
             case SettingCommand.SET_SETTING:
-                return self._set(body, now).encode()
+                return encode_reply(self._set(body, now))
         return None
 
     @property
@@ -77,7 +78,7 @@ class SettingsCommands:
         if first >= len(self._held):
             return SettingsReply(ReplyStatus.RANGE, first)
         found = self.table[first : first + count]
-        while len((reply := SettingsReply(ReplyStatus.OK, first, found)).encode()) > REPLY_SIZE:
+        while len(encode_reply(reply := SettingsReply(ReplyStatus.OK, first, found))) > SETTINGS_SIZE:
             found.pop()
         return reply
 
@@ -100,7 +101,9 @@ class SettingsCommands:
         is_whole = held.setting.pack(value) == bits  # an integer wider than its variable is out of range
         may_crash = held.setting.name in CRASHING and value != held.value
         is_dangerous = (index == _MOTORS_OFF and value > held.value) or may_crash
-        if not (held.setting.accepts(value) and is_whole) or is_dangerous:
+        is_float = held.setting.type is SettingType.FLOAT
+        is_accepted = held.setting.minimum <= value <= held.setting.maximum and (is_float or value == value // 1)
+        if not (is_accepted and is_whole) or is_dangerous:
             return SettingsReply(ReplyStatus.RANGE, index, [held])
         self.change(index, value)
         return SettingsReply(ReplyStatus.OK, index, [self._held[index]])

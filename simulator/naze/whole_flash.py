@@ -4,7 +4,7 @@
 import struct
 from contextlib import suppress
 
-from protocols.firmware_image import FLASH_BASE, FLASH_SIZE, PATCH_MARK, ImageError, check_harakiri, is_patched
+from protocols.firmware_image import FLASH_BASE, FLASH_SIZE, PATCH_MARK, ImageError, check_harakiri
 from simulator.board.flash import ERASED, PAGE_SIZE, FlashError, NorFlash
 from simulator.board.options import Faults
 
@@ -67,7 +67,7 @@ class WholeFlash:
             check_harakiri(program)
         except ImageError:
             return False
-        self._faults.extension = is_patched(program)
+        self._faults.extension = PATCH_MARK in program and b"Harakiri" in program
         if program[_VERSION_AT] != self._version:
             self._version = program[_VERSION_AT]
             self._rest.memory[-_CONFIG_SIZE:] = bytes((ERASED,)) * _CONFIG_SIZE

@@ -17,6 +17,7 @@ from protocols.mission_item import ListIdentity, identify, pack_records
 from protocols.msp import mission as ext
 from protocols.msp.frame import request
 from protocols.msp.mission import Info, InfoFlag, MissionCommand, Records, ReplyStatus, Staged, Stored, WpRecord
+from simulator.naze.replies import decode_radius, encode_radius
 from tests.support.c_core import CCore, PowerCut
 from tests.support.mission_devices import Device, model, simulated_core
 
@@ -76,7 +77,7 @@ class Companion:
         return records
 
     def radius(self, centimetres: int) -> tuple[ReplyStatus, int]:
-        radius = ext.decode_radius(self.ask(ext.encode_radius(centimetres)))
+        radius = decode_radius(self.ask(encode_radius(centimetres)))
         assert radius is not None
         return radius.status, radius.wp_radius_cm
 
@@ -492,7 +493,7 @@ class SameAnswers(RuleBasedStateMachine):
 
     @rule(centimetres=st.integers(0, 2200))
     def set_radius(self, centimetres: int) -> None:
-        self.send(ext.encode_radius(centimetres))
+        self.send(encode_radius(centimetres))
 
     @rule(command=st.sampled_from(MissionCommand), payload=st.binary(max_size=243))
     def anything(self, command: MissionCommand, payload: bytes) -> None:

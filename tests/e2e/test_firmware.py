@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from protocols.firmware_image import FLASH_SIZE
 from simulator.naze.whole_flash import stand_in
 from tests.support.benches import Starter
 from tests.support.programs import Program, happens, run_naze_bridge, until
@@ -57,7 +56,7 @@ def test_the_patch_is_flashed_after_a_backup_and_must_answer(flashing: FlashingB
     assert flashing.controller == "Harakiri with the mission extension"
     (backup,) = flashing.backups
     assert str(backup) in said
-    assert len(backup.read_bytes()) == FLASH_SIZE
+    assert len(backup.read_bytes()) == 128 * 1024
     assert backup.with_suffix(".txt").read_text().startswith("Config:\nFW: simulated\n")
 
 

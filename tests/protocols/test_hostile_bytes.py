@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from bridge.fc.port_listener import GpsWatch
-from protocols.frsky import FrskyParser
+from protocols.frsky import FrskyWatch
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.msp.command_line import EchoWatch
 from protocols.msp.frame import MAX_REPLY, MspParser
@@ -63,7 +63,7 @@ def msp(data: bytes, size: int) -> None:
 PARSERS: dict[str, Callable[[bytes, int], None]] = {
     "MAVLink": mavlink,
     "MSP": msp,
-    "FrSky": lambda data, size: in_pieces(FrskyParser().feed)(data, size),
+    "FrSky": lambda data, size: in_pieces(FrskyWatch().feed)(data, size),
     "GPS": lambda data, size: in_pieces(GpsWatch().feed)(data, size),
     "echo": lambda data, size: in_pieces(EchoWatch().feed)(data, size),
 }

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from protocols.firmware_image import Image, parse_image
+from simulator.emulated_naze.image import Image, load_image
 from tests.support.real_bench import Figure, RealBench, calibrated_flash
 
 _ROWS = pytest.StashKey[list[tuple[str, str]]]()
@@ -17,7 +17,7 @@ def image() -> Image:
     path = os.environ.get("NAZE_IMAGE")
     if not path:
         pytest.skip("NOT RUN: needs a built Harakiri with the patch: make real-board IMAGE=path/to/X.elf")
-    return parse_image(Path(path).read_bytes(), path)
+    return load_image(Path(path).read_bytes(), path)
 
 
 @pytest.fixture(scope="session")

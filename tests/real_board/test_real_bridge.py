@@ -6,12 +6,12 @@ from collections.abc import Callable
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
-from bridge.fc.states.cli import Cli
 from bridge.fc.states.mavlink import HarakiriMavlink
 from bridge.fc.states.msp import Identifying, Polling
-from protocols.firmware_image import Image
+from bridge.fc.states.mute import Cli
 from protocols.mission_item import MissionItem, MissionResult
 from simulator.emulated_naze.board import EmulatedNaze
+from simulator.emulated_naze.image import Image
 from tests.support.conversations import Download, Upload, records_of, waypoints
 from tests.support.real_bench import Figure, RealBench
 from tests.support.world import GroundStation, World

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from protocols.firmware_image import Image, parse_image
 from protocols.msp.frame import Direction, request
 from simulator.board.msp_sensors import MspCommand
+from simulator.emulated_naze.image import Image, load_image
 from tests.support.copies import in_a_copy
 from tests.support.naze_bench import mission
 from tests.support.real_bench import Figure, RealBench
@@ -42,7 +42,7 @@ def plain() -> Image:
     path = os.environ.get("NAZE_PLAIN_IMAGE")
     if not path:
         pytest.skip("NOT RUN: needs the same tree's unpatched image: NAZE_PLAIN_IMAGE=path/to/X.elf")
-    return parse_image(Path(path).read_bytes(), path)
+    return load_image(Path(path).read_bytes(), path)
 
 
 def pids(bench: RealBench) -> bytes:

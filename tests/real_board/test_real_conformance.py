@@ -3,8 +3,8 @@
 
 import pytest
 
-from protocols.firmware_image import Image
 from protocols.msp.frame import Direction, request
+from simulator.emulated_naze.image import Image
 from tests.conformance.test_mission_extension import (  # noqa: F401  (collected here)
     OLD,
     OLDER,

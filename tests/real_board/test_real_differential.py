@@ -3,7 +3,6 @@
 
 import random
 
-from protocols.firmware_image import Image
 from protocols.mission_item import identify, pack_records
 from protocols.msp.frame import MspFrame, request
 from protocols.msp.mission import (
@@ -13,11 +12,12 @@ from protocols.msp.mission import (
     encode_begin,
     encode_chunk,
     encode_commit,
-    encode_radius,
     encode_read,
 )
 from simulator.board.msp_sensors import MspCommand as Msp
 from simulator.board.options import SimOptions, Tree
+from simulator.emulated_naze.image import Image
+from simulator.naze.replies import encode_radius
 from tests.support.naze_bench import Bench, WireBench, mission
 from tests.support.real_bench import Figure, RealBench
 

@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 
 from bridge.firmware.reflash import FlashingError, find_chip, read_dump, read_flash, rewrite_flash, start_boot_loader
-from protocols.firmware_image import PROGRAM_END, Image, parse_image
 from protocols.msp.mission import INFO_REQUEST, decode_info
 from protocols.stm32_boot_loader import Dialogue, start_program
 from simulator.board.simulated_board import Power
+from simulator.emulated_naze.image import Image, load_image
 from tests.support.benches import Starter
 from tests.support.boot_loader_bench import CablePulledError, DialogueBench
 from tests.support.programs import happens
@@ -32,7 +32,7 @@ def plain() -> Image:
     path = os.environ.get("NAZE_PLAIN_IMAGE")
     if not path:
         pytest.skip("NOT RUN: needs NAZE_PLAIN_IMAGE, a build without the patch")
-    return parse_image(Path(path).read_bytes(), path)
+    return load_image(Path(path).read_bytes(), path)
 
 
 @pytest.fixture
@@ -59,7 +59,7 @@ def flash(program: bytes, mark: Callable[[str], None] = lambda _: None) -> Dialo
 
     yield from find_chip(5.0, lambda: None)
     present = yield from read_flash(progress)
-    yield from rewrite_flash(present, program.ljust(PROGRAM_END, b"\xff") + present[PROGRAM_END:], progress)
+    yield from rewrite_flash(present, program.ljust(0x1D800, b"\xff") + present[0x1D800:], progress)
     yield from start_program()
     return present
 
@@ -82,7 +82,7 @@ def test_the_patch_is_flashed_with_the_settings_and_missions_kept(
     began = line.now
     before = line.run(flash(image.program))
     figure("flashing the patch over the plain image", f"{line.now - began:.1f} s on the wire")
-    assert bytes(bench.flash[PROGRAM_END:]) == before[PROGRAM_END:]
+    assert bytes(bench.flash[0x1D800:]) == before[0x1D800:]
     assert_runs(bench, line.now, patched=True)
     line, after = enter(bench)
     assert f"{_CHANGED} = {_VALUE}" in settings(after)

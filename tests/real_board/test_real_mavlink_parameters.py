@@ -8,10 +8,10 @@ from bridge.controllers.harakiri import profile as harakiri
 from bridge.controllers.harakiri.mavlink_settings import HarakiriMavlinkSettings
 from bridge.fc.fc_settings import SettingRefusal
 from bridge.model.settings import SettingTable
-from protocols.firmware_image import Image
 from protocols.mavlink.codec import FrameWriter
 from protocols.mavlink.frame import MavlinkSplitter
 from simulator.emulated_naze.board import EmulatedNaze
+from simulator.emulated_naze.image import Image
 from tests.support import mavlink_parameters as page
 from tests.support.packing import pack
 from tests.support.real_bench import Figure, RealBench

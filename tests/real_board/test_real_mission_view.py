@@ -13,12 +13,12 @@ from math import hypot
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
-from protocols.firmware_image import Image
 from protocols.mavlink.dialect import Message
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.msp.mission_flight import FlightPhase
 from simulator.emulated_naze.console import Console
 from simulator.emulated_naze.flying_naze import FlyingNaze
+from simulator.emulated_naze.image import Image
 from simulator.emulated_naze.prepared_flash import prepared_flash
 from simulator.flights.pilot import HIGH, LOW, MIDDLE, Pilot
 from simulator.sky.earth import Place

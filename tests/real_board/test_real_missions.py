@@ -12,10 +12,10 @@ from itertools import product
 
 import pytest
 
-from protocols.firmware_image import Image
 from protocols.msp.mission import WpCommand, WpRecord
 from protocols.msp.mission_flight import FlightPhase, FlightProgress, FlightReason
 from simulator.emulated_naze.flying_naze import FlyingNaze
+from simulator.emulated_naze.image import Image
 from simulator.emulated_naze.prepared_flash import prepared_flash
 from simulator.flights.judgement import extremes, is_flown, judge
 from simulator.flights.mission_run import MissionRun, fly_mission

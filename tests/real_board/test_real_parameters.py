@@ -6,10 +6,10 @@ from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.fc.fc_settings import Cause, SettingRefusal
 from bridge.model.settings import BoardSetting, SettingTable, shown
-from protocols.firmware_image import Image
 from protocols.msp.frame import Direction, MspParser
 from protocols.msp.setting_table import SettingCommand
 from simulator.emulated_naze.board import EmulatedNaze
+from simulator.emulated_naze.image import Image
 from tests.support.real_bench import Figure
 from tests.support.settings_client import SettingsClient
 from tests.support.world import GroundStation, World

@@ -8,13 +8,13 @@ reply, filled: so requests are tried in pairs. For an image without the patch: `
 from collections.abc import Iterator
 from itertools import product
 
-from protocols.firmware_image import Image
 from protocols.msp.frame import Direction, MspFrame, request
 from protocols.msp.mission import INFO_REQUEST, MissionCommand
 from protocols.rights import Effect
 from protocols.rights.msp import MSP_RIGHTS, Firmware
 from simulator.board.simulated_board import Power
 from simulator.emulated_naze.board import EmulatedNaze
+from simulator.emulated_naze.image import Image
 from tests.support.real_bench import IDENT, Figure, RealBench
 from tests.support.share_program import ShareProgram
 from tests.support.world import World

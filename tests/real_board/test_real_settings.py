@@ -3,8 +3,8 @@
 
 import pytest
 
-from protocols.firmware_image import Image
 from simulator.emulated_naze.board import EmulatedNaze
+from simulator.emulated_naze.image import Image
 from tests.support.real_bench import Figure
 from tests.support.settings_client import SettingsClient
 from tests.support.world import World

@@ -5,8 +5,8 @@ import pytest
 
 from bridge.model.settings import SettingTable, Value, ValueKind
 from bridge.settings.local_settings import RestoreResult
-from protocols.firmware_image import Image
 from simulator.emulated_naze.board import EmulatedNaze
+from simulator.emulated_naze.image import Image
 from tests.support.real_bench import Figure
 from tests.support.settings_client import SettingsClient, value_of
 from tests.support.world import World

@@ -4,10 +4,10 @@
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
-from protocols.firmware_image import Image
 from protocols.mission_item import MissionResult
 from protocols.msp.frame import Direction
 from simulator.emulated_naze.board import EmulatedNaze
+from simulator.emulated_naze.image import Image
 from tests.support.conversations import Upload, waypoints
 from tests.support.real_bench import Figure
 from tests.support.share_program import ShareProgram

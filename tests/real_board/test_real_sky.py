@@ -9,9 +9,9 @@ from contextlib import suppress
 
 import pytest
 
-from protocols.firmware_image import Image
 from protocols.msp.commands import Msp
 from simulator.emulated_naze.flying_naze import FlyingNaze
+from simulator.emulated_naze.image import Image
 from simulator.emulated_naze.prepared_flash import prepare, prepared_flash
 from simulator.flights.mission_upload import UnfitImageError, require_mission_flight
 from simulator.flights.pilot import HIGH, Pilot

@@ -3,19 +3,19 @@
 
 import pytest
 
-from protocols.firmware_image import Image
-from protocols.frsky import FrskyParser
+from protocols.frsky import FrskyWatch
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mission_item import identify
 from protocols.msp.mission import INFO_REQUEST, decode_info
 from simulator.board.options import TelemetryProtocol
+from simulator.emulated_naze.image import Image
 from tests.support.naze_bench import mission
 from tests.support.real_bench import IDENT, Figure, RealBench
 
 
 def has_frsky(received: bytes) -> bool:
     """True if there are consecutive values of the FrSky hub protocol."""
-    watch, longest = FrskyParser(), 0
+    watch, longest = FrskyWatch(), 0
     for byte in received:
         watch.feed(bytes((byte,)))
         longest = max(longest, watch.values_in_a_row)

@@ -12,17 +12,8 @@ from bridge.controllers.harakiri import profile as harakiri
 from bridge.missions.fc_mission_store import PushFailure
 from protocols.mission_item import ListIdentity, MissionResult, identify
 from protocols.msp.frame import Direction, MspFrame, MspParser
-from protocols.msp.mission import (
-    Info,
-    InfoFlag,
-    MissionCommand,
-    Records,
-    ReplyStatus,
-    Staged,
-    Stored,
-    decode_info,
-    unmask,
-)
+from protocols.msp.mission import Info, InfoFlag, MissionCommand, Records, ReplyStatus, Staged, Stored, decode_info
+from simulator.naze.replies import encode_reply, unmask
 from tests.support.conversations import Download, Upload, records_of, waypoints
 from tests.support.fake_controllers import HARAKIRI_CAPABILITY, QuietLine, ident
 from tests.support.world import GroundStation, World
@@ -50,7 +41,7 @@ class FakeExtension(QuietLine):
                 case 116:
                     payload = BOXES
                 case MissionCommand.INFO:
-                    payload = self.info.encode()
+                    payload = encode_reply(self.info)
                 case command if command in TELEMETRY:
                     payload = self.telemetry.get(command, bytes(TELEMETRY[command]))
                 case _:
@@ -71,10 +62,10 @@ class FakeExtension(QuietLine):
             case 2:
                 return b""
             case 3:
-                return Stored(status, ListIdentity(count, checksum)).encode()
+                return encode_reply(Stored(status, ListIdentity(count, checksum)))
             case 4:
-                return Records(status, draw.choice((0, 6, 12, 7, 65535)), records_of(waypoints(6))).encode()
-        return Staged(status, count, checksum).encode()
+                return encode_reply(Records(status, draw.choice((0, 6, 12, 7, 65535)), records_of(waypoints(6))))
+        return encode_reply(Staged(status, count, checksum))
 
 
 class FixedReplies(FakeExtension):
@@ -85,7 +76,7 @@ class FixedReplies(FakeExtension):
         self.answers = answers
 
     def answer(self, frame: MspFrame) -> bytes | None:
-        return self.answers.get(frame.command, Staged(ReplyStatus.OK, 0, 0).encode())
+        return self.answers.get(frame.command, encode_reply(Staged(ReplyStatus.OK, 0, 0)))
 
 
 def found(peer: QuietLine) -> tuple[World, GroundStation]:
@@ -109,15 +100,15 @@ def test_every_conversation_ends_with_any_replies(seed: int) -> None:
 @pytest.mark.parametrize(
     "answers",
     [
-        {MissionCommand.CHUNK: Staged(ReplyStatus.SEQUENCE, 0, 0).encode()},
-        {MissionCommand.CHUNK: Staged(ReplyStatus.OK, 0, 0).encode()},
-        {MissionCommand.COMMIT: Stored(ReplyStatus.INCOMPLETE, ListIdentity(0, 0)).encode()},
-        {MissionCommand.COMMIT: Stored(ReplyStatus.OK, ListIdentity(0, 0)).encode()},
-        {MissionCommand.COMMIT: Stored(ReplyStatus.ARMED, ListIdentity(0, 0)).encode()},
-        {MissionCommand.COMMIT: Stored(ReplyStatus.FLASH, identify(records_of(waypoints(30)))).encode()},
-        {MissionCommand.BEGIN: Staged(ReplyStatus.SAME, 0, 0).encode()},
-        {MissionCommand.BEGIN: Staged(ReplyStatus.BUSY, 0, 0).encode()},
-        {MissionCommand.BEGIN: Staged(ReplyStatus.OK, 30, 0).encode()},
+        {MissionCommand.CHUNK: encode_reply(Staged(ReplyStatus.SEQUENCE, 0, 0))},
+        {MissionCommand.CHUNK: encode_reply(Staged(ReplyStatus.OK, 0, 0))},
+        {MissionCommand.COMMIT: encode_reply(Stored(ReplyStatus.INCOMPLETE, ListIdentity(0, 0)))},
+        {MissionCommand.COMMIT: encode_reply(Stored(ReplyStatus.OK, ListIdentity(0, 0)))},
+        {MissionCommand.COMMIT: encode_reply(Stored(ReplyStatus.ARMED, ListIdentity(0, 0)))},
+        {MissionCommand.COMMIT: encode_reply(Stored(ReplyStatus.FLASH, identify(records_of(waypoints(30)))))},
+        {MissionCommand.BEGIN: encode_reply(Staged(ReplyStatus.SAME, 0, 0))},
+        {MissionCommand.BEGIN: encode_reply(Staged(ReplyStatus.BUSY, 0, 0))},
+        {MissionCommand.BEGIN: encode_reply(Staged(ReplyStatus.OK, 30, 0))},
         {MissionCommand.BEGIN: b"\xff"},
     ],
 )
@@ -127,8 +118,8 @@ def test_a_board_that_always_gives_the_same_reply_is_given_up(answers: dict[int,
 
 
 LIST = identify(records_of(waypoints(60)))
-TOO_FAR, WHOLE = (Staged(ReplyStatus.OK, count, LIST.checksum).encode() for count in (61, 60))
-COMMITTED = Stored(ReplyStatus.OK, LIST).encode()
+TOO_FAR, WHOLE = (encode_reply(Staged(ReplyStatus.OK, count, LIST.checksum)) for count in (61, 60))
+COMMITTED = encode_reply(Stored(ReplyStatus.OK, LIST))
 
 
 class BeginsInTurn(FixedReplies):
@@ -154,8 +145,8 @@ def test_a_board_that_claims_more_records_than_the_list_has_starts_again() -> No
 
 def test_a_failed_commit_does_not_leave_the_next_attempt_uncertain() -> None:
     """The board reports a flash error, takes a new BEGIN and falls silent before any chunk arrives."""
-    refused: dict[int, bytes] = {MissionCommand.COMMIT: Stored(ReplyStatus.FLASH, ListIdentity(0, 0)).encode()}
-    begins = [WHOLE, Staged(ReplyStatus.OK, 0, 0).encode()]
+    refused: dict[int, bytes] = {MissionCommand.COMMIT: encode_reply(Stored(ReplyStatus.FLASH, ListIdentity(0, 0)))}
+    begins = [WHOLE, encode_reply(Staged(ReplyStatus.OK, 0, 0))]
     world, _ = found(BeginsInTurn(begins, refused, then_silent=True))
     outcome = world.push(waypoints(60))
     world.wait_until(lambda _: bool(outcome), 30)
@@ -181,7 +172,7 @@ def test_a_board_that_reports_itself_armed_in_info_gets_no_list() -> None:
 )
 def test_a_download_without_progress_ends(answer: Records) -> None:
     info = Info(1, InfoFlag(0), 15, 2, 6, 146, ListIdentity(20, 99), 200, 50, 0, 0)
-    _, station = found(FixedReplies({MissionCommand.READ: answer.encode()}, info))
+    _, station = found(FixedReplies({MissionCommand.READ: encode_reply(answer)}, info))
     download = Download(station, repeat_s=30)
     download.run(30)
     assert download.result is MissionResult.DENIED
@@ -203,9 +194,9 @@ class Reader(FakeExtension):
             return None
         self.reads += 1
         if self.reads == 1 or self.is_stubborn:
-            return self.first_reply.encode()
+            return encode_reply(self.first_reply)
         first = int.from_bytes(body[:2], "little")
-        return Records(ReplyStatus.OK, first, self.records[first : first + body[2]]).encode()
+        return encode_reply(Records(ReplyStatus.OK, first, self.records[first : first + body[2]]))
 
 
 def test_records_at_a_place_that_was_not_asked_for_are_read_again() -> None:
@@ -223,8 +214,8 @@ def test_a_refused_read_is_tried_only_once_more() -> None:
 
 @pytest.mark.parametrize("field", ["version", "chunk_records", "chunk_window", "read_records"])
 def test_info_without_a_number_that_a_transfer_needs_is_not_accepted(field: str) -> None:
-    assert decode_info(INFO.encode()) == INFO
-    assert decode_info(INFO._replace(**{field: 0}).encode()) is None  # type: ignore[arg-type]
+    assert decode_info(encode_reply(INFO)) == INFO
+    assert decode_info(encode_reply(INFO._replace(**{field: 0}))) is None  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("records", [15, 16, 40, 255])

@@ -2,7 +2,7 @@
 """A whole flight in each protocol: every value on a ground station's screen is correct and current."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import pytest
@@ -18,7 +18,6 @@ from simulator.inav.boxes import BOXES as INAV_BOXES
 from simulator.inav.boxes import NAV_POSHOLD, NAV_WP
 from tests.bridge.vehicle.test_vehicle_messages import battery_mv
 from tests.support.conversations import Upload
-from tests.support.fake_controllers import DeafWhileArmed
 from tests.support.world import GroundStation, World
 
 STEP_S, STALE_S = 0.1, 1.5
@@ -92,12 +91,6 @@ SCREEN = {
     "throttle": Shown("RC_CHANNELS", lambda msg: msg.chan3_raw, lambda c: 1450 if c.armed else 1000, 0),
     "arm switch": Shown("RC_CHANNELS", lambda msg: msg.chan5_raw, lambda c: 2000 if c.armed else 1000, 0),
 }
-#: All values from an armed Harakiri that only sends FrSky telemetry, and their resolution where coarser.
-FRSKY = "FrSky"
-FRSKY_RESOLUTION = {
-    "lat": 17, "lon": 17, "height": 11, "altitude": 501, "climb": 8, "speed north": 50, "speed east": 50,
-    "heading": 0.6, "volts": 160, "volts too": 160,
-}  # fmt: skip
 
 SCREEN_BY_KIND = {
     kind: [each for each in SCREEN.items() if each[1].kind == kind] for kind in {w.kind for w in SCREEN.values()}
@@ -110,7 +103,6 @@ class Screen:
 
     world: World
     station: GroundStation
-    resolution: Mapping[str, float]
     past: list[tuple[float, Craft]] = field(default_factory=list)
     shown: dict[str, tuple[float, float]] = field(default_factory=dict)
 
@@ -136,11 +128,11 @@ class Screen:
 
     def is_true(self, name: str, value: float) -> bool:
         """True if the craft had this value at some time within the last 1.5 s."""
-        what, resolution = SCREEN[name], self.resolution.get(name, SCREEN[name].resolution)
+        what = SCREEN[name]
         truths = [what.truth(craft) for craft in self.recent()]
         if what.circle:
-            return min(abs((value - truth + 180) % 360 - 180) for truth in truths) <= resolution + 1
-        return min(truths) - resolution <= value <= max(truths) + resolution
+            return min(abs((value - truth + 180) % 360 - 180) for truth in truths) <= what.resolution + 1
+        return min(truths) - what.resolution <= value <= max(truths) + what.resolution
 
     def recent(self) -> Iterator[Craft]:
         for at, craft in reversed(self.past):
@@ -170,9 +162,6 @@ def on_the_ground(board: str | TelemetryProtocol) -> Screen:
     """A ground station connected to a craft that is ready to arm."""
     if isinstance(board, TelemetryProtocol):
         world = World(SimOptions(tele_prot=board))
-    elif board == FRSKY:
-        deaf = DeafWhileArmed(SimOptions(tele_prot=TelemetryProtocol.FRSKY_9600), faults := Faults())
-        world = World(peer=deaf, faults=faults)
     else:
         world = World(peer=make_board(board, faults=(faults := Faults(boxes=0))), faults=faults)
     world.wait_ready(30)
@@ -181,7 +170,7 @@ def on_the_ground(board: str | TelemetryProtocol) -> Screen:
     world.run(6)  # long enough for the switches' ranges to be read
     if board in BOXES:
         assert Upload(station, MISSION).run() is MissionResult.ACCEPTED
-    return Screen(world, station, FRSKY_RESOLUTION if board == FRSKY else {})
+    return Screen(world, station)
 
 
 def is_found(world: World) -> bool:
@@ -194,22 +183,15 @@ def arm(screen: Screen) -> None:
         screen.fly(STEP_S, linked=False)
 
 
-ALL = [*TelemetryProtocol, *BOXES, FRSKY]
+ALL = [*TelemetryProtocol, *BOXES]
 
 
 def modes_of(board: str | TelemetryProtocol) -> tuple[tuple[int, int], ...]:
     """The boxes of three parts of a flight, each with the resulting mode."""
     if isinstance(board, TelemetryProtocol):
         return (ANGLE, COPTER_STABILIZE), (ANGLE | BARO, COPTER_ALT_HOLD), (ANGLE | BARO | GPS_HOLD, COPTER_LOITER)
-    if board == FRSKY:  # FrSky has no mode: the heartbeat keeps the last one
-        return ((ANGLE, COPTER_STABILIZE),) * 3
     level, mission, hold = BOXES[board]
     return (level, COPTER_STABILIZE), (mission, COPTER_AUTO), (hold, COPTER_LOITER)
-
-
-def shown_by(board: str | TelemetryProtocol) -> set[str]:
-    """The values that an armed board sends."""
-    return set(FRSKY_RESOLUTION if board == FRSKY else SCREEN)
 
 
 @pytest.mark.parametrize("board", ALL)
@@ -232,7 +214,7 @@ def test_every_shown_value_is_true_for_two_minutes_of_flight(board: str | Teleme
         shown = [screen.shown[name][1] / 1e7 for name in ("lat", "lon")]
         assert (place.lat_deg, place.lon_deg) == pytest.approx(shown)
     assert max(of_home(craft) for _, craft in screen.past) > 20
-    assert set(screen.shown) == shown_by(board)
+    assert set(screen.shown) == set(SCREEN)
 
 
 @pytest.mark.parametrize("board", ALL)
@@ -261,6 +243,6 @@ def test_values_from_before_a_lost_link_are_not_shown_as_current(board: str | Te
     assert any(text.startswith("Flight controller back after 2") for text in screen.station.texts())
     screen.shown.clear()
     screen.fly(5)
-    assert set(screen.shown) == shown_by(board)
+    assert set(screen.shown) == set(SCREEN)
     home = screen.station.messages("HOME_POSITION")[-1]
     assert (home.latitude, home.longitude) == FIELD

@@ -190,8 +190,8 @@ class TestLostFlightController:
             assert glance.armed
             assert not glance.safe
             assert not glance.failsafe
-        # FrSky telemetry has neither attitude nor mode, which the pilot must know.
-        assert set(screens.mission_planner.line.values(began)) <= {"FrSky while armed: no attitude, mode or RC"}
+        # No value is read from FrSky telemetry, which the pilot must know.
+        assert set(screens.mission_planner.line.values(began)) <= {"FrSky while armed: no attitude, position or mode"}
 
 
 class TestArming:

@@ -4,13 +4,13 @@
 import struct
 from collections.abc import Callable, Sequence
 
-from protocols.firmware_image import Image
 from protocols.mission_item import ListIdentity, identify, pack_records
 from protocols.msp.frame import request
 from protocols.msp.mission import WpRecord
 from simulator.board.msp_sensors import MspCommand
 from simulator.board.simulated_board import Power
 from simulator.emulated_naze.board import EmulatedNaze
+from simulator.emulated_naze.image import Image
 from tests.support.naze_bench import WireBench
 
 #: Adds a name and a value to the table printed at the end.

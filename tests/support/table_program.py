@@ -5,8 +5,8 @@ interrupt."""
 import struct
 from dataclasses import dataclass, field
 
-from protocols.firmware_image import Image
 from simulator.emulated_naze.board import EmulatedNaze
+from simulator.emulated_naze.image import Image
 from simulator.emulated_naze.switches import EmulatedFaults
 
 FLASH, RAM = 0x0800_0000, 0x2000_0000

@@ -24,9 +24,9 @@ from bridge.controllers.inav import profile as inav
 from bridge.controllers.table import PROFILES
 from bridge.effects import PublishGroups, RecordFrames, RememberFlight, SendToBoard
 from bridge.fc.profile import Profile
-from bridge.fc.states.cli import Cli
 from bridge.fc.states.mavlink import MavlinkLine
 from bridge.fc.states.msp import Polling
+from bridge.fc.states.mute import Cli
 from bridge.fc.states.searching import SPEEDS
 from bridge.gcs.rights import LinkAccess
 from bridge.gcs.station import Datagrams, Peer
@@ -369,8 +369,8 @@ class World:
                     for peer, frame in effect:
                         if (station := self.stations.get(peer)) is not None:
                             station.carry(frame)
-                case RecordFrames(frames):
-                    self.recorded += frames
+                case RecordFrames():
+                    self.recorded += effect
                 case PublishGroups(groups):
                     self._published |= groups
                 case RememberFlight():

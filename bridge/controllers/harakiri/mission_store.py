@@ -4,7 +4,6 @@
 from abc import ABC
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from typing import TypeVar
 from zlib import crc32
 
 from bridge.controllers.harakiri.check import HarakiriRules
@@ -42,7 +41,6 @@ from protocols.msp.mission import (
     Info,
     InfoFlag,
     MissionCommand,
-    Radius,
     ReplyStatus,
     Staged,
     WpRecord,
@@ -73,8 +71,6 @@ _FAILURES = {
     ReplyStatus.BAD_RECORD: PushFailure.REFUSED,
     ReplyStatus.FLASH: PushFailure.FLASH,
 }
-
-AnswerT = TypeVar("AnswerT", Staged, Radius)
 
 
 class HarakiriStore(FcMissionStore[WpRecord], ABC):
@@ -194,10 +190,10 @@ class HarakiriMissions(HarakiriStore):
         frame: bytes,
         command: MissionCommand,
         size: int,
-        decode: Callable[[bytes], AnswerT | None],
+        decode: Callable[[bytes], Staged | None],
         *,
         exclusive: bool = False,
-    ) -> Conversation[AnswerT | None]:
+    ) -> Conversation[Staged | None]:
         """Ask again for a second while it is busy writing its configuration; None if it does not answer."""
         waited_s = 0.0
         while True:

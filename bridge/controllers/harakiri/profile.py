@@ -117,6 +117,6 @@ FRSKY = Profile(
     _FAMILY,
     Spoken.FRSKY,
     missions=ARMED,
-    notice="FrSky while armed: no attitude, mode or RC",
+    notice="FrSky while armed: no attitude, position or mode",
 )
 PROFILES = (PATCHED, UNPATCHED, MAVLINK, FRSKY)

@@ -203,7 +203,7 @@ def _read(total: int, reading: TableReading) -> Conversation[list[BoardSetting] 
                 return None
             continue
         found += map(_shown, count(len(found)), reply.settings)
-        yield Pause(reading.pace(len(frame) + FRAME_OVERHEAD + len(reply.encode())))
+        yield Pause(reading.pace(len(frame) + FRAME_OVERHEAD + reply.size))
     return found
 
 

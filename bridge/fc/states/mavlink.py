@@ -10,7 +10,7 @@ from bridge.line.msp_link import PROBE, byte_time_s
 from bridge.model.vehicle import Source
 from protocols.mavlink.codec import FrameWriter, Packed
 from protocols.mavlink.dialect import messages
-from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter, is_autopilot_heartbeat, kinds
+from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter, kinds
 from protocols.msp.command_line import HAZARDS, RUN_LENGTH
 from protocols.msp.frame import MspParser
 
@@ -18,11 +18,6 @@ from protocols.msp.frame import MspParser
 _SILENCE_S = 2.5
 #: An incomplete frame is dropped after this long without a byte.
 _LINE_SILENCE_S = 0.1
-#: Heartbeats of one autopilot, and of no other in between, that outweigh the one frame, perhaps damaged, by which the
-#: state was chosen. Those closer together than `_BEAT_S` count as one: every autopilot sends one a second.
-_STEADY_BEATS, _BEAT_S = 5, 0.7
-#: The size of a heartbeat's frame: MAVLink 1, MAVLink 2, and signed.
-_HEARTBEAT_SIZES = frozenset((17, 21, 34))
 #: Armed it sends its attitude 30 times a second: when that ends, it has disarmed and changed its speed.
 _ARMED_SILENCE_S = 0.8
 #: Its stream of 1600 bytes a second overruns its own send ring on a slow line, so most frames are torn: before it
@@ -44,13 +39,11 @@ class MavlinkLine(State):
 
     def __init__(self, port: Port, event: Found, now: float) -> None:
         super().__init__(port, event, now)
-        self._spoken = event.spoken
         (profile,) = (profile for profile in port.profiles if profile.spoken is event.spoken)
         self.controller = FlightController(profile, profile.name)
         self._splitter = MavlinkSplitter()
         self._heard_at = self._last_byte_at = now
         self._look_at = now + _LINE_SILENCE_S
-        self._beating, self._beats, self._beat_at = (0, 0), 0, now
 
     @property
     def bad_checksums(self) -> int | None:
@@ -60,12 +53,10 @@ class MavlinkLine(State):
         """`is_end`: an incomplete frame is dropped."""
         self._last_byte_at = now
         frames = self._splitter.split(data, is_end=is_end)
-        if not frames:
-            return None
-        self._heard_at = now
-        self.take(frames, now)
-        # Measured first: there may be thousands of frames a second.
-        return None if _HEARTBEAT_SIZES.isdisjoint(map(len, frames)) else self._revision(frames, now)
+        if frames:
+            self._heard_at = now
+            self.take(frames, now)
+        return None
 
     def tick(self, now: float) -> Event | None:
         event = None
@@ -91,21 +82,6 @@ class MavlinkLine(State):
     @abstractmethod
     def take(self, frames: list[bytes], now: float) -> None:
         """Handle frames of the flight controller."""
-
-    def _revision(self, frames: list[bytes], now: float) -> Found | None:
-        """The other state, if its flight controller is the only one heard."""
-        for frame in map(MavlinkFrame, frames):
-            if not is_autopilot_heartbeat(frame):
-                continue
-            if frame.sender != self._beating:
-                self._beating, self._beats = frame.sender, 0
-            elif now < self._beat_at + _BEAT_S:
-                continue
-            self._beats, self._beat_at = self._beats + 1, now
-            spoken = self.port.mavlink_of(frame)
-            if self._beats >= _STEADY_BEATS and spoken is not self._spoken:
-                return Found(spoken, self.speed, f"heard only its heartbeats, {self._beats} in a row", frame)
-        return None
 
 
 class PassThrough(MavlinkLine):

@@ -2,14 +2,12 @@
 """The states of an MSP line: the board is being identified, or polled."""
 
 from collections.abc import Sequence
-from math import inf
 
 from bridge.fc.msp_telemetry import hear_msp
 from bridge.fc.profile import MSP_SILENCE_S, FlightController, Interview, NoAnswer, Profile, Spoken
 from bridge.fc.states.base import Event, Found, Identified, Lost, Port, State
 from bridge.line.conversation import Conversation, LinkLost
 from bridge.line.msp_link import MspLink, PendingReplies
-from bridge.model.missions import Refusal
 from protocols.frsky import FRSKY_SPEED
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter, is_disarmed_heartbeat
 from protocols.msp.frame import MspFrame
@@ -23,10 +21,6 @@ _FOREIGN_SIZE = 16
 _IDENTIFY_TIMEOUT_S = 15.0
 #: The speeds of Harakiri's telemetry while armed (tele_prot 3 and 1).
 _ARMED_SPEEDS = (57600, FRSKY_SPEED)
-#: A board that stores no missions is identified again after this time, then after twice as long, and so on: damaged
-#: replies can make a Harakiri look like another board.
-_FIRST_CHECK_S = 2.0
-_LAST_CHECK_S = 64.0
 
 
 class MspLine(State):
@@ -164,18 +158,11 @@ class Polling(MspLine):
         self.link.turn_s = controller.profile.turn_s
         port.polls.begin(event.found.speed, controller.profile.polls, controller.profile.turn_s)
         port.meet(controller)
-        self._check_interval_s = _FIRST_CHECK_S
-        self._check_at = now + _FIRST_CHECK_S if isinstance(controller.profile.missions, Refusal) else inf
 
     def tick(self, now: float) -> Event | None:
         event = super().tick(now)
         if event is None:
             self.port.polls.ask(self.link, now, beside_missions=self.port.runner.needs_line)
-            if now >= self._check_at and self.port.runner.is_busy:
-                self._check_at = now + _FIRST_CHECK_S
-            elif now >= self._check_at:
-                self._check_at = inf
-                self.port.runner.start(_identify(self.port.profiles), self._checked, now)
         return event
 
     @property
@@ -184,14 +171,7 @@ class Polling(MspLine):
             return 0.0
         is_torn = self.link.parser.skipped_bytes > self._foreign.skipped_before
         silent_at = self.link.last_heard_at + (self._silence_s() if is_torn else self._longest_silence_s)
-        return min(self.link.due, self.port.polls.due(self.link), silent_at, self._check_at)
-
-    def _checked(self, board: FlightController | LinkLost | None, now: float) -> None:
-        if isinstance(board, FlightController) and board.profile is not self.controller.profile:
-            self._end = Identified(board, self.found, self.link)
-            return
-        self._check_interval_s = min(self._check_interval_s * 2, _LAST_CHECK_S)
-        self._check_at = now + self._check_interval_s
+        return min(self.link.due, self.port.polls.due(self.link), silent_at)
 
 
 class _ForeignBytes:

@@ -18,7 +18,7 @@ from itertools import cycle, islice
 from bridge.fc.profile import Spoken
 from bridge.fc.states.base import Event, Found, Lost, Port, PortOpened, State
 from bridge.line.msp_link import PROBE, RESYNC, RESYNC_REPLY_SIZE, PendingReplies, byte_time_s
-from protocols.frsky import FRSKY_SPEED, FrskyParser
+from protocols.frsky import FRSKY_SPEED, FrskyWatch
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter, is_plausible_heartbeat
 from protocols.msp.command_line import EchoWatch
 from protocols.msp.commands import Msp
@@ -64,7 +64,7 @@ class _Visit:
     answer: MspFrame | None = None
     heartbeat: MavlinkFrame | None = None
     last_mavlink: MavlinkFrame | None = None
-    frsky: FrskyParser = field(default_factory=FrskyParser)
+    frsky: FrskyWatch = field(default_factory=FrskyWatch)
     echo: EchoWatch = field(default_factory=EchoWatch)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 from bridge.controllers.harakiri.profile import UNPATCHED
 from bridge.fc.states.base import Closed
-from bridge.fc.states.cli import Cli
+from bridge.fc.states.mute import Cli
 from payloads.mission_data import Json
 from protocols.mavlink.signing import Check
 from service.cli.doctor.checked import Checked, note, ok, problem

@@ -14,6 +14,7 @@ from bridge.model.vehicle import MissionLeg, Vehicle
 from protocols.msp.frame import Direction, MspFrame
 from protocols.msp.mission_flight import FLIGHT, FlightPhase, FlightProgress, FlightReason
 from reports.vehicle_groups import Progress
+from simulator.naze.replies import encode_flight
 
 PAUSED = (FlightPhase.HELD, FlightPhase.NO_FIX)
 FLYING = FlightProgress(
@@ -81,7 +82,7 @@ def test_a_compass_error_is_said_once(compass: float | None, why: str) -> None:
     assert (said == "") is (why == "")
 
 
-@pytest.mark.parametrize("payload", [b"", b"\x0b" + bytes(25), b"\0\x09" + bytes(24), FLYING.encode()[:-1]])
+@pytest.mark.parametrize("payload", [b"", b"\x0b" + bytes(25), b"\0\x09" + bytes(24), encode_flight(FLYING)[:-1]])
 def test_other_replies_change_nothing(payload: bytes) -> None:
     vehicle = Vehicle()
     hear_msp(vehicle, MspFrame(Direction.REPLY, FLIGHT, payload), FlightController(PATCHED, PATCHED.name), 0.0)

@@ -8,9 +8,8 @@ import pytest
 
 from bridge.fc.session import TRANSITIONS
 from bridge.fc.states.base import Closed, State
-from bridge.fc.states.cli import Cli
-from bridge.fc.states.frsky import Frsky
 from bridge.fc.states.mavlink import HarakiriMavlink, PassThrough
+from bridge.fc.states.mute import Cli, Frsky
 from bridge.fc.states.searching import Searching
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from tests.support.fake_controllers import DeafWhileArmed, MavlinkOnly

@@ -16,7 +16,6 @@ from bridge.firmware.reflash import (
     settings_in,
     start_boot_loader,
 )
-from protocols.firmware_image import PROGRAM_END
 from protocols.stm32_boot_loader import PAGE_SIZE, Dialogue, start_program
 from simulator.board.options import SimOptions
 from simulator.board.simulated_board import Power
@@ -36,18 +35,18 @@ def quiet(_name: str, _done: int, _total: int) -> None:
 def flash(progress: Progress = quiet) -> Dialogue[None]:
     yield from find_chip(5.0, lambda: None)
     present = yield from read_flash(progress)
-    yield from rewrite_flash(present, PROGRAM.ljust(PROGRAM_END, b"\xff") + present[PROGRAM_END:], progress)
+    yield from rewrite_flash(present, PROGRAM.ljust(0x1D800, b"\xff") + present[0x1D800:], progress)
 
 
 def assert_flashed(board: SimulatedNaze, reserved: bytes) -> None:
     contents = board.flash_contents
-    assert contents[:PROGRAM_END].rstrip(b"\xff") == PROGRAM.rstrip(b"\xff")
-    assert contents[PROGRAM_END:] == reserved
+    assert contents[:0x1D800].rstrip(b"\xff") == PROGRAM.rstrip(b"\xff")
+    assert contents[0x1D800:] == reserved
 
 
 def test_a_program_is_written_and_everything_above_it_is_kept() -> None:
     board = board_in_boot_loader()
-    reserved = board.flash_contents[PROGRAM_END:]
+    reserved = board.flash_contents[0x1D800:]
     steps: dict[str, tuple[int, int]] = {}
     bench = DialogueBench(board)
     bench.run(flash(lambda name, done, total: steps.update({name: (done, total)})))
@@ -88,17 +87,17 @@ def test_a_flash_broken_off_anywhere_is_resumed_and_no_half_program_starts() -> 
             bench.run(flash())
         half = board.flash_contents
         if not half.startswith(b"\xff" * 8):
-            is_whole = half[:PROGRAM_END].rstrip(b"\xff") in (PROGRAM, before[:PROGRAM_END].rstrip(b"\xff"))
+            is_whole = half[:0x1D800].rstrip(b"\xff") in (PROGRAM, before[:0x1D800].rstrip(b"\xff"))
             assert is_whole, f"a half-written program would start, cut {cut}"
         again = DialogueBench(board, bench.now + 1)
         again.run(flash())
-        assert_flashed(board, before[PROGRAM_END:])
+        assert_flashed(board, before[0x1D800:])
 
 
 @pytest.mark.parametrize("operation", [1, 7, 20, 30])
 def test_after_a_power_cut_the_boot_pads_resume_it(operation: int) -> None:
     board = board_in_boot_loader(operation)
-    reserved = board.flash_contents[PROGRAM_END:]
+    reserved = board.flash_contents[0x1D800:]
     board.faults.power_cut_at_flash_operation = operation
     bench = DialogueBench(board)
     with pytest.raises(FlashingError, match="no longer answers"):
@@ -111,7 +110,7 @@ def test_after_a_power_cut_the_boot_pads_resume_it(operation: int) -> None:
 
 def test_lost_bytes_and_failed_operations_are_repeated() -> None:
     board = board_in_boot_loader()
-    reserved = board.flash_contents[PROGRAM_END:]
+    reserved = board.flash_contents[0x1D800:]
     board.faults.lost_byte_rate = 2e-5
     board.faults.flash_failures = 2
     bench = DialogueBench(board)

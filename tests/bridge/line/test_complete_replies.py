@@ -67,7 +67,7 @@ def test_a_few_bytes_are_read_on_arrival() -> None:
     [
         poll(Msp.ATTITUDE, may_wait=False),
         Send(request(Msp.IDENT), Msp.IDENT, 13),
-        Send(request(Msp.RC), Msp.RC, frame_size(Msp.RC, 32), is_kept=True, is_shared=True),
+        Send(request(Msp.RC), Msp.RC, frame_size(Msp.RC, 32), is_kept=True),
     ],
     ids=["a fast poll", "a conversation", "another program"],
 )

@@ -2,7 +2,7 @@
 """The record that the craft flies to, and the last one reached."""
 
 from bridge.model.missions import FlownMission, MissionProgress
-from protocols.msp.nav import FINISHED, NavAction, NavMode, NavState, NavStatus
+from protocols.msp.nav import NavAction, NavMode, NavState, NavStatus
 from reports.vehicle_groups import Progress
 
 ON_ITS_WAY = 5
@@ -44,7 +44,7 @@ def test_the_return_home_at_the_end_completes_the_mission_and_another_one_ends_i
 
 def test_a_finished_mission_is_complete() -> None:
     progress = MissionProgress()
-    assert progress.take(status(4, error=FINISHED)) == (4,)
+    assert progress.take(status(4, error=4)) == (4,)
     assert progress.progress is Progress.COMPLETE
 
 

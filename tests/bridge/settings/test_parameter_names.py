@@ -2,7 +2,7 @@
 
 import pytest
 
-from bridge.settings.parameter_names import LONGEST, parameter_names
+from bridge.settings.parameter_names import parameter_names
 from simulator.inav.setting_table import SETTINGS as INAV_SETTINGS
 from simulator.naze.setting_table import SETTINGS as NAZE_SETTINGS
 from tests.support.settings_client import BOARDS, ready
@@ -35,7 +35,7 @@ def test_all_names_are_short_and_distinct() -> None:
     for settings in (HARAKIRI, INAV):
         names = parameter_names(settings)
         assert [*names.values()] == settings
-        assert all(len(name) <= LONGEST and name == name.upper() for name in names)
+        assert all(len(name) <= 16 and name == name.upper() for name in names)
 
 
 @pytest.mark.parametrize("name", BOARDS)
@@ -50,7 +50,7 @@ def test_no_two_settings_of_a_board_are_one_parameter(name: str) -> None:
 
 
 def test_a_name_that_fits_is_kept() -> None:
-    assert all(name.upper() in parameter_names(HARAKIRI) for name in HARAKIRI if len(name) <= LONGEST)
+    assert all(name.upper() in parameter_names(HARAKIRI) for name in HARAKIRI if len(name) <= 16)
 
 
 def test_long_names_stay_readable() -> None:
@@ -63,7 +63,7 @@ def test_long_names_stay_readable() -> None:
 def test_the_longest_names_of_inav_need_no_checksum() -> None:
     names = parameter_names(LONG.split())
     assert len(names) == len(LONG.split())
-    assert not [name for name in names if "~" in name or len(name) > LONGEST]
+    assert not [name for name in names if "~" in name or len(name) > 16]
     assert parameter_names(["nav_wp_max_safe_distance"]).keys() == {"NAV_WP_MX_SF_DST"}
     assert parameter_names(["failsafe_min_distance_procedure"]).keys() == {"FS_MIN_DIST_PROC"}
 
@@ -72,7 +72,7 @@ def test_names_that_would_coincide_get_a_checksum() -> None:
     alike = ["failsafe_procedure_aa", "failsafe_procedure_ae", "fs_proc_aa"]
     names = parameter_names(alike)
     assert len(names) == 3
-    assert all(len(name) <= LONGEST for name in names)
+    assert all(len(name) <= 16 for name in names)
 
 
 def test_a_name_depends_on_no_other_setting_of_another_name() -> None:

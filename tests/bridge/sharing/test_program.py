@@ -93,7 +93,6 @@ def test_a_flooder_leaves_another_program_of_its_host_its_share() -> None:
 
 
 def test_reads_that_are_never_answered_do_not_slow_telemetry() -> None:
-    """A lost reply slows the polls, because the line may be bad. These say nothing about it."""
     board = FakeInav(drop=lambda frame: "reply" if frame.command in (PID, MISC) else "")
     board.answers = {**board.answers, ATTITUDE: bytes(6)}
     world = World(speeds=(115200,), peer=board)

@@ -13,7 +13,7 @@ from bridge.model.vehicle import MissionLeg
 from protocols.mavlink.dialect import Message
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.msp.frame import MspFrame, MspParser
-from protocols.msp.nav import FINISHED, SET_WP_INDEX, Nav, NavState, NavStatus
+from protocols.msp.nav import FINISHED, Nav, NavState, NavStatus
 from simulator.board.msp_board import MspBoard
 from simulator.board.msp_options import MspOptions
 from simulator.board.options import Faults
@@ -97,7 +97,7 @@ class Flight:
 
     def sent(self) -> list[MspFrame]:
         frames = [frame for _, _, data in self.world.written for frame in MspParser().feed(data)]
-        return [frame for frame in frames if frame.command == SET_WP_INDEX]
+        return [frame for frame in frames if frame.command == 0x2221]
 
     def current(self, station: GroundStation | None = None) -> list[int]:
         return [message.seq for message in (station or self.station).messages("MISSION_CURRENT")]
@@ -298,7 +298,7 @@ def test_without_a_known_mission_nothing_is_sent() -> None:
     station.send(long(1))
     world.run(0.5)
     assert (results(station), station.texts()) == ([DENIED], ["Set WP: the mission on board is not known"])
-    assert SET_WP_INDEX not in inav.commands
+    assert 0x2221 not in inav.commands
 
 
 def test_other_boards_refuse_it_as_before() -> None:

@@ -6,9 +6,6 @@ import struct
 import pytest
 
 from protocols.msp.inav_places import (
-    GEOZONE_SIZE,
-    SAFEHOME_SIZE,
-    VERTEX_SIZE,
     Corner,
     FwApproach,
     Geozone,
@@ -33,14 +30,14 @@ def test_a_zone_is_read_as_it_was_set(zone: Geozone, polygon: bool) -> None:
     assert head == GeozoneHead(zone.number, zone.is_inclusive, polygon, *heights, zone.action, zone.vertices)
     read = [decode_vertex(zone.vertex(number)) for number in range(len(zone.corners))]
     assert read == [(corner, zone.radius_cm) for corner in zone.corners]
-    assert len(zone.head()) == GEOZONE_SIZE
-    assert len(zone.vertex(0)) == VERTEX_SIZE - 4 * polygon
+    assert len(zone.head()) == 14
+    assert len(zone.vertex(0)) == 14 - 4 * polygon
 
 
 def test_replies_that_are_cut_are_none() -> None:
     safehome = Safehome(7, True, 453838000, -84733000)
     assert decode_safehome(safehome.pack()) == safehome
-    assert decode_safehome(safehome.pack()[: SAFEHOME_SIZE - 1]) is None
+    assert decode_safehome(safehome.pack()[: 10 - 1]) is None
     assert decode_approach(APPROACH[:-1]) is None
     assert decode_geozone(CIRCLE.head()[:-1]) is None
     assert decode_vertex(CIRCLE.vertex(0)[:9]) is None

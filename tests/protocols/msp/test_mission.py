@@ -11,7 +11,6 @@ from protocols.msp.frame import MspFrame, MspParser
 from protocols.msp.mission import (
     ABORT_REQUEST,
     INFO_REQUEST,
-    MAX_RADIUS_CM,
     RECORD_SIZE,
     MissionCommand,
     WpRecord,
@@ -19,13 +18,12 @@ from protocols.msp.mission import (
     encode_begin,
     encode_chunk,
     encode_commit,
-    encode_radius,
     encode_read,
     find_mask,
-    unmask,
     unpack_records,
 )
 from simulator.board.msp_port import MspReceiver
+from simulator.naze.replies import MAX_RADIUS_CM, encode_radius, unmask
 
 #: Three in a row of one of these act on Harakiri's command line (serial.c, serialCom).
 HAZARDS = frozenset(b"\r#R")

@@ -18,6 +18,7 @@ from protocols.msp.mission_flight import (
     decode_flight,
     decode_summary,
 )
+from simulator.naze.replies import encode_flight
 from tests.support.programs import REPOSITORY
 
 _HEADER = (REPOSITORY / "firmware" / "naze_flight.h").read_text()
@@ -40,8 +41,8 @@ def test_a_reply_is_read() -> None:
 def test_a_reply_is_written_as_it_was_read() -> None:
     progress = decode_flight(REPLY)
     assert progress is not None
-    assert decode_flight(progress.encode()) == progress
-    assert decode_flight(replace(progress, record=None).encode()) == replace(progress, record=None)
+    assert decode_flight(encode_flight(progress)) == progress
+    assert decode_flight(encode_flight(replace(progress, record=None))) == replace(progress, record=None)
 
 
 @pytest.mark.parametrize("record", [None, 0, 145])

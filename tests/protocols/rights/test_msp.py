@@ -21,7 +21,6 @@ from protocols.msp.mission import (
     encode_begin,
     encode_chunk,
     encode_commit,
-    encode_radius,
     encode_read,
 )
 from protocols.msp.mission_flight import FLIGHT_REQUEST
@@ -42,6 +41,7 @@ from protocols.msp.setting_table import TABLE_REQUEST, SettingCommand, encode_sa
 from protocols.msp.settings import SETTINGS
 from protocols.rights import Effect
 from protocols.rights.msp import MSP_RIGHTS, Firmware, msp_right
+from simulator.naze.replies import encode_radius
 
 EVERY = tuple(Firmware)
 MISSIONS = (Firmware.HARAKIRI_MISSIONS,)

@@ -12,11 +12,15 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from structlog.testing import capture_logs
 
 from protocols.mavlink.frame import MavlinkFrame
-from protocols.mavlink.signing import TICKS_PER_S, TOLERANCE, Check, SignedPeer, Signing, key_from_passphrase, ticks
+from protocols.mavlink.signing import Check, SignedPeer, Signing, key_from_passphrase, ticks
 from service.links.signing_state import FILE_NAME, SigningState
 from service.settings.addresses import GcsAddress
 from service.settings.write_access import WriteAccess
 from tests.support.programs import until_async
+
+#: MAVLink's signing: ticks of 10 us, and the greatest lag of a new stream, one minute.
+TICKS_PER_S, TOLERANCE = 100_000, 6_000_000
+
 
 KEY = key_from_passphrase("a passphrase")
 NOON = 1_795_262_400.0

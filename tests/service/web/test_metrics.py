@@ -64,10 +64,7 @@ async def test_prometheus_reads_the_counters_of_a_daemon(tmp_path: Path) -> None
     assert -90 < after["latitude_degrees", ()] < 90
     assert ("height_meters", ()) in after
     assert after["process_resident_memory_bytes", ()] > 1e6
-    answered = after["fc_round_trip_seconds_bucket", ("+Inf",)]
-    assert answered == after["fc_round_trip_seconds_count", ()] >= 12
-    assert answered >= after["fc_round_trip_seconds_bucket", ("0.1",)]
-    assert 0 <= after["fc_round_trip_seconds_sum", ()] < answered
+    assert 0 < after["fc_round_trip_seconds", ()] < 1
     assert after["fc_dropped_bytes_total", ()] == 0
     for way in ("received", "sent"):
         for name in ("fc", str(link)):

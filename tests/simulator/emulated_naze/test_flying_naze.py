@@ -5,8 +5,8 @@ import struct
 
 import pytest
 
-from protocols.firmware_image import Image
 from simulator.emulated_naze.flying_naze import FlyingNaze
+from simulator.emulated_naze.image import Image
 
 #: Stack pointer, entry, and a jump to itself.
 LOOP = struct.pack("<II", 0x2000_5000, 0x0800_0009) + b"\xfe\xe7"

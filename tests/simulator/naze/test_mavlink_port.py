@@ -8,9 +8,9 @@ from pymavlink.dialects.v10 import common as mavlink1
 from pymavlink.dialects.v20 import common as mavlink2
 
 from protocols.msp.frame import request
-from protocols.msp.mission import encode_radius
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from simulator.naze.firmware import Protocol
+from simulator.naze.replies import encode_radius
 from tests.support.naze_bench import Bench
 
 IDENT = request(100)

@@ -22,16 +22,15 @@ from protocols.msp.mission import (
     WpRecord,
     apply_mask,
     decode_info,
-    decode_radius,
     decode_records,
     encode_begin,
     encode_chunk,
     encode_commit,
-    encode_radius,
     encode_read,
 )
 from simulator.board.options import Faults, SimOptions
 from simulator.board.simulated_board import Power
+from simulator.naze.replies import decode_radius, encode_radius
 from tests.support.naze_bench import BOOT_SECONDS, Bench, mission
 
 NOTHING = ListIdentity(0, 0)

@@ -9,9 +9,7 @@ import pytest
 from protocols.mission_item import Command, MissionResult
 from protocols.msp.frame import Direction, MspFrame
 from protocols.msp.inav_places import (
-    APPROACHES,
     FW_APPROACH,
-    MISSION_APPROACH,
     SET_FW_APPROACH,
     SET_SAFEHOME,
     FwApproach,
@@ -44,30 +42,30 @@ def set_approaches(board: MspBoard, *numbers: int) -> None:
 
 
 def approaches_of(board: MspBoard) -> list[FwApproach | None]:
-    return [decode_approach(places_of(board).answer(FW_APPROACH, bytes((n,))) or b"") for n in range(APPROACHES)]
+    return [decode_approach(places_of(board).answer(FW_APPROACH, bytes((n,))) or b"") for n in range(17)]
 
 
 @pytest.mark.parametrize("platform", [0, _PLANE])
 def test_writes_of_missions_keep_all_approaches_and_save_them(platform: int) -> None:
     """The platform is that of the active profile: a VTOL may be a copter when it is written to."""
     board, world, station = board_with(version="9.1.0", platform=platform)
-    set_approaches(board, *range(APPROACHES))
+    set_approaches(board, *range(17))
     world.inside.missions.settings_changed()
     for size in range(3, 15):
         assert Upload(station, plan(size)).run() is ACCEPTED
-        assert approaches_of(board) == [approach(number) for number in range(APPROACHES)]
+        assert approaches_of(board) == [approach(number) for number in range(17)]
     board.power_off(world.now)
     board.power_on_booted(world.now)
     world.run(1)
-    assert approaches_of(board) == [approach(number) for number in range(APPROACHES)]
+    assert approaches_of(board) == [approach(number) for number in range(17)]
 
 
 def test_an_approach_that_another_client_has_set_since_is_kept() -> None:
     board, _, station = board_with(version="9.1.0", platform=_PLANE)
     assert Upload(station, plan(3)).run() is ACCEPTED
-    set_approaches(board, MISSION_APPROACH)
+    set_approaches(board, 8)
     assert Upload(station, plan(4)).run() is ACCEPTED
-    assert approaches_of(board)[MISSION_APPROACH] == approach(MISSION_APPROACH)
+    assert approaches_of(board)[8] == approach(8)
 
 
 def refusing(answer: Callable[[int, bytes, float], bytes | None], refused: int) -> Callable[..., bytes | None]:
@@ -81,7 +79,7 @@ def refusing(answer: Callable[[int, bytes, float], bytes | None], refused: int) 
 
 def test_a_mission_is_not_saved_without_its_approach(monkeypatch: pytest.MonkeyPatch) -> None:
     board, _, station = board_with(version="9.1.0", platform=_PLANE)
-    set_approaches(board, MISSION_APPROACH)
+    set_approaches(board, 8)
     places_of(board).save()
     firmware = board._firmware
     monkeypatch.setattr(firmware, "answer", refusing(firmware.answer, SET_FW_APPROACH))  # type: ignore[union-attr]

@@ -15,7 +15,7 @@ from bridge.model.missions import Refusal
 from protocols.mission_item import MissionResult
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame
-from protocols.msp.nav import FINISHED, SET_WP_INDEX, NavAction, NavRecord, NavState
+from protocols.msp.nav import FINISHED, NavAction, NavRecord, NavState
 
 RECORD = NavRecord(NavAction.WAYPOINT, 453838000, 84733000, 2000)
 BOARD = FlightController(PROFILE, "INAV", boxes=("ARM", "NAV WP"), version=(9, 1, 0))
@@ -41,7 +41,7 @@ class Inav:
         elif command == Msp.NAV_STATUS:
             reply = pack("<5BH", self.mode, self.state, self.action, self.number, self.error, 0)
         else:
-            assert command == SET_WP_INDEX
+            assert command == 0x2221
             self.set_to.append(asked.request.frame[-2] + 1)
             direction = self.direction
             if self.obeys and direction is Direction.REPLY:
@@ -72,7 +72,7 @@ def test_it_is_sent_once_and_verified() -> None:
 
 
 def test_a_lost_reply_is_no_failure_if_the_craft_flies_there() -> None:
-    inav = Inav(lost=frozenset((SET_WP_INDEX,)))
+    inav = Inav(lost=frozenset((0x2221,)))
     assert run(inav) is None
     assert inav.set_to == [3], "not repeated"
 
@@ -81,7 +81,7 @@ def test_a_lost_reply_is_no_failure_if_the_craft_flies_there() -> None:
     ("inav", "ack", "text"),
     [
         (Inav(obeys=False), MissionResult.ERROR, "Set WP failed: INAV flies on as before"),
-        (Inav(obeys=False, lost=frozenset((SET_WP_INDEX,))), MissionResult.ERROR, "no answer"),
+        (Inav(obeys=False, lost=frozenset((0x2221,))), MissionResult.ERROR, "no answer"),
         (Inav(lost=frozenset((Msp.NAV_STATUS,))), MissionResult.ERROR, "no answer"),
         (Inav(lost=frozenset((Msp.INAV_STATUS,))), MissionResult.ERROR, "no answer"),
     ],
@@ -91,7 +91,7 @@ def test_a_craft_that_does_not_fly_there_is_a_failure(inav: Inav, ack: MissionRe
     assert refusal is not None
     assert refusal.ack is ack
     assert text in refusal.text
-    assert len(inav.set_to) == (inav.lost <= {SET_WP_INDEX})
+    assert len(inav.set_to) == (inav.lost <= {0x2221})
 
 
 def changed(**values: int) -> Callable[[], Inav]:

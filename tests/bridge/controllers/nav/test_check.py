@@ -15,7 +15,7 @@ from bridge.controllers.nav.rules import inav_profile
 from bridge.missions.list_check import check_list
 from protocols.mavlink.codec import item_from_float_message
 from protocols.mission_item import MissionItem, MissionResult
-from protocols.msp.nav import ENDLESS_S, FLY_HOME, LAST, LEGS, NavAction, NavRecord, decode_wp, encode_set_wp
+from protocols.msp.nav import ENDLESS_S, FLY_HOME, LEGS, NavAction, NavRecord, decode_wp, encode_set_wp
 from protocols.msp.nav_items import home_item, items_from_records
 from reports.finding import DROPPED, News
 from reports.verdict import Result
@@ -110,7 +110,7 @@ def test_unsupported_commands_are_dropped(sent: MissionItem) -> None:
 
 def test_a_landing_without_a_position_after_rtl_is_merged_into_it() -> None:
     rtl, land = item(C.NAV_RETURN_TO_LAUNCH, at=False), item(C.NAV_LAND, at=False)
-    assert kept(WP, rtl, land)[1:] == (NavRecord(A.RTH, p1=1, flag=LAST),)
+    assert kept(WP, rtl, land)[1:] == (NavRecord(A.RTH, p1=1, flag=0xA5),)
     assert findings_for(WP, rtl, land) == [(3, "command", 21, DROPPED)]
 
 
@@ -214,7 +214,7 @@ def test_nothing_raises_and_nothing_dangerous_is_kept(sent: list[MissionItem], r
     if verdict.result is not Result.ACCEPTED:
         assert verdict.records == ()
         return
-    assert [record.flag for record in verdict.records] == [0] * (len(verdict.records) - 1) + [LAST]
+    assert [record.flag for record in verdict.records] == [0] * (len(verdict.records) - 1) + [0xA5]
     for number, record in enumerate(verdict.records, 1):
         assert decode_wp(encode_set_wp(number, record)[5:-1]) == (number, record)
         if record.action == A.JUMP:
@@ -302,7 +302,7 @@ foreign_turns = st.one_of(
 @settings(max_examples=MANY, deadline=None)
 def test_another_planners_list_is_written_back_unchanged(before: list[NavRecord], last: NavRecord) -> None:
     """User actions, legs that fly home and a landing's ground elevation appear in no item but are kept."""
-    held = (*before, replace(last, flag=LAST))
+    held = (*before, replace(last, flag=0xA5))
     again = check_list(items_from_records(held, home_item((LAT, LON))), NavRules(inav_profile(), held))
     changes = [finding for finding in again.findings if finding.was != finding.becomes]
     assert (again.result, changes, again.records) == (Result.ACCEPTED, [], held)

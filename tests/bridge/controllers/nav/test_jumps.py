@@ -6,7 +6,7 @@ import math
 import pytest
 
 from protocols.mission_item import MissionItem, MissionResult
-from protocols.msp.nav import LAST, NavRecord
+from protocols.msp.nav import NavRecord
 from reports.finding import REJECTED
 from reports.verdict import Result
 from tests.support.nav_lists import (
@@ -34,7 +34,7 @@ def test_a_jump_target_is_renumbered_for_the_flight_controller() -> None:
 
 
 def test_a_jump_to_a_merged_or_dropped_item_goes_to_the_next() -> None:
-    assert kept(WP, speed(5), WP, WP, jump(2, -1))[3] == NavRecord(A.JUMP, p1=2, p2=-1, flag=LAST)
+    assert kept(WP, speed(5), WP, WP, jump(2, -1))[3] == NavRecord(A.JUMP, p1=2, p2=-1, flag=0xA5)
     takeoff = item(C.NAV_TAKEOFF, at=False, alt_m=5.0)
     assert kept(takeoff, WP, WP, jump(1))[2].p1 == 1
     assert findings_for(takeoff, WP, WP, jump(1))[-1] == (4, "p1", 1, 2)

@@ -4,7 +4,6 @@
 import pytest
 
 from bridge.controllers.harakiri import profile as harakiri
-from bridge.model.vehicle import GlobalPosition
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from simulator.naze.board import SimulatedNaze
 from tests.support.world import World
@@ -48,4 +47,4 @@ def test_a_deaf_board_is_recognised_by_its_frsky_telemetry(after_s: float) -> No
     assert world.kind is harakiri.FRSKY
     world.run(20)
     assert world.kind is harakiri.FRSKY
-    assert world.bridge.vehicle.fresh(GlobalPosition, world.now) is not None
+    assert world.bridge.vehicle.armed

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The flight controller is in its command line, which only a reset leaves."""
+"""The states of a line on which the flight controller answers nothing: its command line, and FrSky telemetry."""
 
+from bridge.fc.profile import FlightController, Spoken
 from bridge.fc.states.base import Event, Found, Lost, Port, State
 from bridge.line.msp_link import PROBE
+from bridge.model.vehicle import Source
+from protocols.frsky import FRSKY_SPEED, FrskyWatch
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.msp.command_line import RUB_OUT_LINE, typed_and_rubbed_out
 from protocols.msp.frame import Direction, MspParser
@@ -11,6 +14,10 @@ from protocols.msp.frame import Direction, MspParser
 _QUIET_S = 3.0
 #: Two requests without an echo: it is restarting, or has no power.
 _SILENCE_S = 7.0
+#: Harakiri sends FrSky telemetry eight times a second.
+_FRSKY_SILENCE_S = 1.0
+#: A Harakiri that receives requests also answers MSP.
+_PROBE_INTERVAL_S = 5.0
 
 
 class Cli(State):
@@ -54,3 +61,41 @@ class Cli(State):
     def _begin_listening(self) -> None:
         # An echoed header hides what follows it from the parser.
         self._msp, self._mavlink = MspParser(), MavlinkSplitter()
+
+
+class Frsky(State):
+    """An armed Harakiri sends FrSky telemetry (tele_prot 1), and did not answer MSP."""
+
+    name = "FrSky"
+    controller: FlightController
+
+    def __init__(self, port: Port, event: Found, now: float) -> None:
+        super().__init__(port, event, now)
+        (profile,) = (profile for profile in port.profiles if profile.spoken is Spoken.FRSKY)
+        self.controller = FlightController(profile, profile.name)
+        self._frsky, self._msp = FrskyWatch(), MspParser()
+        self._probe_due = now + _PROBE_INTERVAL_S
+        port.meet(self.controller)
+        self._note_armed(now)
+
+    def receive(self, data: bytes, now: float) -> Event | None:
+        self._frsky.feed(data)
+        if self._frsky.values_in_a_row:
+            self._note_armed(now)
+        return Lost("it answers MSP again", (FRSKY_SPEED,)) if self._msp.feed(data) else None
+
+    def _note_armed(self, now: float) -> None:
+        self._heard_at = now
+        self.port.hear_armed(Source.FRSKY, now)
+
+    def tick(self, now: float) -> Event | None:
+        if now >= self._probe_due:
+            self._probe_due = now + _PROBE_INTERVAL_S
+            self.port.output.append(PROBE)
+        return (
+            Lost(f"no FrSky telemetry for {_FRSKY_SILENCE_S} s") if now >= self._heard_at + _FRSKY_SILENCE_S else None
+        )
+
+    @property
+    def due(self) -> float:
+        return min(self._probe_due, self._heard_at + _FRSKY_SILENCE_S)
