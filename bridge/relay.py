@@ -71,22 +71,39 @@ class WriteResult:
     items: tuple[MissionItem, ...] | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class SendToVehicle:
+    """An effect: send a frame to the vehicle."""
+
+    frame: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class WriteList:
+    """An effect: have the vehicle write a list, () to clear. The reply is passed to `Relay.wrote`."""
+
+    items: Sequence[MissionItem]
+
+
+RelayEffect = Datagrams | SendToVehicle | WriteList
+
+
 class Relay:
     """One vehicle and its ground stations.
 
-    `to_vehicle` gets the frames for it, `write` the lists, () to clear; the reply is `wrote`. Missions are received
-    here once the vehicle's mission is known (`holds`), which shows that it stores missions itself. `is_near`: as of
-    Ground.
+    After each input, carry out the effects, and call `tick` at `due`:
+
+    >>> relay.gcs_received(peer, data, now, datagram=True)
+    >>> for effect in relay.take():
+    ...     match effect:
+    ...         case SendToVehicle(frame): link.write(frame)
+
+    Missions are received here once the vehicle's mission is known (`holds`), which shows that it stores missions
+    itself. `is_near`: as of Ground.
     """
 
-    def __init__(
-        self,
-        to_vehicle: Callable[[bytes], object],
-        write: Callable[[Sequence[MissionItem]], object],
-        is_near: Callable[[str], bool] = lambda _host: True,
-    ) -> None:
-        self._to_vehicle = to_vehicle
-        self._write = write
+    def __init__(self, is_near: Callable[[str], bool] = lambda _host: True) -> None:
+        self._effects: list[RelayEffect] = []
         self._is_near = is_near
         self._splitter = MavlinkSplitter()
         self._peers: list[tuple[Peer, bool]] = []
@@ -117,14 +134,17 @@ class Relay:
         if self._end is not None:
             self._end.ground.remove_default_peer(peer)
 
-    def take(self) -> Datagrams:
-        """The datagrams to send."""
-        return Datagrams() if self._end is None else self._end.ground.outbox.take()
+    def take(self) -> list[RelayEffect]:
+        """What is to be done since the last call."""
+        if self._end is not None and self._end.ground.outbox.outgoing:
+            self._effects.append(self._end.ground.outbox.take())
+        effects, self._effects[:] = [*self._effects], []
+        return effects
 
     def gcs_received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> None:
         """Handle bytes from a ground station; before the vehicle was heard they are passed on."""
         if self._end is None:
-            self._to_vehicle(data)
+            self._effects.append(SendToVehicle(data))
         else:
             self._end.received(peer, data, now, datagram=datagram)
 
@@ -137,7 +157,7 @@ class Relay:
         """Pass on frames of the vehicle."""
         for frame in self._splitter.feed(data):
             if self._end is None:
-                self._end = _End(frame.sender, self._to_vehicle, self._write, self._is_near)
+                self._end = _End(frame.sender, self._effects, self._is_near)
                 for peer, until_answered in self._peers:
                     self._end.ground.add_default_peer(peer, until_answered=until_answered)
                 self._end.holds(*self._held)
@@ -150,7 +170,7 @@ class Relay:
             self._end.holds(items, identity)
 
     def wrote(self, result: WriteResult) -> None:
-        """The vehicle has replied to `write`."""
+        """The vehicle has replied to a WriteList."""
         if self._end is not None:
             self._end.missions.results.append(result)
 
@@ -158,19 +178,13 @@ class Relay:
 class _End:
     """The vehicle's end of MAVLink's mission protocol, under its ids."""
 
-    def __init__(
-        self,
-        ids: tuple[int, int],
-        to_vehicle: Callable[[bytes], object],
-        write: Callable[[Sequence[MissionItem]], object],
-        is_near: Callable[[str], bool],
-    ) -> None:
+    def __init__(self, ids: tuple[int, int], effects: list[RelayEffect], is_near: Callable[[str], bool]) -> None:
         self.ids = ids
-        self._to_vehicle = to_vehicle
+        self._effects = effects
         self._targets = {(system, component) for system in (0, ids[0]) for component in (0, ids[1])}
         self.ground = Ground(*ids, _ignore, lambda _station, _now: None, {}, LinkAccess(), is_near)
         self._runner = Runner(lambda _effect: None)
-        self.missions = _RemoteMissions(Vehicle(), self._runner, self.ground, write)
+        self.missions = _RemoteMissions(Vehicle(), self._runner, self.ground, effects)
         self.uploads = MissionUploads(self.missions, self.ground, _ignore, count(1))
         downloads = self._downloads = MissionDownloads(self.missions, self.ground)
         uploads = self.uploads
@@ -224,7 +238,7 @@ class _End:
                 return
             sender = self.ground.heard(station, frame, frame.sender, now)
             if sender is not None and not self._is_answered(sender, frame, now):
-                self._to_vehicle(frame.raw)
+                self._effects.append(SendToVehicle(frame.raw))
 
     def _item(self, convert: Callable[[Message], MissionItem], sender: Sender, message: Message, now: float) -> None:
         self.uploads.item(sender, convert(message), now)
@@ -264,12 +278,10 @@ _ENDS_DOWNLOAD = (
 class _RemoteMissions(MissionService):
     """A mission store at the other end of the link. `is_local`: missions are received here."""
 
-    def __init__(
-        self, vehicle: Vehicle, runner: Runner, ground: Ground, write: Callable[[Sequence[MissionItem]], object]
-    ) -> None:
+    def __init__(self, vehicle: Vehicle, runner: Runner, ground: Ground, effects: list[RelayEffect]) -> None:
         super().__init__(vehicle, runner, lambda _ended: None)
         self._ground = ground
-        self._write = write
+        self._effects = effects
         self.is_local = False
         self.results: list[WriteResult] = []
 
@@ -288,7 +300,7 @@ class _RemoteMissions(MissionService):
         if verdict.result is Result.REJECTED:
             return DeliveryResult(verdict.ack, verdict.findings[-1].text(), None)
         self.results.clear()
-        self._write(verdict.items)
+        self._effects.append(WriteList(verdict.items))
         while not self.results:
             yield Pause(_LOOK_S)
         result = self.results.pop()

@@ -4,23 +4,27 @@
 Sans-IO, like the Relay of each vehicle.
 """
 
-from collections.abc import Callable
+from dataclasses import dataclass
 from math import inf
 
-from bridge.gcs.station import Datagrams, Peer
-from bridge.relay import MISSION_REQUESTS, Relay
+from bridge.gcs.station import Peer
+from bridge.relay import MISSION_REQUESTS, Relay, RelayEffect
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 
 
+@dataclass(frozen=True, slots=True)
+class SameSystem:
+    """An effect: a vehicle is left out, because another one has its system id."""
+
+    other: str
+    system: int
+
+
 class Relays:
-    """The relays by the names of their vehicles.
+    """The relays by the names of their vehicles. Ground stations know vehicles by system id alone."""
 
-    Ground stations know vehicles by system id alone: one whose id another vehicle has is left out, and `clashes` is
-    called with its name, the other's, and the id.
-    """
-
-    def __init__(self, clashes: Callable[[str, str, int], object]) -> None:
-        self._clashes = clashes
+    def __init__(self) -> None:
+        self._left_out: list[tuple[str, SameSystem]] = []
         self._relays: dict[str, Relay] = {}
         self._names: dict[int, str] = {}
         self._peers: dict[Peer, bool] = {}
@@ -84,11 +88,12 @@ class Relays:
         if system is None or (other := self._names.setdefault(system, name)) == name:
             return
         self.remove(name)
-        self._clashes(name, other, system)
+        self._left_out.append((name, SameSystem(other, system)))
 
-    def take(self) -> Datagrams:
-        """The datagrams to send."""
-        return Datagrams(each for relay in self._relays.values() for each in relay.take())
+    def take(self) -> list[tuple[str, RelayEffect | SameSystem]]:
+        """What is to be done since the last call, by vehicle."""
+        left_out, self._left_out = self._left_out, []
+        return [*((name, effect) for name, relay in self._relays.items() for effect in relay.take()), *left_out]
 
     def _addresses(self, frame: MavlinkFrame, name: str) -> bool:
         system, _ = frame.target

@@ -8,8 +8,9 @@ from math import inf
 import click
 import zenoh
 
-from bridge.gcs.station import Peer
-from bridge.relays import Relays
+from bridge.gcs.station import Datagrams, Peer
+from bridge.relay import SendToVehicle, WriteList
+from bridge.relays import Relays, SameSystem
 from fleet.enrolment import SYSIDS
 from fleet.session import FleetError
 from fleet.tables import in_few_words
@@ -61,7 +62,7 @@ class FleetRelay:
     ) -> None:
         self._loop = asyncio.get_running_loop()
         self._session, self._prefix, self._bridges, self._is_all = session, prefix, bridges, is_all
-        self._relays = Relays(self._left_out)
+        self._relays = Relays()
         self._vehicles: dict[str, VehicleRelay] = {}
         self._clash = ""
         self._is_started = False
@@ -163,8 +164,17 @@ class FleetRelay:
         self._flush()
 
     def _flush(self) -> None:
-        for peer, data in self._relays.take():
-            self._links[peer.link].send(peer, data)
+        for name, effect in self._relays.take():
+            match effect:
+                case Datagrams():
+                    for peer, data in effect:
+                        self._links[peer.link].send(peer, data)
+                case SendToVehicle(frame):
+                    self._vehicles[name].send(frame)
+                case WriteList(items):
+                    self._vehicles[name].write(items)
+                case SameSystem(other, system):
+                    self._left_out(name, other, system)
         if self._timer is not None:
             self._timer.cancel()
         due = self._relays.due

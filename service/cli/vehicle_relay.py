@@ -45,7 +45,7 @@ class VehicleRelay:
         self._loop = asyncio.get_running_loop()
         self._session, self._prefix, self._name, self._bridges = session, prefix, name, bridges
         self._sent, self._on_input = sent, on_input
-        self.relay = Relay(lambda data: self._input.put(data), self._write, OwnNetworks(Host()))
+        self.relay = Relay(OwnNetworks(Host()))
         self._input = session.declare_publisher(
             self._key(MAVLINK_IN.suffix),
             congestion_control=zenoh.CongestionControl.DROP,
@@ -83,7 +83,7 @@ class VehicleRelay:
         self._waiting -= 1
         self._sent(self._name, data)
 
-    # The vehicle's mission, and commands. Called on zenoh's threads, except for `_write`.
+    # The vehicle's mission, and commands. Called on zenoh's threads, except for `send` and `write`.
 
     def _key(self, suffix: str) -> str:
         return full(self._prefix, self._name, suffix)
@@ -108,7 +108,12 @@ class VehicleRelay:
         identity = None if count is None or checksum is None else ListIdentity(count, int(checksum, 16))
         post(self._loop, self.relay.holds, items, identity)
 
-    def _write(self, items: Sequence[MissionItem]) -> None:
+    def send(self, frame: bytes) -> None:
+        """Send a frame to the vehicle."""
+        self._input.put(frame)
+
+    def write(self, items: Sequence[MissionItem]) -> None:
+        """Have the vehicle write a list, () to clear."""
         replied: list[WriteResult] = []
 
         def reply(answer: zenoh.Reply | None) -> None:

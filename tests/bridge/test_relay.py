@@ -6,8 +6,8 @@ from dataclasses import replace
 
 from pymavlink.dialects.v20 import ardupilotmega as m
 
-from bridge.gcs.station import Peer
-from bridge.relay import Relay, WriteResult
+from bridge.gcs.station import Datagrams, Peer
+from bridge.relay import Relay, SendToVehicle, WriteList, WriteResult
 from protocols.mavlink.codec import FrameWriter, decode
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.frame import MavlinkSplitter
@@ -30,7 +30,7 @@ class Bench:
     def __init__(self) -> None:
         self.to_vehicle: list[bytes] = []
         self.written: list[Sequence[MissionItem]] = []
-        self.relay = Relay(self.to_vehicle.append, self.written.append)
+        self.relay = Relay()
         self.now = 100.0
         self.frames: list[tuple[int, Message]] = []
         self._writer, self._vehicle = FrameWriter(255, 190), FrameWriter(*VEHICLE)
@@ -66,11 +66,17 @@ class Bench:
         return next((each for _, each in reversed(self.frames) if each.get_type() == kind), None)
 
     def _take(self) -> None:
-        for _, data in self.relay.take():
-            for frame in MavlinkSplitter().feed(data):
-                message = decode(frame)
-                assert message is not None
-                self.frames.append((frame.raw[4], message))
+        for effect in self.relay.take():
+            match effect:
+                case SendToVehicle(sent):
+                    self.to_vehicle.append(sent)
+                case WriteList(items):
+                    self.written.append(items)
+                case Datagrams():
+                    for frame in MavlinkSplitter().feed(b"".join(data for _, data in effect)):
+                        message = decode(frame)
+                        assert message is not None
+                        self.frames.append((frame.raw[4], message))
 
 
 def item_int(item: MissionItem) -> Message:

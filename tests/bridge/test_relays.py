@@ -3,9 +3,9 @@
 
 from pymavlink.dialects.v20 import ardupilotmega as m
 
-from bridge.gcs.station import Peer
-from bridge.relay import Relay
-from bridge.relays import Relays
+from bridge.gcs.station import Datagrams, Peer
+from bridge.relay import Relay, SendToVehicle, WriteList
+from bridge.relays import Relays, SameSystem
 from protocols.mavlink.codec import FrameWriter, decode
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.frame import MavlinkSplitter
@@ -23,7 +23,7 @@ class Bench:
         self.sent: dict[str, list[str]] = {}
         self.written: dict[str, int] = {}
         self.clashes: list[tuple[str, str, int]] = []
-        self.relays = Relays(lambda *clash: self.clashes.append(clash))
+        self.relays = Relays()
         self.relays.add_default_peer(PEER)
         self.now = 100.0
         self._writer = FrameWriter(255, 190)
@@ -31,11 +31,8 @@ class Bench:
             self.join(name, system)
 
     def join(self, name: str, system: int) -> None:
-        sent = self.sent.setdefault(name, [])
-        relay = Relay(
-            lambda data: sent.extend(message.get_type() for message in self._messages(data)),
-            lambda items: self.written.__setitem__(name, len(items)),
-        )
+        self.sent[name] = []
+        relay = Relay()
         self.relays.add(name, relay)
         relay.holds((), ListIdentity(0, 0))
         heartbeat = FrameWriter(system, 1).frame(pack(m.MAVLink_heartbeat_message(2, 3, 81, 0, 3, 3)), 2)
@@ -50,7 +47,17 @@ class Bench:
         return self.heard()
 
     def heard(self) -> list[tuple[int, Message]]:
-        frames = [frame for _, data in self.relays.take() for frame in MavlinkSplitter().feed(data)]
+        frames = []
+        for name, effect in self.relays.take():
+            match effect:
+                case Datagrams():
+                    frames += [frame for _, data in effect for frame in MavlinkSplitter().feed(data)]
+                case SendToVehicle(sent):
+                    self.sent[name] += [message.get_type() for message in self._messages(sent)]
+                case WriteList(items):
+                    self.written[name] = len(items)
+                case SameSystem(other, system):
+                    self.clashes.append((name, other, system))
         return [(frame.sysid, message) for frame in frames for message in self._messages(frame.raw)]
 
     def _messages(self, data: bytes) -> list[Message]:
@@ -89,14 +96,15 @@ def test_a_mission_for_all_vehicles_is_for_none() -> None:
     alone.send(m.MAVLink_mission_clear_all_message(0, 0))
     alone.now += 0.1
     alone.relays.tick(alone.now)
+    alone.heard()
     assert alone.written == {"kite": 0}
 
 
 def test_a_vehicle_whose_id_is_in_use_is_left_out_until_the_other_has_left() -> None:
     bench = connected(kite=1)
     bench.join("owl", 1)
-    assert bench.clashes == [("owl", "kite", 1)]
     assert bench.heard() == []
+    assert bench.clashes == [("owl", "kite", 1)]
     bench.send(m.MAVLink_param_request_list_message(1, 1))
     assert (bench.sent["kite"][-1], bench.sent["owl"]) == ("PARAM_REQUEST_LIST", [])
     bench.relays.remove("kite")
