@@ -181,6 +181,9 @@ class _Request:
 class MspLink:
     """One MSP line. `baud` is None where the line has no speed (TCP, the built-in simulator).
 
+    >>> link.send(Send(request(Msp.IDENT), Msp.IDENT, reply_size=13), now)
+    >>> replies = link.receive(port.read(512), now)  # and link.tick(now) at link.due
+
     `output`: gets the bytes to be written to the port, in order. `owed`: bytes of earlier replies that may still arrive
     first.
     """

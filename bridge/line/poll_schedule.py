@@ -155,7 +155,12 @@ _DUE = attrgetter("due")
 
 
 class PollSchedule:
-    """The schedule of one line: `begin` when a flight controller is found, then `ask` at each deadline."""
+    """The schedule of one line.
+
+    >>> polls.begin(115200)  # a flight controller is found
+    >>> polls.want({Msp.ATTITUDE: 0.1})  # a ground station wants it ten times a second
+    >>> polls.ask(link, now, beside_missions=False)  # at polls.due(link), and after each reply
+    """
 
     def __init__(self) -> None:
         self._wanted: Mapping[Msp, float] = {}

@@ -234,7 +234,12 @@ class _Last(Protocol):
 
 
 class Vehicle:
-    """The latest reading of each kind, and home."""
+    """The latest reading of each kind, and home.
+
+    >>> vehicle.hear(Height(100.0, Source.MSP, height_m=12.0, climb_m_s=0.5))
+    >>> vehicle.fresh(Height, now=101.0).height_m, vehicle.fresh(Height, now=102.0)
+    (12.0, None)
+    """
 
     def __init__(self) -> None:
         self._readings: dict[type[Reading], Reading] = {}

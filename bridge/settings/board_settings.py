@@ -51,7 +51,13 @@ OnTable = Callable[[SettingTable | SettingRefusal, float], None]
 
 
 class BoardSettings:
-    """`others_wait`: True while others wait for a reply. `on_table`: called when the table has changed."""
+    """The one owner of a board's settings.
+
+    >>> settings.change("p_roll", 44, on_done, now, client="the page")  # on_done gets it as read back
+    >>> settings.save(on_done, now)
+
+    `others_wait`: True while others wait for a reply. `on_table`: called when the table has changed.
+    """
 
     def __init__(
         self,

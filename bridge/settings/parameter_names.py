@@ -22,7 +22,11 @@ _VOWELS = frozenset("aeiou")
 
 
 def parameter_names(settings: Iterable[str], taken: Collection[str] = ()) -> Mapping[str, str]:
-    """Setting by parameter; the parameters are distinct and in upper case, and none of them is `taken`."""
+    """Setting by parameter; the parameters are distinct and in upper case, and none of them is `taken`.
+
+    >>> parameter_names(["p_roll", "gps_ph_settlespeed"])
+    {'P_ROLL': 'p_roll', 'GPS_PH_SETLSPEED': 'gps_ph_settlespeed'}
+    """
     short = {name: _short(name).upper() for name in settings}
     often = Counter([*short.values(), *taken])
     return {_hashed(name) if often[parameter] > 1 else parameter: name for name, parameter in short.items()}

@@ -35,8 +35,8 @@ _COMMANDS = {
     "demo": LazyCommand("service.cli.demo:demo", "Demonstrate a mission upload to a simulated Naze."),
 }
 
-#: Libraries and their optional dependencies that the daemon does not need, OpenSSL and coloured logs: with these 10 MB it
-#: would exceed the 42 MB that it may have.
+#: Libraries and their optional dependencies that the daemon does not need, OpenSSL and coloured logs: with these 10 MB
+#: it would exceed the 42 MB that it may have.
 _OPTIONAL = (("hmac", "_hashlib"), ("asyncio", "ssl"), ("structlog", "rich"))
 _UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
