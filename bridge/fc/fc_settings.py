@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from math import isfinite
-from typing import ClassVar
 
 from bridge.line.conversation import Conversation, ask, ask_status
 from bridge.model.settings import BoardSetting, SettingTable, Value, ValueKind, shown
@@ -60,9 +59,8 @@ def out_of_range(setting: BoardSetting, value: Value) -> SettingRefusal:
     return SettingRefusal(Cause.OUT_OF_RANGE, f"{setting.name} stays {shown(setting.value)}: {accepted}")
 
 
-def fixed(setting: BoardSetting, why: str = "") -> SettingRefusal:
-    """why: the reason, if it is not the setting's own."""
-    return SettingRefusal(Cause.FIXED, f"{setting.name} stays {shown(setting.value)}: {why or setting.fixed}")
+def fixed(setting: BoardSetting) -> SettingRefusal:
+    return SettingRefusal(Cause.FIXED, f"{setting.name} stays {shown(setting.value)}: {setting.fixed}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,14 +76,7 @@ class TableReading:
 
 
 class FcSettings(ABC):
-    """The settings of one flight controller. Its conversations run while it is disarmed.
-
-    read_only: the reason why none can be changed or saved; empty if they can. is_read_when_asked: the table is not read
-    before a client asks for it, and not again by itself after a failure.
-    """
-
-    read_only: ClassVar[str] = ""
-    is_read_when_asked: ClassVar[bool] = False
+    """The settings of one flight controller. Its conversations run while it is disarmed."""
 
     @abstractmethod
     def read(self, previous: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:

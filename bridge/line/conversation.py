@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from bridge.model.missions import ArrivedMission, Outcome, PendingMission, RecalledMission
-from protocols.mavlink.codec import Packed
 from protocols.mission_item import ListIdentity
 from protocols.msp.commands import Msp
 from protocols.msp.frame import MspFrame, frame_size, request
@@ -65,21 +64,6 @@ class Receive:
 
     commands: frozenset[int]
     request: Send | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Transmit:
-    """Send a MAVLink message. Answer: False if no frame of it is free of hazard bytes."""
-
-    packed: Packed
-
-
-@dataclass(frozen=True, slots=True)
-class Await:
-    """Wait for the next MAVLink frame with one of these message ids. Answer: the frame, or None on timeout."""
-
-    msgids: frozenset[int]
-    seconds: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +122,7 @@ class FindPending:
 
 
 Effect = (
-    TimeLimit | Send | Receive | Transmit | Await | Pause
+    TimeLimit | Send | Receive | Pause
     | Save | BeginSave | EndSave | Conclude | Recall | NoteReader | FindPending
 )  # fmt: skip
 StoreEffect = Save | Conclude | Recall | NoteReader | FindPending

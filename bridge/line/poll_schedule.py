@@ -2,9 +2,9 @@
 """The schedule of telemetry polls. Sans-IO.
 
 Each poll has a requested interval: the fastest that a ground station asked for or the bridge itself needs. The line
-may stretch it: requests and replies together get a share of its bytes, or of the board's time if that is scarcer;
-missions and commands have the rest. A poll is repeated only after its reply has arrived or timed out, so a long round
-trip or a bad line slows the fast ones down by itself.
+may stretch it: requests and replies together get a share of its bytes, or of the board's time if that is scarcer
+(missions and commands have the rest), and lost replies slow all polls down until they arrive again. A poll is repeated
+only after its reply has arrived or timed out, so a long round trip slows the fast ones down by itself.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -30,8 +30,10 @@ _ASSUMED_BAUD = 115200
 _BESIDE_MISSIONS = 0.2
 #: No poll gets slower than this.
 _SLOWEST_S = 5.0
-#: The interval of a poll that another program asks for, until it was silent for this long.
+#: Polls that other programs ask for: the shortest interval, and the smallest part of telemetry's share for them.
 _FOLLOWED_S = 0.1
+_FOLLOWED_SHARE = 0.1
+#: They ask for it until they were silent for this long.
 _FOLLOWED_FOR_S = 3.0
 #: A reply is current for one interval, or for this long.
 _CURRENT_S = 1.0
@@ -41,6 +43,11 @@ _CURRENT_S = 1.0
 _EARLY, _EARLIEST_S = 0.2, 0.05
 #: Replies to polls with at least this interval may be read together. A client of faster ones needs fresh values.
 _MAY_WAIT_S = 0.08
+#: A poll's first lost reply reduces all rates by a tenth, and each received one restores a little: 1 % losses change
+#: nothing, 10 % halve the rates.
+_LOSS_FACTOR = 0.9
+_RECOVERY = 0.005
+_WORST_QUALITY = 0.1
 #: After this many unanswered requests in a row, while others are answered, a poll backs off.
 _TOLERATED_MISSES = 4
 #: After this many error frames in a row the command is unknown to the board; one alone may be line noise.
@@ -92,7 +99,7 @@ class _Slot:
     cost: float = field(init=False)
     reply_payload: int = field(init=False)
     wanted_s: float = inf
-    followed_until: float = inf  # by another program; infinity: by none
+    followed_until: float = -inf
     interval_s: float = inf
     early_s: float = 0.0
     asked_at: float = -inf
@@ -170,7 +177,9 @@ class PollSchedule:
         self._budget = 0.0
         self._least_cost = 0.0
         self._line_scale = 1.0
+        self._followed_s = inf
         self._unfollowed_at = inf  # when programs stop asking for a poll
+        self._quality = 1.0
         self._free_at = 0.0
         self._asked_at = -inf
         self._lost_before = 0
@@ -183,6 +192,7 @@ class PollSchedule:
         """
         bytes_per_s = (baud or _ASSUMED_BAUD) / 10
         self._budget = bytes_per_s * _LINE_SHARE
+        self._quality = 1.0
         self._lost_before = 0
         self._least_cost = turn_s * bytes_per_s
         self._slots = {poll.command: _Slot(poll, self._least_cost) for poll in polls}
@@ -203,7 +213,7 @@ class PollSchedule:
         slot = self._slots.get(command)
         if slot is None or frame != slot.poll.frame:
             return None
-        is_new = slot.followed_until == inf
+        is_new = slot.followed_until == -inf
         slot.followed_until = now + _FOLLOWED_FOR_S
         self._unfollowed_at = min(self._unfollowed_at, slot.followed_until)
         if is_new:
@@ -247,8 +257,9 @@ class PollSchedule:
         """Take a reply to a command that is polled."""
         slot = self._slots[frame.command]
         slot.is_asked = False
-        is_slowed = slot.misses > _TOLERATED_MISSES
+        is_slowed = slot.misses > _TOLERATED_MISSES or self._quality < 1
         slot.misses = 0
+        self._quality = min(self._quality + _RECOVERY, 1.0)
         if frame.direction is Direction.ERROR:
             slot.refusals += 1
             self._fit()
@@ -257,6 +268,7 @@ class PollSchedule:
             slot.expect(len(frame.payload))
             self._fit()
         elif is_slowed:
+            # The others follow with their own replies.
             slot.set_interval(self._present_interval(slot))
 
     def due(self, link: MspLink) -> float:
@@ -276,36 +288,46 @@ class PollSchedule:
     def _look_at(self, link: MspLink, beside_missions: bool, now: float) -> None:
         if now >= self._unfollowed_at:
             for slot in self._slots.values():
-                slot.followed_until = slot.followed_until if now < slot.followed_until else inf
-            self._unfollowed_at = min((slot.followed_until for slot in self._slots.values()), default=inf)
+                slot.followed_until = slot.followed_until if now < slot.followed_until else -inf
+            self._unfollowed_at = min((slot.followed_until for slot in self._followed()), default=inf)
             self._fit()
         asked = self._slots.values() if link.requests_lost != self._lost_before else ()
         self._lost_before = link.requests_lost
         lost = [slot for slot in asked if slot.is_asked and not link.awaits(slot.poll.command)]
-        for slot in lost:
-            slot.is_asked = False
-            slot.misses += 1
         if lost or beside_missions != self._beside_missions:
+            for slot in lost:
+                slot.is_asked = False
+                slot.misses += 1
+            # A poll that the board does not answer is no loss of the line, nor is another request.
+            first = [slot for slot in lost if slot.misses == 1]
+            self._quality = max(self._quality * _LOSS_FACTOR ** len(first), _WORST_QUALITY)
             self._beside_missions = beside_missions
             self._set_intervals()
-            for slot in lost:
-                if slot.misses == 1:
-                    # Asked again at once: a single loss makes no value stale.
-                    slot.due = min(slot.due, now)
+            for slot in first:
+                slot.due = min(slot.due, now)  # asked again at once: a single loss makes no value stale
+
+    def _followed(self) -> list[_Slot]:
+        return [slot for slot in self._slots.values() if slot.followed_until > -inf and not slot.is_unknown]
 
     def _fit(self) -> None:
         """Scale the requested rates to the line."""
         for slot in self._slots.values():
             wanted_s = min(self._wanted.get(slot.poll.command, inf), slot.poll.needed_s)
-            followed_s = _FOLLOWED_S if slot.followed_until < inf else inf
-            slot.wanted_s = inf if slot.is_unknown else min(wanted_s, followed_s)
+            slot.wanted_s = inf if slot.is_unknown else wanted_s
+        followed = self._followed()
+        budget = self._budget * (1 - _FOLLOWED_SHARE) if followed else self._budget
+        self._followed_s = inf
         self._line_scale = 1.0
-        if self._bytes_per_s(1.0) > self._budget:
+        if self._bytes_per_s(1.0) > budget:
             step, self._line_scale = 0.5, _LEAST_SCALE
             for _ in range(_HALVINGS):
-                if self._bytes_per_s(self._line_scale + step) <= self._budget:
+                if self._bytes_per_s(self._line_scale + step) <= budget:
                     self._line_scale += step
                 step /= 2
+        if followed:
+            slower = sum(slot.cost for slot in followed if self._interval(slot, self._line_scale) > _FOLLOWED_S)
+            left = max(self._budget - self._bytes_per_s(self._line_scale), self._budget * _FOLLOWED_SHARE)
+            self._followed_s = max(slower / left, _FOLLOWED_S)
         self._set_intervals()
 
     def _bytes_per_s(self, scale: float) -> float:
@@ -316,7 +338,11 @@ class PollSchedule:
             slot.set_interval(self._present_interval(slot))
 
     def _present_interval(self, slot: _Slot) -> float:
-        return self._interval(slot, self._line_scale * (_BESIDE_MISSIONS if self._beside_missions else 1.0))
+        scale = self._quality * (_BESIDE_MISSIONS if self._beside_missions else 1.0)
+        interval_s = self._interval(slot, self._line_scale * scale)
+        if slot.followed_until == -inf or slot.is_unknown:
+            return interval_s
+        return min(interval_s, self._followed_s / scale * slot.backoff)
 
     def _interval(self, slot: _Slot, scale: float, backoff: float | None = None) -> float:
         is_status = slot.poll.command is Msp.STATUS

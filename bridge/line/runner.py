@@ -8,7 +8,6 @@ from math import inf
 from typing import Any, Generic, TypeVar
 
 from bridge.line.conversation import (
-    Await,
     BeginSave,
     Conclude,
     Conversation,
@@ -25,11 +24,8 @@ from bridge.line.conversation import (
     Stopped,
     StoreEffect,
     TimeLimit,
-    Transmit,
 )
 from bridge.line.msp_link import MspLink
-from protocols.mavlink.codec import Packed
-from protocols.mavlink.frame import MavlinkFrame
 
 #: A failing SD card may hang forever, and the flight controller's conversations wait behind it.
 _STORE_TIMEOUT_S = 3.0
@@ -70,10 +66,9 @@ class Runner:
         #: The commands whose replies the running conversation waits for: the next one is passed to `advance`.
         self.awaited_replies: frozenset[int] = frozenset()
         self._link: MspLink | None = None
-        self._transmit: Callable[[Packed], bool] | None = None
         self._queue: deque[Task[Any]] = deque()
         self._current: Task[Any] | None = None
-        self._awaited: Receive | Await | Pause | StoreEffect | EndSave | None = None
+        self._awaited: Receive | Pause | StoreEffect | EndSave | None = None
         self._begun: _BegunSave | None = None
         #: The time of the next `tick`; infinity while nothing is awaited.
         self.due = inf
@@ -110,14 +105,9 @@ class Runner:
     def link_up(self, link: MspLink) -> None:
         self._link = link
 
-    def mavlink_up(self, transmit: Callable[[Packed], bool]) -> None:
-        """Send MAVLink messages with this function from now on; False: no frame of the message is safe to send."""
-        self._transmit = transmit
-
     def link_down(self, now: float) -> None:
         """The line is down: LinkLost is raised in the running conversation."""
         self._link = None
-        self._transmit = None
         if self._interruptible is not None:
             self.advance(LinkLost("the flight controller's port is gone"), now)
 
@@ -125,11 +115,6 @@ class Runner:
         """Raise Stopped in the running conversation, which may still use the line to clean up."""
         if self._interruptible is not None:
             self.advance(Stopped("the bridge is stopping"), now)
-
-    def received_mavlink(self, frame: MavlinkFrame, now: float) -> None:
-        """Pass on a MAVLink frame if the running conversation waits for it."""
-        if isinstance(self._awaited, Await) and frame.msgid in self._awaited.msgids:
-            self.advance(frame, now)
 
     def store_answered(self, effect: StoreEffect, answer: object, now: float) -> None:
         """Pass on the store's reply to an effect; a reply after its timeout is ignored."""
@@ -161,7 +146,7 @@ class Runner:
     @property
     def _interruptible(self) -> Task[Any] | None:
         """The running conversation, unless it waits for the store, which has its own timeout."""
-        return self._current if isinstance(self._awaited, Receive | Await | Pause) else None
+        return self._current if isinstance(self._awaited, Receive | Pause) else None
 
     def _begin_next(self, now: float) -> None:
         """Run the queue; a loop, because without a link every conversation may end at once."""
@@ -196,17 +181,12 @@ class Runner:
                     case Send() if self._link:
                         self._link.send(effect, now)
                         continue
-                    case Transmit(packed) if self._transmit:
-                        answer = self._transmit(packed)
-                        continue
                     case Receive(commands, request) if self._link:
                         if request is not None:
                             self._link.send(request, now)
                         deadline = min(self._link.reply_deadline(commands, now), task.ends_at)
                         self.awaited_replies = commands
-                    case Await(_, seconds) if self._transmit:
-                        deadline = min(now + seconds, task.ends_at)
-                    case Send() | Transmit() | Receive() | Await():
+                    case Send() | Receive():
                         answer = LinkLost("the flight controller does not speak this protocol now")
                         continue
                     case Pause(seconds):

@@ -115,7 +115,7 @@ class BoardSettings:
         self.known.found()
         self._stop_reading()
         self._retry_s = _RETRY_S
-        self._read_at = now + _FIRST_S if fc_settings is not None and not fc_settings.is_read_when_asked else inf
+        self._read_at = inf if fc_settings is None else now + _FIRST_S
         if fc_settings is None:
             self._answer_readers(self._as_last_read(), now)
         self.due = now
@@ -222,11 +222,9 @@ class BoardSettings:
 
     def _known_answer(self, work: SettingWork) -> Answer | None:
         """The answer without asking the board, if there is one."""
-        table, obstacle, fc_settings = self.known.table, self.obstacle(), self._fc_settings
-        read_only = "" if fc_settings is None else fc_settings.read_only
+        table, obstacle = self.known.table, self.obstacle()
         if not isinstance(work, SettingChange):
-            is_fixed = obstacle is None and read_only
-            return SettingRefusal(Cause.FIXED, f"Nothing is saved: {read_only}") if is_fixed else obstacle
+            return obstacle
         name, value = work.name, work.value
         work.before = setting = None if table is None else table.find(name)
         if table is not None and setting is None:
@@ -235,8 +233,8 @@ class BoardSettings:
             return obstacle
         if setting is None or self.known.freshness is Freshness.UNREAD:
             return _UNREAD
-        if (read_only or setting.fixed) and value != setting.value:
-            return fixed(setting, read_only)
+        if setting.fixed and value != setting.value:
+            return fixed(setting)
         if not setting.accepts(value):
             return out_of_range(setting, value)
         if setting.holds(value):
@@ -267,7 +265,7 @@ class BoardSettings:
     # Reading.
 
     def _read_again(self, at: float) -> None:
-        if self._fc_settings is not None and not self._fc_settings.is_read_when_asked:
+        if self._fc_settings is not None:
             self._read_at = at
             self.due = min(self.due, at)
 
@@ -311,10 +309,6 @@ class BoardSettings:
 
     def _read(self, table: SettingTable | None, now: float) -> None:
         """A reading has ended; None: without a table."""
-        if table is None and self._fc_settings is not None and self._fc_settings.is_read_when_asked:
-            self._read_at = inf
-            self._answer_readers(NO_ANSWER, now)
-            return
         if table is None:
             self._retry_s = min(2 * self._retry_s, _MOST_RETRY_S)
             self._read_at = now + self._retry_s

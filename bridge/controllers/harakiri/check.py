@@ -19,7 +19,6 @@ from bridge.controllers.harakiri.rules import (
     command_rules,
     items_from_records,
 )
-from bridge.controllers.harakiri.single_precision import readable_e7
 from bridge.fc.profile import RuleSettings
 from bridge.missions.flown_legs import Departure, FlownPath, Judgement, Point, beyond_plain_limits
 from bridge.missions.list_check import (
@@ -39,23 +38,19 @@ from protocols.msp.mission import WpCommand, WpRecord
 from reports.finding import CLEARED, DROPPED, Finding, News, RejectingFinding, reject
 from reports.verdict import Result, Verdict
 
-_METRES_PER_E7 = 0.0111
-
 
 @dataclass(frozen=True, slots=True)
 class HarakiriRules:
     """The rules' inputs from the flight controller and the settings.
 
     capacity: records, home included. wp_radius_cm: its gps_wp_radius. takeoff_max_m: the highest take-off.
-    is_single_precision: the list is written over its MAVLink, which moves places a little. flight: of a board that
-    flies the list; None: it only stores it.
+    flight: of a board that flies the list; None: it only stores it.
     """
 
     has_home: ClassVar[bool] = True
     capacity: int = USUAL_CAPACITY
     wp_radius_cm: int = USUAL_WP_RADIUS_CM
     takeoff_max_m: int = TAKEOFF_MAX_M
-    is_single_precision: bool = False
     flight: FlightLimits | None = USUAL_FLIGHT
 
     @property
@@ -84,8 +79,6 @@ class HarakiriCheck(ListCheck):
     def __init__(self, rules: HarakiriRules, count: int, fallback_home: tuple[int, int] | None = None) -> None:
         super().__init__(count)
         self._rules = command_rules(rules.wp_radius_cm, rules.takeoff_max_m)
-        self._is_single_precision = rules.is_single_precision
-        self._moved_e7 = 0
         self._fallback_home = fallback_home if fallback_home and all(fallback_home) else None
         self._roi_known = False
         self._kept: list[tuple[MissionItem, CommandRule]] = []  # items as sent, home included
@@ -111,9 +104,6 @@ class HarakiriCheck(ListCheck):
         if len(self._records) == 1:
             cleared = Finding(None, "count", self._count, CLEARED, "no command left", news=News.WARNING)
             return Verdict(Result.CLEARED, MissionResult.ACCEPTED, findings=(*findings, cleared))
-        if self._moved_e7:
-            moved = f"Places moved by up to {self._moved_e7 * _METRES_PER_E7:.1f} m (single precision)"
-            findings = (*findings, Finding(None, "position", None, None, moved))
         return Verdict(
             Result.ACCEPTED,
             MissionResult.ACCEPTED,
@@ -200,7 +190,7 @@ class HarakiriCheck(ListCheck):
         if item.seq == 0:
             self._note_home(item)
         no_nose = rule.p4 is NOSE_ON_ROI and not self._roi_known
-        lat_e7, lon_e7 = self._place(item) if rule.position else (0, 0)
+        lat_e7, lon_e7 = (item.lat_e7 or 0, item.lon_e7 or 0) if rule.position else (0, 0)
         is_raised = rule.height is CRUISE and (not math.isfinite(item.alt_m) or math.trunc(item.alt_m) == 0)
         p1 = self._fit(item, "p1", rule.p1)
         # Filled-in defaults are not reported, nor is the radius of home, which is not flown to.
@@ -233,15 +223,6 @@ class HarakiriCheck(ListCheck):
                 command=int(rule.record),
             )
         )
-
-    def _place(self, item: MissionItem) -> tuple[int, int]:
-        """The coordinates as they will read back."""
-        sent = item.lat_e7 or 0, item.lon_e7 or 0
-        if not self._is_single_precision:
-            return sent
-        lat_e7, lon_e7 = map(readable_e7, sent)
-        self._moved_e7 = max(self._moved_e7, abs(lat_e7 - sent[0]), abs(lon_e7 - sent[1]))
-        return lat_e7, lon_e7
 
     def _raise_return(self, item: MissionItem) -> int:
         """QGroundControl's Return item has no altitude at all."""

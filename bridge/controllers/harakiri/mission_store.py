@@ -73,8 +73,8 @@ _FAILURES = {
 }
 
 
-class HarakiriStore(FcMissionStore[WpRecord], ABC):
-    """The mission store of a Harakiri, over either protocol: each record is an item, home too."""
+class _HarakiriStore(FcMissionStore[WpRecord], ABC):
+    """Each record is an item, home too."""
 
     def items(self, records: Sequence[WpRecord], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
         return tuple(items_from_records(records, sent_as))
@@ -83,7 +83,7 @@ class HarakiriStore(FcMissionStore[WpRecord], ABC):
         return number if number < len(records) else 0
 
 
-class HarakiriMissions(HarakiriStore):
+class HarakiriMissions(_HarakiriStore):
     """The mission store of one Harakiri with the mission extension."""
 
     def __init__(self, board: FlightController, vehicle: Vehicle, settings: RuleSettings) -> None:
@@ -278,3 +278,24 @@ def _confirmed(packed: bytes, answer: Staged) -> int:
 def _again(status: ReplyStatus) -> PushFailed:
     """Retry after any refusal: on a bad line one in a hundred is a damaged reply that the XOR missed."""
     return PushFailed(_FAILURES.get(status, PushFailure.NO_ANSWER), is_final=False)
+
+
+class HarakiriArmedMissions(_HarakiriStore):
+    """A Harakiri that speaks MAVLink, because it is armed: its list is neither read nor written."""
+
+    def __init__(self, _board: FlightController, vehicle: Vehicle, settings: RuleSettings) -> None:
+        self._vehicle = vehicle
+        self._settings = settings
+
+    def report(self) -> Conversation[StoreReport | None]:
+        yield from ()
+        rules = HarakiriRules(takeoff_max_m=self._settings.takeoff_max_m)
+        return StoreReport(StoreState.ARMED, rules, None) if self._vehicle.armed else None
+
+    def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Conversation[PushResult]:
+        yield from ()
+        return PushResult(PushFailure.ARMED)
+
+    def pull(self) -> Conversation[tuple[WpRecord, ...] | None]:
+        yield from ()
+        return None

@@ -7,10 +7,8 @@ Disarmed it speaks MSP. Armed, its setting tele_prot decides: MSP (0), FrSky tel
 from dataclasses import replace
 
 from bridge.controllers.harakiri.check import harakiri_rules
-from bridge.controllers.harakiri.mavlink_missions import HarakiriMavlinkMissions
 from bridge.controllers.harakiri.mavlink_readings import HarakiriReadings
-from bridge.controllers.harakiri.mavlink_settings import HarakiriMavlinkSettings
-from bridge.controllers.harakiri.mission_store import HarakiriMissions
+from bridge.controllers.harakiri.mission_store import HarakiriArmedMissions, HarakiriMissions
 from bridge.controllers.harakiri.settings import HarakiriFcSettings
 from bridge.controllers.msp_parts import MspPartSettings
 from bridge.fc.mission_flight import FLIGHT_DECODERS, FLIGHT_POLL
@@ -106,8 +104,7 @@ MAVLINK = Profile(
     "Harakiri in MAVLink mode",
     _FAMILY,
     Spoken.MAVLINK,
-    missions=HarakiriMavlinkMissions,
-    settings=lambda _board: HarakiriMavlinkSettings(),
+    missions=HarakiriArmedMissions,
     arming_blockers=arming_blockers,
     mavlink_readings=HarakiriReadings,
     mavlink_sender=(1, 1, 200),  # baseflight_mavlink.c; other autopilots send as component 1

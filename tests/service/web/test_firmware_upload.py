@@ -24,10 +24,10 @@ _LONGEST_S = 180.0
 @pytest.mark.parametrize(
     ("name", "body", "why"),
     [
-        ("x.elf", PATCHED, "not an ELF file"),
+        ("x.hex", PATCHED, "not an Intel HEX file"),
         ("x.bin", stand_in(patched=False), "without the mission patch"),
         ("x.bin", PATCHED.ljust(PROGRAM_END + 1, b"\0"), "too large"),
-        ("x.elf", bytes(1_000_001), "not an ELF file"),
+        ("x.elf", bytes(1_000_001), "not a binary"),
     ],
 )
 def test_a_wrong_image_is_refused(shared_web: WebBench, name: str, body: bytes, why: str) -> None:
