@@ -143,6 +143,7 @@ class Bridge:
             ground,
             emit,
             config.settings_memory,
+            lambda: self.missions.transfer is not None,
             lambda: sharing.due < inf,
             self._table_changed,
         )

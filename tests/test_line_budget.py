@@ -11,7 +11,7 @@ import pytest
 _ROOT = Path(__file__).resolve().parents[1]
 _SUFFIXES = {".py", ".js", ".css", ".html"}
 _INSTALLED = ("bridge", "protocols", "service", "storage", "fleet", "payloads", "terminal", "reports")
-CEILINGS = {_INSTALLED: 44_490, ("bridge",): 19_062}
+CEILINGS = {_INSTALLED: 43_688, ("bridge",): 18_515}
 
 
 def lines(packages: tuple[str, ...]) -> int:

@@ -56,7 +56,8 @@ class BoardSettings:
     >>> settings.change("p_roll", 44, on_done, now, client="the page")  # on_done gets it as read back
     >>> settings.save(on_done, now)
 
-    `others_wait`: True while others wait for a reply. `on_table`: called when the table has changed.
+    `is_transferring`: True while a mission is received or written. `others_wait`: while others wait for a reply from
+    the board. `on_table`: called when the table has changed.
     """
 
     def __init__(
@@ -66,6 +67,7 @@ class BoardSettings:
         ground: Ground,
         emit: Callable[[BridgeEvent | TakenBackup], None],
         memory: SettingsMemory,
+        is_transferring: Callable[[], bool],
         others_wait: Callable[[], bool],
         on_table: Callable[[SettingTable], None],
     ) -> None:
@@ -73,6 +75,7 @@ class BoardSettings:
         self._missions = missions
         self._ground = ground
         self._emit = emit
+        self._is_transferring = is_transferring
         self._others_wait = others_wait
         self._on_table = on_table
         self.known = KnownSettings(memory)
@@ -101,7 +104,7 @@ class BoardSettings:
             return ARMED
         if self._fc_settings is None:
             return _NO_BOARD
-        if self._missions.occupied() is not None:
+        if self._missions.occupied() is not None or self._is_transferring():
             return _OCCUPIED
         return None if armed is False else _UNREAD
 
@@ -152,10 +155,13 @@ class BoardSettings:
         The same request of a client that still waits is not repeated, and gets no answer of its own.
         """
         change = SettingChange(client, on_done, name=name, value=value)
-        of_client = [each for each in self._work if each.client == client]
-        if any(isinstance(each, SettingChange) and (each.name, each.value) == (name, value) for each in of_client):
-            return
-        if len(self._work) >= _MOST_WAITING or len(of_client) >= _MOST_OF_ONE:
+        of_client = 0
+        for each in self._work:
+            if each.client == client:
+                of_client += 1
+                if isinstance(each, SettingChange) and (each.name, each.value) == (name, value):
+                    return
+        if len(self._work) >= _MOST_WAITING or of_client >= _MOST_OF_ONE:
             change.end(_TOO_MANY, now)
             return
         self._work.append(change)
@@ -189,7 +195,8 @@ class BoardSettings:
 
     def _begin(self, work: SettingWork, now: float) -> None:
         controller, fc_settings = self._controller, self._fc_settings
-        answer = self._known_answer(work)
+        arm_bit = None if controller is None else controller.arm_bit
+        answer = self._known_answer(work, arm_bit)
         if answer is not None or controller is None or fc_settings is None:
             self._work.remove(work)
             work.end(_NO_BOARD if answer is None else answer, now)
@@ -218,9 +225,9 @@ class BoardSettings:
         work.advance(WorkEvent.TURN)
         self._is_on_line = True
         is_change = isinstance(work, SettingChange)
-        self._missions.runner.start(work.carry_out(fc_settings, controller.arm_bit), done, now, in_background=is_change)
+        self._missions.runner.start(work.carry_out(fc_settings, arm_bit), done, now, in_background=is_change)
 
-    def _known_answer(self, work: SettingWork) -> Answer | None:
+    def _known_answer(self, work: SettingWork, arm_bit: int | None) -> Answer | None:
         """The answer without asking the board, if there is one."""
         table, obstacle = self.known.table, self.obstacle()
         if not isinstance(work, SettingChange):
@@ -239,8 +246,7 @@ class BoardSettings:
             return out_of_range(setting, value)
         if setting.holds(value):
             return (setting,)
-        has_arm_flag = self._controller is not None and self._controller.arm_bit is not None
-        return None if has_arm_flag else _NO_ARM_FLAG
+        return _NO_ARM_FLAG if arm_bit is None else None
 
     def _changed(self, work: SettingChange, result: Answer, now: float) -> Answer:
         """The answer to a change, from the settings read back."""

@@ -25,7 +25,7 @@ def parameter_names(settings: Iterable[str], taken: Collection[str] = ()) -> Map
     """Setting by parameter; the parameters are distinct and in upper case, and none of them is `taken`.
 
     >>> parameter_names(["p_roll", "gps_ph_settlespeed"])
-    {'P_ROLL': 'p_roll', 'GPS_PH_SETLSPEED': 'gps_ph_settlespeed'}
+    {'P_ROLL': 'p_roll', 'GPS_PH_STTLSPD': 'gps_ph_settlespeed'}
     """
     short = {name: _short(name).upper() for name in settings}
     often = Counter([*short.values(), *taken])

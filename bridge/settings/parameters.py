@@ -177,7 +177,11 @@ class Parameters:
 
         if setting is None and not isclose(value, values.get(parameter, value), rel_tol=1e-6):
             self.refuse(sender, name, SettingRefusal(Cause.FIXED, f"{parameter} is read-only"))
-        elif setting is None or value == single(float(setting.value)):
+        elif (
+            setting is None
+            or value == setting.value
+            or (abs(value) >= _MOST_EXACT and value == single(float(setting.value)))
+        ):
             self._send(sender, name)
         elif setting.kind is ValueKind.INTEGER and setting.accepts(value) and abs(value) >= _MOST_EXACT:
             above = f"{parameter} stays {shown(setting.value)}: only up to {_MOST_EXACT - 1} over MAVLink"

@@ -12,6 +12,7 @@ import pytest
     [
         "bridge.missions.list_check",
         "bridge.model.events",
+        "bridge.settings.parameter_names",
         "protocols.mavlink.codec",
         "protocols.mission_file",
         "protocols.msp.frame",
