@@ -60,7 +60,7 @@ def lay_out(root: Path, libraries: Mapping[str, Path], project: Path, version: s
     documents = root / "usr/share/doc/naze-bridge"
     _copy(_HERE / "copyright", documents)
     # As in the repository, so that the pages' links work.
-    shutil.copytree(project / "docs", documents / "docs")
+    shutil.copytree(project / "docs", documents / "docs", ignore=shutil.ignore_patterns("before"))
     for page in _PAGES:
         _copy(project / page, documents / Path(page).parent)
     shutil.copytree(project / _SCHEMAS, documents / _SCHEMAS, ignore=shutil.ignore_patterns("__pycache__"))
