@@ -26,7 +26,7 @@ from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import GroundStation
 from bridge.gcs.rights import LinkAccess
 from bridge.gcs.routes import Routes
-from bridge.gcs.station import Peer, Severity
+from bridge.gcs.station import Peer
 from bridge.line.conversation import StoreEffect
 from bridge.line.runner import Runner
 from bridge.missions.mission_service import NO_LINK, MissionService
@@ -52,6 +52,8 @@ from bridge.vehicle.message_router import MessageRouter
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.set_waypoint import SetWaypoint
 from bridge.vehicle.vehicle_report import VehicleReporter
+from bridge.voice.happening import Happening
+from bridge.voice.sentences import OF_THE_PI
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.mission_item import MissionResult
 from reports.vehicle_groups import Group, VehicleReport
@@ -225,7 +227,8 @@ class Bridge:
     @property
     def fc_trouble(self) -> str:
         """The reason why the board cannot be used, and the remedy; empty if it can be."""
-        return self._trouble()
+        trouble = self._trouble()
+        return "" if trouble is None else trouble.text
 
     @property
     def is_searching(self) -> bool:
@@ -254,7 +257,7 @@ class Bridge:
 
     def notify(self, text: str) -> None:
         """Show a text to each ground station that connects from now on."""
-        self._ground.notices.append(text)
+        self._ground.notices.append(OF_THE_PI(text))
 
     def link_closed(self, name: str, now: float) -> None:
         """A link is closed, and all ground stations on it are gone."""
@@ -339,11 +342,11 @@ class Bridge:
 
     # Between the parts.
 
-    def _say(self, severity: Severity, text: str) -> None:
+    def _say(self, happening: Happening) -> None:
         if not self.is_passing_through:
-            self._ground.say(severity, text)
+            self._ground.say(happening)
 
-    def _trouble(self) -> str:
+    def _trouble(self) -> Happening | None:
         return self._session.state.trouble
 
     def _table_changed(self, table: SettingTable) -> None:

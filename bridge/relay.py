@@ -16,7 +16,7 @@ from typing import Any
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import Sender
 from bridge.gcs.rights import LinkAccess
-from bridge.gcs.station import Datagrams, Peer, Severity
+from bridge.gcs.station import Datagrams, Peer
 from bridge.line.conversation import Conversation, Pause
 from bridge.line.runner import Runner
 from bridge.missions.fc_mission_store import PushProgress, StoreReport, StoreState
@@ -27,6 +27,7 @@ from bridge.model.missions import ARMED, ArrivedMission, Refusal
 from bridge.model.vehicle import FlightState, Source, Vehicle
 from bridge.transfers.downloads import MissionDownloads
 from bridge.transfers.uploads import MissionUploads
+from bridge.voice import sentences
 from protocols.mavlink.codec import decode, item_from_float_message, item_from_int_message, repack
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
@@ -41,7 +42,7 @@ _MOST_ITEMS = 1000
 _LOOK_S = 0.02
 #: The state's copy of the mission arrives within this time.
 _COPY_S = 5.0
-_UNKNOWN = Refusal(MissionResult.DENIED, "The vehicle's mission is not known yet: try again")
+_UNKNOWN = Refusal(MissionResult.DENIED, sentences.VEHICLE_UNKNOWN())
 #: A ground station's messages about the mission that is on a vehicle.
 MISSION_REQUESTS = frozenset(
     (
@@ -298,19 +299,21 @@ class _RemoteMissions(MissionService):
         """Have the vehicle check, write and verify the list."""
         verdict = arrived.verdict
         if verdict.result is Result.REJECTED:
-            return DeliveryResult(verdict.ack, verdict.findings[-1].text(), None)
+            return DeliveryResult(verdict.ack, sentences.REJECTED(verdict.findings[-1].text()), None)
         self.results.clear()
         self._effects.append(WriteList(verdict.items))
         while not self.results:
             yield Pause(_LOOK_S)
         result = self.results.pop()
         is_lossy = any(finding.is_warning for finding in result.findings)
+        accepted = sentences.STORED_WITH_LOSSES if is_lossy else sentences.STORED
+        why = (accepted if result.ack is MissionResult.ACCEPTED else sentences.REJECTED)(result.text)
         if result.items is not None:
             # Until the vehicle publishes it: Mission Planner may read at once.
             self.held = HeldMission(ListIdentity(len(result.items), 0), (), result.items)
             for finding in without_defaults(result.findings):
-                self._ground.say(Severity.NOTICE, finding.text())
-        return DeliveryResult(result.ack, result.text, None, is_lossy)
+                self._ground.say(sentences.CHANGED_ITEM(finding.text()))
+        return DeliveryResult(result.ack, why, None)
 
     def shown(self) -> Conversation[HeldMission | Refusal]:
         """The copy of the vehicle's state."""

@@ -18,16 +18,18 @@ from tests.support.forked import PRELOADED
 REPOSITORY = Path(__file__).parents[1]
 #: The other packages that each one may import.
 BRIDGE = {
-    "bridge.model": set[str](),
-    "bridge.line": {"bridge.model"},
-    "bridge.missions": {"bridge.line", "bridge.model"},
-    "bridge.fc": {"bridge.missions", "bridge.line", "bridge.model"},
-    "bridge.controllers": {"bridge.fc", "bridge.missions", "bridge.line", "bridge.model"},
-    "bridge.gcs": {"bridge.model"},
-    "bridge.settings": {"bridge.gcs", "bridge.fc", "bridge.missions", "bridge.line", "bridge.model"},
-    "bridge.sharing": {"bridge.gcs", "bridge.fc", "bridge.missions", "bridge.line", "bridge.model"},
-    "bridge.transfers": {"bridge.gcs", "bridge.missions", "bridge.line", "bridge.model"},
+    "bridge.voice": set[str](),
+    "bridge.model": {"bridge.voice"},
+    "bridge.line": {"bridge.voice", "bridge.model"},
+    "bridge.missions": {"bridge.voice", "bridge.line", "bridge.model"},
+    "bridge.fc": {"bridge.voice", "bridge.missions", "bridge.line", "bridge.model"},
+    "bridge.controllers": {"bridge.voice", "bridge.fc", "bridge.missions", "bridge.line", "bridge.model"},
+    "bridge.gcs": {"bridge.voice", "bridge.model"},
+    "bridge.settings": {"bridge.voice", "bridge.gcs", "bridge.fc", "bridge.missions", "bridge.line", "bridge.model"},
+    "bridge.sharing": {"bridge.voice", "bridge.gcs", "bridge.fc", "bridge.missions", "bridge.line", "bridge.model"},
+    "bridge.transfers": {"bridge.voice", "bridge.gcs", "bridge.missions", "bridge.line", "bridge.model"},
     "bridge.vehicle": {
+        "bridge.voice",
         "bridge.transfers",
         "bridge.gcs",
         "bridge.fc",
@@ -144,6 +146,17 @@ def _decodes_bytes(call: ast.Call) -> bool:
     of = call.func.value if isinstance(call.func, ast.Attribute) else None
     is_base64 = isinstance(of, ast.Call) and isinstance(of.func, ast.Attribute) and of.func.attr == "b64encode"
     return of is not None and not is_base64 and all(isinstance(each, ast.Constant) for each in call.args)
+
+
+def test_every_sentence_for_pilots_is_in_the_table() -> None:
+    """`bridge.voice.sentences`: Ground.say and refusals take only what these make. Others pack a text of theirs."""
+    makers = {(file, name) for file, name, _ in calls("bridge") if name in ("Sentence", "MAVLink_statustext_message")}
+    assert makers == {
+        ("bridge/voice/sentences.py", "Sentence"),
+        ("bridge/gcs/ground_station.py", "MAVLink_statustext_message"),
+        ("bridge/gcs/return_path.py", "MAVLink_statustext_message"),  # before the station is known
+        ("bridge/vehicle/incoming.py", "MAVLink_statustext_message"),  # in the name of an autopilot
+    }
 
 
 def test_the_terminal_gets_text_and_never_markup() -> None:

@@ -11,7 +11,8 @@ import pytest
 _ROOT = Path(__file__).resolve().parents[1]
 _SUFFIXES = {".py", ".js", ".css", ".html"}
 _INSTALLED = ("bridge", "protocols", "service", "storage", "fleet", "payloads", "terminal", "reports")
-CEILINGS = {_INSTALLED: 43_688, ("bridge",): 18_515}
+#: Raised once: the texts for pilots are in a table of their own (bridge/voice).
+CEILINGS = {_INSTALLED: 44_206, ("bridge",): 19_033}
 
 
 def lines(packages: tuple[str, ...]) -> int:

@@ -12,6 +12,7 @@ from bridge.fc.fc_settings import NO_ANSWER, NOT_TAKEN, Cause, FcSettings, Setti
 from bridge.fc.profile import FlightController
 from bridge.line.conversation import Conversation, Pause, ask, ask_surely
 from bridge.model.settings import BoardSetting, SettingTable, Value, ValueKind, table_of
+from bridge.voice import sentences
 from protocols.msp.command_line import is_clean
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, request
@@ -82,7 +83,7 @@ class MspPartSettings(FcSettings):
         try:
             payloads = _payloads(before, place, value)
         except ValueError as error:
-            return SettingRefusal(Cause.OUT_OF_RANGE, f"{setting.name}: {error}")
+            return SettingRefusal(Cause.OUT_OF_RANGE, sentences.WRONG_FORM(setting.name, str(error)))
         if payloads is None:
             return fixed(replace(setting, fixed="the board has no free range"))
         for payload in payloads:

@@ -9,6 +9,7 @@ from bridge.fc.profile import SILENCE_WITH_H7_S, FlightController, Interview, Pr
 from bridge.line.conversation import Conversation
 from bridge.model.craft import FAILSAFE_BOX, airframe
 from bridge.model.missions import Refusal
+from bridge.voice import sentences
 from protocols.mission_item import MissionResult
 from protocols.rights.msp import Firmware
 
@@ -64,7 +65,5 @@ OTHER_MAVLINK = Profile(
     "another MAVLink autopilot",
     "MAVLink",
     Spoken.OTHER_MAVLINK,
-    missions=Refusal(
-        MissionResult.UNSUPPORTED, "This autopilot speaks MAVLink itself: write its missions from a ground station"
-    ),
+    missions=Refusal(MissionResult.UNSUPPORTED, sentences.SPEAKS_MAVLINK()),
 )

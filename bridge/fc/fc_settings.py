@@ -13,6 +13,8 @@ from math import isfinite
 
 from bridge.line.conversation import Conversation, ask, ask_status
 from bridge.model.settings import BoardSetting, SettingTable, Value, ValueKind, shown
+from bridge.voice import sentences
+from bridge.voice.happening import Happening
 from protocols.msp.frame import Direction, request
 
 _EEPROM_WRITE = 250
@@ -37,30 +39,34 @@ class Cause(Enum):
 
 @dataclass(frozen=True, slots=True)
 class SettingRefusal:
-    """The reason, in one sentence for people. After NO_ANSWER the board may or may not have acted."""
+    """The reason. After NO_ANSWER the board may or may not have acted."""
 
     cause: Cause
-    text: str
+    why: Happening
+
+    @property
+    def text(self) -> str:
+        """The whole reason, in one sentence for people."""
+        return self.why.text
 
 
-#: At most 50 characters: of a longer text Mission Planner's HUD shows the end.
-ARMED = SettingRefusal(Cause.ARMED, "Armed: disarm to change settings")
-NO_ANSWER = SettingRefusal(Cause.NO_ANSWER, "No answer from the board: read the settings again")
-WRITES_SPENT = SettingRefusal(Cause.LIMIT, "The board limits flash wear: one save in 5 minutes")
-BUSY = SettingRefusal(Cause.OCCUPIED, "The board writes its configuration: try again")
-NOT_SAVED = SettingRefusal(Cause.REFUSED, "The board could not save: read the settings again")
-NOT_TAKEN = SettingRefusal(Cause.REFUSED, "The flight controller did not take the value")
+ARMED = SettingRefusal(Cause.ARMED, sentences.SETTINGS_ARMED())
+NO_ANSWER = SettingRefusal(Cause.NO_ANSWER, sentences.SETTINGS_UNANSWERED())
+WRITES_SPENT = SettingRefusal(Cause.LIMIT, sentences.BOARD_LIMITS_SAVES())
+BUSY = SettingRefusal(Cause.OCCUPIED, sentences.SETTINGS_BUSY())
+NOT_SAVED = SettingRefusal(Cause.REFUSED, sentences.SETTINGS_NOT_SAVED())
+NOT_TAKEN = SettingRefusal(Cause.REFUSED, sentences.VALUE_NOT_TAKEN())
 
 
 def out_of_range(setting: BoardSetting, value: Value) -> SettingRefusal:
     is_number = setting.kind is ValueKind.INTEGER and not isinstance(value, str) and isfinite(value)
     is_part = is_number and value != round(float(value))
     accepted = f"a whole number, {setting.range_text}" if is_part else setting.range_text
-    return SettingRefusal(Cause.OUT_OF_RANGE, f"{setting.name} stays {shown(setting.value)}: {accepted}")
+    return SettingRefusal(Cause.OUT_OF_RANGE, sentences.STAYS(setting.name, shown(setting.value), accepted))
 
 
 def fixed(setting: BoardSetting) -> SettingRefusal:
-    return SettingRefusal(Cause.FIXED, f"{setting.name} stays {shown(setting.value)}: {setting.fixed}")
+    return SettingRefusal(Cause.FIXED, sentences.STAYS(setting.name, shown(setting.value), setting.fixed))
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,8 @@ from bridge.fc.profile import Decoder, FlightController
 from bridge.line.poll_schedule import Poll
 from bridge.model.missions import FlightReport, Stage, Way
 from bridge.model.vehicle import MissionLeg, Source, Vehicle
+from bridge.voice import sentences
+from bridge.voice.happening import Happening
 from protocols.msp.commands import Msp
 from protocols.msp.mission_flight import (
     FLIGHT_REQUEST,
@@ -34,45 +36,7 @@ _STAGES: Mapping[FlightPhase, Stage] = {
     FlightPhase.DESCENT: Stage.LANDING,
     FlightPhase.SINK: Stage.LANDING,
 }
-_FLOWN = "Mission flown"
 _COMPASS_OFF_DEG = 20
-_LOW_BATTERY = "Battery low: land, or switch GPS HOME on"
-#: Nothing is said about the pilot's own switch and disarming.
-_WHY: Mapping[FlightReason, str] = {
-    FlightReason.DISABLED: "Mission not started: mission_fly is 0",
-    FlightReason.NOT_ARMED: "Mission not started: switch was on at arming",
-    FlightReason.FIX_MISSING: "Mission not started: no GPS fix",
-    FlightReason.HOME_MISSING: "Mission not started: no home position",
-    FlightReason.NOT_READY: "Mission not started: calibrate compass and baro",
-    FlightReason.LIST_EMPTY: "Mission refused: the list is empty",
-    FlightReason.LIST_DAMAGED: "Mission refused: the list is damaged",
-    FlightReason.LIST_CHANGED: "Mission refused: list changed since arming",
-    FlightReason.BAD_ORDER: "Mission refused: wrong command or order",
-    FlightReason.BAD_PLACE: "Mission refused: a place is missing",
-    FlightReason.FIRST_FAR: "Mission refused: the first place is too far",
-    FlightReason.LEG_LONG: "Mission refused: a leg is too long",
-    FlightReason.TOO_HIGH: "Mission refused: an altitude is too high",
-    FlightReason.ON_GROUND: "Mission refused: below 1 m it needs TAKEOFF first",
-    FlightReason.THROTTLE_LOW: "Mission stopped: throttle not in the middle",
-    FlightReason.NO_LIFT: "Mission stopped: the craft did not lift off",
-    FlightReason.CLIMB_SLOW: "Mission stopped: the climb took too long",
-    FlightReason.STALLED: "Mission stopped: too slow against the wind",
-    FlightReason.TURN_SLOW: "Mission stopped: the craft did not turn",
-    FlightReason.LAND_SLOW: "Landing takes too long",
-    FlightReason.STICKS: "Mission stopped: roll or pitch stick",
-    FlightReason.THROTTLE: "Mission stopped: throttle stick",
-    FlightReason.FIX_LOST: "Mission stopped: GPS fix lost, fly by hand",
-    FlightReason.RTL: "Mission ended: return to launch",
-    FlightReason.FAILSAFE: "Mission ended: failsafe",
-    FlightReason.FLOWN: _FLOWN,
-    FlightReason.AWAY: "Mission stopped: off course, compass or GPS wrong",
-    FlightReason.COMPASS: "Mission stopped: the compass is wrong",
-    FlightReason.HOLD_LOST: "Landing: it cannot hold its place",
-    FlightReason.BLIND: "Landing: no GPS fix for too long",
-    FlightReason.FENCE: "Mission stopped: outside mission_radius or _height",
-    FlightReason.BATTERY: "Mission ended: battery low",
-    FlightReason.JUMP: "Mission stopped: the GPS has jumped",
-}
 
 
 def _flight(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
@@ -90,10 +54,12 @@ def flight_report(progress: FlightProgress, before: FlightReport | None) -> Flig
     record, reached = progress.record or 0, progress.reached or 0
     if progress.state is FlightPhase.OFF:
         if before is not None and progress.reason is FlightReason.DISARMED and _has_landed(before):
-            return FlightReport(record, record, Progress.COMPLETE, is_flown=False, why=_FLOWN)
-        why = _WHY.get(progress.reason, "") if progress.switch_on else ""
+            return FlightReport(
+                record, record, Progress.COMPLETE, is_flown=False, why=sentences.of_flight(FlightReason.FLOWN)
+            )
+        why = sentences.of_flight(progress.reason) if progress.switch_on else None
         return FlightReport(0, reached, Progress.NOT_STARTED, is_flown=False, why=why)
-    why = _WHY.get(progress.reason) or (_LOW_BATTERY if progress.battery_low else _compass(progress))
+    why = sentences.of_flight(progress.reason) or _warning(progress)
     if progress.state in _PAUSED:
         return FlightReport(record, reached, Progress.PAUSED, is_flown=False, why=why)
     way = Way(progress.distance, progress.bearing if progress.distance else 0.0, progress.height_error)
@@ -103,10 +69,12 @@ def flight_report(progress: FlightProgress, before: FlightReport | None) -> Flig
     return FlightReport(record, reached, state, is_flown=True, way=way, stage=_STAGES.get(progress.state), why=why)
 
 
-def _compass(progress: FlightProgress) -> str:
-    """Rounded, so that it is said once."""
+def _warning(progress: FlightProgress) -> Happening | None:
+    if progress.battery_low:
+        return sentences.LOW_BATTERY()
+    # Rounded, so that it is said once.
     error = round((progress.compass or 0) / 10) * 10
-    return f"Compass about {abs(error)} deg off: check mag_dec" if abs(error) >= _COMPASS_OFF_DEG else ""
+    return sentences.COMPASS_OFF(abs(error)) if abs(error) >= _COMPASS_OFF_DEG else None
 
 
 def _has_landed(before: FlightReport) -> bool:

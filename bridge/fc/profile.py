@@ -19,6 +19,8 @@ from bridge.missions.place_lists import NO_PLACES
 from bridge.model.craft import ARM_BOX, Airframe
 from bridge.model.missions import Refusal
 from bridge.model.vehicle import Vehicle
+from bridge.voice import sentences
+from bridge.voice.happening import Sentence
 from protocols.mission_item import MissionResult
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame, request
@@ -111,7 +113,7 @@ MSP_SILENCE_S = 2.0
 #: An STM32H743 erases the sector of its settings in up to 2.2 s.
 SILENCE_WITH_H7_S = 2.5
 
-NO_MISSIONS = Refusal(MissionResult.UNSUPPORTED, "This flight controller stores no missions")
+NO_MISSIONS = Refusal(MissionResult.UNSUPPORTED, sentences.NO_MISSIONS())
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,7 +194,7 @@ class Profile:
     restarts_after_calibration: bool = False
     arming_blockers: Callable[[Vehicle, float], tuple[str, ...] | None] = _none_known
     calibrates_six_positions: bool = False
-    notice: str | None = None
+    notice: Sentence[()] | None = None
 
 
 @dataclass(frozen=True, slots=True)

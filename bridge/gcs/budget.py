@@ -63,10 +63,6 @@ class Cost(IntEnum):  # hashed for each datagram: as an int, in C
     RECORDED = Rate(50, 400), Rate(100, 800)
 
 
-#: The text for a ground station that may not write to the flash now.
-TOO_MANY_WRITES = "Flash wear limit: try again in 10 minutes"
-
-
 #: Addresses that are remembered after their stations have left: a new connection does not renew a budget.
 _MAX_HOSTS = 1024
 

@@ -8,8 +8,9 @@ from bridge.gcs.budget import Budgets, Cost
 from bridge.gcs.ground_station import GroundStation, Outbox, Sender
 from bridge.gcs.return_path import ReturnPath
 from bridge.gcs.rights import LinkAccess, Standing
-from bridge.gcs.station import RECORDER, Peer, Severity
+from bridge.gcs.station import RECORDER, Peer
 from bridge.model.events import Emit, GcsFound, GcsSilent
+from bridge.voice.happening import Happening
 from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.frame import MavlinkFrame
@@ -64,7 +65,7 @@ class Ground:
         self._budgets = Budgets()
         self.due = inf
         #: Texts for each newcomer, about problems that began before it connected.
-        self.notices: list[str] = []
+        self.notices: list[Happening] = []
         #: Frames from ground stations whose checksum was wrong.
         self.bad_frames = 0
         #: All stations that receive broadcasts.
@@ -128,6 +129,8 @@ class Ground:
             for ids, sender in station.senders.items():
                 latest[peer.link, ids] = max(sender.heard_at, latest.get((peer.link, ids), -inf))
         for peer, station in [*self._heard.items()]:
+            if now >= station.bad_news.due:
+                station.say_again(now)
             # Heard later at another address: the station has moved there.
             moved = all(latest[peer.link, ids] > each.heard_at for ids, each in station.senders.items())
             if now >= station.heard_at + (MOVED_S if moved else EXPIRY_S):
@@ -220,7 +223,7 @@ class Ground:
         self._on_newcomer(station, now)
         self._emit(GcsFound(station=str(sender)))
         for notice in self.notices:
-            sender.say(Severity.WARNING, notice)
+            sender.say(notice)
 
     def _ask(self, station: GroundStation, path: ReturnPath) -> None:
         """Reply to a datagram with the vehicle's heartbeat and a question that only its address gets."""
@@ -280,7 +283,7 @@ class Ground:
     def broadcast(self, message: Message) -> None:
         self.outbox.multicast(pack(message), self.everyone)
 
-    def say(self, severity: Severity, text: str, *, but: GroundStation | None = None) -> None:
-        """Show a text on all ground stations, except one that knows it."""
+    def say(self, happening: Happening, *, but: GroundStation | None = None) -> None:
+        """Show a happening on all ground stations, except one that knows it."""
         readers = [station for station in self.everyone if not station.is_listener and station is not but]
-        self.outbox.show(severity, text, readers)
+        self.outbox.show(happening, readers)

@@ -9,10 +9,11 @@ from bridge.gcs.budget import Budget, Cost
 from bridge.gcs.message_rates import MessageRates
 from bridge.gcs.return_path import ReturnPath
 from bridge.gcs.rights import FrameRefusal, LinkAccess, Standing
-from bridge.gcs.station import RECORDER, Datagrams, Peer, Severity
-from bridge.gcs.texts import RecentTexts, cut_text, split_text
+from bridge.gcs.station import RECORDER, Datagrams, Peer
 from bridge.model.events import Emit, GcsText
 from bridge.model.missions import Refusal, TransferMemory
+from bridge.voice.happening import Happening, Severity
+from bridge.voice.stations import BadNews, Behaviour, Kind, pieces, rendered
 from protocols.mavlink.codec import FrameWriter, Packed, pack
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame, MavlinkSplitter
@@ -37,8 +38,6 @@ _ROUTINE = Effect.RATE, Effect.SILENCE
 _MOST_LATE = 32
 #: After such a silence a sender may have been restarted, and numbers its frames from 0 again.
 _RESTARTED_S = 1.0
-#: A text that the pilot must read is repeated after these times.
-_REPEATS_S = (2.0, 4.0)
 
 
 class Outbox:
@@ -115,26 +114,23 @@ class Outbox:
         for receiver in receivers:
             self.outgoing[receiver] += frames
 
-    def show(self, severity: Severity, text: str, receivers: Sequence["GroundStation"]) -> None:
-        """Show a text on these stations, in pieces that fit STATUSTEXT."""
-        self._emit(GcsText(text=text))
+    def show(self, happening: Happening, receivers: Sequence["GroundStation"]) -> None:
+        """Show a happening on these stations, as each kind needs it."""
+        self._emit(GcsText(text=happening.text))
         if receivers and self.recorder is not None and self.recorder not in receivers:
             receivers = [*receivers, self.recorder]  # the log also has the texts for one station
-        self._text_id = self._text_id % _MAX_TEXT_ID + 1
-        others: list[GroundStation] = []
-        joining: list[GroundStation] = []
+        alike: dict[Kind, list[GroundStation]] = {}
         for receiver in receivers:
-            (joining if receiver.is_like_mavsdk else others).append(receiver)
-        if joining:
-            # MAVSDK joins the pieces without a separator, and shows padding as a gap.
-            self._send_pieces(severity, cut_text(text), joining)
-        if others:
-            self._send_pieces(severity, split_text(text), others)
+            alike.setdefault(receiver.behaviour.kind, []).append(receiver)
+        for kind, stations in alike.items():
+            for severity, text in rendered(happening, kind):
+                self._send_pieces(severity, pieces(text, kind), stations)
 
-    def _send_pieces(self, severity: Severity, pieces: Sequence[str], receivers: Sequence["GroundStation"]) -> None:
-        for chunk, piece in enumerate(pieces):
+    def _send_pieces(self, severity: Severity, texts: Sequence[str], receivers: Sequence["GroundStation"]) -> None:
+        self._text_id = self._text_id % _MAX_TEXT_ID + 1
+        for chunk, piece in enumerate(texts):
             # With an id, MAVSDK, MAVProxy and QGroundControl join the pieces; Mission Planner shows each separately.
-            text_id = self._text_id if len(pieces) > 1 else 0
+            text_id = self._text_id if len(texts) > 1 else 0
             message = messages.MAVLink_statustext_message(severity, piece.encode("ascii", "replace"), text_id, chunk)
             self.multicast(pack(message), receivers)
 
@@ -203,6 +199,12 @@ class Sender:
         return self.station.peer
 
     @property
+    def name(self) -> str:
+        """The kind of station and its host, for the pilots of others."""
+        title, host = self.station.behaviour.kind.title, self.peer.host
+        return " ".join(filter(None, (title, host if isinstance(host, str) else ""))) or "another station"
+
+    @property
     def identity(self) -> str:
         """A name that survives a restart of either side, and a TCP reconnection, which changes the port."""
         return f"{self.peer.host} sysid {self.sysid} compid {self.compid}"
@@ -215,15 +217,15 @@ class Sender:
         if not self.station.has_left:
             self.station.outbox.send(self.station, together)
 
-    def say(self, severity: Severity, text: str, *, is_reminder: bool = False) -> None:
-        self.station.say(severity, text, is_reminder=is_reminder)
+    def say(self, happening: Happening, *, is_routine: bool = False) -> None:
+        self.station.say(happening, is_routine=is_routine)
 
     def mission_ack(self, result: MissionResult, mission_type: int = 0) -> None:
         self.to(messages.MAVLink_mission_ack_message(self.sysid, self.compid, result, mission_type))
 
     def refuse(self, refusal: Refusal, mission_type: int = 0) -> None:
         """Refuse a mission transfer: send the reason as a text, and a MISSION_ACK."""
-        self.say(Severity.ERROR, refusal.text)
+        self.say(refusal.why)
         self.mission_ack(refusal.ack, mission_type)
 
     def is_older(self, number: int) -> bool:
@@ -268,11 +270,9 @@ class GroundStation:
         self.is_back = False
         #: By sysid and compid.
         self.senders: dict[tuple[int, int], Sender] = {}
-        #: It has sent REQUEST_DATA_STREAM; a command.
-        self.uses_streams = False
-        self.uses_commands = False
+        self.behaviour = Behaviour()
         self.rates = MessageRates()
-        self.texts = RecentTexts()
+        self.bad_news = BadNews()
         #: The reasons for refusals that were logged.
         self.reported: set[str] = set()
         #: A newcomer gets more heartbeats until this time, then home and the reasons not to arm.
@@ -280,8 +280,6 @@ class GroundStation:
         self.is_informed = True
         #: One of its missions was accepted: it has been told that fences are not stored.
         self.has_written = False
-        #: The text that the pilot must read, and when it is to be repeated.
-        self.to_read: tuple[Severity, str, bool, list[float]] | None = None
 
     # Rights and limits.
 
@@ -336,46 +334,53 @@ class GroundStation:
         self.heard_at = now
         if self.version != 2:
             self.version = frame.version
+            self.behaviour.speaks_v2 = self.version == 2
             self.frame_version = 2 if self.access.signing is not None else self.version
         sender = self.senders.get(ids)
         if sender is None:
             if len(self.senders) >= _MAX_SENDERS:
                 del self.senders[min(self.senders, key=lambda each: self.senders[each].heard_at)]
             sender = self.senders[ids] = Sender(self, *ids)
+            self.behaviour.compid = sender.compid
         sender.heard(frame, now)
         return sender
 
     # Sending.
 
-    def say(self, severity: Severity, text: str, *, is_reminder: bool = False) -> None:
-        """Show a text on this station; a refusal only once per attempt, unless `is_reminder`."""
+    def say(self, happening: Happening, *, is_routine: bool = False) -> None:
+        """Show a happening on this station; a refusal only once for each attempt.
+
+        `is_routine`: the program itself has made the request that was refused, and no pilot waits for the reason.
+        """
         if self.has_left or not self.allows(Cost.TEXT):
             return
-        if severity is not Severity.ERROR or is_reminder or self.texts.is_new(text, self.heard_at):
-            self.outbox.show(severity, text, [self])
+        is_refusal = happening.sentence.severity is Severity.ERROR
+        if is_refusal and self.bad_news.is_repeated(happening, self.heard_at, is_routine=is_routine):
+            return
+        self.outbox.show(happening, [self])
+        if is_refusal or happening.sentence.lasts:
+            self._ask(None if is_routine else self.bad_news.said(happening, self.behaviour.kind, self.heard_at))
 
-    def must_read(self, severity: Severity, text: str, now: float, *, is_unexpected: bool = False) -> None:
-        """Show a text, and again if SYS_STATUS replaces it on Mission Planner's HUD, or if it is `is_unexpected`."""
-        self.say(severity, text)
-        self.to_read = severity, text, is_unexpected, [now + later_s for later_s in _REPEATS_S]
+    def say_again(self, now: float) -> None:
+        """Repeat the bad news that may not have arrived, or was replaced on the HUD. A silent station waits."""
+        is_silent = now >= self.heard_at + _RETURNS_S
+        for happening, question in () if is_silent else self.bad_news.again(self.behaviour.kind, now):
+            self.outbox.show(happening, [self])
+            self._ask(question)
+
+    def _ask(self, question: Message | None) -> None:
+        if question is not None:
+            self.outbox.send(self, [question])
 
     def sent_sys_status(self, now: float, *, is_unhealthy: bool) -> None:
-        """Repeat a text where the pilot can read it: right after a SYS_STATUS, it stays until the next one."""
-        if self.to_read is not None:
-            severity, text, is_unexpected, due = self.to_read
-            if due and now >= due[0] and (is_unexpected or is_unhealthy):
-                del due[0]
-                self.say(severity, text, is_reminder=True)
+        """Repeat bad news where the pilot can read it: right after a SYS_STATUS, it stays until the next one."""
+        self.bad_news.is_replaced |= is_unhealthy
+        self.say_again(now)
 
     @property
     def reads_v2_only(self) -> bool:
         """True if heartbeats in MAVLink 2 are enough: it has sent that version, or must."""
         return self.version == 2 or self.access.signing is not None or self.peer is RECORDER
-
-    @property
-    def is_like_mavsdk(self) -> bool:
-        """True for a station that requests messages only by commands, in MAVLink 2, as MAVSDK does."""
-        return self.version == 2 and self.uses_commands and not self.uses_streams
 
 
 def _in_datagrams(frames: Sequence[bytes], together: bytes) -> list[bytes]:

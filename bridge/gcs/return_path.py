@@ -10,7 +10,7 @@ sent go back, as in QUIC (RFC 9000, section 8.1).
 
 from secrets import randbelow
 
-from bridge.gcs.station import Severity
+from bridge.voice.sentences import BEHIND_A_ROUTER
 from protocols.mavlink.codec import decode
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
@@ -22,9 +22,8 @@ _NONCES = 1 << 47
 _ROUND = 4
 #: A client may send a dozen requests before its answer arrives.
 _ENOUGH_QUESTIONS = 16
-#: The reason why frames of such a station are ignored, and the text for its user.
+#: The reason why frames of such a station are ignored.
 NOT_SHOWN = "behind a router, and answers no PING or TIMESYNC"
-_ADVICE = "Behind a router: use a key, or connect by TCP"
 
 
 class ReturnPath:
@@ -76,5 +75,5 @@ class ReturnPath:
             case 2:
                 return m.MAVLink_timesync_message(0, self._nonce)
             case 0 if self._asked >= _ENOUGH_QUESTIONS:
-                return m.MAVLink_statustext_message(Severity.WARNING, _ADVICE.encode())
+                return m.MAVLink_statustext_message(BEHIND_A_ROUTER.severity, BEHIND_A_ROUTER.text.encode())
         return None

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The addresses of ground stations, and the severities of texts for them."""
+"""The addresses of ground stations."""
 
 from collections.abc import Hashable
-from enum import IntEnum
 from typing import NamedTuple
 
 
@@ -32,13 +31,3 @@ class Datagrams(list[tuple[Peer, bytes]]):  # made thousands of times a second: 
 
 #: The telemetry log as a peer: it is served like a ground station, but no datagram is sent.
 RECORDER = Peer("log", "flight")
-
-
-class Severity(IntEnum):
-    """MAV_SEVERITY."""
-
-    CRITICAL = 2
-    ERROR = 3
-    WARNING = 4
-    NOTICE = 5
-    INFO = 6

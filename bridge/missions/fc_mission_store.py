@@ -14,6 +14,7 @@ from typing import Any, Generic
 from bridge.line.conversation import Conversation
 from bridge.missions.list_check import MissionRules
 from bridge.model.missions import Refusal
+from bridge.voice import sentences
 from protocols.mission_item import ListIdentity, MissionItem
 from reports.verdict import RecordT
 
@@ -47,23 +48,23 @@ class StoreReport:
 class PushFailure(Enum):
     """The reason that a write failed. The flight controller's old list is intact except for LIST_IS_GONE."""
 
-    ARMED = "the flight controller is armed: disarm first"
-    BUSY = "the flight controller is busy writing its configuration: try again"
-    WRITES_SPENT = "the flight controller limits flash wear: one write in 5 minutes now, no limit after a restart"
-    NO_SPACE = "the list does not fit the flight controller"
-    REFUSED = "the flight controller refused a record"
-    UNSAFE = "an item's bytes would trigger a firmware bug: move a waypoint a little"
-    FLASH = "the flight controller could not write its flash; its old mission is kept"
-    NO_ANSWER = "the flight controller does not answer; its old mission is kept: write it again"
-    OUT_OF_TIME = "the flight controller did not finish in time; its old mission is kept: check the wiring"
-    STOPPED = "naze-bridge was stopped during the write; the old mission is kept"
-    UNCERTAIN = "Link lost while writing: checked when it is back"
-    INCOMPLETE = "interrupted: the flight controller has no mission to fly; write it again"
-    ARMED_WHILE_WRITING = "armed during the write: the flight controller has no mission to fly; disarm, write it again"
-    PLACES_KEPT = "not written: the old ones are kept; write them again"
-    PLACES_PARTLY = "written only in part and not saved: write them again"
-    PLACES_NOT_SAVED = "written but not saved, and lost at power-off: write them again"
-    NOT_SAVED = "the mission is there but not saved: it is lost at power-off; write it again"
+    ARMED = sentences.ARMED_BEFORE()
+    BUSY = sentences.BUSY_BEFORE()
+    WRITES_SPENT = sentences.WRITES_SPENT()
+    NO_SPACE = sentences.NO_SPACE()
+    REFUSED = sentences.RECORD_REFUSED()
+    UNSAFE = sentences.UNSAFE()
+    FLASH = sentences.FLASH_FAILED()
+    NO_ANSWER = sentences.WRITE_UNANSWERED()
+    OUT_OF_TIME = sentences.OUT_OF_TIME()
+    STOPPED = sentences.STOPPED_WHILE_WRITING()
+    UNCERTAIN = sentences.UNCERTAIN()
+    INCOMPLETE = sentences.INCOMPLETE()
+    ARMED_WHILE_WRITING = sentences.ARMED_WHILE_WRITING()
+    PLACES_KEPT = sentences.PLACES_KEPT()
+    PLACES_PARTLY = sentences.PLACES_PARTLY()
+    PLACES_NOT_SAVED = sentences.PLACES_NOT_SAVED()
+    NOT_SAVED = sentences.NOT_SAVED()
 
 
 #: After these failures the old list is lost, or may be.
@@ -76,7 +77,7 @@ class PushFailed(Exception):
     """An attempt to write has failed; `is_final`: a retry would not help."""
 
     def __init__(self, failure: PushFailure, *, is_final: bool = True) -> None:
-        super().__init__(failure.value)
+        super().__init__(failure.value.text)
         self.failure = failure
         self.is_final = is_final
 

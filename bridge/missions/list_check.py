@@ -135,10 +135,11 @@ class ListCheck(ABC):
                 self._note(sent[place], field, value, value, why, news)
         return None
 
-    def _no_position(self, item: MissionItem, news: News = News.NOTICE) -> None:
+    def _no_position(self, item: MissionItem) -> None:
+        """An unused position is no news: QGroundControl sends one with each take-off."""
         for name, value in (("lat_e7", item.lat_e7), ("lon_e7", item.lon_e7)):
             if value:
-                self._note(item, name, value, 0, UNUSED.why, news)
+                self._note(item, name, value, 0, UNUSED.why, News.NONE)
 
     def _note_home(self, item: MissionItem) -> None:
         """Item 0 is home. MAVSDK's `mission` plugin sends none, so its first waypoint becomes home.

@@ -7,6 +7,7 @@ Ground stations (bridge.transfers.uploads, downloads) and the command line (loca
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from functools import partial
 from math import inf
 from typing import Any, TypeVar
 
@@ -33,9 +34,11 @@ from bridge.missions.fc_mission_store import (
     StoreState,
 )
 from bridge.missions.list_check import check_list
-from bridge.missions.mission_texts import has_losses, summary, with_meant_home
 from bridge.model.missions import ARMED, ArrivedMission, Outcome, PendingMission, RecalledMission, Refusal
 from bridge.model.vehicle import Vehicle
+from bridge.voice import sentences
+from bridge.voice.happening import Happening
+from bridge.voice.mission_report import has_losses, summary, with_meant_home
 from protocols.mission_item import ListIdentity, MissionItem, MissionResult, identify
 from reports.verdict import Result, SentSeqs, Verdict, is_renumbered
 
@@ -69,15 +72,18 @@ class MissionTransfer:
 class DeliveryResult:
     """The result of a mission. `number` is its number in the store, None if it could not be stored.
 
-    `is_lossy`: accepted, but an item was lost, the list erased, or an altitude changed its meaning. `change`: the
-    change on the aircraft as text; empty if there is none.
+    `change`: makes the sentence for other ground stations about a change on the aircraft, from the name of the station
+    that caused it; None if there is no change.
     """
 
     ack: MissionResult
-    text: str
+    why: Happening
     number: int | None
-    is_lossy: bool = False
-    change: str = ""
+    change: Callable[[str], Happening] | None = None
+
+    @property
+    def text(self) -> str:
+        return self.why.text
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,11 +102,11 @@ class HeldMission:
 
 #: Ground stations whose own item numbers are remembered.
 _MOST_SENDERS = 16
-NO_LINK = Refusal(MissionResult.DENIED, "No link to the flight controller")
-_BUSY = Refusal(MissionResult.DENIED, "Flight controller is busy writing: try again")
-STOPPING = Refusal(MissionResult.DENIED, "naze-bridge is stopping: try again later")
-_UNKNOWN = Refusal(MissionResult.DENIED, "Armed: the mission on board is not known, disarm to read it")
-OCCUPIED = Refusal(MissionResult.DENIED, "Another mission transfer is running")
+NO_LINK = Refusal(MissionResult.DENIED, sentences.NO_LINK())
+_BUSY = Refusal(MissionResult.DENIED, sentences.BUSY())
+STOPPING = Refusal(MissionResult.DENIED, sentences.STOPPING())
+_UNKNOWN = Refusal(MissionResult.DENIED, sentences.ARMED_AND_UNKNOWN())
+OCCUPIED = Refusal(MissionResult.DENIED, sentences.OCCUPIED())
 
 
 @dataclass(frozen=True, slots=True)
@@ -273,12 +279,12 @@ class MissionService:
         fc_store, verdict = self.fc_store, arrived.verdict
         identity, before = identify(verdict.records), None if self.held is None else self.held.identity
         outcome: Outcome | None = Outcome.FAILED
-        is_lossy, change = False, ""
+        change: Callable[[str], Happening] | None = None
         if verdict.result is Result.REJECTED:
-            ack, text = verdict.ack, verdict.findings[-1].text()
+            ack, why = verdict.ack, sentences.REJECTED(verdict.findings[-1].text())
             outcome = Outcome.CANCELLED if ack is MissionResult.OPERATION_CANCELLED else Outcome.REJECTED
         elif isinstance(fc_store, Refusal):
-            ack, text = fc_store.ack, fc_store.text
+            ack, why = fc_store.ack, fc_store.why
         else:
             result = yield from self._push(fc_store, arrived, progress)
             if result.failure in LIST_IS_GONE:
@@ -288,23 +294,24 @@ class MissionService:
                 verdict = with_meant_home(verdict) if arrived.is_home_meant() else verdict
                 is_erased = verdict.result is Result.CLEARED
                 outcome, ack = Outcome.VERIFIED, MissionResult.ACCEPTED
-                is_lossy = has_losses(verdict) or (is_erased and not result.unchanged)
                 if is_erased and not verdict.findings:
-                    text = _ALREADY_CLEAR if result.unchanged else _CLEARED
+                    why = sentences.ALREADY_CLEAR() if result.unchanged else sentences.CLEARED()
                 else:
-                    text = summary(len(arrived.items), verdict, is_unchanged=result.unchanged)
+                    is_lossy = has_losses(verdict) or (is_erased and not result.unchanged)
+                    stored = sentences.STORED_WITH_LOSSES if is_lossy else sentences.STORED
+                    why = stored(summary(len(arrived.items), verdict, is_unchanged=result.unchanged))
                 if not result.unchanged:
-                    change = "Mission erased" if is_erased else f"New mission, {len(verdict.items)} items"
+                    change = sentences.ERASED_BY if is_erased else partial(sentences.NEW_MISSION, len(verdict.items))
             else:
-                ack, text = _ACKS.get(result.failure, MissionResult.DENIED), result.failure.value
+                ack, why = _ACKS.get(result.failure, MissionResult.DENIED), result.failure.value
                 outcome = None if result.failure is PushFailure.UNCERTAIN else outcome
         number = (yield from end_save()) if is_kept else None
         if outcome is None:
             # Only reading the list will show it.
             self.pending.append(PendingMission(number, identity, before))
-        if number is not None and outcome is not None and not (yield from conclude(number, outcome, text)):
+        if number is not None and outcome is not None and not (yield from conclude(number, outcome, why.text)):
             number = None
-        delivery = DeliveryResult(ack, text, number, is_lossy, change)
+        delivery = DeliveryResult(ack, why, number, change)
         self._do(MissionEnded(arrived, delivery))
         return delivery
 
@@ -390,4 +397,3 @@ _ACKS = {
     PushFailure.NO_SPACE: MissionResult.NO_SPACE,
     PushFailure.REFUSED: MissionResult.INVALID,
 }
-_CLEARED, _ALREADY_CLEAR = "Mission on the flight controller cleared", "The flight controller already held no mission"

@@ -2,6 +2,7 @@
 """Fences and rally points: lists like missions, but the board's configuration holds them, and the Pi stores no copy."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from bridge.line.conversation import Conversation
@@ -10,10 +11,11 @@ from bridge.missions.fc_mission_store import AnyFcMissionStore, PushProgress
 from bridge.missions.mission_service import NO_LINK, DeliveryResult, HeldMission, MissionService
 from bridge.model.missions import ArrivedMission, Refusal
 from bridge.model.vehicle import Vehicle
+from bridge.voice import sentences
 from protocols.mission_item import MissionResult, identify
 from reports.verdict import Result
 
-NO_PLACES = Refusal(MissionResult.UNSUPPORTED, "No fences or rally points: only missions are stored")
+NO_PLACES = Refusal(MissionResult.UNSUPPORTED, sentences.NO_PLACES())
 
 
 class PlaceLists(MissionService):
@@ -39,20 +41,26 @@ class PlaceLists(MissionService):
     ) -> Conversation[DeliveryResult]:
         verdict, fc_store = arrived.verdict, self.fc_store
         if verdict.result is Result.REJECTED:
-            return DeliveryResult(verdict.ack, verdict.findings[-1].text(), None)
+            return DeliveryResult(verdict.ack, sentences.REJECTED(verdict.findings[-1].text()), None)
         if isinstance(fc_store, Refusal):
-            return DeliveryResult(fc_store.ack, fc_store.text, None)
+            return DeliveryResult(fc_store.ack, fc_store.why, None)
         result = yield from fc_store.push(verdict.records, progress)
         self._on_change()
         if result.failure is not None:
-            return DeliveryResult(MissionResult.DENIED, f"{self._name}: {result.failure.value}", None)
+            return DeliveryResult(
+                MissionResult.DENIED, sentences.PLACES_FAILED(self._name, result.failure.value.text), None
+            )
         self.held = HeldMission(identify(verdict.records), verdict.records, verdict.items)
         warnings = sum(finding.is_warning for finding in verdict.findings)
-        done = f"{self._name} " + (f"verified: {len(verdict.items)} items" if verdict.items else "cleared")
-        more = [", unchanged"] if result.unchanged else []
-        more += [f", warnings: {warnings}"] if warnings else []
-        change = "" if result.unchanged else done
-        return DeliveryResult(MissionResult.ACCEPTED, done + "".join(more), None, bool(warnings), change)
+        unchanged, count = ", unchanged" if result.unchanged else "", len(verdict.items)
+        if not verdict.items:
+            why = sentences.PLACES_CLEARED(self._name, unchanged)
+        elif warnings:
+            why = sentences.PLACES_STORED_WITH_LOSSES(self._name, count, unchanged, warnings)
+        else:
+            why = sentences.PLACES_STORED(self._name, count, unchanged)
+        change = None if result.unchanged else partial(sentences.NEW_PLACES, self._name)
+        return DeliveryResult(MissionResult.ACCEPTED, why, None, change)
 
     def read_back(self) -> Conversation[HeldMission | Refusal]:
         """The flight controller's list, read now."""

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from enum import Enum, IntEnum
 from typing import Any
 
+from bridge.voice import sentences
+from bridge.voice.happening import Happening
 from protocols.mission_item import ListIdentity, MissionItem, MissionResult
 from protocols.msp.nav import FINISHED, LEGS, NavAction, NavMode, NavState, NavStatus
 from reports.vehicle_groups import Progress
@@ -17,10 +19,15 @@ class Refusal:
     """The reply to a ground station: the MISSION_ACK code, and the reason as a STATUSTEXT."""
 
     ack: MissionResult
-    text: str
+    why: Happening
+
+    @property
+    def text(self) -> str:
+        """The whole reason."""
+        return self.why.text
 
 
-ARMED = Refusal(MissionResult.DENIED, "Armed: disarm to change the mission")
+ARMED = Refusal(MissionResult.DENIED, sentences.ARMED())
 
 
 class Outcome(Enum):
@@ -143,7 +150,7 @@ class FlightReport:
     is_flown: bool
     way: Way | None = None
     stage: Stage | None = None
-    why: str = ""
+    why: Happening | None = None
     summary: int = 0
 
 

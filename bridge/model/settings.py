@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any, Protocol
 
+from bridge.voice.sentences import settings_changed
 from protocols.float32 import single
 from protocols.param_file import is_setting_name
 
@@ -155,14 +156,10 @@ class SettingsChange:
     names: tuple[str, ...]
     at: float
 
-    def text(self, most: int | None = None) -> str:
-        """For the pilot: all names, or as many as fit into `most` characters."""
-        for count in range(len(self.names), -1, -1):
-            more = [f"+{len(self.names) - count}"] if count < len(self.names) else []
-            text = "Settings changed elsewhere: " + ", ".join([*self.names[:count], *more])
-            if most is None or len(text) <= most:
-                break
-        return text
+    @property
+    def text(self) -> str:
+        """All names, for people."""
+        return settings_changed(self.names).text
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,13 +13,14 @@ from bridge.fc.fc_settings import ARMED, NO_ANSWER, Cause, FcSettings, SettingRe
 from bridge.fc.profile import FlightController, Spoken
 from bridge.fc.session import FcSession
 from bridge.gcs.ground import Ground
-from bridge.gcs.station import Severity
 from bridge.line.conversation import Conversation, LinkLost, Pause, ask_surely
 from bridge.missions.mission_service import MissionService
 from bridge.model.events import BridgeEvent, SettingChanged, SettingsChangedOnBoard, SettingsRead, SettingsSaved
 from bridge.model.settings import BoardId, SettingsChange, SettingsMemory, SettingTable, TakenBackup, Value, shown
 from bridge.settings.known_settings import Freshness, KnownSettings
 from bridge.settings.setting_work import Answer, OnDone, SettingChange, SettingsSave, SettingWork, WorkEvent
+from bridge.voice import sentences
+from bridge.voice.happening import Happening
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, request
 from protocols.rights import Effect
@@ -35,17 +36,15 @@ _MOST_NAMED = 20
 _CHANGE_SIZE = 200
 #: Items that wait: of one client, which repeats them, and of all.
 _MOST_OF_ONE, _MOST_WAITING = 8, 64
-#: Of a longer text Mission Planner's HUD shows the end.
-_MOST_TEXT = 50
 _UID_SIZE = 12
 #: A client waits this long for a table: INAV's takes 20 s, a Harakiri's over MAVLink 24 s, and again for a lost value.
 READ_WITHIN_S = 60.0
 
-_NO_BOARD = SettingRefusal(Cause.NO_LINK, "No flight controller whose settings can be read")
-_OCCUPIED = SettingRefusal(Cause.OCCUPIED, "A mission is being transferred: try again later")
-_UNREAD = SettingRefusal(Cause.OCCUPIED, "The settings are still being read: try again")
-_TOO_MANY = SettingRefusal(Cause.OCCUPIED, "Too many changes at once: try again")
-_NO_ARM_FLAG = SettingRefusal(Cause.REFUSED, "Not changed: the board does not report arming")
+_NO_BOARD = SettingRefusal(Cause.NO_LINK, sentences.NO_SETTINGS())
+_OCCUPIED = SettingRefusal(Cause.OCCUPIED, sentences.SETTINGS_OCCUPIED())
+_UNREAD = SettingRefusal(Cause.OCCUPIED, sentences.SETTINGS_UNREAD())
+_TOO_MANY = SettingRefusal(Cause.OCCUPIED, sentences.TOO_MANY_CHANGES())
+_NO_ARM_FLAG = SettingRefusal(Cause.REFUSED, sentences.NO_ARM_FLAG())
 
 OnTable = Callable[[SettingTable | SettingRefusal, float], None]
 
@@ -89,7 +88,7 @@ class BoardSettings:
         self._is_on_line, self._line_free_at = False, 0.0
         self._read_at, self._retry_s = inf, _RETRY_S
         #: The text for ground stations that connect later.
-        self._told = ""
+        self._told: Happening | None = None
         self.due = inf
 
     @property
@@ -126,7 +125,7 @@ class BoardSettings:
     def arming_changed(self, now: float, *, is_armed: bool) -> None:
         """A pilot who has armed has decided to fly: stations that connect later get no text about earlier changes."""
         if is_armed:
-            self._tell_newcomers("")
+            self._tell_newcomers(None)
         else:
             self._read_again(now + _FIRST_S)
 
@@ -235,7 +234,7 @@ class BoardSettings:
         name, value = work.name, work.value
         work.before = setting = None if table is None else table.find(name)
         if table is not None and setting is None:
-            return SettingRefusal(Cause.UNKNOWN_NAME, f"This flight controller has no setting {name[:32]}")
+            return SettingRefusal(Cause.UNKNOWN_NAME, sentences.NO_SUCH_SETTING(name[:32]))
         if obstacle is not None:
             return obstacle
         if setting is None or self.known.freshness is Freshness.UNREAD:
@@ -260,8 +259,7 @@ class BoardSettings:
             self._on_table(table)
         after = next((each for each in result if each.name == before.name), before)
         if not after.holds(work.value):
-            text = f"{before.name} stays {shown(after.value)}: the flight controller refused it"
-            return SettingRefusal(Cause.REFUSED, text)
+            return SettingRefusal(Cause.REFUSED, sentences.REFUSED_BY_BOARD(before.name, shown(after.value)))
         self.known.unsaved[after.name] = after.value
         self._emit(
             SettingChanged(setting=after.name, before=shown(before.value), after=shown(after.value), by=work.client)
@@ -335,18 +333,19 @@ class BoardSettings:
 
     def _report(self, change: SettingsChange) -> None:
         self._missions.settings_changed()
-        self._ground.say(Severity.WARNING, change.text(_MOST_TEXT))
-        self._tell_newcomers(change.text(_MOST_TEXT))
+        happening = sentences.settings_changed(change.names)
+        self._ground.say(happening)
+        self._tell_newcomers(happening)
         assert self.known.state is not None
-        self._emit(SettingsChangedOnBoard(detail=change.text(), seal=self.known.state.seal))
+        self._emit(SettingsChangedOnBoard(detail=change.text, seal=self.known.state.seal))
 
-    def _tell_newcomers(self, text: str) -> None:
-        """A board is mostly found before the first ground station connects. An empty text: no more."""
+    def _tell_newcomers(self, change: Happening | None) -> None:
+        """A board is mostly found before the first ground station connects. None: no more."""
         if self._told in self._ground.notices:
             self._ground.notices.remove(self._told)
-        self._told = text
-        if text:
-            self._ground.notices.append(text)
+        self._told = change
+        if change is not None:
+            self._ground.notices.append(change)
 
     def _pace(self, size: int) -> float:
         """The rest of the line carries these bytes in this time, which has already passed in part."""

@@ -16,13 +16,14 @@ from bridge.model.settings import BoardSetting, SettingTable, Value
 from bridge.settings.board_settings import READ_WITHIN_S, BoardSettings, OnTable
 from bridge.settings.parameter_names import LONGEST, parameter_names
 from bridge.settings.setting_work import Answer
+from bridge.voice import sentences
 from protocols.param_file import is_equal
 
 _MOST_NAMES = 8
-_NO_BOARD = SettingRefusal(Cause.NO_LINK, "The flight controller is not connected")
+_NO_BOARD = SettingRefusal(Cause.NO_LINK, sentences.NO_SETTINGS())
 #: Reasons why a save was not started.
 _BEFORE_SAVE = (Cause.ARMED, Cause.OCCUPIED, Cause.LIMIT, Cause.NO_LINK)
-_RUNNING = SettingRefusal(Cause.OCCUPIED, "Another restore is running: wait until it has ended")
+_RUNNING = SettingRefusal(Cause.OCCUPIED, sentences.RESTORE_RUNS())
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +62,7 @@ def plan_restore(
     Settings of another firmware are refused: equal names may mean something else there.
     """
     if source and source.split()[0] != board.split()[0]:
-        return SettingRefusal(Cause.REFUSED, f"These settings are from {source}, but the board has {board}")
+        return SettingRefusal(Cause.REFUSED, sentences.OTHER_FIRMWARE(source, board))
     changes: list[PlannedChange] = []
     left_out: list[LeftOut] = []
     for name, value in wanted.items():
@@ -79,7 +80,7 @@ def plan_restore(
         else:
             changes.append(PlannedChange(setting.name, setting.value, becomes))
     if not wanted.keys() & table.settings.keys():
-        return SettingRefusal(Cause.REFUSED, f"The board ({board}) has none of these settings")
+        return SettingRefusal(Cause.REFUSED, sentences.NONE_OF_THESE())
     is_other = source not in ("", board)
     notice = f"The settings are from {source}, the board has {board}: some may mean something else there"
     return RestorePlan(tuple(changes), tuple(left_out), notice if is_other else "")

@@ -19,13 +19,14 @@ from bridge.fc.fc_settings import Cause, SettingRefusal
 from bridge.gcs.budget import Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import Sender
-from bridge.gcs.station import Severity
 from bridge.model.settings import BoardSetting, SettingTable, ValueKind, shown
 from bridge.model.vehicle import Health, Orientation, Readiness, Vehicle
 from bridge.settings.board_settings import BoardSettings
 from bridge.settings.parameter_files import GENERAL_URI, ParameterFiles
 from bridge.settings.parameter_names import parameter_names
 from bridge.settings.setting_work import Answer
+from bridge.voice import sentences
+from bridge.voice.happening import Happening
 from protocols.float32 import single
 from protocols.mavlink.codec import pack, pack_component_metadata
 from protocols.mavlink.dialect import Message, messages
@@ -136,7 +137,7 @@ class Parameters:
 
         def done(table: SettingTable | SettingRefusal, at: float) -> None:
             if isinstance(table, SettingRefusal) and table.cause is Cause.NO_ANSWER:
-                sender.say(Severity.WARNING, table.text)
+                sender.say(sentences.LIST_UNANSWERED())
             dialogue.awaits_list, dialogue.next = False, 0
             self.due = min(self.due, at)
 
@@ -164,11 +165,12 @@ class Parameters:
         setting = self._named.get(_RADIUS if parameter == WP_RADIUS else parameter)
         if parameter == WP_RADIUS and isfinite(value):
             value = float(round(value))  # Mission Planner keeps metres as text: 2.10 m arrives as 209.99998 cm
-        setting_name = parameter if setting is None else setting.name
 
         def done(result: Answer, _at: float) -> None:
             if isinstance(result, SettingRefusal):
-                self.refuse(sender, name, replace(result, text=result.text.replace(setting_name, parameter, 1)))
+                self.refuse(
+                    sender, name, replace(result, why=result.why.renamed(setting.name if setting else "", parameter))
+                )
                 return
             if not self._told:
                 self._ground.broadcast(self._message(parameter))
@@ -176,7 +178,7 @@ class Parameters:
                 self._send(sender, name)
 
         if setting is None and not isclose(value, values.get(parameter, value), rel_tol=1e-6):
-            self.refuse(sender, name, SettingRefusal(Cause.FIXED, f"{parameter} is read-only"))
+            self.refuse(sender, name, SettingRefusal(Cause.FIXED, sentences.READ_ONLY(parameter)))
         elif (
             setting is None
             or value == setting.value
@@ -184,7 +186,7 @@ class Parameters:
         ):
             self._send(sender, name)
         elif setting.kind is ValueKind.INTEGER and setting.accepts(value) and abs(value) >= _MOST_EXACT:
-            above = f"{parameter} stays {shown(setting.value)}: only up to {_MOST_EXACT - 1} over MAVLink"
+            above = sentences.STAYS(parameter, shown(setting.value), f"only up to {_MOST_EXACT - 1} over MAVLink")
             self.refuse(sender, name, SettingRefusal(Cause.OUT_OF_RANGE, above))
         else:
             self._settings.change(setting.name, value, done, now, str(sender))
@@ -199,7 +201,7 @@ class Parameters:
         if refused is not None:
             # Each Write in Mission Planner sends its default radius of 30 m if its plan screen was open first.
             is_routine = name.upper() == WP_RADIUS and cause is Cause.OUT_OF_RANGE
-            sender.say(Severity.NOTICE if is_routine else Severity.ERROR, refused.text)
+            sender.say(Happening(sentences.RADIUS_KEPT, refused.why.values) if is_routine else refused.why)
         if name.upper() in self._values():
             self._error(sender, name, _ERRORS.get(cause, messages.MAV_PARAM_ERROR_PERMISSION_DENIED))
         self._send(sender, name)

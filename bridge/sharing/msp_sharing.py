@@ -17,12 +17,12 @@ from bridge.fc.profile import FlightController
 from bridge.fc.session import FcSession
 from bridge.gcs.budget import Rate, TokenBucket
 from bridge.gcs.ground import Ground
-from bridge.gcs.station import Severity
 from bridge.line.conversation import Conversation, LinkLost, Receive, Send, ask_armed
 from bridge.line.msp_link import MspLink
 from bridge.missions.mission_service import MissionService
 from bridge.model.events import Emit, Level, ShareRefused, ShareUnanswered
 from bridge.sharing.program import Program, WaitingRequest
+from bridge.voice import sentences
 from protocols.msp.command_line import is_clean
 from protocols.msp.frame import Direction, MspFrame, frame_size
 from protocols.msp.nav import Nav, UnsafeRecord, decode_wp, encode_set_wp
@@ -209,9 +209,7 @@ class MspSharing:
         level = self._level(self._refusals, name, why, now)
         self._emit(ShareRefused(level=level, program=program.name, command=name, why=why))
         if level == "warning":
-            # In flight a warning would cover the texts that concern the craft.
-            severity = Severity.NOTICE if self._session.vehicle.armed else Severity.WARNING
-            self._ground.say(severity, f"{program.host}: {name} refused ({why})")
+            self._ground.say(sentences.PROGRAM_REFUSED(program.host, name, why))
         self._disconnect(program, request)
 
     def _give_up(self, program: Program, request: WaitingRequest, now: float) -> None:

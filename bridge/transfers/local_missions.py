@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from bridge.gcs.ground import Ground
-from bridge.gcs.station import Severity
 from bridge.line.conversation import Conversation
 from bridge.missions.fc_mission_store import StoreReport
 from bridge.missions.list_check import check_list
@@ -14,11 +13,12 @@ from bridge.missions.mission_service import DeliveryResult, HeldMission, Mission
 from bridge.model.events import Emit, PushEnded, PushStarted
 from bridge.model.missions import ArrivedMission, Refusal
 from bridge.transfers.uploads import MissionUploads
+from bridge.voice import sentences
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.plain_text import plain_text
 from reports.verdict import Result, Verdict
 
-_WOULD_ERASE = Refusal(MissionResult.DENIED, "No item can be stored: this would erase the current mission")
+_WOULD_ERASE = Refusal(MissionResult.DENIED, sentences.WOULD_ERASE())
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,8 +77,9 @@ class LocalMissions:
         def done(result: DeliveryResult | Refusal, _at: float) -> None:
             self._missions.release(owner)
             if arrived and isinstance(result, DeliveryResult):
-                severity = Severity.WARNING if result.is_lossy else Severity.NOTICE
-                self._ground.say(severity, f"{source}: {result.text}")
+                is_lossy = result.ack is MissionResult.ACCEPTED and result.why.severity.is_on_hud
+                pushed = sentences.PUSHED_WITH_LOSSES if is_lossy else sentences.PUSHED
+                self._ground.say(pushed(source, result.text))
             self._emit(
                 PushEnded(
                     level="info" if result.ack is MissionResult.ACCEPTED else "warning",

@@ -4,16 +4,13 @@
 from math import inf
 
 from bridge.gcs.ground import Ground
-from bridge.gcs.station import Severity
 from bridge.line.conversation import Conversation, LinkLost, conclude, find_pending, recall
 from bridge.missions.fc_mission_store import Loading
 from bridge.missions.mission_service import NO_LINK, HeldMission, MissionService
 from bridge.model.events import Emit, Level, MissionChangedOnBoard
 from bridge.model.missions import Outcome, Refusal
-
-#: A change of the flight controller's list that no ground station requested, as text for the pilot.
-MissionChange = tuple[Severity, str]
-_NOT_LOADED = (Severity.WARNING, "No mission is loaded: disarm to load the saved one")
+from bridge.voice import sentences
+from bridge.voice.happening import Happening
 
 
 class MissionWatch:
@@ -55,7 +52,7 @@ class MissionWatch:
         is_known = self._missions.is_settled and not self._missions.pending
         return not (is_known and (yield from self._missions.fc_store.is_current()))
 
-    def _catch_up(self) -> Conversation[MissionChange | None]:
+    def _catch_up(self) -> Conversation[Happening | None]:
         """Read the list; returns the text for the pilot if it is another one."""
         is_first, before = not self._missions.is_settled, self._missions.held
         held = yield from self._missions.read_back()
@@ -67,43 +64,40 @@ class MissionWatch:
             return news
         if loading is Loading.ARMED:
             announced, self._unloaded = self._unloaded, self._missions.fc_store
-            return None if announced is self._unloaded else _NOT_LOADED
+            return None if announced is self._unloaded else sentences.NOT_LOADED()
         is_loaded = loading is Loading.LOADED
         if isinstance(held, Refusal) or (is_first and not (is_loaded and held.records)):
             return None
         if is_loaded:
             is_ours = (yield from recall(held.identity)) is not None
-            again = "loaded again" if is_ours else "loaded, not written by naze-bridge"
-            return Severity.NOTICE, f"Saved mission {again}: {held.identity.count} records"
+            return (sentences.LOADED_AGAIN if is_ours else sentences.LOADED_FOREIGN)(held.identity.count)
         if before is not None and before.identity == held.identity:
             return None
-        return Severity.WARNING, f"Mission on the flight controller changed: {held.identity.count} records"
+        return sentences.CHANGED_ON_BOARD(held.identity.count)
 
-    def _settle(self, held: HeldMission) -> Conversation[MissionChange | None]:
+    def _settle(self, held: HeldMission) -> Conversation[Happening | None]:
         """Conclude the pending missions by the list found; returns the text about the newest for the pilot."""
         news = None
         pending, self._missions.pending = self._missions.pending, []
         for mission in pending:
-            has_arrived = mission.identity == held.identity
             if mission.identity is None:
-                outcome, text = Outcome.CANCELLED, "interrupted, old mission kept"
-            elif has_arrived:
-                outcome, text = Outcome.VERIFIED, f"The mission did arrive: {held.identity.count} records"
+                outcome, why = Outcome.CANCELLED, sentences.INTERRUPTED()
+            elif mission.identity == held.identity:
+                outcome, why = Outcome.VERIFIED, sentences.DID_ARRIVE(held.identity.count)
             elif mission.before == held.identity or (mission.before is None and held.records):
-                outcome, text = Outcome.FAILED, "The mission did not arrive: old mission kept, write it again"
+                outcome, why = Outcome.FAILED, sentences.DID_NOT_ARRIVE()
             else:
-                outcome, text = Outcome.FAILED, "The mission arrived incomplete: write it again"
+                outcome, why = Outcome.FAILED, sentences.ARRIVED_INCOMPLETE()
             if mission.number is not None:
-                yield from conclude(mission.number, outcome, text)
+                yield from conclude(mission.number, outcome, why.text)
             if mission.identity is not None:
-                news = Severity.NOTICE if has_arrived else Severity.WARNING, text
+                news = why
         return news
 
-    def _caught_up(self, news: MissionChange | LinkLost | None, now: float) -> None:
+    def _caught_up(self, news: Happening | LinkLost | None, now: float) -> None:
         assert self._began_at is not None
         self.due, self._began_at = max(now, self._began_at + self._missions.watch_s), None
-        if isinstance(news, tuple):
-            severity, text = news
-            self._ground.say(severity, text)
-            level: Level = "warning" if severity is Severity.WARNING else "info"
-            self._emit(MissionChangedOnBoard(level=level, detail=text))
+        if isinstance(news, Happening):
+            self._ground.say(news)
+            level: Level = "warning" if news.severity.is_on_hud else "info"
+            self._emit(MissionChangedOnBoard(level=level, detail=news.text))

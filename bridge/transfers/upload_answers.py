@@ -6,12 +6,11 @@ from typing import Any
 
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import Sender
-from bridge.gcs.station import Severity
 from bridge.missions.mission_service import DeliveryResult
-from bridge.missions.mission_texts import finding_lines
 from bridge.model.missions import FinalAck, Refusal, TransferMemory
+from bridge.voice import sentences
+from bridge.voice.mission_report import finding_lines
 from protocols.mission_item import MissionResult
-from reports.finding import News
 from reports.verdict import Result, Verdict
 
 #: Mission Planner sends its last item for 5 s, its Cancel for 2.8 s.
@@ -19,11 +18,8 @@ _MEMORY_S = 10.0
 _CANCEL_S = 3.0
 #: QGroundControl waits 1.5 s for the final ack, and MAVSDK 2.5 s; neither asks for it again. So it is sent three times.
 _ACK_AGAIN_S = (0.4, 0.9)
-_SEVERITIES = {News.DANGER: Severity.WARNING, News.WARNING: Severity.NOTICE}
-_NOT_WHOLE = Refusal(MissionResult.UNSUPPORTED, "A mission can only be written as a whole")
-#: QGroundControl silently leaves out lists that the vehicle does not offer to store.
-_ONLY_MISSIONS = "Fences and rally points are not stored here"
-_UNKNOWN_UPLOAD = Refusal(MissionResult.OPERATION_CANCELLED, "Unknown upload: write it again")
+_NOT_WHOLE = Refusal(MissionResult.UNSUPPORTED, sentences.NOT_WHOLE())
+_UNKNOWN_UPLOAD = Refusal(MissionResult.OPERATION_CANCELLED, sentences.UNKNOWN_UPLOAD())
 
 
 class UploadAnswers:
@@ -66,7 +62,7 @@ class UploadAnswers:
         self._memory(sender).final_ack = answer
         sender.mission_ack(ack, self._mission_type if mission_type is None else mission_type)
 
-    def report(self, sender: Sender, verdict: Verdict[Any], delivery: DeliveryResult, now: float) -> None:
+    def report(self, sender: Sender, verdict: Verdict[Any], delivery: DeliveryResult) -> None:
         """Report everything to the sender, and the change on the aircraft to other ground stations.
 
         The summary is last: Mission Planner shows the last text. Before it only dangers are warnings, which its voice
@@ -76,22 +72,16 @@ class UploadAnswers:
         if verdict.result is Result.ACCEPTED and not sender.station.has_written:
             sender.station.has_written = True
             if self.are_only_missions_stored:
-                sender.say(Severity.INFO, _ONLY_MISSIONS)
-        for news, line in finding_lines(verdict.findings) if accepted else ():
-            if line != delivery.text:
-                sender.say(_SEVERITIES.get(news, Severity.INFO), line)
+                # QGroundControl silently leaves out lists that the vehicle does not offer to store.
+                sender.say(sentences.ONLY_MISSIONS())
+        for line in finding_lines(verdict.findings) if accepted else ():
+            if line.text != delivery.text:
+                sender.say(line)
         if delivery.number is None and not self._mission_type:  # the Pi stores no others
-            sender.say(Severity.WARNING, "The mission could not be stored on the Pi")
-        severity = Severity.INFO if accepted else Severity.ERROR
-        if accepted and delivery.is_lossy:
-            severity = Severity.WARNING
-        if severity is Severity.INFO:
-            sender.say(severity, delivery.text)
-        else:
-            sender.station.must_read(severity, delivery.text, now)
-        if delivery.change:
-            severity = Severity.WARNING if verdict.result is Result.CLEARED else Severity.INFO
-            self._ground.say(severity, f"{delivery.change}, by {sender.peer}", but=sender.station)
+            sender.say(sentences.NOT_STORED_ON_PI())
+        sender.say(delivery.why)
+        if delivery.change is not None:
+            self._ground.say(delivery.change(sender.name), but=sender.station)
 
     def went_on(self, sender: Sender) -> None:
         """The station has sent another mission message: it has the final ack, or does not wait for it."""
@@ -130,7 +120,7 @@ class UploadAnswers:
             if answer.is_refusal or seq == answer.count - 1:
                 sender.mission_ack(answer.ack, self._mission_type)
         elif is_lost and not any(self.last_at(where, now) for where in self._ground.elsewhere(sender)):
-            sender.say(Severity.ERROR, _UNKNOWN_UPLOAD.text)
+            sender.say(_UNKNOWN_UPLOAD.why)
             self.end(sender, _UNKNOWN_UPLOAD.ack, 0, now)
 
     def partial_list(self, sender: Sender, now: float) -> None:
@@ -143,7 +133,8 @@ class UploadAnswers:
 
     def forget(self, sender: Sender) -> None:
         """The ground station has begun a new upload."""
-        self._memory(sender).final_ack = sender.station.to_read = None
+        self._memory(sender).final_ack = None
+        sender.station.bad_news.forget()
 
     def _memory(self, sender: Sender) -> TransferMemory:
         return sender.transfers[self._mission_type]

@@ -11,6 +11,7 @@ from bridge.missions.list_check import ListCheck
 from bridge.missions.mission_service import OCCUPIED
 from bridge.model.missions import Refusal
 from bridge.transfers.arriving_list import ArrivingList, WholeList
+from bridge.voice import sentences
 from protocols.mission_item import MissionItem, MissionResult
 
 #: QGroundControl reports a failed write 1.5 s after its last item, unless that is requested again; MAVSDK after 2.5 s.
@@ -116,14 +117,14 @@ class Asking(UploadState):
     """The flight controller has been asked if it can take a list."""
 
     seconds = 5.0
-    timeout = Refusal(MissionResult.DENIED, "The flight controller does not answer: try again")
+    timeout = Refusal(MissionResult.DENIED, sentences.NO_ANSWER())
 
 
 class Receiving(UploadState):
     """Items arrive."""
 
     seconds = 5.0
-    timeout = Refusal(MissionResult.OPERATION_CANCELLED, f"Upload silent for {seconds:.0f} s, old mission kept")
+    timeout = Refusal(MissionResult.OPERATION_CANCELLED, sentences.UPLOAD_SILENT(seconds))
 
     def __init__(self, upload: "Upload", event: Ready, now: float) -> None:
         super().__init__(upload, event, now)
@@ -156,9 +157,8 @@ class Closing(Receiving):
         UploadState.__init__(self, upload, event, now)
         assert isinstance(upload.state, Receiving)
         self.list, missing = upload.state.list, upload.state.list.missing
-        lost = f"{missing} of {upload.count} missing" if missing else "messages lost"
-        text = f"Mission NOT written: {lost}, use Write"
-        self.timeout = Refusal(MissionResult.OPERATION_CANCELLED, text)
+        why = sentences.ITEMS_MISSING(missing, upload.count) if missing else sentences.MESSAGES_LOST()
+        self.timeout = Refusal(MissionResult.OPERATION_CANCELLED, why)
 
 
 class _Whole(UploadState):
@@ -204,7 +204,7 @@ class Delivering(_Whole):
     """The list is stored, written and read back: 146 records take 25 s at 1200 baud."""
 
     seconds = 60.0
-    timeout = Refusal(MissionResult.DENIED, "Still writing the mission: wait for the result")
+    timeout = Refusal(MissionResult.DENIED, sentences.STILL_WRITING())
 
 
 class DeliveringDespiteCancel(Delivering):

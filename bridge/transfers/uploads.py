@@ -11,15 +11,14 @@ from functools import partial
 from math import inf
 from typing import Any
 
-from bridge.gcs.budget import TOO_MANY_WRITES, Cost
+from bridge.gcs.budget import Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import Sender
-from bridge.gcs.station import Peer, Severity
+from bridge.gcs.station import Peer
 from bridge.line.conversation import Conversation
 from bridge.missions.fc_mission_store import StoreReport
 from bridge.missions.list_check import begin_check, check_count
 from bridge.missions.mission_service import OCCUPIED, DeliveryResult, MissionService, MissionTransfer, TransferStep
-from bridge.missions.mission_texts import with_meant_home
 from bridge.model.events import Emit, StationMoved, UploadEnded, UploadRefused, UploadStarted
 from bridge.model.missions import ArrivedMission, Refusal
 from bridge.transfers.arriving_list import Reply, WholeList
@@ -46,12 +45,15 @@ from bridge.transfers.upload_states import (
     UploadQueue,
     Waiting,
 )
+from bridge.voice import sentences
+from bridge.voice.happening import Happening
+from bridge.voice.mission_report import with_meant_home
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionItem, MissionResult
 from reports.finding import Finding
 from reports.verdict import CLEARED_LIST, Result, Verdict
 
-_TOO_MANY_UPLOADS = Refusal(MissionResult.DENIED, "Too many uploads: wait a few seconds")
+_TOO_MANY_UPLOADS = Refusal(MissionResult.DENIED, sentences.TOO_MANY_UPLOADS())
 #: The maximum number of simultaneous uploads.
 _MOST_UPLOADS = 256
 #: A ground station that reads the mission has given up an upload that was silent for this long.
@@ -135,8 +137,8 @@ class MissionUploads:
             # The next request or the final ack will follow anyway.
             state.item_repeated(now)
         elif item.seq >= upload.count:
-            text = f"WP {item.seq} is beyond the {upload.count} items announced"
-            sender.refuse(Refusal(MissionResult.INVALID_SEQUENCE, text), self._missions.mission_type)
+            beyond = Refusal(MissionResult.INVALID_SEQUENCE, sentences.BEYOND_THE_COUNT(item.seq, upload.count))
+            sender.refuse(beyond, self._missions.mission_type)
         else:
             taken = state.list.take(item, sender, now)
             if isinstance(taken, int):
@@ -158,7 +160,7 @@ class MissionUploads:
         if isinstance(upload.state, Delivering):
             return
         if result != MissionResult.ACCEPTED:
-            self._handle(upload, Ended(_cancelled(f"cancelled (result {result})")), now)
+            self._handle(upload, Ended(_cancelled(sentences.CANCELLED_WITH(result))), now)
         elif upload.state.received:
             self._handle(upload, SenderFinished(), now)
 
@@ -179,7 +181,7 @@ class MissionUploads:
         """A ground station's connection is closed: its uploads end without waiting for the timeout."""
         for upload in self._queue.undelivered():
             if upload.sender.peer == peer:
-                self._handle(upload, Ended(_cancelled("ended: disconnected")), now)
+                self._handle(upload, Ended(_cancelled(sentences.DISCONNECTED())), now)
 
     def tick(self, now: float) -> None:
         """Repeat requests and answers, end states at their deadlines, continue the uploads whose turn has come."""
@@ -209,7 +211,7 @@ class MissionUploads:
         self.answers.forget(sender)
         if not sender.station.allows(Cost.UPLOAD):
             # A flood must cost less than the lists that it announces: no incident, no log entry.
-            sender.say(Severity.ERROR, _TOO_MANY_UPLOADS.text)
+            sender.say(_TOO_MANY_UPLOADS.why)
             self.answers.end(sender, _TOO_MANY_UPLOADS.ack, 0, now, mission_type)
             return
         number = sender.number
@@ -221,7 +223,7 @@ class MissionUploads:
             self._handle(upload, Ended(armed), now)
         elif len(self._queue.uploads) > _MOST_UPLOADS:
             ended = self._queue.least_worth()
-            self._handle(ended, Ended(_cancelled("ended: too many at once")), now)
+            self._handle(ended, Ended(_cancelled(sentences.TOO_MANY_AT_ONCE())), now)
 
     def _turn(self, upload: Upload, now: float) -> Event | None:
         """The event that continues an upload, None if it must wait for others."""
@@ -230,7 +232,7 @@ class MissionUploads:
             refusal = self._missions.acquire(upload)
             is_write = state.whole.verdict.result is not Result.REJECTED
             if refusal is None and is_write and not upload.sender.station.allows(Cost.FLASH):
-                refusal = Refusal(MissionResult.DENIED, TOO_MANY_WRITES)
+                refusal = Refusal(MissionResult.DENIED, sentences.FLASH_WEAR())
         else:
             refusal = OCCUPIED if self._queue.must_wait(now) else self._missions.occupied()
         if refusal is not None:
@@ -264,9 +266,9 @@ class MissionUploads:
                 self._emit(UploadStarted(station=str(upload.sender), count=upload.count, incident=upload.incident))
                 self._request(upload, now, 0)
             case Cancelled() if after is Fixed.END:
-                self._refuse(upload, _cancelled("cancelled"), now)
+                self._refuse(upload, _cancelled(sentences.CANCELLED()), now)
             case Replaced(why) if after is Fixed.END:
-                self._emit_refusal(upload, Refusal(MissionResult.OPERATION_CANCELLED, f"superseded: {why}"))
+                self._emit_refusal(upload, _cancelled(sentences.SUPERSEDED(why)))
             case Ended(refusal):
                 self._refuse(upload, refusal, now)
         self.due = min(self.due, self.answers.due)
@@ -278,7 +280,7 @@ class MissionUploads:
             if isinstance(answer, Refusal):
                 event = Ended(answer)
             elif rejection := check_count(upload.count, answer.rules):
-                event = Ended(Refusal(rejection.ack, rejection.finding.text()))
+                event = Ended(Refusal(rejection.ack, sentences.REJECTED(rejection.finding.text())))
             else:
                 event = Ready(begin_check(upload.count, answer.rules, self._missions.vehicle.place()))
             self._handle(upload, event, now)
@@ -315,7 +317,7 @@ class MissionUploads:
         if verdict.result is not Result.REJECTED and accepted and not delivery.change:
             upload.sender.station.give_back(Cost.FLASH)
         shown = with_meant_home(verdict) if upload.is_write_fast else verdict
-        self.answers.report(upload.sender, shown, delivery, now)
+        self.answers.report(upload.sender, shown, delivery)
         if upload in self._queue.uploads:
             self._answer(upload, delivery.ack, now)
             self._handle(upload, Delivered(), now)
@@ -337,9 +339,7 @@ class MissionUploads:
             finding = Finding(None, "list", len(items), None, refusal.text)
             whole = WholeList(items, Verdict(Result.REJECTED, refusal.ack, findings=(finding,)))
             self._missions.run(self._delivery(upload, whole), lambda _result, _at: None, now)
-        # Mission Planner has reported "Write Fast" as a success to its user.
-        is_unexpected = bool(items) and upload.state.seems_written
-        upload.sender.station.must_read(Severity.ERROR, refusal.text, now, is_unexpected=is_unexpected)
+        upload.sender.say(refusal.why)
         self._answer(upload, refusal.ack, now)
         self._emit_refusal(upload, refusal)
 
@@ -387,9 +387,9 @@ class MissionUploads:
         self._emit(UploadRefused(station=name, ack=ack, why=refusal.text, incident=upload.incident))
 
 
-def _cancelled(why: str) -> Refusal:
-    return Refusal(MissionResult.OPERATION_CANCELLED, f"Upload {why}, old mission kept")
+def _cancelled(why: Happening) -> Refusal:
+    return Refusal(MissionResult.OPERATION_CANCELLED, why)
 
 
-STOPPED = _cancelled("ended: naze-bridge stops")
-FC_LOST = Refusal(MissionResult.DENIED, "Flight controller lost during the upload")
+STOPPED = _cancelled(sentences.BRIDGE_STOPS())
+FC_LOST = Refusal(MissionResult.DENIED, sentences.LOST_DURING_UPLOAD())

@@ -10,14 +10,12 @@ from math import inf
 from bridge.fc.session import FcSession
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import GroundStation
-from bridge.gcs.station import Severity
 from bridge.model.vehicle import Health
 from bridge.vehicle.link_announcer import LinkAnnouncer
+from bridge.voice.happening import Happening
+from bridge.voice.sentences import READY, prearm_lines
 
 _RENEWED_S = 30.0
-#: A longer text would be split, and Mission Planner shows only the last piece.
-_LINE_LENGTH = 50
-_PREFIX = "PreArm: "
 
 
 class ArmingReasons:
@@ -28,7 +26,7 @@ class ArmingReasons:
         self._announcer = announcer
         self._ground = ground
         self.current: tuple[str, ...] = ()
-        self._told: list[str] = []
+        self._told: list[Happening] = []
         self._told_at = -inf
 
     def follow(self, now: float) -> None:
@@ -40,36 +38,25 @@ class ArmingReasons:
         if lines == self._told and now < self._told_at + _RENEWED_S:
             return
         if self._told and not lines:
-            # Otherwise the previous reason would stay for 10 s in Mission Planner, for 35 s in QGroundControl.
-            self._ground.say(Severity.INFO, _PREFIX + "ready")
+            # Otherwise the previous reason would stay for 10 s in Mission Planner.
+            self._ground.say(READY())
         self._told, self._told_at = lines, now
         for line in lines:
-            self._ground.say(Severity.WARNING, line)
+            self._ground.say(line)
 
     def tell(self, station: GroundStation) -> None:
         """Report the reasons to a newcomer, or in answer to MAV_CMD_RUN_PREARM_CHECKS."""
         for line in self._told:
-            station.say(Severity.WARNING, line)
+            station.say(line)
 
     def _find(self, now: float) -> tuple[str, ...]:
         vehicle, state = self._session.vehicle, self._session.state
         if vehicle.armed:
             return ()
         if self._announcer.why_unknown:
-            return (state.trouble or self._announcer.why_unknown,)
+            return (self._announcer.why_unknown if state.trouble is None else state.trouble.text,)
         if state.controller is None or vehicle.fresh(Health, now) is None:
             # Silent for a moment, perhaps because it is arming and switches protocol.
             return self.current
         known = state.controller.profile.arming_blockers(vehicle, now)
         return self.current if known is None else known
-
-
-def prearm_lines(reasons: tuple[str, ...]) -> list[str]:
-    """The reasons in as few texts of at most 50 characters as possible."""
-    lines: list[str] = []
-    for reason in reasons:
-        if lines and len(lines[-1]) + 2 + len(reason) <= _LINE_LENGTH:
-            lines[-1] += f", {reason}"
-        else:
-            lines.append(_PREFIX + reason)
-    return lines

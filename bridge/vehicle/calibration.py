@@ -14,14 +14,15 @@ from enum import Enum
 from math import inf
 
 from bridge.fc.session import FcSession
-from bridge.gcs.budget import TOO_MANY_WRITES, Cost
+from bridge.gcs.budget import Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import Sender
-from bridge.gcs.station import Severity
 from bridge.line.conversation import Conversation, LinkLost, Pause, Receive, ask, ask_status, send
 from bridge.missions.mission_service import MissionService
 from bridge.settings.board_settings import BoardSettings
 from bridge.vehicle.link_announcer import LinkAnnouncer
+from bridge.voice import sentences
+from bridge.voice.happening import Happening
 from protocols.mavlink.dialect import CommandResult
 from protocols.mavlink.dialect import messages as m
 from protocols.msp.commands import Msp, MspAction
@@ -56,34 +57,38 @@ _MAX_TILT = 0.05
 class FcAction:
     """A calibration. `needs`: the sensor. A Harakiri does nothing else until it is done, and then restarts.
 
-    instruction: for the pilot.
+    name, instruction: for the pilot.
     """
 
     command: MspAction
     needs: Sensor
-    instruction: str
+    name: str
+    instruction: Happening
 
 
-CALIBRATE_ACCELEROMETER = FcAction(MspAction.ACC_CALIBRATION, Sensor.ACCELEROMETER, "Keep the craft level and still")
-CALIBRATE_COMPASS = FcAction(MspAction.MAG_CALIBRATION, Sensor.COMPASS, "Turn the craft about all axes")
+CALIBRATE_ACCELEROMETER = FcAction(
+    MspAction.ACC_CALIBRATION, Sensor.ACCELEROMETER, "Accel", sentences.CALIBRATING_ACCELEROMETER()
+)
+CALIBRATE_COMPASS = FcAction(MspAction.MAG_CALIBRATION, Sensor.COMPASS, "Compass", sentences.CALIBRATING_COMPASS())
 
 
 class ActionResult(Enum):
-    """The result of an action: the text for the pilot (at most 50 characters), and the acknowledgement."""
+    """The result of an action: the reason if it failed, in at most 22 characters, and the acknowledgement."""
 
-    def __init__(self, text: str, ack: CommandResult) -> None:
-        self.text, self.ack = text, ack
+    def __init__(self, why: str, ack: CommandResult) -> None:
+        self.why, self.ack = why, ack
 
-    DONE = "Done", CommandResult.ACCEPTED
-    FREEZES = "Calibrating: it restarts when done (up to 5 min)", CommandResult.ACCEPTED
-    ARMED = "Armed: disarm first", CommandResult.DENIED
-    NO_LINK = "No MSP link to the flight controller", CommandResult.DENIED
-    OCCUPIED = "Wait for the mission transfer to end", CommandResult.TEMPORARILY_REJECTED
-    NO_SENSOR = "The flight controller has no such sensor", CommandResult.DENIED
-    SIX_POSITIONS = "Six positions: calibrate with INAV Configurator", CommandResult.UNSUPPORTED
-    RUNNING = "A calibration is running", CommandResult.TEMPORARILY_REJECTED
-    NO_ANSWER = "No answer from the flight controller", CommandResult.FAILED
-    REFUSED = "Not supported by the flight controller", CommandResult.UNSUPPORTED
+    DONE = "", CommandResult.ACCEPTED
+    FREEZES = "restarts", CommandResult.ACCEPTED
+    ARMED = "armed", CommandResult.DENIED
+    NO_LINK = "no MSP link", CommandResult.DENIED
+    OCCUPIED = "a transfer is running", CommandResult.TEMPORARILY_REJECTED
+    NO_SENSOR = "no such sensor", CommandResult.DENIED
+    SIX_POSITIONS = "use INAV Configurator", CommandResult.UNSUPPORTED
+    RUNNING = "another is running", CommandResult.TEMPORARILY_REJECTED
+    FLASH_WEAR = "again in 10 minutes", CommandResult.TEMPORARILY_REJECTED
+    NO_ANSWER = "no answer", CommandResult.FAILED
+    REFUSED = "not supported", CommandResult.UNSUPPORTED
 
 
 #: Without an answer it may be done.
@@ -116,8 +121,7 @@ class Calibration:
         elif self._action is not None:
             self._asked(sender, command, action, ActionResult.RUNNING, now)
         elif not sender.station.allows(Cost.FLASH):
-            sender.say(Severity.ERROR, TOO_MANY_WRITES)
-            self._acknowledge(sender, command, CommandResult.TEMPORARILY_REJECTED)
+            self._refuse(sender, command, action, ActionResult.FLASH_WEAR)
         elif (refused := self._start(sender, command, action, now)) is not None:
             self._asked(sender, command, action, refused, now)
 
@@ -155,13 +159,12 @@ class Calibration:
         if outcome in _NOT_DONE:
             sender.station.give_back(Cost.FLASH)
         if result is not CommandResult.ACCEPTED:
-            sender.say(Severity.ERROR, outcome.text)
-            self._acknowledge(sender, command, result)
+            self._refuse(sender, command, action, outcome)
             return
-        sender.say(Severity.NOTICE, action.instruction)
+        sender.say(action.instruction)
         self._restarts = outcome is ActionResult.FREEZES
         if self._restarts:
-            sender.say(Severity.NOTICE, outcome.text)
+            sender.say(sentences.RESTARTS_AFTERWARDS())
         if command == m.MAV_CMD_DO_START_MAG_CAL:
             self._acknowledge(sender, command, result)
         self._sender, self._command, self._action = sender, command, action
@@ -170,6 +173,10 @@ class Calibration:
             self._announcer.expect_silence(now + _LONGEST_S)
         self.tick(now)
         self._settings.may_have_changed(now)
+
+    def _refuse(self, sender: Sender, command: int, action: FcAction, outcome: ActionResult) -> None:
+        sender.say(sentences.NOT_CALIBRATED(action.name, outcome.why))
+        self._acknowledge(sender, command, outcome.ack)
 
     def tick(self, now: float) -> None:
         """Report a running calibration, and end it when its time has passed."""
@@ -206,10 +213,10 @@ class Calibration:
         if self._restarts:
             self._announcer.expect_silence(now)
         if self._restarts and elapsed_s >= _LONGEST_S:
-            self._end("it does not answer; power it off and on", now)
+            self._end("no answer, power cycle", now)
         elif self._action is CALIBRATE_COMPASS:
             is_stored = not self._restarts or elapsed_s >= _SHORTEST_COMPASS_S
-            self._end("" if is_stored else "it was interrupted", now)
+            self._end("" if is_stored else "interrupted", now)
         else:
             self._missions.runner.start(_is_level(), self._looked, now)
 
@@ -217,15 +224,12 @@ class Calibration:
         if level is True:
             self._end("", now)
         else:
-            self._end("not level, or moved" if level is False else "it does not answer", now)
+            self._end("not level, or moved" if level is False else "no answer", now)
 
     def _end(self, failure: str, now: float) -> None:
         """Report the result; `failure`: the reason, empty if it was successful."""
-        sensor = "Compass" if self._action is CALIBRATE_COMPASS else "Accel"
-        if failure:
-            self._sender.say(Severity.ERROR, f"{sensor} calibration failed: {failure}")
-        else:
-            self._sender.say(Severity.NOTICE, f"{sensor} calibration successful")
+        name = (self._action or CALIBRATE_ACCELEROMETER).name
+        self._sender.say(sentences.NOT_CALIBRATED(name, failure) if failure else sentences.CALIBRATED(name))
         if self._command == m.MAV_CMD_DO_START_MAG_CAL:
             if not failure:
                 self._send_progress(now, 100)

@@ -6,16 +6,15 @@ DO_SET_MISSION_CURRENT on an INAV that flies its mission.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from bridge.fc.fc_settings import Cause, SettingRefusal
 from bridge.fc.profile import Spoken
 from bridge.fc.session import FcSession
-from bridge.gcs.budget import TOO_MANY_WRITES, Cost
+from bridge.gcs.budget import Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import Sender
-from bridge.gcs.station import Severity
 from bridge.model.craft import MISSION_BOXES
 from bridge.model.missions import Refusal
 from bridge.model.vehicle import MissionLeg, Switches
@@ -26,6 +25,8 @@ from bridge.vehicle.calibration import CALIBRATE_ACCELEROMETER, CALIBRATE_COMPAS
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.set_waypoint import SetWaypoint
 from bridge.vehicle.vehicle_messages import auto_mode
+from bridge.voice import sentences
+from bridge.voice.happening import Happening, Sentence
 from protocols.mavlink.codec import COMPONENT_METADATA
 from protocols.mavlink.dialect import CommandResult, messages
 from protocols.mission_item import MissionResult
@@ -41,44 +42,40 @@ _ASKS_FOR = {
 
 #: Gyro and barometer have no request in MSP.
 _CALIBRATED_AT_START = ({1: 1}, {3: 1}, {1: 1, 3: 1})
-_AT_START = "Gyro and baro calibrate at each power-on: keep it still"
-_FLY = "It is flown with the transmitter"
-_OUTPUTS = "Motors, servos and relays cannot be driven here"
-#: Commands that would act on the aircraft: command number -> text for the pilot.
-_REFUSED = {
-    messages.MAV_CMD_COMPONENT_ARM_DISARM: "Arm and disarm with the transmitter sticks",
-    messages.MAV_CMD_DO_SET_MODE: "Modes are set with the transmitter switches",
-    messages.MAV_CMD_MISSION_START: "A mission is started with the transmitter",
-    messages.MAV_CMD_DO_SET_MISSION_CURRENT: "Set WP: needs INAV 9.1",
-    messages.MAV_CMD_DO_PAUSE_CONTINUE: "A mission is paused with the transmitter",
-    messages.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: "The flight controller cannot be rebooted from here",
-    messages.MAV_CMD_NAV_TAKEOFF: "Take off with the transmitter",
-    messages.MAV_CMD_NAV_LAND: "Land with the transmitter",
-    messages.MAV_CMD_NAV_RETURN_TO_LAUNCH: "Return with the transmitter switches",
-    messages.MAV_CMD_DO_CHANGE_SPEED: "Speed is set with the transmitter",
-    messages.MAV_CMD_DO_SET_HOME: "Home is where the craft is armed",
-    messages.MAV_CMD_NAV_WAYPOINT: _FLY,
-    messages.MAV_CMD_NAV_LOITER_UNLIM: _FLY,
-    messages.MAV_CMD_CONDITION_YAW: _FLY,
-    messages.MAV_CMD_DO_REPOSITION: _FLY,
-    messages.MAV_CMD_DO_CHANGE_ALTITUDE: _FLY,
-    messages.MAV_CMD_OVERRIDE_GOTO: _FLY,
-    messages.MAV_CMD_GUIDED_CHANGE_SPEED: _FLY,
-    messages.MAV_CMD_GUIDED_CHANGE_ALTITUDE: _FLY,
-    messages.MAV_CMD_GUIDED_CHANGE_HEADING: _FLY,
-    messages.MAV_CMD_DO_FLIGHTTERMINATION: _OUTPUTS,
-    messages.MAV_CMD_DO_MOTOR_TEST: _OUTPUTS,
-    messages.MAV_CMD_DO_SET_SERVO: _OUTPUTS,
-    messages.MAV_CMD_DO_REPEAT_SERVO: _OUTPUTS,
-    messages.MAV_CMD_DO_SET_RELAY: _OUTPUTS,
-    messages.MAV_CMD_DO_REPEAT_RELAY: _OUTPUTS,
-    messages.MAV_CMD_DO_JUMP_TAG: "The current waypoint cannot be set",
-    messages.MAV_CMD_DO_FENCE_ENABLE: "There is no fence",
+#: Commands that would act on the aircraft.
+_REFUSED: Mapping[int, Sentence[()]] = {
+    messages.MAV_CMD_COMPONENT_ARM_DISARM: sentences.ARM,
+    messages.MAV_CMD_DO_SET_MODE: sentences.MODE,
+    messages.MAV_CMD_MISSION_START: sentences.MISSION_START,
+    messages.MAV_CMD_DO_SET_MISSION_CURRENT: sentences.NOT_SET_TO_ITEM,
+    messages.MAV_CMD_DO_PAUSE_CONTINUE: sentences.FLY,
+    messages.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: sentences.REBOOT,
+    messages.MAV_CMD_NAV_TAKEOFF: sentences.FLY,
+    messages.MAV_CMD_NAV_LAND: sentences.FLY,
+    messages.MAV_CMD_NAV_RETURN_TO_LAUNCH: sentences.FLY,
+    messages.MAV_CMD_DO_CHANGE_SPEED: sentences.FLY,
+    messages.MAV_CMD_DO_SET_HOME: sentences.HOME,
+    messages.MAV_CMD_NAV_WAYPOINT: sentences.FLY,
+    messages.MAV_CMD_NAV_LOITER_UNLIM: sentences.FLY,
+    messages.MAV_CMD_CONDITION_YAW: sentences.FLY,
+    messages.MAV_CMD_DO_REPOSITION: sentences.FLY,
+    messages.MAV_CMD_DO_CHANGE_ALTITUDE: sentences.FLY,
+    messages.MAV_CMD_OVERRIDE_GOTO: sentences.FLY,
+    messages.MAV_CMD_GUIDED_CHANGE_SPEED: sentences.FLY,
+    messages.MAV_CMD_GUIDED_CHANGE_ALTITUDE: sentences.FLY,
+    messages.MAV_CMD_GUIDED_CHANGE_HEADING: sentences.FLY,
+    messages.MAV_CMD_DO_FLIGHTTERMINATION: sentences.OUTPUTS,
+    messages.MAV_CMD_DO_MOTOR_TEST: sentences.OUTPUTS,
+    messages.MAV_CMD_DO_SET_SERVO: sentences.OUTPUTS,
+    messages.MAV_CMD_DO_REPEAT_SERVO: sentences.OUTPUTS,
+    messages.MAV_CMD_DO_SET_RELAY: sentences.OUTPUTS,
+    messages.MAV_CMD_DO_REPEAT_RELAY: sentences.OUTPUTS,
+    messages.MAV_CMD_DO_JUMP_TAG: sentences.NOT_SET_TO_ITEM,
+    messages.MAV_CMD_DO_FENCE_ENABLE: sentences.NO_FENCE,
 }
 #: Those that would start or move a mission flight.
 _OF_A_MISSION = frozenset((messages.MAV_CMD_MISSION_START, messages.MAV_CMD_DO_SET_MISSION_CURRENT))
-_FLIES_NONE = "This flight controller flies no missions"
-_NO_RESET = Refusal(MissionResult.DENIED, "Set WP: the mission cannot be reset, only its waypoint set")
+_NO_RESET = Refusal(MissionResult.DENIED, sentences.NO_MISSION_RESET())
 _NOT_SET = {MissionResult.ERROR: CommandResult.FAILED}
 #: param1 of MAV_CMD_PREFLIGHT_STORAGE.
 _SAVE = 1
@@ -104,7 +101,7 @@ class CommandService:
 
     def take(self, sender: Sender, command: int, params: Sequence[float], now: float) -> None:
         """Execute a command and acknowledge it. `params`: param1..param7."""
-        sender.station.uses_commands = True
+        sender.station.behaviour.commands = True
         action = _action(command, params)
         if command == messages.MAV_CMD_PREFLIGHT_STORAGE:
             self._store(sender, command, params[0], now)
@@ -138,25 +135,30 @@ class CommandService:
 
     def _set(self, sender: Sender, refusal: Refusal | None, now: float) -> None:
         if refusal is not None:
-            sender.say(Severity.ERROR, refusal.text)
+            sender.say(refusal.why)
             self._vehicle.refuse_current(sender, now)
 
     def refuse(self, sender: Sender, command: int, custom_mode: float = -1) -> None:
         """Give the reason for refusing a command, or a message that does the same but is not acknowledged."""
         is_auto = command == messages.MAV_CMD_DO_SET_MODE and custom_mode == auto_mode(self._session.vehicle)
         of_mission = self._mission_refusal() if is_auto or command in _OF_A_MISSION else None
-        sender.say(Severity.ERROR, of_mission or _REFUSED[command])
+        if not self._vehicle.has_board:
+            sender.say(sentences.NO_BOARD_TO_COMMAND())
+        elif command == messages.MAV_CMD_DO_FENCE_ENABLE and self._vehicle.stores_fences:
+            sender.say(sentences.FENCE_SWITCH())
+        else:
+            sender.say(of_mission or _REFUSED[command]())
 
-    def _mission_refusal(self) -> str | None:
+    def _mission_refusal(self) -> Happening | None:
         """The switch that flies the mission, or that none does; None if that is not known."""
         controller, vehicle = self._session.state.controller, self._session.vehicle
         if vehicle.last(MissionLeg) is None:
             is_asked = controller is not None and controller.profile.spoken is Spoken.MSP
-            return _FLIES_NONE if is_asked else None
+            return sentences.FLIES_NO_MISSIONS() if is_asked else None
         switches = vehicle.last(Switches)
         boxes = controller.boxes if controller is not None and controller.boxes else switches.boxes if switches else ()
         switch = next((box for box in boxes if box in MISSION_BOXES), None)
-        return None if switch is None else f"Only the switch {switch} flies the mission"
+        return None if switch is None else sentences.MISSION_SWITCH(switch)
 
     def _acknowledge(self, sender: Sender, command: int, result: CommandResult) -> None:
         ack = messages.MAVLink_command_ack_message(command, result, 0, 0, sender.sysid, sender.compid)
@@ -181,7 +183,7 @@ class CommandService:
             case messages.MAV_CMD_DO_SEND_BANNER:
                 controller = self._session.state.controller
                 name = "no flight controller" if controller is None else controller.name
-                sender.say(Severity.INFO, f"naze-bridge {self._version}: {name}")
+                sender.say(sentences.BANNER(self._version, name))
                 self._vehicle.send_once(sender, messages.MAVLINK_MSG_ID_HOME_POSITION, now)
                 return CommandResult.ACCEPTED
             case messages.MAV_CMD_RUN_PREARM_CHECKS:
@@ -190,13 +192,13 @@ class CommandService:
             case messages.MAV_CMD_DO_ACCEPT_MAG_CAL:
                 return CommandResult.ACCEPTED  # it is stored already
             case messages.MAV_CMD_DO_CANCEL_MAG_CAL if self._calibration.is_endless:
-                sender.say(Severity.ERROR, "It cannot be cancelled: wait, or power the craft off")
+                sender.say(sentences.NOT_CANCELLED())
                 return CommandResult.DENIED
             case messages.MAV_CMD_DO_CANCEL_MAG_CAL:
                 # QGroundControl also asks in this way if there is such a calibration.
                 return CommandResult.ACCEPTED
             case messages.MAV_CMD_PREFLIGHT_CALIBRATION if _asked(params) in _CALIBRATED_AT_START:
-                sender.say(Severity.ERROR, _AT_START)
+                sender.say(sentences.CALIBRATED_AT_START())
                 return CommandResult.DENIED
         if command in _ASKS_FOR:
             return self._send_once(sender, _ASKS_FOR[command], now)
@@ -209,26 +211,27 @@ class CommandService:
         """MAV_CMD_PREFLIGHT_STORAGE. Mission Planner sends it 10 s after any PARAM_SET, even in flight."""
         settings = self._settings
         if what != _SAVE:
-            sender.say(Severity.ERROR, "Settings are only saved, not loaded or reset")
+            sender.say(sentences.ONLY_SAVED())
             self._acknowledge(sender, command, CommandResult.DENIED)
         elif not settings.known.unsaved and (
             settings.known.is_saved or self._parameters.was_refused or settings.obstacle() is not None
         ):
             self._acknowledge(sender, command, CommandResult.ACCEPTED)
         elif not sender.station.allows(Cost.FLASH):
-            sender.say(Severity.ERROR, TOO_MANY_WRITES)
+            sender.say(sentences.FLASH_WEAR())
             self._acknowledge(sender, command, CommandResult.TEMPORARILY_REJECTED)
         else:
             settings.save(lambda result, _at: self._stored(sender, command, result), now)
 
     def _stored(self, sender: Sender, command: int, result: Answer) -> None:
         if not isinstance(result, SettingRefusal):
-            sender.say(Severity.INFO, "Settings saved")
+            sender.say(sentences.SETTINGS_SAVED())
             self._acknowledge(sender, command, CommandResult.ACCEPTED)
             return
         if result.cause is not Cause.NO_ANSWER:
             sender.station.give_back(Cost.FLASH)
-        sender.say(Severity.ERROR, result.text)
+        # Mission Planner sends it by itself.
+        sender.say(result.why, is_routine=True)
         self._acknowledge(sender, command, _NOT_STORED.get(result.cause, CommandResult.DENIED))
 
     def _send_once(self, sender: Sender, msgid: int, now: float, index: int = 0) -> CommandResult:

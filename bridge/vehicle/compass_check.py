@@ -7,9 +7,10 @@ A wrong declination turns every flight to a place by the same angle: Harakiri's 
 import math
 
 from bridge.gcs.ground import Ground
-from bridge.gcs.station import Severity
 from bridge.model.settings import SettingTable
 from bridge.model.vehicle import GlobalPosition, Health, Vehicle
+from bridge.voice.happening import Happening
+from bridge.voice.sentences import DECLINATION
 from protocols.msp.telemetry import Sensor
 
 #: Degrees east, every 10 degrees of latitude from 50 south and 15 of longitude from 180 west, for mid 2027 from
@@ -56,34 +57,34 @@ class CompassCheck:
     def __init__(self, vehicle: Vehicle, ground: Ground) -> None:
         self._vehicle = vehicle
         self._ground = ground
-        self._told = ""
+        self._told: Happening | None = None
 
     def follow(self, table: SettingTable) -> None:
         """Compare the settings of the disarmed board with the place just heard."""
-        if (text := self._problem(table)) == self._told:
+        if (problem := self._problem(table)) == self._told:
             return
         notices = self._ground.notices
         if self._told in notices:
             notices.remove(self._told)
-        self._told = text
-        if text:
-            self._ground.say(Severity.WARNING, text)
-            notices.append(text)
+        self._told = problem
+        if problem is not None:
+            self._ground.say(problem)
+            notices.append(problem)
 
-    def _problem(self, table: SettingTable) -> str:
+    def _problem(self, table: SettingTable) -> Happening | None:
         place, health = self._vehicle.last(GlobalPosition), self._vehicle.last(Health)
         setting = table.find("mag_dec") or table.find("mag_declination")
         automatic = table.find(_AUTOMATIC)
         if place is None or health is None or Sensor.COMPASS not in health.sensors:
-            return ""
+            return None
         if setting is None or isinstance(setting.value, str) or (automatic is not None and automatic.value):
-            return ""
+            return None
         here_deg = declination_deg(place.lat_e7 / 1e7, place.lon_e7 / 1e7)
         if here_deg is None:
-            return ""
+            return None
         # 100 times the degrees, plus the minutes.
         minutes, degrees = math.modf(setting.value / 100)
         off_deg = abs(math.remainder(here_deg - degrees - minutes / 0.6, 360))
         if off_deg < _REPORTED_DEG:
-            return ""
-        return f"Compass {off_deg:.0f} deg off: set {setting.name} to {100 * round(here_deg)}"
+            return None
+        return DECLINATION(off_deg, setting.name, 100 * round(here_deg))

@@ -11,10 +11,11 @@ from bridge.gcs.ground_station import GroundStation, Sender
 from bridge.gcs.return_path import NOT_SHOWN
 from bridge.gcs.rights import FrameRefusal
 from bridge.gcs.routes import Routes
-from bridge.gcs.station import Peer, Severity
+from bridge.gcs.station import Peer
 from bridge.model.events import Emit, GcsRefused
 from bridge.settings.parameters import Parameters
 from bridge.vehicle.message_router import MessageRouter
+from bridge.voice.sentences import FRAME_REFUSED
 from protocols.mavlink.codec import FrameWriter, decode
 from protocols.mavlink.dialect import MESSAGE_FORMATS, CommandResult, Message
 from protocols.mavlink.dialect import messages as m
@@ -133,10 +134,11 @@ class Incoming:
             self._ground.outbox.send(station, [answer], writer)
         elif message is not None and frame.msgid == m.MAVLINK_MSG_ID_PARAM_SET and self.routes is None:
             self._parameters.refuse(sender, message.param_id)
-        text = f"Refused: {refused.why}"
-        if not refused.is_routine and station.texts.is_new(text, station.heard_at) and station.allows(Cost.TEXT):
-            message = m.MAVLink_statustext_message(Severity.WARNING, text.encode())
-            self._ground.outbox.send(station, [message], writer)
+        why, now = FRAME_REFUSED(refused.why), station.heard_at
+        is_new = not refused.is_routine and not station.bad_news.is_repeated(why, now, is_routine=False)
+        if is_new and station.allows(Cost.TEXT):
+            text = m.MAVLink_statustext_message(why.severity, why.line.encode())
+            self._ground.outbox.send(station, [text], writer)
 
     def _report(self, refused: FrameRefusal, station: GroundStation, frame: MavlinkFrame) -> None:
         """Log a connected station's refusal once for each reason."""

@@ -9,7 +9,8 @@ from collections.abc import Callable
 from math import inf
 
 from bridge.fc.profile import FlightController, Spoken
-from bridge.gcs.station import Severity
+from bridge.voice import sentences
+from bridge.voice.happening import Happening
 
 #: Silence that counts as a loss; a switch of protocol takes less.
 _LOST_S = 3.0
@@ -30,8 +31,8 @@ class LinkAnnouncer:
 
     def __init__(
         self,
-        say: Callable[[Severity, str], None],
-        trouble: Callable[[], str],
+        say: Callable[[Happening], None],
+        trouble: Callable[[], Happening | None],
         now: float,
         *,
         was_found: bool = False,
@@ -77,12 +78,12 @@ class LinkAnnouncer:
         if not is_switch:
             self._known = controller.name
         if profile.notice is not None and controller.name != before:
-            self._say(Severity.WARNING, profile.notice)
+            self._say(profile.notice())
         elif was_lost and silent_since is not None and was_found:
             # It replaces the warning on Mission Planner's HUD.
-            self._say(Severity.WARNING, f"Flight controller back after {now - silent_since:.0f} s")
+            self._say(sentences.BACK(now - silent_since))
         elif controller.name != before and not is_switch:
-            self._say(Severity.INFO, f"Found {controller.name}")
+            self._say(sentences.FOUND(controller.name))
 
     def tick(self, now: float) -> None:
         """Report a loss, and again as long as it lasts."""
@@ -91,10 +92,10 @@ class LinkAnnouncer:
         self.is_lost = True
         self.due = now + _REPEAT_S
         if trouble := self._trouble():
-            self._say(Severity.WARNING, trouble)
+            self._say(trouble)
         elif not self.was_found:
             self.due = now + _NOT_FOUND_REPEAT_S
-            self._say(Severity.WARNING, f"No flight controller found: {self._check}")
+            self._say(sentences.NOT_FOUND(self._check))
         else:
             # Another text each time: Mission Planner does not renew a text that it still shows.
-            self._say(Severity.WARNING, f"Flight controller lost: silent for {now - self._silent_since:.0f} s")
+            self._say(sentences.LOST(now - self._silent_since))

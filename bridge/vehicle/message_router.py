@@ -8,7 +8,6 @@ from math import inf
 from bridge.gcs.budget import Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import Sender
-from bridge.gcs.station import Severity
 from bridge.missions.place_lists import NO_PLACES
 from bridge.settings.parameters import Parameters
 from bridge.transfers.downloads import MissionDownloads
@@ -84,6 +83,7 @@ class MessageRouter:
             m.MAVLINK_MSG_ID_COMMAND_INT: lambda s, msg, now: commands.take(
                 s, msg.command, (msg.param1, msg.param2, msg.param3, msg.param4, msg.x, msg.y, msg.z), now
             ),
+            m.MAVLINK_MSG_ID_HEARTBEAT: self._heartbeat,
             m.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: self._data_stream,
             m.MAVLINK_MSG_ID_SET_MODE: lambda s, msg, _: commands.refuse(s, m.MAV_CMD_DO_SET_MODE, msg.custom_mode),
             m.MAVLINK_MSG_ID_AUTOPILOT_VERSION_REQUEST: lambda s, _msg, now: vehicle.send_once(
@@ -137,7 +137,7 @@ class MessageRouter:
             (self._of_type[of_type.lists.mission_type].get(msgid) or handler)(sender, message, now)
         elif msgid != m.MAVLINK_MSG_ID_MISSION_ACK:
             if msgid == m.MAVLINK_MSG_ID_MISSION_COUNT:
-                sender.say(Severity.ERROR, NO_PLACES.text)
+                sender.say(NO_PLACES.why)
             sender.mission_ack(MissionResult.UNSUPPORTED, mission_type)
         if clears_all:
             # The one answer is the missions'.
@@ -159,16 +159,22 @@ class MessageRouter:
         else:
             uploads.item(sender, convert(message), now)
 
+    def _heartbeat(self, sender: Sender, message: Message, _now: float) -> None:
+        sender.station.behaviour.base_mode = message.base_mode
+
     def _data_stream(self, sender: Sender, message: Message, _now: float) -> None:
         rate_hz = message.req_message_rate if message.start_stop else 0
         self._vehicle.set_stream(sender.station, message.req_stream_id, 1 / rate_hz if rate_hz else inf)
 
     def _ping(self, sender: Sender, message: Message, _now: float) -> None:
-        # A PING with targets is itself an answer.
-        if message.target_system == 0:
+        if message.target_system != 0:
+            sender.station.bad_news.answered(message.time_usec)
+        else:
             answer = m.MAVLink_ping_message(message.time_usec, message.seq, sender.sysid, sender.compid)
             sender.to(answer)
 
     def _timesync(self, sender: Sender, message: Message, now: float) -> None:
-        if message.tc1 == 0:
+        if message.tc1 != 0:
+            sender.station.bad_news.answered(message.ts1)
+        else:
             sender.to(m.MAVLink_timesync_message(int(now * 1e9), message.ts1))

@@ -4,7 +4,8 @@
 from collections.abc import Mapping
 from math import inf
 
-from bridge.gcs.station import Severity
+from bridge.voice.happening import Sentence
+from bridge.voice.sentences import EMERGENCY, NAVIGATION
 from protocols.msp.nav import FINISHED, NavAction, NavMode, NavState, NavStatus
 
 #: Legs may be shorter; the words of the last one are said.
@@ -37,9 +38,9 @@ def nav_words(status: NavStatus, *, is_plane: bool) -> str:
     return _WORDS.get(status.state, "")
 
 
-def severity_of(words: str) -> Severity:
-    """As of INAV's own MAVLink: NOTICE, and CRITICAL for words that blink."""
-    return Severity.CRITICAL if words == _WORDS[NavState.EMERGENCY_LANDING] else Severity.NOTICE
+def sentence_for(words: str) -> Sentence[str]:
+    """With the severity of INAV's own MAVLink: NOTICE, and CRITICAL for words that blink."""
+    return EMERGENCY if words == _WORDS[NavState.EMERGENCY_LANDING] else NAVIGATION
 
 
 class NavWords:

@@ -14,7 +14,6 @@ from bridge.fc.session import FcSession
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import GroundStation, Sender
 from bridge.gcs.message_rates import fastest_s, take_due
-from bridge.gcs.station import Severity
 from bridge.missions.mission_service import MissionService
 from bridge.model.craft import Airframe, FlightMode, Home
 from bridge.model.missions import FlightReport, FlownMission, MissionProgress
@@ -22,9 +21,11 @@ from bridge.model.vehicle import STALE_S, FlightState, Health, MissionLeg, Mode,
 from bridge.vehicle import vehicle_messages as make
 from bridge.vehicle.arming_reasons import ArmingReasons
 from bridge.vehicle.link_announcer import LinkAnnouncer
-from bridge.vehicle.nav_words import NavWords, severity_of
+from bridge.vehicle.nav_words import NavWords, sentence_for
 from bridge.vehicle.telemetry_table import NO_STREAM, TELEMETRY, Row
 from bridge.vehicle.vehicle_messages import Moment
+from bridge.voice import sentences
+from bridge.voice.happening import Happening
 from protocols.mavlink.codec import pack
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.commands import Msp
@@ -92,10 +93,19 @@ class OwnVehicle:
         #: The ground stations whose waypoint was set since the last report of the board.
         self._asked_current: list[Sender] = []
         self._nav_words = NavWords()
-        #: The last reason for the stop of a mission flight.
         #: What a Harakiri's flight has decided, as it was last sent.
         self._summary = 0
-        self._said_why = ""
+        #: The last reason for the stop of a mission flight.
+        self._said_why: Happening | None = None
+
+    @property
+    def has_board(self) -> bool:
+        """False if the flight controller is lost, or was never found."""
+        return not self._announcer.why_unknown
+
+    @property
+    def stores_fences(self) -> bool:
+        return bool(self._capabilities() & messages.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE)
 
     def newcomer(self, station: GroundStation, now: float) -> None:
         """Send a new ground station more heartbeats, so that it connects sooner, then home and why it cannot arm."""
@@ -221,7 +231,7 @@ class OwnVehicle:
         Mission Planner's window hangs until one arrives. MAVSDK, which requests no streams, repeats its request at each
         that has another number, without end.
         """
-        if sender.station.uses_streams:
+        if sender.station.behaviour.streams:
             self.send_once(sender, messages.MAVLINK_MSG_ID_MISSION_CURRENT, now)
         else:
             self.withhold_current(sender.station, now)
@@ -236,7 +246,7 @@ class OwnVehicle:
 
     def set_stream(self, station: GroundStation, stream: int, interval_s: float) -> None:
         """Set the interval of all messages of one of ArduPilot's streams."""
-        station.uses_streams = True
+        station.behaviour.streams = True
         for row in TELEMETRY:
             if row.stream == stream or (stream == _ALL_STREAMS and row.stream != NO_STREAM):
                 self.set_interval(station, row.msgid, interval_s)
@@ -312,9 +322,9 @@ class OwnVehicle:
         if self._announced == announced:
             return
         if state.is_failsafe and not was_failsafe:
-            self._ground.say(Severity.CRITICAL, "Failsafe: the flight controller has taken over")
+            self._ground.say(sentences.FAILSAFE())
         elif was_failsafe and not state.is_failsafe and state.armed:
-            self._ground.say(Severity.NOTICE, "Failsafe ended: the pilot has control")
+            self._ground.say(sentences.FAILSAFE_ENDED())
         self._ground.outbox.multicast(pack(self._heartbeat(now)), self._ground.everyone)
 
     def _beat(self, now: float, stations: Sequence[GroundStation]) -> None:
@@ -334,9 +344,8 @@ class OwnVehicle:
             self._ground.broadcast(messages.MAVLink_named_value_int_message(boot_ms, SUMMARY.encode(), self._summary))
         if isinstance(leg.report, FlightReport) and leg.report.why != self._said_why:
             self._said_why = leg.report.why
-            if self._said_why:
-                is_flown = leg.report.progress is Progress.COMPLETE
-                self._ground.say(Severity.NOTICE if is_flown else Severity.WARNING, self._said_why)
+            if self._said_why is not None:
+                self._ground.say(self._said_why)
         if isinstance(leg.report, NavStatus):
             self._say_nav_words(leg.report, now)
         if self._missions.on_board is None:
@@ -366,7 +375,8 @@ class OwnVehicle:
         flown = FlownMission(() if held is None else held.items, item)
         for sent_seqs, stations in self._by_item_numbers(self._ground.everyone):
             readers = [station for station in stations if not station.is_listener]
-            self._ground.outbox.show(severity_of(words), words.format(*flown.counted(sent_seqs)), readers)
+            said = sentence_for(words)(words.format(*flown.counted(sent_seqs)))
+            self._ground.outbox.show(said, readers)
 
     def _send_current(self, receivers: Sequence[GroundStation], now: float) -> None:
         for sent_seqs, stations in self._by_item_numbers(receivers):

@@ -10,23 +10,19 @@ from collections.abc import Callable
 from bridge.gcs.budget import Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import Sender
-from bridge.gcs.station import Severity
 from bridge.missions.fc_mission_store import FliesToItems
 from bridge.missions.mission_service import HeldMission, MissionService
 from bridge.model.missions import Refusal
 from bridge.vehicle.own_vehicle import OwnVehicle
+from bridge.voice import sentences
+from bridge.voice.happening import Happening
 from protocols.mavlink.dialect import command_name
 from protocols.mission_item import MissionResult
 from protocols.rights import Effect
 
-
-def _denied(text: str) -> Refusal:
-    return Refusal(MissionResult.DENIED, f"Set WP: {text}")
-
-
-_NOT_FLOWN = _denied("only in flight, in the mode NAV WP")
-_UNKNOWN = _denied("the mission on board is not known")
-_BUSY = _denied("another request is running, try again")
+_NOT_FLOWN = Refusal(MissionResult.DENIED, sentences.SET_IN_FLIGHT())
+_UNKNOWN = Refusal(MissionResult.DENIED, sentences.SET_ON_CHANGED_LIST())
+_BUSY = Refusal(MissionResult.DENIED, sentences.SET_TOO_SOON())
 
 
 class SetWaypoint:
@@ -60,7 +56,7 @@ class SetWaypoint:
         elif refusal is None:
             item = self._as_read(held, sender, seq)
             number = store.leg_of(held.records, item)
-            refusal = None if number else _denied(_why_not(held, item, seq))
+            refusal = None if number else Refusal(MissionResult.DENIED, _why_not(held, item, seq))
         if held is None or refusal is not None:
             on_end(refusal)
             return
@@ -71,7 +67,7 @@ class SetWaypoint:
                 self._vehicle.progress.set_to = 0
             else:
                 self._vehicle.confirm_current(sender)
-                self._ground.say(Severity.NOTICE, "Another ground station has set the waypoint", but=sender.station)
+                self._ground.say(sentences.SET_BY_ANOTHER(), but=sender.station)
             on_end(refused)
 
         self._present = sender, seq
@@ -81,7 +77,7 @@ class SetWaypoint:
 
     def _obstacle(self, sender: Sender) -> Refusal | None:
         if (refused := sender.station.passing_refusal(Effect.MOVE)) is not None:
-            return _denied(refused.why)
+            return Refusal(MissionResult.DENIED, sentences.SET_WITHOUT_RIGHT(refused.why))
         if not self._missions.vehicle.armed:
             return _NOT_FLOWN
         if self._present is not None or self._missions.runner.needs_line:
@@ -94,7 +90,7 @@ class SetWaypoint:
         return next((number for number, shown in enumerate(numbers) if shown == seq), 0)
 
 
-def _why_not(held: HeldMission, item: int, seq: float) -> str:
+def _why_not(held: HeldMission, item: int, seq: float) -> Happening:
     if item:
-        return f"item {seq:.0f} ({command_name(held.items[item].command)}) is not flown to"
-    return "item 0 is home" if seq == 0 else f"there is no item {seq:.0f} on board"
+        return sentences.SET_TO_ACTION(seq, command_name(held.items[item].command))
+    return sentences.SET_TO_HOME() if seq == 0 else sentences.SET_TO_MISSING(seq)

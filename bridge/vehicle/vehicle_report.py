@@ -129,7 +129,7 @@ class VehicleReporter:
             mission = MissionIdentity(held.identity.count, f"{held.identity.checksum:08x}", state, item)
         settings = None
         if (sealed := self._settings.known.state) is not None:
-            settings = SettingsIdentity(sealed.seal, None if sealed.change is None else sealed.change.text())
+            settings = SettingsIdentity(sealed.seal, None if sealed.change is None else sealed.change.text)
         groups = {group.value: self.group(group, now) for group in Group}
         return VehicleReport(**groups, last_heard=self._last_heard(now), mission=mission, settings=settings)
 

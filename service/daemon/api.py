@@ -137,7 +137,7 @@ class DaemonApi:
             "mission_state": None if mission is None else mission.state,
             "mission_item": None if mission is None else mission.item,
             "settings_seal": None if settings is None else str(settings.seal),
-            "settings_changed": None if change is None else change.text(),
+            "settings_changed": None if change is None else change.text,
             "settings_changed_s": None if change is None else round(self._loop.time() - change.at, 1),
             "round_trip_ms": link.round_trip_ms,
             "requests_lost": link.requests_lost,

@@ -79,7 +79,9 @@ def _is_telling(clause: str) -> bool:
 
 
 def _part(part: ast.expr) -> str:
-    return part.value if isinstance(part, ast.Constant) and isinstance(part.value, str) else "\0"
+    """A text, also of the table of sentences, with \\0 for each inserted value."""
+    is_text = isinstance(part, ast.Constant) and isinstance(part.value, str)
+    return re.sub(r"\{[\d:.f]*\}", "\0", part.value) if is_text else "\0"  # type: ignore[attr-defined]
 
 
 @cache

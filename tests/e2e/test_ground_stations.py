@@ -138,7 +138,7 @@ def test_all_stations_are_told_the_result_of_an_upload(shared: Bench) -> None:
     writer, other = shared.mission_planner(), shared.mission_planner()
     other.wait_for_vehicle()
     writer.write(plain_plan(13, start=60))
-    other.wait_for_text("New mission, 13 items, by udp")
+    other.wait_for_text("New mission, 13 items, by ")
     other.wait_until(lambda: 12 in [message.total for message in other.messages("MISSION_CURRENT")], "the new total")
 
 

@@ -59,7 +59,7 @@ def test_float_items_parameters_and_refusals_work(shared: Bench, tmp_path: Path)
         mavproxy.wait_for("Settings saved")
         mavproxy.type("param set p_roll 35")
         mavproxy.type("arm throttle")
-        mavproxy.wait_for("transmitter sticks")
+        mavproxy.wait_for("disarm with the transmitter")
 
 
 def test_refusals_have_a_reason_and_keep_the_list(bench: Bench, tmp_path: Path) -> None:

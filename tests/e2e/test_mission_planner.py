@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from bridge.missions.mission_texts import finding_lines, summary
+from bridge.voice.mission_report import finding_lines, summary
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mission_item import Command, Frame, MissionResult
@@ -125,11 +125,11 @@ def test_a_write_is_stored_with_the_rules_applied(shared: Bench, count: int, use
     # Every important change and drop was reported.
     lines = finding_lines(verdict.findings)
     assert lines
-    assert all(line in planner.joined_texts() for _, line in lines)
+    assert all(line.text in planner.joined_texts() for line in lines)
     # The summary stays on the HUD, even after the radius and a Read.
     assert planner.read_hud() == summary(count, verdict)
     # The voice says the first danger: the return is lower than the way out.
-    assert planner.screen.heard()[0] == lines[0][1]
+    assert planner.screen.heard()[0] == lines[0].line
 
 
 def test_a_read_of_float_items_shows_the_same_list(shared: Bench) -> None:
@@ -327,7 +327,7 @@ def test_arming_ends_the_upload(bench: Bench) -> None:
 def test_its_arm_button_is_refused_with_a_reason(shared: Bench) -> None:
     planner = shared.mission_planner()
     assert planner.arm() == messages.MAV_RESULT_DENIED
-    planner.wait_for_text("transmitter sticks")
+    planner.wait_for_text("disarm with the transmitter")
     assert not shared.board.stats()["armed"]
 
 

@@ -10,7 +10,7 @@ from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile
 from bridge.missions.list_check import check_list
-from bridge.missions.mission_texts import finding_lines, has_losses, summary
+from bridge.voice.mission_report import finding_lines, has_losses, summary
 from reports.finding import DROPPED, REJECTED, Finding, News
 from tests.support.rule_items import (
     HOME,
@@ -120,8 +120,8 @@ def test_a_leg_below_home_is_not_counted_as_raised() -> None:
 
 def test_an_altitude_below_one_metre_is_raised_with_that_reason() -> None:
     verdict = check_list(mission(item(WAYPOINT, alt_m=0.5), item(WAYPOINT, alt_m=0.0)), HarakiriRules())
-    assert finding_lines(verdict.findings) == [
-        (News.WARNING, "WP 1: Alt raised from 0.5 to 2 m (less than 1)"),
-        (News.WARNING, "WP 2: Alt raised from 0 to 2 m (0 not allowed)"),
+    assert [line.text for line in finding_lines(verdict.findings)] == [
+        "WP 1: Alt raised from 0.5 to 2 m (less than 1)",
+        "WP 2: Alt raised from 0 to 2 m (0 not allowed)",
     ]
     assert summary(3, verdict) == "3 of 3 stored: 2 Alt raised, 0 m, no landing"

@@ -150,7 +150,7 @@ def test_a_failed_commit_does_not_leave_the_next_attempt_uncertain() -> None:
     world, _ = found(BeginsInTurn(begins, refused, then_silent=True))
     outcome = world.push(waypoints(60))
     world.wait_until(lambda _: bool(outcome), 30)
-    assert outcome[0][0].text == PushFailure.NO_ANSWER.value
+    assert outcome[0][0].text == PushFailure.NO_ANSWER.value.text
 
 
 def test_a_board_that_reports_itself_armed_in_info_gets_no_list() -> None:

@@ -41,6 +41,8 @@ LOST, LOST_ON_GROUND = "Flight controller lost: silent for", "PreArm: flight con
 def connected(world: World, seconds: float = 15.0) -> tuple[GroundStation, Screens]:
     """A station on a world that has run for a while: what came before is no longer on the screens."""
     station = GroundStation(world)
+    # As Mission Planner is known by, with the usual rate.
+    station.send(m.MAVLink_request_data_stream_message(1, 1, m.MAV_DATA_STREAM_EXTRA3, 1, 1))
     screens = Screens(station)
     world.run(seconds)
     return station, screens

@@ -541,10 +541,22 @@ class GroundStation:
         for each in found:
             self.frames.append(each.raw)
             self._undecoded.append((self.world.now, each.raw))
+            if each.msgid in (messages.MAVLINK_MSG_ID_PING, messages.MAVLINK_MSG_ID_TIMESYNC):
+                self._answer(*(message for _, message in self.received[-2:]))
             if self.on_message:
                 message = self.received[-1][1]
                 for react in self.on_message:
                     react(message)
+
+    def _answer(self, before: Message, message: Message | None = None) -> None:
+        """Answer a question with a text as Mission Planner, QGroundControl and MAVSDK do; others are the test's."""
+        if message is None or before.get_type() != "STATUSTEXT":
+            return
+        if message.get_type() == "TIMESYNC" and message.tc1 == 0:
+            self.send(messages.MAVLink_timesync_message(1 + round(self.world.now * 1e9), message.ts1))
+        elif message.get_type() == "PING" and message.target_system == 0:
+            ids = message.get_srcSystem(), message.get_srcComponent()
+            self.send(messages.MAVLink_ping_message(message.time_usec, message.seq, *ids))
 
     def _transmit(self, arrive: Callable[[], None]) -> None:
         chance, radio = self.world.random, self.radio

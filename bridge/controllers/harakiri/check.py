@@ -205,7 +205,9 @@ class HarakiriCheck(ListCheck):
         if is_raised and rule.record is WpCommand.RETURN_TO_LAUNCH:
             height_m = self._raise_return(item)
         else:
-            height_m = self._fit(item, "alt_m", rule.height, News.WARNING if item.seq and is_raised else News.NOTICE)
+            # A home of height 0 is no news: QGroundControl sends it without terrain data.
+            news = News.NOTICE if not is_raised else News.WARNING if item.seq else News.NONE
+            height_m = self._fit(item, "alt_m", rule.height, news)
         has_turns = rule.record is WpCommand.LOITER_TURNS
         if rule.record is WpCommand.SETROI:
             self._roi_known = True

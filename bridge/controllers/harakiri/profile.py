@@ -18,6 +18,7 @@ from bridge.line.poll_schedule import BOX_POLL, POLLS
 from bridge.model.craft import FlightMode, airframe
 from bridge.model.missions import ARMED, Refusal
 from bridge.model.vehicle import Health, Mode, Sticks, Vehicle
+from bridge.voice import sentences
 from protocols.mission_item import MissionResult
 from protocols.msp.mission import INFO_SIZE, MissionCommand, decode_info
 from protocols.msp.telemetry import Sensor
@@ -95,7 +96,7 @@ UNPATCHED = Profile(
     recognise=_recognise_unpatched,
     polls=(*POLLS, BOX_POLL),
     acc_axes=_ACC_AXES,
-    missions=Refusal(MissionResult.UNSUPPORTED, "This Harakiri lacks the mission patch"),
+    missions=Refusal(MissionResult.UNSUPPORTED, sentences.NOT_PATCHED()),
     settings=MspPartSettings,
     restarts_after_calibration=True,
     arming_blockers=arming_blockers,
@@ -114,6 +115,6 @@ FRSKY = Profile(
     _FAMILY,
     Spoken.FRSKY,
     missions=ARMED,
-    notice="FrSky while armed: no attitude, position or mode",
+    notice=sentences.FRSKY,
 )
 PROFILES = (PATCHED, UNPATCHED, MAVLINK, FRSKY)

@@ -10,6 +10,7 @@ from bridge.fc.profile import FlightController
 from bridge.line.conversation import Conversation, Pause, ask
 from bridge.model.craft import ARM_BOX, MISSION_BOXES, names_of_active
 from bridge.model.missions import Refusal
+from bridge.voice import sentences
 from protocols.mission_item import MissionResult
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, request
@@ -35,15 +36,11 @@ _FIRST = 9, 1, 0
 _LOOKS, _LOOK_INTERVAL_S = 5, 0.1
 
 
-def _denied(text: str) -> Refusal:
-    return Refusal(MissionResult.DENIED, f"Set WP: {text}")
-
-
-_NOT_FLOWN = _denied("only in flight, in the mode NAV WP")
-_LANDS = _denied("it is landing, or has landed")
-_CHANGED = _denied("the mission on board has changed: Read it")
-_UNCHANGED = Refusal(MissionResult.ERROR, "Set WP failed: INAV flies on as before")
-_NO_ANSWER = Refusal(MissionResult.ERROR, "Set WP: no answer from INAV, see where it flies")
+_NOT_FLOWN = Refusal(MissionResult.DENIED, sentences.SET_IN_FLIGHT())
+_LANDS = Refusal(MissionResult.DENIED, sentences.SET_WHILE_LANDING())
+_CHANGED = Refusal(MissionResult.DENIED, sentences.SET_ON_CHANGED_LIST())
+_UNCHANGED = Refusal(MissionResult.ERROR, sentences.SET_WITHOUT_EFFECT())
+_NO_ANSWER = Refusal(MissionResult.ERROR, sentences.SET_UNANSWERED())
 
 
 def fly_to(
@@ -83,6 +80,7 @@ def _is_down(status: NavStatus) -> bool:
 
 
 def _refused(board: FlightController) -> Refusal:
-    version = ".".join(map(str, board.version or ()))
-    is_older = board.version is not None and board.version < _FIRST
-    return _denied(f"needs INAV 9.1, this is {version}" if is_older else "INAV refused it")
+    if board.version is not None and board.version < _FIRST:
+        older = sentences.SET_ON_NEWER_INAV(".".join(map(str, board.version)))
+        return Refusal(MissionResult.DENIED, older)
+    return Refusal(MissionResult.DENIED, sentences.SET_REFUSED_BY_INAV())

@@ -147,7 +147,7 @@ class NavCheck(ListCheck):
         for name in ("p2", "p3", "p4"):
             self._fit(item, name, UNUSED, news)
         if not rule.position:
-            self._no_position(item, News.NONE)
+            self._no_position(item)
         self._keep(item, self._record(item, rule, p1))
         return None
 
@@ -344,7 +344,7 @@ class NavCheck(ListCheck):
         """Note values without a meaning, in `names` and the coordinates; nothing is lost."""
         for name in (*names, "alt_m"):
             self._fit(item, name, UNUSED, News.NONE)
-        self._no_position(item, News.NONE)
+        self._no_position(item)
 
 
 def _centimetres(height_m: float) -> int:

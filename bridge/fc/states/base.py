@@ -19,6 +19,7 @@ from bridge.line.poll_schedule import PollSchedule
 from bridge.line.runner import Runner
 from bridge.model.ground_track import GroundTrack
 from bridge.model.vehicle import FlightState, Source, Vehicle
+from bridge.voice.happening import Happening
 from protocols.mavlink.frame import MavlinkFrame
 
 
@@ -131,8 +132,8 @@ class State(ABC):
     name: ClassVar[str]
     #: True while the flight controller is being searched for.
     is_searching: ClassVar[bool] = False
-    #: The reason why the board cannot be used, and the remedy; empty if it can be.
-    trouble: ClassVar[str] = ""
+    #: The reason why the board cannot be used, and the remedy; None if it can be.
+    trouble: ClassVar[Happening | None] = None
     #: The flight controller on the line; None until it is identified.
     controller: FlightController | None = None
     #: While MSP is spoken.

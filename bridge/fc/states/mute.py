@@ -5,6 +5,7 @@ from bridge.fc.profile import FlightController, Spoken
 from bridge.fc.states.base import Event, Found, Lost, Port, State
 from bridge.line.msp_link import PROBE
 from bridge.model.vehicle import Source
+from bridge.voice.sentences import IN_COMMAND_LINE
 from protocols.frsky import FRSKY_SPEED, FrskyWatch
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.msp.command_line import RUB_OUT_LINE, typed_and_rubbed_out
@@ -28,7 +29,7 @@ class Cli(State):
     """
 
     name = "command line"
-    trouble = "Board in its CLI: type exit, or unplug it"
+    trouble = IN_COMMAND_LINE()
 
     def __init__(self, port: Port, event: Found, now: float) -> None:
         super().__init__(port, event, now)

@@ -40,7 +40,7 @@ def check_flight_controller(
     try:
         status = ask_port()
     except ControlError as error:
-        return [problem("flight controller", str(error), _AGAIN if str(error) == Cli.trouble else _WIRING)]
+        return [problem("flight controller", str(error), _AGAIN if str(error) == Cli.trouble.text else _WIRING)]
     return [_who(fc, status, source), *check_running(status)]
 
 
@@ -49,7 +49,7 @@ def _who(fc: FcAddress, status: Json, source: str) -> Checked:
     if status["state"] == Closed.name:
         return note("flight controller", f"{fc} cannot be opened yet", "see the port, and the daemon's log")
     if status["state"] == Cli.name:
-        return problem("flight controller", Cli.trouble, _AGAIN)
+        return problem("flight controller", Cli.trouble.text, _AGAIN)
     if name is None:
         return _silent(fc, status, source)
     speed = "" if status["speed_baud"] is None else f" at {status['speed_baud']} baud"

@@ -13,6 +13,7 @@ from bridge.fc.states.msp import Identifying
 from bridge.fc.states.searching import SPEEDS
 from bridge.line.conversation import Conversation
 from bridge.model.missions import Refusal
+from bridge.voice import sentences
 from protocols.mission_item import MissionResult
 from simulator.board.options import SimOptions, TelemetryProtocol
 from simulator.naze.firmware import Protocol
@@ -27,7 +28,7 @@ def recognise(board: Interview) -> Conversation[FlightController | None]:
     return FlightController(TOY, "Toy 1.0", boxes=(yield from board.box_names()))
 
 
-NO_MISSIONS = Refusal(MissionResult.UNSUPPORTED, "Toys do not navigate")
+NO_MISSIONS = Refusal(MissionResult.UNSUPPORTED, sentences.NO_MISSIONS())
 TOY = Profile("a toy", "Toy", recognise=recognise, missions=NO_MISSIONS)
 
 
@@ -45,7 +46,7 @@ def test_a_new_flight_controller_needs_only_a_profile() -> None:
     assert "Found Toy 1.0" in station.texts()
     assert station.messages("HEARTBEAT")[-1].base_mode & 128, "its ARM box is the second one"
     assert Upload(station, waypoints(3)).run() is MissionResult.UNSUPPORTED
-    assert "Toys do not navigate" in station.texts()
+    assert sentences.NO_MISSIONS().text in station.texts()
 
 
 #: Counted from when the board can be heard again.

@@ -15,8 +15,9 @@ from bridge.gcs.ground_station import GroundStation as GcsStation
 from bridge.gcs.ground_station import Outbox
 from bridge.gcs.message_rates import take_due
 from bridge.gcs.rights import LinkAccess
-from bridge.gcs.station import Peer, Severity
-from bridge.gcs.texts import split_text
+from bridge.gcs.station import Peer
+from bridge.voice import sentences
+from bridge.voice.stations import Kind, pieces
 from protocols.mavlink.dialect import CRC_EXTRA, Message
 from protocols.mavlink.dialect import messages as own
 from protocols.mavlink.frame import MavlinkSplitter
@@ -318,7 +319,7 @@ def test_each_kind_of_station_gets_pieces_of_a_long_text_as_it_shows_them() -> N
     for long in (text, text[:50], text[:51], text[:50] * 2):
         for station in (mavsdk, planner, old):
             station.take()
-        world.inside.ground.say(Severity.WARNING, long)
+        world.inside.ground.say(sentences.CHANGED_ITEM(long))
         world.run(0.1)
         pieces = [piece.text.rstrip("\0") for piece in mavsdk.messages("STATUSTEXT")]
         assert "".join(pieces) == long
@@ -326,7 +327,7 @@ def test_each_kind_of_station_gets_pieces_of_a_long_text_as_it_shows_them() -> N
         assert len(pieces) == 1 or len(pieces[-1]) < 50
     for station in (mavsdk, planner, old):
         station.take()
-    world.inside.ground.say(Severity.WARNING, text)
+    world.inside.ground.say(sentences.CHANGED_ITEM(text))
     world.run(0.1)
     words = text.split()
     for station in (planner, old):
@@ -344,19 +345,19 @@ def test_texts_are_split_without_loss() -> None:
         "",
     ]
     for text in texts:
-        pieces = split_text(text)
+        found = pieces(text, Kind.UNKNOWN)
         # A receiver that joins pieces expects another one after a piece of 50 characters.
-        assert all(len(piece) == 50 for piece in pieces[:-1])
-        assert len(pieces[-1]) <= (50 if len(pieces) == 1 else 49)
-        assert "".join("".join(pieces).split()) == "".join(text.split())
-        assert all(pieces[:-1])
+        assert all(len(piece) == 50 for piece in found[:-1])
+        assert len(found[-1]) <= (50 if len(found) == 1 else 49)
+        assert "".join("".join(found).split()) == "".join(text.split())
+        assert all(found[:-1])
 
 
 @given(st.lists(st.integers(1, 49), min_size=1, max_size=20))
 def test_pieces_joined_without_a_space_have_the_same_words(sizes: list[int]) -> None:
     """As MAVSDK and QGroundControl join them."""
     words = [chr(ord("a") + number % 26) * size for number, size in enumerate(sizes)]
-    assert "".join(split_text(" ".join(words))).split() == words
+    assert "".join(pieces(" ".join(words), Kind.UNKNOWN)).split() == words
 
 
 def test_the_pieces_of_a_long_text_can_be_joined_or_read_alone() -> None:
@@ -369,7 +370,7 @@ def test_the_pieces_of_a_long_text_can_be_joined_or_read_alone() -> None:
         station.take()
     long = "Mission rejected: the first half of a sentence of more than fifty characters, and the rest of it"
     for text in (long, "short", long):
-        world.inside.ground.say(Severity.WARNING, text)
+        world.inside.ground.say(sentences.CHANGED_ITEM(text))
     world.run(0.1)
     chunks = [(text.id, text.chunk_seq) for text in stations[0].messages("STATUSTEXT")]
     (first, _), (second, _) = chunks[0], chunks[3]

@@ -105,9 +105,9 @@ def assert_is_true(
     """The reported outcome of an interrupted push is true. UNCERTAIN promises nothing."""
     if delivery.ack is ACCEPTED:
         assert craft.holds(new)
-    elif delivery.text not in {failure.value for failure in LIST_IS_GONE}:
+    elif delivery.text not in {failure.value.text for failure in LIST_IS_GONE}:
         assert craft.holds(old)
-    elif delivery.text != PushFailure.UNCERTAIN.value:
+    elif delivery.text != PushFailure.UNCERTAIN.value.text:
         # An INAV loads its saved mission again, and the pilot is told.
         assert len(craft.download()) <= 1 or craft.holds(old)
 

@@ -398,6 +398,7 @@ def test_preflight_storage_in_flight_is_denied_while_something_is_unsaved() -> N
     world.faults.armed = False
     world.run(1)
     for what in (0, 2, 3):
+        world.run(1)
         station.take()
         station.send(command_of_storage(what))
         world.run(1)

@@ -343,7 +343,7 @@ def test_a_mission_that_was_not_read_before_arming_is_read_or_refused(board: str
         assert download.result is None
     else:
         assert download.result is A.DENIED
-        assert "Armed: the mission on board is not known, disarm to read it" in " ".join(station.texts())
+        assert "Armed, mission not known: disarm to read it" in " ".join(station.texts())
 
 
 def test_another_boards_mission_is_not_served() -> None:

@@ -78,7 +78,7 @@ def test_a_list_of_the_same_size_is_noticed_within_two_seconds(kind: str, size: 
     else:
         MultiWiiMission(memoryview(eeprom), options.capacity).store(size // 2, unpack_waypoint(b"\0" + changed)[1])
     world.run(2.0)
-    assert f"Mission on the flight controller changed: {size} records" in " ".join(station.texts())
+    assert f"Mission on board changed: {size} records" in " ".join(station.texts())
     assert [record.pack() for record in world.bridge.missions.held.records] == packed(moved)  # type: ignore[union-attr]
 
 
@@ -100,7 +100,7 @@ def test_another_list_of_the_longest_size_is_noticed_within_two_seconds(streams_
     for number, record in enumerate(other, 1):
         mission.write(number, unpack_waypoint(bytes((number,)) + record)[1])
     world.run(2.0)
-    assert f"Mission on the flight controller changed: {CAPACITY} records" in " ".join(station.texts())
+    assert f"Mission on board changed: {CAPACITY} records" in " ".join(station.texts())
     assert [record.pack() for record in world.bridge.missions.held.records] == other  # type: ignore[union-attr]
 
 
@@ -114,7 +114,7 @@ def test_one_changed_record_in_the_longest_list_is_noticed_from_the_upload() -> 
         mission.write(number, unpack_waypoint(bytes((number,)) + record)[1])
         world.run(0.01)
     world.run(2.0)
-    assert f"Mission on the flight controller changed: {CAPACITY} records" in " ".join(station.texts())
+    assert f"Mission on board changed: {CAPACITY} records" in " ".join(station.texts())
 
 
 @pytest.mark.parametrize("streams_hz", [0, 50])
@@ -156,14 +156,14 @@ def test_a_list_that_another_client_is_writing_is_reported_once_it_is_complete()
         bench.world.run(0.1)
     bench.world.run(2)
     text = " ".join(bench.station.texts()[before:])
-    assert text == "Mission on the flight controller changed: 30 records"
+    assert text == "Mission on board changed: 30 records"
 
 
 def test_a_list_that_another_client_left_unfinished_is_reported() -> None:
     bench = Bench(9)
     bench.board._firmware._mission.write(1, waypoint(1))  # type: ignore[union-attr]
     bench.world.run(2)
-    assert "Mission on the flight controller changed: 0 records" in bench.text()
+    assert "Mission on board changed: 0 records" in bench.text()
 
 
 def test_a_multiwii_is_not_read_in_flight() -> None:

@@ -19,4 +19,4 @@ def test_arming_blockers_are_reported_when_they_change() -> None:
     board.faults.arming_blockers = 0
     world.run(3)
     assert station.messages("SYS_STATUS")[-1].onboard_control_sensors_health & PREARM
-    assert [text for text in station.texts() if "Arm" in text][1:] == ["PreArm: ready"]
+    assert [text for text in station.texts() if "rm" in text][1:] == ["Ready to arm"]

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from bridge.controllers import other
 from bridge.gcs.rights import LinkAccess
-from bridge.gcs.station import Severity
+from bridge.voice import sentences
 from protocols.mavlink.codec import FrameWriter, Packed
 from protocols.mavlink.dialect import CRC_EXTRA, Message
 from protocols.mavlink.signing import TICKS_PER_S, TOLERANCE, Check, Signing, Timestamps, key_from_passphrase, ticks
@@ -291,9 +291,9 @@ def test_a_listener_gets_no_texts_for_others(access: LinkAccess) -> None:
     for station in (pilot, listener):
         station.send(READS[0])
     world.run(0.1)
-    world.inside.ground.say(Severity.INFO, "for everyone")
+    world.inside.ground.say(sentences.FOUND("INAV"))
     world.run(0.1)
-    assert (pilot.texts(), listener.texts()) == (["for everyone"], [])
+    assert (pilot.texts(), listener.texts()) == (["Found INAV"], [])
 
 
 def test_listeners_do_not_displace_a_station_with_the_key() -> None:

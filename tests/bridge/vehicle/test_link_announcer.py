@@ -5,8 +5,9 @@ from math import inf
 
 from bridge.controllers import other
 from bridge.fc.profile import FlightController
-from bridge.gcs.station import Severity
 from bridge.vehicle.link_announcer import LinkAnnouncer
+from bridge.voice.happening import Happening
+from bridge.voice.sentences import IN_COMMAND_LINE
 
 BOARD = FlightController(other.OTHER_MSP, "BTFL")
 
@@ -14,12 +15,12 @@ BOARD = FlightController(other.OTHER_MSP, "BTFL")
 class Said:
     """An announcer at time 0, and its texts."""
 
-    def __init__(self, trouble: str = "", *, was_found: bool = False) -> None:
+    def __init__(self, trouble: Happening | None = None, *, was_found: bool = False) -> None:
         self.texts: list[str] = []
         self.announcer = LinkAnnouncer(self._say, lambda: trouble, 0.0, was_found=was_found)
 
-    def _say(self, severity: Severity, text: str) -> None:
-        self.texts.append(text)
+    def _say(self, happening: Happening) -> None:
+        self.texts.append(happening.text)
 
     def until(self, end: float) -> list[str]:
         """The texts of all ticks up to a time."""
@@ -33,12 +34,12 @@ def test_without_a_flight_controller_the_reason_is_repeated() -> None:
     said = Said()
     assert said.until(9.0) == []
     assert said.until(60.0) == ["No flight controller found: check power, wiring"] * 2
-    assert Said("busy: another program has it open").until(10.0) == ["busy: another program has it open"]
+    assert Said(IN_COMMAND_LINE()).until(10.0) == ["Board in its CLI: type exit, or unplug it"]
 
 
 def test_behind_a_wifi_adapter_there_is_no_wiring_to_check() -> None:
     texts: list[str] = []
-    announcer = LinkAnnouncer(lambda _, text: texts.append(text), lambda: "", 0.0, is_wired=False)
+    announcer = LinkAnnouncer(lambda said: texts.append(said.text), lambda: None, 0.0, is_wired=False)
     announcer.tick(announcer.due)
     assert (texts, announcer.why_unknown) == (
         ["No flight controller found: check power, Wi-Fi"],

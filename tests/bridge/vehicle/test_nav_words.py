@@ -4,8 +4,8 @@
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
-from bridge.gcs.station import Severity
-from bridge.vehicle.nav_words import NavWords, nav_words, severity_of
+from bridge.vehicle.nav_words import NavWords, nav_words, sentence_for
+from bridge.voice.happening import Severity
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.msp.nav import FINISHED, NavAction, NavMode, NavState, NavStatus
 from tests.bridge.vehicle.test_item_numbers import HOME, LEGS, WITH_TAKEOFF, bench
@@ -52,8 +52,8 @@ def test_a_plane_circles_above_home() -> None:
 
 
 def test_only_an_emergency_landing_is_shown_on_the_hud_of_mission_planner() -> None:
-    assert severity_of("EMERGENCY LANDING") is Severity.CRITICAL
-    assert severity_of("TO WP {}/{}") is Severity.NOTICE
+    assert sentence_for("EMERGENCY LANDING").severity is Severity.CRITICAL
+    assert sentence_for("TO WP {}/{}").severity is Severity.NOTICE
 
 
 def test_words_are_said_once_and_not_more_often_than_every_two_seconds() -> None:

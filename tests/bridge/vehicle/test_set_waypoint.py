@@ -297,7 +297,7 @@ def test_without_a_known_mission_nothing_is_sent() -> None:
     station = GroundStation(world)
     station.send(long(1))
     world.run(0.5)
-    assert (results(station), station.texts()) == ([DENIED], ["Set WP: the mission on board is not known"])
+    assert (results(station), station.texts()) == ([DENIED], ["Set WP: Read the mission on board first"])
     assert 0x2221 not in inav.commands
 
 

@@ -60,7 +60,7 @@ def push_under(inject: Injection, seed: int, options: SimOptions | None = None) 
         reported = result.text
         # INVALID: the last of three attempts ended with a record whose damage passed the checksum.
         assert result.ack in (MissionResult.DENIED, MissionResult.NO_SPACE, MissionResult.INVALID)
-        if result.text == PushFailure.UNCERTAIN.value:
+        if result.text == PushFailure.UNCERTAIN.value.text:
             assert committed
             assert stored in (OLD_RECORDS, NEW_RECORDS)
         else:
@@ -123,7 +123,7 @@ def test_bit_errors_are_recovered(rate: float) -> None:
 def test_many_bit_errors_are_recovered() -> None:
     """A third of the long frames are damaged, and some pass an 8-bit checksum: of 120 pushes, 2 end with a reason."""
     found = outcomes(setting(bit_error_rate=5e-4), 15)
-    assert set(found) <= {"ACCEPTED", PushFailure.NO_ANSWER.value}
+    assert set(found) <= {"ACCEPTED", PushFailure.NO_ANSWER.value.text}
     assert found["ACCEPTED"] >= 13
 
 
@@ -155,7 +155,7 @@ def test_a_damaged_reply_is_not_trusted() -> None:
     """Seeds with damage that passed the checksum: INFO's radius and COMMIT's reply."""
     for seed in (1073, 1171, 1339, 1540):
         reported, _ = push_under(setting(bit_error_rate=1e-3), seed)
-        assert reported in ("ACCEPTED", PushFailure.OUT_OF_TIME.value)
+        assert reported in ("ACCEPTED", PushFailure.OUT_OF_TIME.value.text)
 
 
 def test_a_pull_over_a_bad_line_is_exact_or_fails() -> None:
@@ -202,7 +202,7 @@ def test_a_push_fails_after_a_long_stall() -> None:
     reported = outcomes(
         lambda world, draw: world.after(draw.random() * 0.4, lambda: setattr(world.faults, "hang", True)), 15
     )
-    assert set(reported) <= {"ACCEPTED", PushFailure.NO_ANSWER.value, PushFailure.UNCERTAIN.value}
+    assert set(reported) <= {"ACCEPTED", PushFailure.NO_ANSWER.value.text, PushFailure.UNCERTAIN.value.text}
     assert reported["ACCEPTED"] < 8
 
 
@@ -257,13 +257,13 @@ def test_arming_during_a_push_keeps_the_old_list() -> None:
         world.after(draw.random() * 0.45, lambda: setattr(world.faults, "armed", True))
 
     reported = outcomes(inject, 24)
-    assert set(reported) <= {"ACCEPTED", PushFailure.ARMED.value, ARMED.text}
-    assert reported[PushFailure.ARMED.value] > 6
+    assert set(reported) <= {"ACCEPTED", PushFailure.ARMED.value.text, ARMED.text}
+    assert reported[PushFailure.ARMED.value.text] > 6
 
 
 def test_a_brief_arming_during_a_push_damages_no_list() -> None:
     reported = outcomes(switching("armed", 0.4, 0.1), 15)
-    assert set(reported) <= {"ACCEPTED", PushFailure.ARMED.value, ARMED.text}
+    assert set(reported) <= {"ACCEPTED", PushFailure.ARMED.value.text, ARMED.text}
 
 
 @pytest.mark.parametrize(("busy_s", "expected"), [(0.5, "ACCEPTED"), (3.0, BUSY_TEXT)])
@@ -277,7 +277,7 @@ def test_a_push_waits_up_to_a_second_for_a_busy_board(busy_s: float, expected: s
 
 def test_a_board_that_becomes_busy_during_a_push_keeps_the_old_list() -> None:
     reported = outcomes(switching("busy", 0.4, 2), 12)
-    assert set(reported) <= {"ACCEPTED", PushFailure.BUSY.value, BUSY_TEXT}
+    assert set(reported) <= {"ACCEPTED", PushFailure.BUSY.value.text, BUSY_TEXT}
 
 
 def test_a_refusal_for_flash_wear_is_not_reported_as_busy() -> None:
@@ -288,11 +288,13 @@ def test_a_refusal_for_flash_wear_is_not_reported_as_busy() -> None:
         world.wait_until(lambda _, outcome=outcome: bool(outcome), 20)  # type: ignore[misc]
         results.append(outcome[0][0])
     assert [result.ack for result in results] == [MissionResult.ACCEPTED] * 250 + [MissionResult.DENIED]
-    assert results[-1].text == PushFailure.WRITES_SPENT.value
+    assert results[-1].text == PushFailure.WRITES_SPENT.value.text
     assert world.stored == records_of(waypoints(2, seed=1249))
 
 
-@pytest.mark.parametrize(("failures", "expected"), [(1, "ACCEPTED"), (2, "ACCEPTED"), (3, PushFailure.FLASH.value)])
+@pytest.mark.parametrize(
+    ("failures", "expected"), [(1, "ACCEPTED"), (2, "ACCEPTED"), (3, PushFailure.FLASH.value.text)]
+)
 def test_a_failed_flash_write_is_retried_twice(failures: int, expected: str) -> None:
     def inject(world: World, draw: random.Random) -> None:
         world.after(draw.random() * 0.2, lambda: setattr(world.faults, "flash_failures", failures))

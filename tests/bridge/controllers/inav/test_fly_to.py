@@ -127,7 +127,7 @@ def test_nothing_is_sent_if_the_board_has_another_record_there(held: NavRecord |
     inav = Inav()
     refusal = run(inav, held=held)
     assert refusal is not None
-    assert refusal.text == "Set WP: the mission on board has changed: Read it"
+    assert refusal.text == "Set WP: Read the mission on board first"
     assert inav.set_to == []
 
 

@@ -238,7 +238,7 @@ def test_a_stop_during_a_transfer_loads_the_old_list_again() -> None:
     world.run(0.4)
     world.bridge.abort(world.now)
     assert upload.run(2) is DENIED
-    assert any("stopped during the write" in text for text in station.texts())
+    assert any("naze-bridge stopped" in text for text in station.texts())
     assert without_home(Download(station).run()) == without_home(plan(10))
     assert board.counters.flash_writes == 1
 

@@ -85,7 +85,7 @@ def test_a_record_that_is_not_stored_is_noticed_and_the_old_list_restored() -> N
     assert inav.records == packed(old)
     assert (inav.is_valid, inav.saves) == (True, 1)
     assert Download(station).run() == old
-    assert "refused a record" in world.store.missions[-1][1].detail  # type: ignore[union-attr]
+    assert "refused an item" in world.store.missions[-1][1].detail  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize("first", ["a refused record", "an arming"])
@@ -120,7 +120,7 @@ def test_half_a_list_on_an_empty_board_cannot_be_flown() -> None:
     world, station = found(inav)
     assert Upload(station, plan(40)).run() is DENIED
     assert (len(inav.records), inav.is_valid, inav.saved) == (19, False, None)
-    assert "no mission to fly" in world.store.missions[-1][1].detail  # type: ignore[union-attr]
+    assert "no mission on board" in world.store.missions[-1][1].detail  # type: ignore[union-attr]
     assert Download(station).run()[1:] == []
 
 
@@ -194,7 +194,7 @@ def test_after_arming_during_a_transfer_the_last_record_is_not_sent() -> None:
     assert upload.run() is DENIED
     assert not inav.is_valid
     assert len(inav.records) < 59
-    assert any("armed during the write" in text for text in station.texts())
+    assert any("Armed while writing" in text for text in station.texts())
     assert world.bridge.missions.held is None
 
 
@@ -316,7 +316,7 @@ def test_a_crashing_record_is_not_written_back() -> None:
     world, station = found(inav)
     inav.drop = lambda frame: "request" if frame.command == Nav.SET_WP and frame.payload[0] == 5 else ""
     assert Upload(station, plan(10)).run() is DENIED
-    assert "no mission to fly" in world.store.missions[-1][1].detail  # type: ignore[union-attr]
+    assert "no mission on board" in world.store.missions[-1][1].detail  # type: ignore[union-attr]
     inav.drop = lambda _frame: ""
     assert Upload(station, plan(10)).run() is ACCEPTED
 
@@ -329,7 +329,7 @@ def test_a_list_replaced_by_another_program_is_not_restored() -> None:
     inav.drop = lambda frame: "request" if frame.command == Nav.SET_WP and frame.payload[0] == 3 else ""
     assert Upload(station, plan(10, 1)).run() is DENIED
     assert not inav.is_valid
-    assert "no mission to fly" in world.store.missions[-1][1].detail  # type: ignore[union-attr]
+    assert "no mission on board" in world.store.missions[-1][1].detail  # type: ignore[union-attr]
 
 
 def test_a_save_whose_reply_is_lost_is_repeated() -> None:
@@ -346,7 +346,7 @@ def test_if_the_first_record_is_lost_the_old_list_is_reported_kept() -> None:
     assert Upload(station, plan(12)).run() is ACCEPTED
     inav.drop = lambda frame: "request" if frame.command == Nav.SET_WP else ""
     assert Upload(station, plan(10, 1)).run() is DENIED
-    assert "old mission is kept" in world.store.missions[-1][1].detail  # type: ignore[union-attr]
+    assert "old mission kept" in world.store.missions[-1][1].detail  # type: ignore[union-attr]
     assert inav.records == packed(plan(12))
     inav.drop = lambda _frame: ""
     assert Download(station).run()[1:] == plan(12)[1:]

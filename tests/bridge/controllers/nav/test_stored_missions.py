@@ -185,7 +185,7 @@ def test_a_saved_mission_from_another_planner_is_reported_as_such() -> None:
 
 def test_while_armed_the_missing_mission_is_reported_but_not_loaded() -> None:
     bench = Bench(4, faults=Faults(boxes=0, armed=True))
-    assert bench.text().count("No mission is loaded: disarm to load the saved one") == 1
+    assert bench.text().count("No mission is loaded: disarm to load it") == 1
     # None is loaded, so there is nothing to fly.
     assert without_home(Download(bench.station).run()) == []
     bench.faults.armed = False

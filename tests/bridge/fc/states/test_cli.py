@@ -86,7 +86,7 @@ def test_it_is_recognised_when_the_port_is_opened(kind: str) -> None:
     world.run(30)
     assert is_in_cli(world)
     assert station.texts().count(TROUBLE) == 4
-    assert world.inside.session.state.trouble == TROUBLE
+    assert world.bridge.fc_trouble == TROUBLE
     assert not world.events("fc.found")
     assert Upload(station, waypoints(5)).run() is MissionResult.DENIED
     assert station.texts()[-1] == TROUBLE
@@ -127,7 +127,7 @@ def test_it_is_found_again_after_unplugging(kind: str) -> None:
     world.run(10)
     world.power_off()
     world.wait_until(lambda w: isinstance(w.inside.session.state, Searching), 10)
-    assert world.inside.session.state.trouble == ""
+    assert world.bridge.fc_trouble == ""
     world.power_on()
     world.wait_until(lambda w: w.is_found, 20)
     world.run(1)

@@ -23,12 +23,12 @@ def test_a_silent_flight_controller_is_a_problem() -> None:
 
 def test_a_flight_controller_in_its_command_line_is_recognised() -> None:
     (_, found) = check_flight_controller(PORT, STATUS | {"flight_controller": None, "state": Cli.name}, None)
-    assert_problem(found, Cli.trouble, "naze-bridge doctor` again")
+    assert_problem(found, Cli.trouble.text, "naze-bridge doctor` again")
 
     def listened() -> Json:
-        raise ControlError(Cli.trouble)
+        raise ControlError(Cli.trouble.text)
 
-    assert_problem(check_flight_controller(PORT, None, listened), Cli.trouble, "naze-bridge doctor` again")
+    assert_problem(check_flight_controller(PORT, None, listened), Cli.trouble.text, "naze-bridge doctor` again")
 
 
 def test_a_daemon_is_asked_and_the_port_left_alone() -> None:

@@ -6,14 +6,19 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
+from bridge.voice import sentences
+from bridge.voice.happening import LINE_LENGTH, Happening
 from protocols.mission_item import Command
 from reports.finding import DROPPED, Finding, News, without_defaults
 from reports.verdict import Verdict
 
 _MOST_LINES = 10
-#: A longer text would be split, and Mission Planner's HUD shows only the last piece.
-_LINE_LENGTH = 50
-_RANKS = (News.DANGER, News.WARNING, News.NOTICE)
+#: The sentences of findings, the most important first. Before the summary only dangers are warnings.
+_SENTENCES = {
+    News.DANGER: sentences.DANGER,
+    News.WARNING: sentences.CHANGED_ITEM,
+    News.NOTICE: sentences.ROUNDED_ITEM,
+}
 
 
 def with_meant_home(verdict: Verdict[Any]) -> Verdict[Any]:
@@ -56,19 +61,19 @@ def summary(sent: int, verdict: Verdict[Any], *, is_unchanged: bool = False) -> 
 
 def _fitted(start: str, news: list[str], flight: Sequence[str]) -> str:
     """As much of the flight as fits the line, then as much of the news."""
-    if len(text := start + ", ".join((*news, *flight))) <= _LINE_LENGTH:
+    if len(text := start + ", ".join((*news, *flight))) <= LINE_LENGTH:
         return text
     short = [fact.replace("returns home at", "RTL at").replace("does not land", "no landing") for fact in flight]
     least = [fact for fact in short if not fact.startswith("highest")]
     for facts in (short, least, least[:1], ()):
-        if len(text := start + ", ".join((*news, *facts))) <= _LINE_LENGTH:
+        if len(text := start + ", ".join((*news, *facts))) <= LINE_LENGTH:
             return text
-    while len(text) > _LINE_LENGTH:
+    while len(text) > LINE_LENGTH:
         text = start + ", ".join([*(news := news[:-1]), "more"])
     return text
 
 
-def finding_lines(findings: Iterable[Finding]) -> list[tuple[News, str]]:
+def finding_lines(findings: Iterable[Finding]) -> list[Happening]:
     """The lines before the summary: warnings first, at most ten."""
     first: dict[Finding, Finding] = {}
     counts: Counter[Finding] = Counter()
@@ -76,9 +81,8 @@ def finding_lines(findings: Iterable[Finding]) -> list[tuple[News, str]]:
         kind = replace(finding, seq=min(finding.seq or 0, 1))
         first.setdefault(kind, finding)
         counts[kind] += 1
-    lines = [(finding.news, finding.text(counts[kind])) for kind, finding in first.items()]
-    lines.sort(key=lambda line: _RANKS.index(line[0]))
+    lines = [_SENTENCES[finding.news](finding.text(counts[kind])) for kind, finding in first.items()]
+    lines.sort(key=lambda line: line.severity)
     if len(lines) > _MOST_LINES:
-        more = f"and {len(lines) - _MOST_LINES} more: see the status page or naze-bridge missions show"
-        lines[_MOST_LINES:] = [(News.NOTICE, more)]
+        lines[_MOST_LINES:] = [sentences.MORE_FINDINGS(len(lines) - _MOST_LINES)]
     return lines

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The whole table of sentences, for each kind of ground station, with the longest values."""
+
+from collections import Counter
+from string import Formatter
+
+import pytest
+
+from bridge.voice.happening import Happening, Severity
+from bridge.voice.sentences import prearm_lines, settings_changed, table
+from bridge.voice.stations import Kind, pieces, rendered
+
+TABLE = table()
+#: Sentences of the mission rules, whose whole text goes to the Messages tab first.
+FREE = {"REJECTED", "DANGER"}
+
+
+def longest(name: str) -> Happening:
+    return Happening(TABLE[name], TABLE[name].longest)
+
+
+@pytest.mark.parametrize("kind", Kind)
+@pytest.mark.parametrize("name", TABLE)
+def test_every_sentence_fits_a_hud(name: str, kind: Kind) -> None:
+    texts = rendered(longest(name), kind)
+    for severity, text in texts:
+        assert text.isascii()
+        assert len(text) <= 50 or (severity > 4 and not text.startswith("PreArm"))
+        # Values are not cut, except a name in its middle.
+        assert name in FREE or not text.endswith("..")
+    # The HUD keeps the last text, and the Messages tab has each once.
+    assert texts[-1][0] is longest(name).severity
+    assert len(set(texts)) == len(texts)
+
+
+@pytest.mark.parametrize("kind", Kind)
+@pytest.mark.parametrize("name", TABLE)
+def test_nothing_of_a_sentence_is_lost(name: str, kind: Kind) -> None:
+    """What a HUD's line lacks is in another text."""
+    said = " ".join(text for _, text in rendered(longest(name), kind))
+    missing = [value for value in TABLE[name].longest if isinstance(value, str) and value not in said]
+    # The short list of names stands for the long one.
+    assert missing in ([], [TABLE["SETTINGS_CHANGED"].longest[1]])
+
+
+def test_only_a_failure_begins_with_prearm_on_other_stations_than_mission_planner() -> None:
+    """QGroundControl shows each as a failed check for 35 s."""
+    for kind in Kind:
+        failures = {name for name in TABLE if rendered(longest(name), kind)[-1][1].startswith("PreArm")}
+        assert failures == {"NOT_READY"} | ({"READY"} if kind is Kind.MISSION_PLANNER else set())
+
+
+def test_no_text_is_twice_in_the_table() -> None:
+    texts = Counter((sentence.severity, sentence.text) for sentence in TABLE.values() if sentence.text != "{}")
+    assert [text for text, count in texts.items() if count > 1] == []
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_the_longest_values_are_those_of_the_text(name: str) -> None:
+    sentence = TABLE[name]
+    for text in (sentence.text, sentence.short):
+        fields = [field for _, field, _, _ in Formatter().parse(text) if field is not None]
+        assert all(not field or int(field) < len(sentence.longest) for field in fields)
+        assert "" not in fields or len(fields) == len(sentence.longest)
+
+
+@pytest.mark.parametrize("kind", Kind)
+def test_a_long_text_is_whole_again_when_its_pieces_are_joined(kind: Kind) -> None:
+    text = "19 items: Delay changed from 3 to 1 (0 = fly through, 1 = brake; to hold use LOITER_TIME) and so on"
+    joined = "".join(pieces(text, kind))
+    assert joined.split() == text.split()
+    assert kind is not Kind.MAVSDK or joined == text
+
+
+def test_bad_news_is_worse_than_a_notice() -> None:
+    assert {sentence.severity for sentence in TABLE.values() if sentence.lasts} <= {Severity.ERROR, Severity.WARNING}
+
+
+def test_reasons_not_to_arm_share_lines() -> None:
+    reasons = "not level", "no RC link", "accelerometer not calibrated", "compass not calibrated", "system overloaded"
+    lines = [line.line for line in prearm_lines(reasons)]
+    assert lines == [
+        "PreArm: not level, no RC link",
+        "PreArm: accelerometer not calibrated",
+        "PreArm: compass not calibrated, system overloaded",
+    ]
+    assert prearm_lines(()) == []
+
+
+def test_a_setting_name_is_shortened_in_its_middle() -> None:
+    line = TABLE["REFUSED_BY_BOARD"]("osd_mah_remaining_precision_and_more", "-1.234567e+30").line
+    assert line == "osd_mah_rem..n_and_more stays -1.234567e+30: refused"[: len(line)] or len(line) <= 50
+    assert settings_changed(("p_roll",)).line == "Settings changed elsewhere: p_roll"
