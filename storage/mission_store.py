@@ -28,8 +28,7 @@ DAMAGED = "DAMAGED"  # the outcome in a list if the row does not match its check
 
 #: The size limit of the store, bytes.
 BUDGET = 200 << 20
-#: The fraction of the budget that is freed at once, so that not every mission pays for the search.
-_FREED_PART = 50
+#: So that not every mission pays for the search.
 _DELETED_AT_ONCE = 20
 _MOST_SENDERS = 16
 _BUDGET_IN_MEMORY = 8 << 20
@@ -252,9 +251,7 @@ class MissionStore:
         return StoreError(f"mission {number} in {self._path} was damaged on the disk; the others can still be read")
 
     def _make_room(self) -> None:
-        if self._size() <= self._budget:
-            return
-        while self._size() > self._budget - self._budget // _FREED_PART:
+        while self._size() > self._budget:
             oldest = self._connection.execute(
                 "SELECT number FROM missions ORDER BY CASE WHEN outcome IN ('REJECTED', 'CANCELLED') THEN 0"
                 " WHEN outcome = ? THEN 2 ELSE 1 END, number LIMIT ?",
