@@ -120,6 +120,5 @@ def _read(state: Any) -> _Kept:
         str(name): [[int(number) for number in (sysid, compid, link_id, last)] for sysid, compid, link_id, last in all_]
         for name, all_ in state["streams"].items()
     }
-    newest = state.get("newest", 0)
-    refused_until = int(state.get("refused_until", -1))
-    return int(state["timestamp"]), streams, refused_until, None if newest is None else int(newest)
+    newest = state["newest"]
+    return int(state["timestamp"]), streams, int(state["refused_until"]), None if newest is None else int(newest)
