@@ -148,10 +148,20 @@ class DaemonApi:
         }
 
     async def list_missions(self, limit: int) -> Json:
-        return await self._daemon.store.ask(lambda store: listed(store, limit))
+        def listed(store: MissionStore) -> list[Json]:
+            missions = store.list(min(limit, _MOST_LISTED))
+            return [_fields(mission) | {"checksum": _hex(mission.checksum)} for mission in missions]
+
+        return {"missions": await self._daemon.store.ask(listed)}
 
     async def show_mission(self, number: int) -> Json:
-        return await self._daemon.store.ask(lambda store: shown(store, number))
+        """One mission; ControlError if there is none of that number."""
+        mission = await self._daemon.store.ask(lambda store: store.get(number))
+        if mission is None:
+            raise ControlError(f"there is no mission {number}; `naze-bridge missions list` shows the numbers")
+        received = mission.received
+        as_text = {"records": received.records.hex(), "checksum": _hex(received.checksum)}
+        return _fields(mission) | {"received": _fields(received) | as_text}
 
     async def restore(self, number: int, progress: Callable[[Json], None]) -> Json:
         """Push a stored mission again, as it was sent; the current rules apply."""
@@ -172,24 +182,6 @@ def delivery_data(outcome: DeliveryResult | Refusal, arrived: ArrivedMission | N
             "mission": outcome.number if isinstance(outcome, DeliveryResult) else None,
         }
     return answer
-
-
-def listed(store: MissionStore, limit: int) -> Json:
-    return _listed(store.list(min(limit, _MOST_LISTED)))
-
-
-def _listed(missions: list[MissionSummary]) -> Json:
-    return {"missions": [_fields(mission) | {"checksum": _hex(mission.checksum)} for mission in missions]}
-
-
-def shown(store: MissionStore, number: int) -> Json:
-    """Answer the request "mission"; ControlError if there is none of that number."""
-    mission = store.get(number)
-    if mission is None:
-        raise ControlError(f"there is no mission {number}; `naze-bridge missions list` shows the numbers")
-    received = mission.received
-    as_text = {"records": received.records.hex(), "checksum": _hex(received.checksum)}
-    return _fields(mission) | {"received": _fields(received) | as_text}
 
 
 def _fields(thing: MissionSummary | StoredMission | ReceivedMission) -> Json:

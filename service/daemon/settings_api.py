@@ -84,14 +84,15 @@ class SettingsApi:
         return plain(await self._answer(restore))
 
     async def backups(self, limit: int) -> Json:
-        return await self._daemon.store.ask(lambda store: backups_listed(store, limit))
+        lines = await self._daemon.store.ask(lambda store: store.backups.list(min(limit, _MOST_LISTED)))
+        return {"backups": [asdict(line) for line in lines]}
 
     async def newest_backup(self) -> int | None:
         return await self._daemon.store.ask(lambda store: store.backups.newest())
 
     async def backup(self, number: int) -> Json:
         """One backup, with its difference from the same board's one before."""
-        return await self._daemon.store.ask(lambda store: backup_shown(store, number))
+        return await self._daemon.store.ask(lambda store: _backup(store, number))
 
     async def _setting(self, request: Json) -> BoardSetting:
         name = str(request.get("name"))[:_LONGEST_NAME]
@@ -129,11 +130,7 @@ class SettingsApi:
         return result
 
 
-def backups_listed(store: MissionStore, limit: int) -> Json:
-    return {"backups": [asdict(line) for line in store.backups.list(min(limit, _MOST_LISTED))]}
-
-
-def backup_shown(store: MissionStore, number: int) -> Json:
+def _backup(store: MissionStore, number: int) -> Json:
     """Answer the request "backup"; ControlError if there is none of that number."""
     backup = store.backups.get(number)
     if backup is None:
