@@ -147,6 +147,7 @@ class MissionIdentity:
         "not started, active, paused or complete; null: not reported (by a Harakiri without mission flight)",
     ] = None
     item: Annotated[int | None, "the item being flown, as read back; null: none, or not reported"] = None
+    why: Annotated[str | None, "why its flight stopped, is slow, or has ended; null: not reported"] = None
 
 
 @dataclass(frozen=True, slots=True)

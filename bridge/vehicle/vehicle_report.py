@@ -13,7 +13,7 @@ from bridge.missions.mission_service import MissionService
 from bridge.model import vehicle as v
 from bridge.model.craft import FlightMode
 from bridge.model.ground_track import bearing_deg, distance_m
-from bridge.model.missions import MissionProgress
+from bridge.model.missions import FlightReport, MissionProgress
 from bridge.settings.board_settings import BoardSettings
 from protocols.msp.telemetry import Sensor
 from reports.vehicle_groups import (
@@ -123,10 +123,11 @@ class VehicleReporter:
         held = self._missions.on_board
         mission = None
         if held is not None:
-            state, item = None, None
-            if self._fresh(v.MissionLeg, now) is not None:
+            state, item, why = None, None, None
+            if (leg := self._fresh(v.MissionLeg, now)) is not None:
+                why = leg.report.why or None if isinstance(leg.report, FlightReport) else None
                 state, item = self._progress.progress.text, self._missions.seq_of(self._progress.number) or None
-            mission = MissionIdentity(held.identity.count, f"{held.identity.checksum:08x}", state, item)
+            mission = MissionIdentity(held.identity.count, f"{held.identity.checksum:08x}", state, item, why)
         settings = None
         if (sealed := self._settings.known.state) is not None:
             settings = SettingsIdentity(sealed.seal, None if sealed.change is None else sealed.change.text)

@@ -454,7 +454,7 @@ static void check_step(flight_t *flight)
     CHECK(!out->nose || (out->heading_cd >= 0 && out->heading_cd < 36000));
     CHECK(labs(out->climb_cm_s) <= settings.climb_cm_s);
     CHECK(out->mode == NF_PASS || (in->armed && in->switch_on));
-    CHECK(out->mode != NF_LAND || list.record[list.count - 1].command == LAND || core->reason >= NF_RTL);
+    CHECK(out->mode != NF_LAND || list.record[list.count - 1].command == LAND || core->reason >= NF_RTL || core->reason == NF_LAND_SLOW);
     CHECK(out->lean_cd.n * out->lean_cd.n + out->lean_cd.e * out->lean_cd.e <= 1.001f * LEAN_CD * LEAN_CD);
     CHECK(out->steer == ST_NONE || (out->mode != NF_PASS && out->mode != NF_GROUND && in->flying));
     if (fabs(craft.lies.compass) <= 60)

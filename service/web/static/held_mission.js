@@ -13,6 +13,7 @@ export class HeldMission {
   #shown; // identifies the mission that is shown
   #held = { count: null, items: [] };
   #trail = []; // of the craft since it was armed, or since the page was opened
+  #decisions = []; // of a board that flies its mission, and where
   #wasArmed = null;
 
   constructor() {
@@ -36,15 +37,22 @@ export class HeldMission {
     const flown = state.mission?.item ?? null, { lat_deg, lon_deg } = state.last_heard; // where the craft was lost
     markFlown(byId("held-list"), flown);
     this.#follow(state.last_heard);
-    this.#map.show({ items: this.#held.items, flown, position: { ...state.position, lat_deg, lon_deg }, attitude: state.attitude, trail: [...this.#trail] });
+    this.#note(state.last_heard, state.mission);
+    this.#map.show({ items: this.#held.items, flown, position: { ...state.position, lat_deg, lon_deg }, attitude: state.attitude, trail: [...this.#trail], decisions: this.#decisions });
   }
 
   #showProfile() {
     showProfile(byId("profile"), this.#held.items);
   }
 
+  #note({ armed, lat_deg: lat, lon_deg: lon }, mission) {
+    if (!armed || lat === null || !mission?.state) return;
+    const text = mission.why ?? `item ${mission.item ?? "none"}, ${mission.state}`;
+    if (text !== this.#decisions[this.#decisions.length - 1]?.text) this.#decisions.push({ lat, lon, text });
+  }
+
   #follow({ armed, lat_deg: lat, lon_deg: lon }) {
-    if (armed && !this.#wasArmed) this.#trail = [];
+    if (armed && !this.#wasArmed) [this.#trail, this.#decisions] = [[], []];
     this.#wasArmed = armed;
     const last = this.#trail[this.#trail.length - 1];
     if (!armed || lat === null || (last && Math.hypot(lat - last.lat, lon - last.lon) < STEP_DEG)) return;

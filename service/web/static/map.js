@@ -11,10 +11,10 @@ export const isPlaced = (item) => Boolean(item.lat_e7 && item.lon_e7);
 export const placeOf = (item) => ({ lat: item.lat_e7 / 1e7, lon: item.lon_e7 / 1e7 });
 
 // items: of /api/held; flown: the seq of the one that is flown, or null. position, attitude: of /api/state.
-// trail: the track that was flown, [{lat, lon}].
+// trail: the track that was flown, [{lat, lon}]; decisions: what the board decided on it, [{lat, lon, text}].
 // camera: zoom (1: everything fits) and dx, dy in pixels.
 // Returns { svg, view, width, height }, or null if nothing has a position. view(place): its [x, y] in the picture.
-export function drawMap({ items, flown, position, attitude, trail }, width, camera) {
+export function drawMap({ items, flown, position, attitude, trail, decisions = [] }, width, camera) {
   const placed = items.filter(isPlaced);
   const craft = position.lat_deg === null ? null : { lat: position.lat_deg, lon: position.lon_deg };
   const home = craftHome(position) ?? (items.length && isPlaced(items[0]) ? placeOf(items[0]) : null);
@@ -26,6 +26,7 @@ export function drawMap({ items, flown, position, attitude, trail }, width, came
   const svg = draw("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": inWords(items, flown, home, craft) });
   svg.append(...tracks(items, home, view));
   if (trail.length > 1) svg.append(draw("polyline", { class: "trail", points: line(trail, view) }));
+  for (const each of decisions) svg.append(decisionMark(view(each), each.text));
   if (home) svg.append(homeMark(view(home)));
   for (const item of placed.filter((each) => each.seq > 0)) svg.append(itemMark(item, view(placeOf(item)), item.seq === flown));
   if (craft) svg.append(craftMark(view(craft), attitude.heading_deg, position.height_m));
@@ -94,6 +95,10 @@ function itemMark(item, [x, y], isFlown) {
   if (LOITERS.includes(item.command)) group.append(draw("circle", { class: "loiter", cx: x, cy: y, r: 15 }));
   group.append(draw("text", { class: "number", x, y: y + 4 }, String(item.seq)));
   return group;
+}
+
+function decisionMark([x, y], text) {
+  return draw("g", { class: "touched" }, draw("title", {}, text), draw("circle", { class: "decision", cx: x, cy: y, r: 4 }));
 }
 
 function homeMark([x, y]) {

@@ -84,7 +84,13 @@ def test_the_state_and_the_list_of_missions_are_reported(commanded: tuple[Bench,
     bench, opened = commanded
     ask(opened, UPLOAD, mission_file(9))
     (state,) = ask(opened, "state")
-    assert state["mission"] == {"count": 9, "checksum": bench.daemon.pull()["checksum"], "state": None, "item": None}
+    assert state["mission"] == {
+        "count": 9,
+        "checksum": bench.daemon.pull()["checksum"],
+        "state": None,
+        "item": None,
+        "why": None,
+    }
     assert (state["link"]["state"], state["status"]["armed"]) == ("MSP", False)
     (listed,) = ask(opened, "mission/list")
     assert listed["missions"][0]["number"] == bench.daemon.missions()[0]["number"]
