@@ -125,7 +125,7 @@ class VehicleReporter:
         if held is not None:
             state, item, why = None, None, None
             if (leg := self._fresh(v.MissionLeg, now)) is not None:
-                why = leg.report.why or None if isinstance(leg.report, FlightReport) else None
+                why = report.why.text if isinstance(report := leg.report, FlightReport) and report.why else None
                 state, item = self._progress.progress.text, self._missions.seq_of(self._progress.number) or None
             mission = MissionIdentity(held.identity.count, f"{held.identity.checksum:08x}", state, item, why)
         settings = None

@@ -313,3 +313,11 @@ def test_what_the_core_decides_is_logged(tele_prot: TelemetryProtocol) -> None:
     flight.reports(held)
     messages = [message for message in flight.station.messages("NAMED_VALUE_INT") if message.name == "flight"]
     assert [message.value for message in messages] == [LEG.summary, held.summary]
+
+
+def test_the_state_tells_why_a_flight_has_stopped() -> None:
+    flight = Flight()
+    flight.reports(replace(LEG, state=FlightPhase.HELD, reason=FlightReason.STALLED))
+    mission = flight.world.bridge.report(flight.world.now).mission
+    assert mission is not None
+    assert (mission.state, mission.why) == ("paused", "Mission stopped: too slow against the wind")
