@@ -25,6 +25,7 @@ from bridge.firmware.reflash import (
     settings_in,
     start_boot_loader,
 )
+from bridge.model.vehicle import STALE_S
 from payloads.mission_data import Json
 from protocols.firmware_image import FLASH_SIZE, PROGRAM_END, ImageError, check_backup, check_patched
 from protocols.plain_text import file_text
@@ -104,7 +105,7 @@ class FirmwareApi:
         """True if a disarmed Harakiri answers, False if nothing does. ControlError if the board must not be touched."""
         daemon, report = self._daemon, self._daemon.report()
         link, why = report.link, ""
-        voltage = report.battery.voltage_v
+        voltage, age_s = report.battery.voltage_v, report.battery.age_s
         if report.status.armed:
             why = "the craft is armed"
         elif daemon.bridge.fc_trouble:
@@ -115,6 +116,8 @@ class FirmwareApi:
             why = f"this flight controller is not a Harakiri ({link.flight_controller})"
         elif link.state != "MSP" or report.status.armed is None:
             why = "it is not known whether the craft is disarmed: wait until its status is shown, and try again"
+        elif voltage is None and (age_s is None or age_s > STALE_S) and not with_battery:
+            why = "it is not known whether a battery is connected: wait until its voltage is shown, and try again"
         elif voltage is not None and voltage > _USB_V and not with_battery:
             why = f"a battery is connected ({voltage:.1f} V): unplug it, or use --battery with the propellers off"
         if why:

@@ -6,7 +6,7 @@ import { MapView } from "./map_view.js";
 import { listTable, markFlown } from "./mission_tables.js";
 import { showProfile } from "./profile.js";
 
-const STEP_DEG = 1e-5, MOST_PLACES = 2000; // about 1 m
+const STEP_DEG = 1e-5; // about 1 m
 
 export class HeldMission {
   #map = new MapView(byId("map"));
@@ -57,6 +57,5 @@ export class HeldMission {
     const last = this.#trail[this.#trail.length - 1];
     if (!armed || lat === null || (last && Math.hypot(lat - last.lat, lon - last.lon) < STEP_DEG)) return;
     this.#trail.push({ lat, lon });
-    if (this.#trail.length > MOST_PLACES) this.#trail = this.#trail.filter((_, index) => index % 2 === 0);
   }
 }

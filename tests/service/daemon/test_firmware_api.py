@@ -2,11 +2,16 @@
 """The requests for new firmware, as far as they are refused; tests/e2e/test_firmware.py carries them out."""
 
 import base64
+from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 
+from bridge.controllers.harakiri.profile import PATCHED as HARAKIRI
 from protocols.firmware_image import FLASH_SIZE, PROGRAM_END
+from reports.vehicle_groups import Battery
 from service.daemon.client import ControlError, ask_daemon
+from service.daemon.firmware_api import FirmwareApi
 from simulator.naze.whole_flash import stand_in
 from tests.support.programs import Daemon
 
@@ -34,6 +39,16 @@ def test_a_board_on_no_serial_port_is_refused(daemon: Daemon) -> None:
     request = {"do": "flash-firmware", "image": base64.b64encode(PATCHED).decode(), "battery": True}
     with pytest.raises(ControlError, match="Nothing was changed: sim: is not a serial port"):
         ask_daemon(daemon.state_dir, request)
+
+
+@pytest.mark.parametrize("age_s", [None, 2.0])
+async def test_a_battery_that_is_not_known_is_refused(age_s: float | None) -> None:
+    link, status = SimpleNamespace(flight_controller=HARAKIRI.name, state="MSP"), SimpleNamespace(armed=False)
+    report = SimpleNamespace(link=link, status=status, battery=Battery(age_s=age_s))
+    bridge, fc = SimpleNamespace(fc_trouble=""), SimpleNamespace(is_lent=False)
+    api = FirmwareApi(Mock(bridge=bridge, fc=fc, report=lambda: report), Mock(), None)
+    with pytest.raises(ControlError, match="not known whether a battery is connected"):
+        await api.flash(PATCHED, lambda _: None)
 
 
 def test_what_is_no_base64_is_not_understood(daemon: Daemon) -> None:
