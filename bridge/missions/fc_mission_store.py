@@ -13,6 +13,7 @@ from typing import Any, Generic
 
 from bridge.line.conversation import Conversation
 from bridge.missions.list_check import MissionRules
+from bridge.model.ground_track import Place
 from bridge.model.missions import Refusal
 from bridge.voice import sentences
 from protocols.mission_item import ListIdentity, MissionItem
@@ -132,6 +133,10 @@ class FcMissionStore(ABC, Generic[RecordT]):
         """True if it still holds the list that was last read or written, or does not answer."""
         yield from ()
         return True
+
+    def why_stopped(self, place: Place) -> str:
+        """What may have stopped a mission at this place; empty: nothing that the bridge knows."""
+        return ""
 
     def settings_changed(self) -> None:
         """The board's own settings may have changed: its rules may depend on them."""

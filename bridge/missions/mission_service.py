@@ -35,11 +35,12 @@ from bridge.missions.fc_mission_store import (
 )
 from bridge.missions.list_check import check_list
 from bridge.model.missions import ARMED, ArrivedMission, Outcome, PendingMission, RecalledMission, Refusal
-from bridge.model.vehicle import Vehicle
+from bridge.model.vehicle import GlobalPosition, Vehicle
 from bridge.voice import sentences
 from bridge.voice.happening import Happening
 from bridge.voice.mission_report import has_losses, summary, with_meant_home
 from protocols.mission_item import ListIdentity, MissionItem, MissionResult, identify
+from protocols.msp.nav import FINISHED, NavAction, NavMode, NavStatus
 from reports.verdict import Result, SentSeqs, Verdict, is_renumbered
 
 T = TypeVar("T")
@@ -135,6 +136,8 @@ class MissionService:
         #: Called when a transfer has ended, and another may begin.
         self.on_released: Callable[[], None] = lambda: None
         self._closed = False
+        #: By the last report, a mission is being flown.
+        self._is_flown = False
         #: False until the current flight controller's list was read, and after an interrupted push.
         self.is_settled = False
         #: The saved mission's loading since MissionWatch last reported it.
@@ -212,6 +215,16 @@ class MissionService:
         if isinstance(self.fc_store, Refusal) or (known := self.on_board) is None:
             return 0
         return self.fc_store.seq_of(known.records, number)
+
+    def stopped(self, report: NavStatus) -> str:
+        """Why the craft has just left its mission, in one sentence; empty if it has not, or for no known reason."""
+        was_flown, self._is_flown = self._is_flown, report.mode == NavMode.MISSION and report.error != FINISHED
+        place, is_return = self.vehicle.last(GlobalPosition), report.mode == NavMode.RTH
+        has_left = was_flown and (is_return or report.mode == NavMode.HOLD) and report.action != NavAction.RTH
+        if not has_left or place is None or isinstance(self.fc_store, Refusal):
+            return ""
+        why = self.fc_store.why_stopped(place)
+        return why and f"{'Returns' if is_return else 'Holds'}: {why}"
 
     def occupied(self) -> Refusal | None:
         """The reason that no list can be written now, if there is one."""

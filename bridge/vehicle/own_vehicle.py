@@ -348,6 +348,8 @@ class OwnVehicle:
                 self._ground.say(self._said_why)
         if isinstance(leg.report, NavStatus):
             self._say_nav_words(leg.report, now)
+            if why := self._missions.stopped(leg.report):
+                self._ground.say(Severity.WARNING, why)
         if self._missions.on_board is None:
             # Until the list is read, no record has an item.
             return

@@ -99,6 +99,7 @@ class NavInfo:
 class NavMode(IntEnum):
     """The modes in MSP_NAV_STATUS while a mission is flown."""
 
+    HOLD = 1
     RTH = 2
     MISSION = 3
 

@@ -112,7 +112,9 @@ class InavFirmware(MspFirmware):
         settings, places = boot.eeprom[EEPROM_SIZE:-PLACES_SIZE], boot.eeprom[-PLACES_SIZE:]
         self._settings = InavSettings(settings, self._version)
         self._places = InavPlaces(places, self._version)
-        self._navigation = InavNavigation(self._mission, self._craft, self._settings)
+        self._navigation = InavNavigation(
+            self._mission, self._craft, self._settings, self._places, boot.options.platform
+        )
         self._booted_at = boot.now
         self._received = bytearray(self.habits.buffer_size)
         self._stick_loads = boot.faults.stick_loads
@@ -167,7 +169,7 @@ class InavFirmware(MspFirmware):
     def _fly(self, seconds: float) -> None:
         if not self._navigation.is_in_mission:
             self._mission.follow_selection()
-        self._navigation.step(seconds, self._is_on(NAV_WP))
+        self._navigation.step(seconds, self._is_on(NAV_WP), self._is_on(ANGLE))
 
     def _is_on(self, box: int) -> bool:
         return bool(self._faults.boxes >> self._boxes.index(box) & 1)

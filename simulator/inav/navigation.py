@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""INAV's waypoint mode of a copter: the navigation states of a mission.
+"""INAV's waypoint mode: the navigation states of a mission.
 
-After navOnEnteringState_NAV_STATE_WAYPOINT_... of INAV 9.1.0 (src/main/navigation/navigation.c). Not simulated: the
-pilot's sticks, safe distances, and the climb before a return home.
+After navOnEnteringState_NAV_STATE_WAYPOINT_..., getActiveSpeed and performeFenceAction of INAV 9.1.0
+(src/main/navigation). Not simulated: the pilot's sticks, safe distances, the climb before a return home, and its way
+around geozones.
 """
 
-from enum import Enum
+from enum import Enum, IntEnum
 
+from protocols.msp.inav_places import FenceAction
 from protocols.msp.nav import NavAction
 from simulator.board.flight import FIELD_ALTITUDE_M
 from simulator.board.msp_firmware import CrashError
@@ -14,13 +16,25 @@ from simulator.board.nav_status import Error, Mode, NavStatus, State
 from simulator.board.nav_waypoint import FLAG_HOME, FLAG_LAST
 from simulator.board.waypoint_craft import WaypointCraft
 from simulator.inav.mission import CAPACITY, InavMission
+from simulator.inav.places import InavPlaces
 from simulator.inav.settings import InavSettings
 
 _CRUISE_MS = 3.0
-_MAX_MS = 10.0
 _MIN_MISSION_CMS = 50
 _HOVER_HEIGHT_M = 10.0
 _MEAN_SEA_LEVEL = 1
+
+
+class Platform(IntEnum):
+    """INAV's platform types whose missions differ."""
+
+    MULTIROTOR = 0
+    AEROPLANE = 1
+    ROVER = 4
+    BOAT = 5
+
+
+_ON_THE_GROUND = (Platform.ROVER, Platform.BOAT)
 
 
 class Phase(Enum):
@@ -32,6 +46,7 @@ class Phase(Enum):
     HOLD = (Mode.NAV, State.HOLD_TIMED, Error.NONE)
     LANDING = (Mode.NAV, State.LAND_IN_PROGRESS, Error.LANDING)
     FINISHED = (Mode.NAV, State.WP_ENROUTE, Error.FINISH)
+    ZONE_HOLD = (Mode.HOLD, State.HOLD_INFINIT, Error.NONE)
     RTH_ENROUTE = (Mode.RTH, State.RTH_ENROUTE, Error.NONE)
     RTH_HOVER = (Mode.RTH, State.HOVER_ABOVE_HOME, Error.NONE)
     RTH_LANDING = (Mode.RTH, State.LAND_IN_PROGRESS, Error.LANDING)
@@ -44,9 +59,14 @@ _RETURNING = frozenset((Phase.RTH_ENROUTE, Phase.RTH_HOVER, Phase.RTH_LANDING, P
 class InavNavigation:
     """Flies `craft`. An index is a waypoint's number less 1."""
 
-    def __init__(self, mission: InavMission, craft: WaypointCraft, settings: InavSettings) -> None:
+    def __init__(
+        self, mission: InavMission, craft: WaypointCraft, settings: InavSettings, places: InavPlaces, platform: int
+    ) -> None:
         self._mission = mission
         self._settings = settings
+        self._places = places
+        self._platform = platform
+        self._has_zone_return = False
         self._craft = craft
         self._home = craft.position
         self._restarts = True
@@ -57,7 +77,7 @@ class InavNavigation:
     @property
     def is_in_mission(self) -> bool:
         """True if the flight mode is NAV WP; during a mission's RTH it is NAV RTH."""
-        return self.phase is not Phase.IDLE and not self.is_returning
+        return self.phase not in (Phase.IDLE, Phase.ZONE_HOLD) and not self.is_returning
 
     @property
     def is_returning(self) -> bool:
@@ -91,10 +111,12 @@ class InavNavigation:
             self._pre_action()
         return True
 
-    def step(self, seconds: float, is_requested: bool) -> None:
-        """Advance the flight; `is_requested`: the pilot's switch NAV WP is on. CrashError."""
+    def step(self, seconds: float, is_requested: bool, is_fenced: bool = False) -> None:
+        """Advance the flight. CrashError. is_requested: the pilot's switch NAV WP is on. is_fenced: that of ANGLE."""
         if not is_requested:
             self.phase = Phase.IDLE
+        elif not is_fenced and (self.phase is Phase.ZONE_HOLD or self._has_zone_return):
+            self._pre_action()
         elif self.phase is Phase.IDLE and self._mission.is_valid and self._mission.count:
             self._begin()
         match self.phase:
@@ -103,16 +125,17 @@ class InavNavigation:
             case Phase.PRE_ACTION:
                 self.phase = Phase.ENROUTE
             case Phase.ENROUTE:
-                self._fly_leg(seconds)
+                self._fly_leg(seconds, is_fenced)
             case Phase.HOLD:
                 self._hold(seconds)
             case Phase.LANDING | Phase.RTH_LANDING:
                 self._land(seconds)
-            case Phase.FINISHED | Phase.RTH_HOVER:
+            case Phase.FINISHED | Phase.RTH_HOVER | Phase.ZONE_HOLD:
                 self._craft.hover(self._craft.height_m, seconds)
             case Phase.RTH_ENROUTE:
                 if self._craft.fly_to(self._home, self._rth_height_m, _CRUISE_MS, seconds):
-                    self.phase = Phase.RTH_LANDING if self._mission.lands_after_rth else Phase.RTH_HOVER
+                    lands = self._has_zone_return or self._mission.lands_after_rth
+                    self.phase = Phase.RTH_LANDING if lands else Phase.RTH_HOVER
 
     def _begin(self) -> None:
         if self._restarts or self.index == 0:
@@ -123,6 +146,7 @@ class InavNavigation:
 
     def _pre_action(self) -> None:
         """Execute waypoints without a place up to the next leg, which takes INAV 10 ms each. CrashError."""
+        self._has_zone_return = False
         for _ in range(CAPACITY):
             waypoint = self._mission[self.index]
             match waypoint.action:
@@ -155,7 +179,7 @@ class InavNavigation:
             int(self._settings["nav_rth_alt_mode"])
         ]
 
-    def _fly_leg(self, seconds: float) -> None:
+    def _fly_leg(self, seconds: float, is_fenced: bool) -> None:
         waypoint = self._mission[self.index]
         height = waypoint.alt_cm / 100
         if waypoint.p3 & _MEAN_SEA_LEVEL:
@@ -163,10 +187,18 @@ class InavNavigation:
         highest_cm = int(self._settings["nav_max_altitude"])
         if highest_cm and not self._settings["nav_wp_enforce_altitude"]:
             height = min(height, highest_cm / 100)
+        if self._platform in _ON_THE_GROUND:
+            height = 0.0
         flies_home = waypoint.flag == FLAG_HOME or not (waypoint.lat_e7 or waypoint.lon_e7)
         target = self._home if flies_home else (waypoint.lat_e7, waypoint.lon_e7)
         wanted = waypoint.p2 if waypoint.action == NavAction.POSHOLD_TIME else waypoint.p1
-        speed = min(wanted / 100, _MAX_MS) if wanted >= _MIN_MISSION_CMS else _CRUISE_MS
+        has_speed = wanted >= _MIN_MISSION_CMS and self._platform == Platform.MULTIROTOR
+        speed = min(wanted, int(self._settings["nav_max_auto_speed"])) / 100 if has_speed else _CRUISE_MS
+        if is_fenced and (action := self._places.action_ahead(self._craft.position, target)):
+            self._has_zone_return = action == FenceAction.RTH
+            self._rth_height_m = self._height_home_m()
+            self.phase = Phase.RTH_ENROUTE if self._has_zone_return else Phase.ZONE_HOLD
+            return
         if not self._craft.fly_to(target, height, speed, seconds):
             return
         match waypoint.action:

@@ -35,6 +35,8 @@ _NO_VERTICES = _FREE * _VERTICES
 _EXCLUSIVE, _CIRCLE = 0, 0
 #: Inclusive zones whose corners are further away are off.
 _IGNORED_M = 2000
+#: The distance at which it notices a border, and the steps in which the way is looked at here.
+_DETECTED_M, _SAMPLED_M = 150, 5
 PLACES_SIZE = (
     1 + 4 + _SAFEHOMES * _SAFEHOME_SIZE + _APPROACHES * _APPROACH_SIZE + _ZONES * _ZONE.size + _VERTICES * _VERTEX.size
 )
@@ -160,6 +162,21 @@ class InavPlaces:
             return True
         inclusive = [number for number, zone in active if zone[0] != _EXCLUSIVE]
         return not inside and any(self._distance_m(number, position) <= _IGNORED_M for number in inclusive)
+
+    def action_ahead(self, here: tuple[int, int], target: tuple[int, int]) -> int:
+        """The action of the first zone whose border is within 150 m on the way to a place; 0: none is."""
+        active = [(number, _ZONE.unpack(zone)) for number, zone in enumerate(self._zones_in_force)]
+        active = [(number, zone) for number, zone in active if zone[6] and zone[5]]
+        metres = _metres(here, target)
+        for step in range(1, round(min(metres, _DETECTED_M) / _SAMPLED_M) + 1):
+            share = step * _SAMPLED_M / metres
+            place = tuple(round(start + share * (end - start)) for start, end in zip(here, target, strict=True))
+            for number, zone in active:
+                was_inside = self._is_inside(number, zone[1], here)
+                enters = zone[0] == _EXCLUSIVE
+                if was_inside != enters and self._is_inside(number, zone[1], (place[0], place[1])) == enters:
+                    return int(zone[5])
+        return 0
 
     def _corners(self, zone: int) -> list[tuple[float, float]]:
         corners = sorted(vertex for vertex in self._vertices_in_force if vertex[0] == zone)

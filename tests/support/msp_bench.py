@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A test bench: a simulated board other than a Naze, a client on its port, and a clock moved only by the test."""
 
+import struct
 from dataclasses import replace
 from functools import reduce
 from operator import xor
 from typing import NamedTuple
 
 from protocols.msp.frame import Direction, MspParser, request
+from protocols.msp.inav_places import GEOZONE_FEATURE, SET_GEOZONE, SET_GEOZONE_VERTEX, Geozone
 from protocols.msp.inav_settings import COMMON_SET_SETTING
 from protocols.msp.nav import NavAction
+from simulator.board.msp_board import MspBoard
 from simulator.board.msp_options import MspOptions
 from simulator.board.nav_waypoint import FLAG_LAST, NavWaypoint, unpack_waypoint
 from simulator.board.options import Faults
@@ -128,3 +131,12 @@ def waypoint(index: int = 0, action: int = NavAction.WAYPOINT, **fields: int) ->
     """A waypoint near the field, different for each index."""
     usual = {"lat_e7": 453838000 + 900 * index, "lon_e7": 84733000 + 700 * (index % 7), "alt_cm": 2000, "flag": 0}
     return NavWaypoint(action, **usual | fields)
+
+
+def set_zone(board: MspBoard, zone: Geozone) -> None:
+    """A geozone of one place, in force since the boot."""
+    places = board._firmware._places  # type: ignore[union-attr]
+    places._features |= GEOZONE_FEATURE
+    assert places.answer(SET_GEOZONE, zone.head()) == places.answer(SET_GEOZONE_VERTEX, zone.vertex(0)) == b""
+    places._zones_in_force = [*places._zones]
+    places._vertices_in_force = [struct.unpack("<bBii", vertex) for vertex in places._vertices if vertex[0] != 0xFF]

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 
+from bridge.controllers.inav.platforms import PLATFORMS, MissionPart, Platform, PlatformEffect
 from bridge.controllers.multiwii import multiwii_profile
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile
@@ -137,7 +138,22 @@ def table() -> str:
     lines = ["| sent | records and messages | flown |", "|---|---|---|"]
     for cells, rows in groupby(ROWS, _cells):
         lines.append(f"| {' | '.join((', '.join(row.name for row in rows), *cells))} |")
+    return "\n".join(lines) + "\n\n" + platform_table()
+
+
+def platform_table() -> str:
+    """How each platform of INAV flies the parts of a mission, and where that is known from."""
+    assert PLATFORMS[Platform.ROVER] is PLATFORMS[Platform.BOAT]
+    lines = ["| on INAV | multirotor | aeroplane | rover, boat |", "|---|---|---|---|"]
+    for part in MissionPart:
+        columns = Platform.MULTIROTOR, Platform.AEROPLANE, Platform.ROVER
+        cells = [_effect(PLATFORMS[platform][part], platform) for platform in columns]
+        lines.append(f"| {part.value[0]} | {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
+
+
+def _effect(effect: PlatformEffect, platform: Platform) -> str:
+    return f"{effect.why.format(platform.value) or 'as sent'} ({effect.source})"
 
 
 def _cells(row: Row) -> tuple[str, str]:

@@ -11,12 +11,13 @@ from enum import IntEnum
 from typing import Any
 
 from bridge.controllers.inav.approaches import approach_text
+from bridge.controllers.inav.platforms import Platform, flown_otherwise
 from bridge.controllers.inav.zone_check import judge_zones
 from bridge.controllers.nav.flown_path import above_home_cm
 from bridge.missions.flown_legs import Departure, FlownPath, Judgement, beyond_plain_limits, first_of, in_metres
 from bridge.model.ground_track import Place, distance_m
 from protocols.msp.inav_places import FwApproach, Geozone, Safehome
-from protocols.msp.nav import FLY_HOME, LEGS, TURNS, NavAction, NavRecord
+from protocols.msp.nav import FLY_HOME, LEGS, NavAction, NavRecord
 from protocols.msp.nav_items import leg_speed
 from protocols.settings_file import SavedSettings
 from reports.finding import News
@@ -62,7 +63,7 @@ class InavLimits:
     safehomes: tuple[Safehome, ...] = ()
     zones: tuple[Geozone, ...] = ()
     selected: int = 1
-    is_aeroplane: bool = False
+    platform: Platform = Platform.MULTIROTOR
     approach: FwApproach | None = None
 
     def with_settings(self, values: Mapping[str, float | str]) -> "InavLimits":
@@ -90,7 +91,7 @@ class InavLimits:
         for leg in path.legs:
             if leg.is_return:
                 yield from self._return(leg.target, records[leg.target], path.highest_cm, departure)
-            if records[leg.target].action == NavAction.LAND and self.is_aeroplane:
+            if records[leg.target].action == NavAction.LAND and self.platform is Platform.AEROPLANE:
                 name = f"FW approach {self.approach.number} has no heading" if self.approach else _NO_APPROACHES
                 yield _landing(leg.target, self.approach, "", "here", name)
         between = [leg for leg in path.legs if not (leg.is_first or leg.is_return)]
@@ -98,7 +99,9 @@ class InavLimits:
         within = f"within nav_wp_radius ({self.nav_wp_radius / 100:g} m): it may count as reached at once"
         whys = [(leg.cause, f"{leg.length_m:.1f} m from the waypoint before, {within}") for leg in close]
         yield from first_of(whys, "lat_e7", News.NOTICE)
-        yield from self._ignored(records)
+        yield from flown_otherwise(records, self.platform)
+        if self.platform is Platform.MULTIROTOR:
+            yield from self._speeds(records)
         yield from judge_zones(self.zones, path, departure)
         yield from beyond_plain_limits(path, departure, height=not self.nav_max_altitude)
         if self.selected > 1:
@@ -134,16 +137,8 @@ class InavLimits:
                 yield Judgement(place, "alt_m", why, None)
         yield from first_of(unknown, "alt_m")
 
-    def _ignored(self, records: Sequence[NavRecord]) -> Iterable[Judgement]:
-        """An aeroplane flies at its own speed, nose first (getActiveSpeed is for multirotors only)."""
+    def _speeds(self, records: Sequence[NavRecord]) -> Iterable[Judgement]:
         speeds = [(place, leg_speed(record, 0)) for place, record in enumerate(records) if record.action in LEGS]
-        if self.is_aeroplane:
-            why = "no effect on an aeroplane"
-            turns = [(place, why) for place, record in enumerate(records) if record.action in TURNS and record.p1 >= 0]
-            slowed = [(place, f"its speed: {why}") for place, speed in speeds if speed]
-            yield from first_of(slowed, "command", News.WARNING)
-            yield from first_of(turns, "command", News.WARNING)
-            return
         limit = self.nav_max_auto_speed
         fast = [(place, speed) for place, speed in speeds if speed > limit]
         whys = [(place, f"{speed / 100:g} m/s, nav_max_auto_speed is {limit / 100:g} m/s") for place, speed in fast]
@@ -161,7 +156,7 @@ class InavLimits:
                 metres = distance_m(start, near)
                 why = f"returns to safehome {near.number}, {metres:.0f} m from home ({limit})"
                 yield Judgement(place, "p1", why, News.WARNING)
-            if rth.p1 and self.is_aeroplane:
+            if rth.p1 and self.platform is Platform.AEROPLANE:
                 yield self._landing_after_return(place, near, returns_there=returns_there)
 
     def _near_safehome(self, start: Place) -> Safehome | None:
@@ -194,7 +189,7 @@ _CHOICES: Mapping[str, type[IntEnum]] = {
     "nav_rth_alt_mode": RthAltMode,
     "safehome_usage_mode": SafehomeUsageMode,
 }
-_OTHER_FIELDS = ("safehomes", "zones", "selected", "is_aeroplane", "approach")
+_OTHER_FIELDS = ("safehomes", "zones", "selected", "platform", "approach")
 #: Those that decide if a list is flown, and how high and fast.
 DECISIVE_NAMES = (
     *("nav_wp_max_safe_distance", "nav_max_altitude", "nav_wp_enforce_altitude"),

@@ -14,8 +14,10 @@ from bridge.controllers.inav.approaches import read_approaches, write_approaches
 from bridge.controllers.inav.fly_to import FLOWN_TO, fly_to
 from bridge.controllers.inav.geozones import has_zones, read_zones_in_force
 from bridge.controllers.inav.limits import DECISIVE_NAMES, SETTING_NAMES, InavLimits
+from bridge.controllers.inav.platforms import Platform, platform_of
 from bridge.controllers.inav.safehomes import read_safehomes, with_approaches
 from bridge.controllers.inav.settings import read_values
+from bridge.controllers.inav.zone_check import zone_ahead
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.mission_store import NOTHING, NavMissions
 from bridge.controllers.nav.rules import Mission, NavProfile
@@ -30,7 +32,7 @@ from bridge.missions.fc_mission_store import (
     PushResult,
     StoreReport,
 )
-from bridge.model.craft import Airframe
+from bridge.model.ground_track import Place
 from bridge.model.missions import Refusal
 from bridge.model.vehicle import Vehicle
 from protocols.msp.frame import Direction, request
@@ -79,7 +81,7 @@ class InavMissions(NavMissions, FliesToItems):
     def __init__(self, profile: NavProfile, controller: FlightController, vehicle: Vehicle) -> None:
         super().__init__(profile, controller, vehicle)
         self._has_zones = has_zones(controller)
-        self._is_aeroplane = controller.airframe is Airframe.FIXED_WING
+        self._platform = platform_of(controller.airframe)
         self._board = controller
 
     def report(self) -> Conversation[StoreReport | None]:
@@ -137,6 +139,9 @@ class InavMissions(NavMissions, FliesToItems):
             self._seen = None
             return True
         return (yield from self._is_unchanged(seen))
+
+    def why_stopped(self, place: Place) -> str:
+        return zone_ahead(() if self._limits is None else self._limits.zones, place)
 
     def leg_of(self, records: Sequence[NavRecord], seq: int) -> int:
         numbers = (number for number, shown in enumerate(item_seqs(records), 1) if shown == seq)
@@ -198,7 +203,7 @@ class InavMissions(NavMissions, FliesToItems):
         if values is None or safehomes is None or zones is None:
             self._are_limits_doubtful = self._are_limits_silent = True
         elif values:
-            limits = InavLimits(safehomes=safehomes, zones=zones, is_aeroplane=self._is_aeroplane)
+            limits = InavLimits(safehomes=safehomes, zones=zones, platform=self._platform)
             self._limits = limits.with_settings(values)
 
     def _read_decisive_limits(self) -> Conversation[None]:
@@ -244,7 +249,7 @@ class InavMissions(NavMissions, FliesToItems):
 
         An aeroplane would land without its approach: only a loaded mission has a number (loadedMultiMissionIndex).
         """
-        if self.others or self._is_aeroplane:
+        if self.others or self._platform is Platform.AEROPLANE:
             reply = yield from ask(LOAD_REQUEST, Nav.LOAD, 0)
             if reply is None or reply.direction is Direction.ERROR or (yield from self._info()) != saved:
                 raise PushFailed(PushFailure.UNCERTAIN)
@@ -252,7 +257,7 @@ class InavMissions(NavMissions, FliesToItems):
 
     def _confirm(self, before: Mission | None) -> Conversation[Mission | None]:
         known = self._approaches
-        if known is None or self._is_aeroplane or not all(each.is_empty for each in known):
+        if known is None or self._platform is Platform.AEROPLANE or not all(each.is_empty for each in known):
             # Another client may have set one since.
             self._approaches = yield from read_approaches(range(APPROACHES))
             if self._approaches is None:

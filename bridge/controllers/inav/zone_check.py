@@ -1,22 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mission's way and INAV's geozones.
+"""A mission's way and INAV's geozones (navigation_geozone.c of 9.1.0; flown by tests/real_inav/test_sitl.py).
 
-In its waypoint mode INAV acts at a border only if the switch of ANGLE (HORIZON, COURSE HOLD, CRUISE) is on as well.
+In its waypoint mode INAV acts at a border only if the zone has an action and the switch of ANGLE (HORIZON, COURSE HOLD,
+CRUISE) is on as well (performeFenceAction). A return then flies around the zones, else straight through.
 """
 
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
-from math import sqrt
+from math import inf, sqrt
 
 from bridge.missions.flown_legs import Departure, FlownPath, Judgement, Leg, first_of
-from bridge.model.ground_track import Place, distance_m, north_east_m
-from protocols.msp.inav_places import Corner, Geozone
+from bridge.model.ground_track import Place, distance_m, north_east_m, passing_distance_m
+from protocols.msp.inav_places import Corner, FenceAction, Geozone
 from reports.finding import News
 
 #: Inclusive zones whose corners are further away are off (GEOZONE_INCLUSE_IGNORE_DISTANCE).
 _IGNORED_M = 2000
-#: docs/inav.md describes both cases.
-_BOTH = "flown, or a stop if ANGLE is on"
+#: A stop begins 150 m before a border, by default.
+_AHEAD_M = 200
 
 
 def judge_zones(zones: Sequence[Geozone], path: FlownPath, departure: Departure) -> Iterable[Judgement]:
@@ -26,11 +27,35 @@ def judge_zones(zones: Sequence[Geozone], path: FlownPath, departure: Departure)
     for zone in zones:
         if not zone.is_inclusive:
             through = [leg for leg in path.legs if _shares_height(zone, leg) and any(_insides([zone], leg))]
-            yield from first_of([(leg.cause, f"geozone {zone.number}: {_BOTH}") for leg in through], "lat_e7")
+            yield from _met(through, f"geozone {zone.number}", zone.action)
     inclusive = [zone for zone in zones if zone.is_inclusive]
     if departure.place is not None and any(_is_inside(zone, departure.place) for zone in inclusive):
         leaving = [leg for leg in path.legs if not all(_insides(inclusive, leg))]
-        yield from first_of([(leg.cause, f"leaves zones: {_BOTH}") for leg in leaving], "lat_e7")
+        yield from _met(leaving, "leaves zones", max(zone.action for zone in inclusive))
+
+
+def _met(legs: Sequence[Leg], what: str, action: int) -> Iterable[Judgement]:
+    if not action:
+        yield from first_of([(leg.cause, f"{what}: flown, no action is set") for leg in legs], "lat_e7", News.NOTICE)
+        return
+    stop = "a return" if action == FenceAction.RTH else "a stop"
+    cases = [(leg.cause, f"{what}: flown, or {'around' if leg.is_return else stop} if ANGLE is on") for leg in legs]
+    yield from first_of(cases, "lat_e7")
+
+
+def zone_ahead(zones: Sequence[Geozone], place: Place) -> str:
+    """The nearest border at which INAV may have stopped here; empty if there is none."""
+    near = [(_border_m(zone, place), zone) for zone in zones if zone.action]
+    metres, zone = min(near, key=lambda each: each[0], default=(inf, None))
+    if zone is None or metres > _AHEAD_M:
+        return ""
+    return f"{metres:.0f} m from the border of geozone {zone.number}"
+
+
+def _border_m(zone: Geozone, place: Place) -> float:
+    if zone.is_circle:
+        return abs(distance_m(zone.corners[0], place) - zone.radius_cm / 100)
+    return min(passing_distance_m(*side, place) for side in pairwise((*zone.corners, zone.corners[0])))
 
 
 def _weight(blocked: Sequence[str]) -> News | None:

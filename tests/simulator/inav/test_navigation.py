@@ -9,21 +9,22 @@ from math import hypot
 import pytest
 
 from protocols.msp.frame import Direction, MspParser, request
+from protocols.msp.inav_places import Corner, FenceAction, Geozone
 from protocols.msp.nav import SET_WP_INDEX, NavAction
 from simulator.board.msp_options import MspOptions
 from simulator.board.nav_waypoint import FLAG_HOME, FLAG_LAST, NavWaypoint
 from simulator.board.options import Faults
-from tests.support.msp_bench import MspBench, waypoint
+from tests.support.msp_bench import MspBench, set_zone, waypoint
 
 NAV_WP = 1 << 13
-NAV, RTH, NONE = 3, 2, 0
+NAV, RTH, HOLD, NONE = 3, 2, 1, 0
 
 
 class Flight:
     """A mission in flight; `seen` has (mode, state, action, number, error) four times a second."""
 
-    def __init__(self, *waypoints: NavWaypoint, version: str = "9.1.0") -> None:
-        self.bench = MspBench("inav", MspOptions(version=version), faults=Faults(boxes=0))
+    def __init__(self, *waypoints: NavWaypoint, version: str = "9.1.0", platform: int = 0) -> None:
+        self.bench = MspBench("inav", MspOptions(version=version, platform=platform), faults=Faults(boxes=0))
         self.bench.set("nav_wp_max_safe_distance", 0)
         self.bench.upload(list(waypoints))
         self.bench.faults.armed = True
@@ -81,7 +82,7 @@ def test_a_craft_stays_at_the_end_of_a_circuit() -> None:
 
 
 @pytest.mark.parametrize(("speed", "seconds"), [(0, 33), (500, 20), (20, 33), (2000, 10)])
-def test_a_leg_is_flown_at_its_own_speed(speed: int, seconds: int) -> None:
+def test_a_leg_is_flown_at_its_own_speed_up_to_nav_max_auto_speed(speed: int, seconds: int) -> None:
     flight = Flight(waypoint(100, lat_e7=453838000 + 8983, lon_e7=84733000, p1=speed))  # 100 m to the north
     flight.until(is_finished)
     assert flight.bench.now == pytest.approx(seconds, abs=1.5)
@@ -250,3 +251,56 @@ def test_older_versions_do_not_know_the_request() -> None:
     flight.until(lambda status: status[:2] == (NAV, 5))
     assert not sets_index(flight.bench, 1)
     assert flight.status()[3] == 1
+
+
+ANGLE = 1 << 3
+NORTH = 8983
+
+
+def fenced(action: FenceAction, boxes: int, *, is_inclusive: bool = False) -> Flight:
+    """Legs to the north, 100 m and 500 m; an exclusive zone 300 m away, or an inclusive one of 300 m."""
+    hundreds, radius_cm = (0, 30000) if is_inclusive else (3, 3000)
+    zone = Geozone(0, is_inclusive, (Corner(453838000 + hundreds * NORTH, 84733000),), radius_cm, action=action)
+    flight = Flight(*(waypoint(20, lat_e7=453838000 + at * NORTH, lon_e7=84733000, p1=1000) for at in (1, 5)))
+    bench = flight.bench
+    set_zone(bench.board, zone)
+    bench.faults.boxes = boxes
+    bench.run(100)
+    flight.seen.append(flight.status())
+    return flight
+
+
+@pytest.mark.parametrize(
+    ("action", "boxes", "is_inclusive", "mode"),
+    [
+        (FenceAction.POS_HOLD, NAV_WP | ANGLE, False, HOLD),
+        (FenceAction.AVOID, NAV_WP | ANGLE, False, HOLD),
+        (FenceAction.POS_HOLD, NAV_WP, False, NAV),
+        (FenceAction.NONE, NAV_WP | ANGLE, False, NAV),
+        (FenceAction.RTH, NAV_WP | ANGLE, False, RTH),
+        (FenceAction.POS_HOLD, NAV_WP | ANGLE, True, HOLD),
+        (FenceAction.POS_HOLD, NAV_WP, True, NAV),
+    ],
+)
+def test_a_zone_stops_a_mission_as_on_inavs_own_sitl(
+    action: FenceAction, boxes: int, is_inclusive: bool, mode: int
+) -> None:
+    """tests/real_inav/test_sitl.py flies the same."""
+    flight = fenced(action, boxes, is_inclusive=is_inclusive)
+    assert flight.seen[-1][0] == mode
+    if mode == HOLD:
+        before = 150 if is_inclusive else 270 - 150
+        assert flight.away_from(waypoint(0, lat_e7=453838000 + NORTH * before // 100, lon_e7=84733000)) < 20
+        flight.bench.faults.boxes = NAV_WP
+        flight.until(is_finished)
+
+
+@pytest.mark.parametrize(("platform", "seconds", "height_m"), [(0, 20, 20), (1, 33, 20), (4, 33, 0), (5, 33, 0)])
+def test_platforms_differ_in_speed_and_height(platform: int, seconds: int, height_m: int) -> None:
+    flight = Flight(waypoint(20, lat_e7=453838000 + NORTH, lon_e7=84733000, p1=500), platform=platform)
+    flight.bench.faults.boxes = 1 << 13 if platform != 1 else 1 << 12
+    flight.until(is_finished)
+    truth = flight.bench.board.truth(flight.bench.now)
+    assert truth is not None
+    assert flight.bench.now == pytest.approx(seconds, abs=1.5)
+    assert truth.flight.height_m == pytest.approx(height_m, abs=1)

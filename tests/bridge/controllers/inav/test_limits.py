@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from bridge.controllers.inav.limits import InavLimits, RthAltMode, SafehomeUsageMode, saved_limits
+from bridge.controllers.inav.platforms import Platform
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile
 from bridge.missions.list_check import check_list
@@ -57,9 +58,20 @@ def test_a_speed_that_a_multirotor_does_not_fly_is_named() -> None:
 
 def test_what_an_aeroplane_ignores_is_named() -> None:
     yaw = item(Command.CONDITION_YAW, at=False, p1=90.0)
-    assert texts(NEAR, speed(12), FAR, yaw, FAR, item(Command.NAV_ROI), FAR, is_aeroplane=True)[:2] == [
+    assert texts(NEAR, speed(12), FAR, yaw, FAR, item(Command.NAV_ROI), FAR, platform=Platform.AEROPLANE)[:2] == [
         "WP 3: its speed: no effect on an aeroplane (+2)",
         "WP 4: no effect on an aeroplane (+1)",
+    ]
+
+
+@pytest.mark.parametrize("platform", [Platform.ROVER, Platform.BOAT])
+def test_what_a_rover_or_boat_flies_otherwise_is_named(platform: Platform) -> None:
+    hold, land = item(Command.NAV_LOITER_TIME, p1=5.0), replace(FAR, command=Command.NAV_LAND)
+    assert sorted(texts(speed(3), NEAR, hold, land, platform=platform)) == [
+        f"WP 2: Alt: no effect on {platform.value} (+2)",
+        f"WP 2: its speed: no effect on {platform.value} (+2)",
+        f"WP 3: {platform.value} drives on while it holds",
+        f"WP 4: {platform.value} disarms there",
     ]
 
 
@@ -140,7 +152,7 @@ def test_another_selected_mission_is_named() -> None:
 )
 def test_how_an_aeroplane_lands_is_named(approach: FwApproach | None, news: str) -> None:
     there = replace(LAND, lat_e7=LAT + NORTH)
-    assert texts(WP, there, is_aeroplane=True, approach=approach) == [f"WP 2: {news}"]
+    assert texts(WP, there, platform=Platform.AEROPLANE, approach=approach) == [f"WP 2: {news}"]
     assert texts(WP, there, approach=approach) == []
 
 
@@ -197,9 +209,9 @@ def test_how_an_aeroplane_lands_after_its_return_is_named(
     safehome: Safehome | None, limits: dict[str, Any], news: list[str]
 ) -> None:
     limits = {"safehomes": (safehome,) if safehome else (), **limits}
-    assert texts(WP, RTL_LANDS, is_aeroplane=True, **limits) == [f"WP 2: {each}" for each in news]
+    assert texts(WP, RTL_LANDS, platform=Platform.AEROPLANE, **limits) == [f"WP 2: {each}" for each in news]
     assert not any("lands" in text and "FW" in text for text in texts(WP, RTL_LANDS, **limits))
-    assert not any("FW" in text for text in texts(WP, RTL, is_aeroplane=True, **limits))
+    assert not any("FW" in text for text in texts(WP, RTL, platform=Platform.AEROPLANE, **limits))
 
 
 def test_an_aeroplanes_approach_is_read_and_its_mission_loaded_because_only_then_inav_uses_it() -> None:

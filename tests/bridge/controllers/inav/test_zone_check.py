@@ -7,13 +7,19 @@ from typing import Any
 import pytest
 
 from bridge.controllers.inav.limits import InavLimits
+from bridge.controllers.inav.zone_check import zone_ahead
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile
 from bridge.missions.list_check import check_list
-from protocols.mission_item import MissionItem
-from protocols.msp.inav_places import Corner, Geozone
+from protocols.mission_item import MissionItem, MissionResult
+from protocols.msp.inav_places import Corner, FenceAction, Geozone
+from tests.bridge.controllers.inav.test_mission_store import board_with
+from tests.support.conversations import Upload
+from tests.support.msp_bench import set_zone
 from tests.support.nav_lists import HOME, LAT, LON, RTL_LANDS, WP, jump
 
+HOLDS = FenceAction.POS_HOLD
+ANGLE, NAV_WP = 1 << 3, 1 << 13
 #: 100 m to the north.
 NORTH = 8983
 EAST = 12788
@@ -32,13 +38,13 @@ def at(north: float, east: float = 0.0, **fields: Any) -> MissionItem:
 
 def circle(north: float, east: float = 0.0, radius_m: int = 50, **fields: Any) -> Geozone:
     centre = Corner(LAT + round(north * NORTH), LON + round(east * EAST))
-    return Geozone(0, fields.pop("is_inclusive", False), (centre,), radius_m * 100, **fields)
+    return Geozone(0, fields.pop("is_inclusive", False), (centre,), radius_m * 100, **{"action": HOLDS, **fields})
 
 
 def square(north: float, size: float, *, is_inclusive: bool = False) -> Geozone:
     corners = [(north - size, -size), (north - size, size), (north + size, size), (north + size, -size)]
     places = tuple(Corner(LAT + round(n * NORTH), LON + round(e * EAST)) for n, e in corners)
-    return Geozone(3, is_inclusive, places)
+    return Geozone(3, is_inclusive, places, action=HOLDS)
 
 
 LEGS = at(1), at(3)
@@ -80,10 +86,10 @@ def test_zones_are_judged_on_the_way_as_flown() -> None:
     corner = at(1), at(1, 2), at(3, 2), jump(1), at(3, 3)
     assert texts(circle(2, 1, 40), legs=corner) == ["WP 4: geozone 0: flown, or a stop if ANGLE is on"]
     back = at(1), at(1, 2), RTL_LANDS
-    assert texts(circle(0.5, 1, 30), legs=back) == ["WP 3: geozone 0: flown, or a stop if ANGLE is on"]
+    assert texts(circle(0.5, 1, 30), legs=back) == ["WP 3: geozone 0: flown, or around if ANGLE is on"]
     places = [(-1, -1), (3, -1), (3, 0), (0, 0.5), (3, 1), (3, 3), (-1, 3)]
     corners = tuple(Corner(LAT + round(n * NORTH), LON + round(e * EAST)) for n, e in places)
-    concave = Geozone(1, True, corners)
+    concave = Geozone(1, True, corners, action=HOLDS)
     assert texts(concave, legs=(at(2, -0.5), at(2, 2))) == ["WP 2: " + LEAVES]
     assert texts(concave, legs=(at(0, -0.5), at(-0.5, 2))) == []
 
@@ -103,3 +109,40 @@ def test_a_list_is_rejected_if_inav_would_not_arm_at_home() -> None:
     # The craft does not arm where it is, but at the home of the list.
     warning = "The craft is in geozone 0: it does not arm"
     assert texts(circle(-3), legs=LEGS, here=(LAT - 3 * NORTH, LON))[0] == warning
+
+
+def test_without_an_action_a_zone_stops_nothing() -> None:
+    assert texts(circle(2, action=FenceAction.NONE), legs=LEGS) == ["WP 2: geozone 0: flown, no action is set"]
+    assert texts(circle(2, action=FenceAction.RTH), legs=LEGS) == ["WP 2: geozone 0: flown, or a return if ANGLE is on"]
+
+
+def test_the_nearest_border_with_an_action_is_named_where_a_mission_stops() -> None:
+    place = Corner(LAT, LON)
+    assert zone_ahead((circle(3, radius_m=150), square(5, 1)), place) == "150 m from the border of geozone 0"
+    assert zone_ahead((square(3, 2),), place) == "100 m from the border of geozone 3"
+    assert zone_ahead((circle(3), circle(2, action=FenceAction.NONE)), place) == ""
+
+
+@pytest.mark.parametrize(
+    ("action", "said"),
+    [
+        (FenceAction.POS_HOLD, "Holds: {} m from the border of geozone 0"),
+        (FenceAction.RTH, "Returns: {} m from the border of geozone 0"),
+        (FenceAction.NONE, ""),
+    ],
+)
+def test_a_stop_at_a_zone_is_said_once(action: FenceAction, said: str) -> None:
+    """300 m to the north, with the switch of ANGLE on."""
+    board, world, station = board_with(version="9.1.0")
+    zone = circle(3, radius_m=30, action=action)
+    set_zone(board, zone)
+    world.inside.missions.settings_changed()
+    first, second = at(0.9, alt_m=20.0), at(5, alt_m=20.0)
+    assert Upload(station, [HOME, first, second]).run() is MissionResult.ACCEPTED
+    station.take()
+    board.faults.boxes = NAV_WP | ANGLE
+    board.faults.armed = True
+    world.run(150)
+    texts = [text for text in station.texts() if "geozone" in text]
+    assert len(texts) == bool(said)
+    assert all(len(text) <= 50 and text == said.format(text.split()[1]) for text in texts)
