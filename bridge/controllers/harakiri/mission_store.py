@@ -2,7 +2,7 @@
 """The companion's side of Harakiri's mission extension (docs/msp-mission.md)."""
 
 from abc import ABC
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from zlib import crc32
 
@@ -172,37 +172,24 @@ class HarakiriMissions(_HarakiriStore):
         return None if reply is None else ext.decode_info(reply.payload)
 
     def _begin(self, wanted: ListIdentity) -> Conversation[Staged]:
-        answer = yield from self._ask_until_free(
-            ext.encode_begin(wanted), MissionCommand.BEGIN, _SHORT_REPLY_SIZE, ext.decode_progress, exclusive=True
-        )
-        if answer is None:
-            raise PushFailed(PushFailure.NO_ANSWER)
-        if answer.status is ReplyStatus.BUSY:
-            info = yield from self._read_info()
-            is_spent = info is not None and InfoFlag.WRITES_SPENT in info.flags
-            raise PushFailed(PushFailure.WRITES_SPENT if is_spent else PushFailure.BUSY)
+        """Ask again for a second while it is busy writing its configuration."""
+        waited_s = 0.0
+        while True:
+            reply = yield from ask(ext.encode_begin(wanted), MissionCommand.BEGIN, _SHORT_REPLY_SIZE, exclusive=True)
+            answer = None if reply is None else ext.decode_progress(reply.payload)
+            if answer is None:
+                raise PushFailed(PushFailure.NO_ANSWER)
+            if answer.status is not ReplyStatus.BUSY:
+                break
+            if waited_s >= _BUSY_TIMEOUT_S:
+                info = yield from self._read_info()
+                is_spent = info is not None and InfoFlag.WRITES_SPENT in info.flags
+                raise PushFailed(PushFailure.WRITES_SPENT if is_spent else PushFailure.BUSY)
+            yield Pause(_BUSY_INTERVAL_S)
+            waited_s += _BUSY_INTERVAL_S
         if answer.status not in (ReplyStatus.OK, ReplyStatus.SAME):
             raise _again(answer.status)
         return answer
-
-    def _ask_until_free(
-        self,
-        frame: bytes,
-        command: MissionCommand,
-        size: int,
-        decode: Callable[[bytes], Staged | None],
-        *,
-        exclusive: bool = False,
-    ) -> Conversation[Staged | None]:
-        """Ask again for a second while it is busy writing its configuration; None if it does not answer."""
-        waited_s = 0.0
-        while True:
-            reply = yield from ask(frame, command, size, exclusive=exclusive)
-            answer = None if reply is None else decode(reply.payload)
-            if answer is None or answer.status is not ReplyStatus.BUSY or waited_s >= _BUSY_TIMEOUT_S:
-                return answer
-            yield Pause(_BUSY_INTERVAL_S)
-            waited_s += _BUSY_INTERVAL_S
 
     def _transfer(
         self, packed: bytes, wanted: ListIdentity, begun: Staged, progress: PushProgress

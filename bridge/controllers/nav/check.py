@@ -42,8 +42,6 @@ from reports.verdict import Result, Verdict
 #: The greatest height at which single precision still resolves a centimetre.
 _MAX_HEIGHT_CM = 3_276_700
 _FULL_CIRCLE = 360
-#: DO_CHANGE_SPEED's param3 without a throttle: none, no change, as set.
-_NO_THROTTLE = (0, -1, -2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,8 +217,6 @@ class NavCheck(ListCheck):
             return self._drop(item, "command", item.command, "leg speeds are not supported")
         if math.isfinite(item.p1) and item.p1 not in (0, GROUND_SPEED):
             return self._drop(item, "p1", item.p1, "speed over ground only")
-        if item.p3 not in _NO_THROTTLE:
-            self._fit(item, "p3", UNUSED)
         if self._speed.leaves_it(item):
             return self._drop(item, "p2", given(item.p2), "it changes nothing", News.NONE)
         self._speed.change(item, self._note)

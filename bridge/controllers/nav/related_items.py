@@ -5,11 +5,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from bridge.missions.list_check import given, missing_coordinate
+from bridge.missions.list_check import missing_coordinate
 from protocols.float32 import is_single
 from protocols.mission_item import Frame, MissionItem, MissionResult
 from protocols.msp.nav import LEAST_SPEED_CMS, LEGS, NavRecord
-from protocols.msp.nav_items import AS_SET, GROUND_SPEED
+from protocols.msp.nav_items import AS_SET
 from reports.finding import Note, RejectingFinding, reject
 
 #: INAV does not arm with a JUMP to a closer record (navigation.c, navigationIsBlockingArming).
@@ -100,8 +100,6 @@ class LegSpeed:
     def change(self, item: MissionItem, note: Note) -> None:
         self.waiting = item
         self.changed_at.append(item.seq)
-        if item.p1 != GROUND_SPEED:
-            note(item, "p1", given(item.p1), GROUND_SPEED, "speed over ground")
         if item.p2 == AS_SET:
             self.cms = 0
             return
