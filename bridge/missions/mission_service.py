@@ -136,8 +136,7 @@ class MissionService:
         #: Called when a transfer has ended, and another may begin.
         self.on_released: Callable[[], None] = lambda: None
         self._closed = False
-        #: By the last report, a mission is being flown.
-        self._is_flown = False
+        self._flies_mission = False
         #: False until the current flight controller's list was read, and after an interrupted push.
         self.is_settled = False
         #: The saved mission's loading since MissionWatch last reported it.
@@ -218,7 +217,10 @@ class MissionService:
 
     def stopped(self, report: NavStatus) -> str:
         """Why the craft has just left its mission, in one sentence; empty if it has not, or for no known reason."""
-        was_flown, self._is_flown = self._is_flown, report.mode == NavMode.MISSION and report.error != FINISHED
+        was_flown, self._flies_mission = (
+            self._flies_mission,
+            report.mode == NavMode.MISSION and report.error != FINISHED,
+        )
         place, is_return = self.vehicle.last(GlobalPosition), report.mode == NavMode.RTH
         has_left = was_flown and (is_return or report.mode == NavMode.HOLD) and report.action != NavAction.RTH
         if not has_left or place is None or isinstance(self.fc_store, Refusal):

@@ -31,9 +31,9 @@ class BoardSetting:
     """A setting with the value that the board holds in RAM.
 
     name: as in the board's command line, or made from its MSP layout if it has no such name. minimum, maximum: of a
-    number; of a text its lengths. choices: names of the values from `minimum` on. text: what it is, in a few words;
-    empty if unknown. fixed: the reason why it cannot be set over the air; empty if it can. raised: the same for a
-    higher value. handle: what its FcSettings needs to change it.
+    number; of a text its lengths. choices: names of the values from `minimum` on. fixed: the reason why it cannot be
+    set over the air; empty if it can. raised: the same for a higher value. handle: what its FcSettings needs to change
+    it.
     """
 
     name: str
@@ -43,7 +43,6 @@ class BoardSetting:
     value: Value
     unit: str = ""
     choices: tuple[str, ...] = ()
-    text: str = ""
     fixed: str = ""
     raised: str = ""
     handle: Any = field(default=None, compare=False, repr=False)

@@ -71,7 +71,7 @@ def _description(parameter: str, setting: BoardSetting) -> dict[str, Any]:
     described: dict[str, Any] = {
         "name": parameter,
         "type": "Float",
-        "shortDesc": setting.text or setting.name,
+        "shortDesc": setting.name,
         "longDesc": f"{setting.name}: {setting.fixed}" if setting.fixed else setting.name,
         "min": setting.minimum,
         "max": setting.maximum,

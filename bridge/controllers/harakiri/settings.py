@@ -6,7 +6,6 @@ from dataclasses import replace
 from itertools import count
 from typing import NamedTuple
 
-from bridge.controllers.harakiri.setting_texts import TEXTS
 from bridge.controllers.msp_parts import MspPartSettings
 from bridge.fc.fc_settings import (
     ARMED,
@@ -57,6 +56,34 @@ _CRASHES = "a running Harakiri can crash with another one; set it on its command
 _FIXED = dict.fromkeys(
     ("gbl_flg", *(f"align_{sensor}_{axis}" for sensor in ("gyro", "acc", "mag") for axis in "xyz")), _CRASHES
 )
+#: The units of the settings, as the firmware documents them; the others have none.
+_UNITS = {
+    name: unit
+    for unit, names in {
+        "us": (
+            "rc_db rc_dbyw rc_dbah rc_dbgps rc_minchk rc_mid rc_maxchk esc_min esc_max esc_nfly esc_moff fs_rcthr "
+            "tri_ymid tri_ymin tri_ymax looptime"
+        ),
+        "ms": "rc_killt tri_ydel al_tobaro al_tosnr gps_lag",
+        "%": (
+            "rc_rate rc_expo thr_mid thr_expo roll_pitch_rate yawrate rssicut al_debounce gps_expo "
+            "gps_ph_minbrakepercent"
+        ),
+        "Hz": "esc_pwm srv_pwm acc_lpfhz acc_altlpfhz acc_gpslpfhz gy_lpf maincuthz gpscuthz",
+        "0.1 s": "fs_delay fs_ofdel",
+        "s": "fs_ddplt",
+        "baud": "serial_baudrate gps_baudrate",
+        "0.1 V": "vbatmaxcellvoltage vbatmincellvoltage",
+        "cm/s": "al_barolr al_snrlr as_clmbr gps_ph_settlespeed rtl_cr nav_speed_min nav_speed_max",
+        "m": "as_trgt gps_rtl_flyaway rtl_mnh rtl_mnd",
+        "90 deg": "align_board_yaw",
+        "min": "mag_time",
+        "deg": "gps_maxangle gps_ph_brakemaxangle snr_tilt",
+        "cm/s2": "gps_ph_brkacc",
+        "cm": "gps_wp_radius snr_min snr_max",
+    }.items()
+    for name in names.split()
+}  # fmt: skip
 _LOWERED_ONLY = {"esc_moff": "it can only be lowered, a disarmed board sends it to the motors"}
 
 
@@ -220,15 +247,13 @@ def _is(listed: Sequence[BoardSetting], whole: TableReply) -> bool:
 def _shown(number: int, held: HeldSetting) -> BoardSetting:
     described, value = held
     kind = ValueKind.FLOAT if described.type is SettingType.FLOAT else ValueKind.INTEGER
-    unit, text = TEXTS.get(described.name, ("", ""))
     return BoardSetting(
         described.name,
         kind,
         described.minimum,
         described.maximum,
         value,
-        unit,
-        text=text,
+        _UNITS.get(described.name, ""),
         fixed=_FIXED.get(described.name, ""),
         raised=_LOWERED_ONLY.get(described.name, ""),
         handle=_Place(number, described),

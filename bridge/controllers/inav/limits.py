@@ -10,8 +10,8 @@ from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from typing import Any
 
-from bridge.controllers.inav.approaches import approach_text
 from bridge.controllers.inav.platforms import Platform, flown_otherwise
+from bridge.controllers.inav.safehomes import approach_text
 from bridge.controllers.inav.zone_check import judge_zones
 from bridge.controllers.nav.flown_path import above_home_cm
 from bridge.missions.flown_legs import Departure, FlownPath, Judgement, beyond_plain_limits, first_of, in_metres
@@ -94,9 +94,9 @@ class InavLimits:
             if records[leg.target].action == NavAction.LAND and self.platform is Platform.AEROPLANE:
                 name = f"FW approach {self.approach.number} has no heading" if self.approach else _NO_APPROACHES
                 yield _landing(leg.target, self.approach, "", "here", name)
-        between = [leg for leg in path.legs if not (leg.is_first or leg.is_return)]
-        close = [leg for leg in between if leg.length_m * 100 < self.nav_wp_radius]
-        within = f"within nav_wp_radius ({self.nav_wp_radius / 100:g} m): it may count as reached at once"
+        short_m = self.nav_wp_radius / 100
+        close = [leg for leg in path.legs if leg.length_m < short_m and not (leg.is_first or leg.is_return)]
+        within = f"within nav_wp_radius ({short_m:g} m): it may count as reached at once"
         whys = [(leg.cause, f"{leg.length_m:.1f} m from the waypoint before, {within}") for leg in close]
         yield from first_of(whys, "lat_e7", News.NOTICE)
         yield from flown_otherwise(records, self.platform)

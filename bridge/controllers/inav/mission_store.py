@@ -10,12 +10,11 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import chain
 
-from bridge.controllers.inav.approaches import read_approaches, write_approaches
 from bridge.controllers.inav.fly_to import FLOWN_TO, fly_to
 from bridge.controllers.inav.geozones import has_zones, read_zones_in_force
 from bridge.controllers.inav.limits import DECISIVE_NAMES, SETTING_NAMES, InavLimits
 from bridge.controllers.inav.platforms import Platform, platform_of
-from bridge.controllers.inav.safehomes import read_safehomes, with_approaches
+from bridge.controllers.inav.safehomes import read_approaches, read_safehomes, with_approaches, write_approaches
 from bridge.controllers.inav.settings import read_values
 from bridge.controllers.inav.zone_check import zone_ahead
 from bridge.controllers.nav.check import NavRules

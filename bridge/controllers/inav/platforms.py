@@ -42,12 +42,10 @@ class PlatformEffect(NamedTuple):
     news: News = News.WARNING
 
 
-_NO_SPEED = "navigation_multicopter.c:734 alone calls getActiveSpeed"
-_DRIVES_ON = PlatformEffect("{} drives on while it holds", "navigation_rover_boat.c:119: only the end stops the motors")
 _ON_THE_GROUND = {
     MissionPart.SPEED: PlatformEffect("its speed: no effect on {}", "navigation_rover_boat.c:130: cruise throttle"),
     MissionPart.HEIGHT: PlatformEffect("Alt: no effect on {}", "flight/mixer.c:171: no altitude control", News.NOTICE),
-    MissionPart.HOLD: _DRIVES_ON,
+    MissionPart.HOLD: PlatformEffect("{} drives on while it holds", "navigation_rover_boat.c:119: stops at the end"),
     MissionPart.TURN: PlatformEffect("no effect on {}", "navigation.c:1998 and 2006: multirotors only"),
     MissionPart.LANDING: PlatformEffect("{} disarms there", "navigation.c:1896", News.NOTICE),
 }
@@ -60,7 +58,7 @@ PLATFORMS: Mapping[Platform, Mapping[MissionPart, PlatformEffect]] = {
         MissionPart.LANDING: PlatformEffect("", "flown"),
     },
     Platform.AEROPLANE: {
-        MissionPart.SPEED: PlatformEffect("its speed: no effect on {}", _NO_SPEED),
+        MissionPart.SPEED: PlatformEffect("its speed: no effect on {}", "navigation_multicopter.c:734 only"),
         MissionPart.HEIGHT: PlatformEffect("", "navigation_fixedwing.c:136"),
         MissionPart.HOLD: PlatformEffect("{} circles there", "navigation_fixedwing.c:324", News.NOTICE),
         MissionPart.TURN: PlatformEffect("no effect on {}", "navigation.c:1998 and 2006: multirotors only"),

@@ -1,23 +1,31 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""INAV's safehomes as rally points: up to eight places, without heights."""
+"""INAV's safehomes as rally points: up to eight places, without heights; and the approaches by which it lands.
 
-from collections.abc import Mapping, Sequence
+Each MSP_SET_WP erases an approach: that of the mission whose number is the count of missions written since the boot,
+and after nine missions all of them, also those of the safehomes (fc_msp.c, 7.1.0 to 9.1.0). SAVE would store that.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from bridge.controllers.inav.approaches import approach_text, read_approaches, write_approaches
 from bridge.controllers.inav.place_store import InavPlaceStore, take
 from bridge.line.conversation import Conversation, ask
 from bridge.missions.list_check import ListCheck, missing_coordinate, refuse_frame, refuse_position
 from bridge.model.ground_track import distance_m
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
 from protocols.msp.inav_places import (
+    APPROACH_SIZE,
+    FW_APPROACH,
     SAFEHOME,
     SAFEHOME_SIZE,
     SAFEHOMES,
+    SET_FW_APPROACH,
     SET_SAFEHOME,
     FwApproach,
     Safehome,
+    decode_approach,
     decode_safehome,
+    encode_read_approach,
     encode_read_safehome,
 )
 from reports.finding import DROPPED, Finding, News, RejectingFinding, reject
@@ -25,6 +33,45 @@ from reports.verdict import CLEARED_LIST, Result, Verdict
 
 #: Items as floats are up to 0.9 m off.
 _NOT_MOVED_M = 1.0
+
+
+def read_approaches(numbers: Iterable[int]) -> Conversation[tuple[FwApproach, ...] | None]:
+    """Those of these numbers; none from a version before 7.1. None: no answer, or one about others."""
+    found: list[FwApproach] = []
+    for number in numbers:
+        reply = yield from ask(encode_read_approach(number), FW_APPROACH, APPROACH_SIZE)
+        if reply is None:
+            return None
+        approach = decode_approach(reply.payload)
+        if approach is None:
+            return ()
+        if approach.number != number:
+            return None
+        found.append(approach)
+    return tuple(found)
+
+
+def write_approaches(wanted: Sequence[FwApproach], held: Sequence[FwApproach] = ()) -> Conversation[bool]:
+    """Set those that the board lacks, and read them back; False if that fails.
+
+    Of the empty ones only those are set that are not empty in `held`, the board's own.
+    """
+    filled = {each.number for each in (*wanted, *held) if not each.is_empty}
+    for new in wanted:
+        if new.number not in filled or (yield from read_approaches((new.number,))) == (new,):
+            continue
+        is_taken = yield from take(SET_FW_APPROACH, new.pack())
+        if not is_taken or (yield from read_approaches((new.number,))) != (new,):
+            return False
+    return True
+
+
+def approach_text(approach: FwApproach) -> str:
+    """An approach with a heading."""
+    level = "sea level" if approach.is_above_sea else "home"
+    heights = f"from {approach.approach_cm / 100:g} m to the ground at {approach.ground_cm / 100:g} m above {level}"
+    headings = " or ".join(map(str, approach.directions()))
+    return f"FW approach {approach.number}: heading {headings}, {heights}"
 
 
 def read_safehomes() -> Conversation[tuple[Safehome, ...] | None]:

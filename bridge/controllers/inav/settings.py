@@ -63,7 +63,7 @@ class InavFcSettings(FcSettings):
         skipped = 0
         for index in range(_MOST):
             payload = encode_about_index(index)
-            is_past_end, before = False, None
+            is_past_end = False
             for _ in range(_TRIES):
                 reply = yield from _ask(payload)
                 if reply is None:
@@ -72,11 +72,8 @@ class InavFcSettings(FcSettings):
                 yield Pause(reading.pace(frame_size(COMMON_SETTING_INFO, len(payload)) + len(reply.encode())))
                 info = None if is_past_end else decode_setting_info(reply.payload)
                 if info is not None and info.place == index:
-                    held = None if previous is None else previous.settings.get(info.name)
-                    if held is None or info.value == held.value or info == before:
-                        found.append(_shown(info))
-                        break
-                    before = info  # another value than before may be damage
+                    found.append(_shown(info))
+                    break
             else:
                 if is_past_end:  # one error frame alone may be noise
                     break

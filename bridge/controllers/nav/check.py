@@ -41,7 +41,6 @@ from reports.verdict import Result, Verdict
 
 #: The greatest height at which single precision still resolves a centimetre.
 _MAX_HEIGHT_CM = 3_276_700
-_FULL_CIRCLE = 360
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,14 +180,11 @@ class NavCheck(ListCheck):
             return self._drop(item, "p4", item.p4, "relative headings are not supported")
         if not math.isfinite(item.p1):
             return self._drop(item, "p1", given(item.p1), "no heading is given")
-        heading = math.trunc(item.p1) % _FULL_CIRCLE
+        heading = math.trunc(item.p1) % 360
         if heading != item.p1:
-            is_same = item.p1 % _FULL_CIRCLE == heading
-            why = "the same heading" if is_same else "whole numbers only"
-            self._note(item, "p1", item.p1, heading, why, News.NONE if is_same else News.NOTICE)
-        for name in ("p2", "p3", "p4"):
-            self._fit(item, name, UNUSED)
-        self._unused(item)
+            news = News.NONE if item.p1 % 360 == heading else News.NOTICE
+            self._note(item, "p1", item.p1, heading, "whole degrees", news)
+        self._unused(item, "p2", "p3", "p4")
         self._keep(item, NavRecord(NavAction.SET_HEAD, p1=heading))
         return None
 

@@ -10,7 +10,7 @@ from bridge.settings.parameter_files import ParameterFiles
 from protocols.mavlink.ftp import file_crc32
 
 SETTINGS = {
-    "p_roll": BoardSetting("p_roll", ValueKind.INTEGER, 1, 200, 35, text="P of roll"),
+    "p_roll": BoardSetting("p_roll", ValueKind.INTEGER, 1, 200, 35),
     "failsafe_prcdr": BoardSetting("failsafe_procedure", ValueKind.INTEGER, 0, 1, 0, choices=("LAND", "DROP")),
     "nav_speed_max": BoardSetting("nav_speed_max", ValueKind.FLOAT, 0, 10, 2.5, "m/s"),
 }
@@ -40,11 +40,11 @@ def test_the_general_file_names_the_descriptions_and_their_checksum() -> None:
     assert (general["version"], described["type"], described["fileCrc"]) == (1, 1, file_crc32(content))
 
 
-def test_a_description_has_the_range_the_unit_and_the_texts() -> None:
+def test_a_description_has_the_range_and_the_unit() -> None:
     described = json.loads(lzma.decompress(files().find("parameter.json.xz") or b""))
     assert described["version"] == 1
     p_roll, failsafe, speed = described["parameters"]
-    assert (p_roll["name"], p_roll["min"], p_roll["max"], p_roll["shortDesc"]) == ("p_roll", 1, 200, "P of roll")
+    assert (p_roll["name"], p_roll["min"], p_roll["max"], p_roll["shortDesc"]) == ("p_roll", 1, 200, "p_roll")
     assert (p_roll["decimalPlaces"], p_roll["increment"], p_roll["type"]) == (0, 1, "Float")
     assert failsafe["longDesc"] == "failsafe_procedure"
     assert failsafe["values"] == [{"value": 0, "description": "LAND"}, {"value": 1, "description": "DROP"}]
