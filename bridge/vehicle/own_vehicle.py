@@ -349,7 +349,7 @@ class OwnVehicle:
         if isinstance(leg.report, NavStatus):
             self._say_nav_words(leg.report, now)
             if why := self._missions.stopped(leg.report):
-                self._ground.say(Severity.WARNING, why)
+                self._ground.say(sentences.LEFT_MISSION(why))
         if self._missions.on_board is None:
             # Until the list is read, no record has an item.
             return

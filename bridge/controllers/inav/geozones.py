@@ -4,7 +4,7 @@
 They take effect after INAV's next start, and only with its feature GEOZONE (src/main/navigation/navigation_geozone.c).
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
 
@@ -69,10 +69,10 @@ def _ask_feature() -> Conversation[bool | None]:
     return None if reply is None else bool(int.from_bytes(reply.payload[:FEATURE_SIZE], "little") & GEOZONE_FEATURE)
 
 
-def read_zones(numbers: Iterable[int] = range(GEOZONES)) -> Conversation[tuple[Geozone, ...] | None]:
-    """Those of these numbers that have corners; None: it does not answer."""
+def read_zones() -> Conversation[tuple[Geozone, ...] | None]:
+    """Those that have corners; None: it does not answer."""
     zones: list[Geozone] = []
-    for number in numbers:
+    for number in range(GEOZONES):
         reply = yield from ask(encode_read_geozone(number), GEOZONE, GEOZONE_SIZE)
         head = None if reply is None else decode_geozone(reply.payload)
         if reply is None or (head is None and reply.direction is Direction.REPLY):
@@ -106,11 +106,6 @@ class InavGeozones(InavPlaceStore[Geozone]):
         if is_on is not None and found is not None:
             self._is_in_force, self._known = is_on, found
         return found
-
-    def _read_back(
-        self, wanted: tuple[Geozone, ...], before: tuple[Geozone, ...]
-    ) -> Conversation[tuple[Geozone, ...] | None]:
-        return (yield from read_zones(sorted({zone.number for zone in (*wanted, *before)})))
 
     def items(self, records: Sequence[Geozone], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
         return fence_items(records)

@@ -56,8 +56,7 @@ class InavPlaceStore(FcMissionStore[RecordT]):
                 return PushResult(None, unchanged=True)
             self._is_unsaved = True
             is_written = yield from self._write(wanted, before)
-            self._known = None
-            held = yield from self._read_back(wanted, before)
+            held = yield from self.pull()
             if not is_written or held != wanted:
                 yield from self._write(before, held or wanted)
                 self._is_unsaved = (yield from self.pull()) != before
@@ -87,12 +86,6 @@ class InavPlaceStore(FcMissionStore[RecordT]):
     @abstractmethod
     def _write(self, wanted: tuple[RecordT, ...], held: tuple[RecordT, ...]) -> Conversation[bool]:
         """Set what differs from `held`; False if the board refuses or does not answer."""
-
-    def _read_back(
-        self, wanted: tuple[RecordT, ...], before: tuple[RecordT, ...]
-    ) -> Conversation[tuple[RecordT, ...] | None]:
-        """Read what may have changed."""
-        return (yield from self.pull())
 
 
 def take(command: int, payload: bytes, *, tries: int = 3) -> Conversation[bool]:
