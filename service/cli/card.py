@@ -9,20 +9,22 @@ runs `naze-bridge setup`, removes the folder with its secrets, and restarts the 
 import re
 import shlex
 import shutil
+import tarfile
+from io import BytesIO
 from pathlib import Path
+from typing import NamedTuple
 
 import click
 from segno.helpers import make_wifi_data
 
-from service.cli.package_file import read_package
+from protocols.plain_text import plain_text
 from service.cli.setup.answers import PAGE_PORT
 from service.cli.setup.command import check_answers, secret_line
 from service.cli.setup.hotspot import ADDRESS, CONNECTION
-from service.machine.package import version
 from service.settings.passphrase import STRONGER, new_passphrase, weakness
 from service.web.token import new_token
 from storage.os_error import reason
-from storage.small_files import read_bounded
+from storage.small_files import open_regular, read_bounded
 from terminal.options import PATH
 from terminal.sentences import complain, fail, show_secret
 
@@ -34,6 +36,10 @@ _MAX_BYTES = 1 << 20
 _ARCHITECTURES = ("arm64", "armhf")
 _LINK = "/etc/systemd/system/multi-user.target.wants/naze-bridge-card.service"
 RESULT = "naze-bridge-RESULT.txt"
+#: A package: an ar archive of tar archives (deb(5)).
+_MAGIC = b"!<arch>\n"
+_HEADER_SIZE, _SIZE = 60, slice(48, 58)
+_MOST_CONTROL = 1 << 20
 #: The boot partition's place: from bookworm on, and before.
 _FIND = "for boot in /boot/firmware /boot; do [ ! -e $boot/naze-bridge/{0} ] || exec sh $boot/naze-bridge/{0}; done"
 #: Once the folder is renamed, all is done; a power cut may have left a part of it.
@@ -202,14 +208,12 @@ def _check_package(path: Path, boot: Path) -> None:
         package = read_package(path)
     except ValueError as error:
         raise CardError(f"{error}. Releases have packages, and `make deb` builds one") from error
-    own, needed = version(), _architecture(boot)
+    needed = _architecture(boot)
     if package.name != "naze-bridge":
         raise CardError(f"{path} is the package of {package.name}, not of naze-bridge")
     if package.architecture not in _ARCHITECTURES or needed not in (package.architecture, None):
         wanted = needed or " or ".join(_ARCHITECTURES)
         raise CardError(f"{path} is for {package.architecture}; this card needs the one for {wanted}")
-    if _numbers(package.version) < _numbers(own):
-        raise CardError(f"{path} has version {package.version}; this program is {own}, and prepares no older ones")
 
 
 def _architecture(boot: Path) -> str | None:
@@ -220,11 +224,6 @@ def _architecture(boot: Path) -> str | None:
     if is_32_bit:
         return None if runs_64_bit else "armhf"
     return "arm64" if is_64_bit else None
-
-
-def _numbers(version_text: str) -> list[int]:
-    """The release that a version belongs to or comes before: 0.2.1~dev7 is 0.2.1."""
-    return [int(number) for number in re.findall("[0-9]+", version_text)[:3]]
 
 
 def _text(path: Path) -> str:
@@ -267,3 +266,45 @@ def _with_command(file: Path, text: str) -> str:
         raise CardError(f"{file}: write runcmd as a list of lines that begin with -, not in brackets")
     line = text.index("\n", found.start()) + 1
     return f"{text[:line]}{found[2]}- {_IN_USER_DATA}\n{text[line:]}"
+
+
+class PackageFile(NamedTuple):
+    """The fields as in the control file."""
+
+    name: str
+    version: str
+    architecture: str
+
+
+def read_package(path: Path) -> PackageFile:
+    """Read a package's description; ValueError, one sentence, if it is damaged or no package."""
+    try:
+        lines = map(plain_text, _control(path).splitlines())
+        fields = dict(line.split(": ", 1) for line in lines if ": " in line)
+        return PackageFile(fields["Package"], fields["Version"], fields["Architecture"])
+    except OSError as error:
+        raise ValueError(f"{path} cannot be read: {reason(error)}") from error
+    except (ValueError, KeyError, EOFError, tarfile.TarError):
+        raise ValueError(f"{path} is not a Debian package (.deb), or it is damaged: fetch it again") from None
+
+
+def _control(path: Path) -> bytes:
+    """The control file; reads to the end of the package, which a download may lack."""
+    with open_regular(path) as file:
+        size = path.stat().st_size
+        if file.read(len(_MAGIC)) != _MAGIC:
+            raise ValueError
+        control = b""
+        while header := file.read(_HEADER_SIZE):
+            length = int(header[_SIZE])
+            if header.startswith(b"control.tar") and length <= _MOST_CONTROL:
+                with tarfile.open(fileobj=BytesIO(file.read(length))) as archive:
+                    (member,) = (each for each in archive if each.name in ("control", "./control"))
+                    found = archive.extractfile(member)
+                    control = b"" if found is None else found.read(_MOST_CONTROL)
+                file.seek(length % 2, 1)
+            else:
+                file.seek(length + length % 2, 1)
+        if file.tell() > size:
+            raise ValueError
+        return control

@@ -19,9 +19,8 @@ from terminal.options import PATH
 from terminal.printing import console, print_json, progress_bars
 from terminal.sentences import INTERRUPTED, complain, fail
 
-_LEFT = "interrupted; the daemon continues: see `naze-bridge missions list`, or `settings history`"
-_WRITES = ("push", "restore", "restore-settings")
-_FLASHES_ON = "interrupted; the daemon continues, do not switch the board off: see `naze-bridge status`"
+_LEFT = "interrupted; the daemon continues: leave the board on, and see `naze-bridge status`"
+_WRITES = ("push", "restore", "restore-settings", *FIRMWARE_REQUESTS)
 _FLASH_BROKEN = "interrupted: the board stays in its boot loader; run the same command again"
 
 
@@ -44,7 +43,8 @@ class BridgeClient:
             answer: Json = printable(event_loop.run(asking))
             return answer
         except (KeyboardInterrupt, Interrupted) as error:
-            complain(_interruption(request, str(error), is_own=self.fc is not None))
+            own = _FLASH_BROKEN if request["do"] in FIRMWARE_REQUESTS else str(error) or "interrupted"
+            complain(own if self.fc is not None else _LEFT if request["do"] in _WRITES else "interrupted")
             raise SystemExit(INTERRUPTED) from None
         except (AddressError, SettingsError) as error:
             raise click.UsageError(str(error)) from error
@@ -99,9 +99,3 @@ def bridge_options(command: Callable[..., None]) -> Callable[..., None]:
     """Add the options that select a bridge: a daemon's, or one of the command's own."""
     fc = click.option("--fc", metavar="FC", help="Talk to this flight controller directly, without a daemon.")
     return daemon_options(fc(command))
-
-
-def _interruption(request: Json, why: str, *, is_own: bool) -> str:
-    if request["do"] in FIRMWARE_REQUESTS:
-        return _FLASH_BROKEN if is_own else _FLASHES_ON
-    return _LEFT if not is_own and request["do"] in _WRITES else why or "interrupted"

@@ -51,7 +51,10 @@ def status_lines(facts: Json, addresses: list[str]) -> Iterator[tuple[str, str]]
         yield "Connect to", _reachable(link, addresses)
     if facts["page"] is not None:
         page = parse_listen(facts["page"])
-        yield "Page", f"http://{ListenAddress(client_hosts(page.host, addresses)[0], page.port)}/"
+        if facts["page_trouble"]:
+            yield "Page", f"{page} cannot be opened: {facts['page_trouble']}; see sudo naze-bridge doctor"
+        else:
+            yield "Page", f"http://{ListenAddress(client_hosts(page.host, addresses)[0], page.port)}/"
     if facts["store_trouble"]:
         yield "Missions", f"kept in memory only: {facts['store_trouble']}"
     for text in facts["recording"]:

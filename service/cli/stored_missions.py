@@ -2,7 +2,6 @@
 """`naze-bridge missions`: the received missions and their results."""
 
 from datetime import datetime
-from typing import NoReturn
 
 import click
 from rich.table import Column, Table
@@ -16,13 +15,7 @@ from terminal.mission_table import mission_table
 from terminal.printing import print_json, print_table
 from terminal.sentences import say
 
-
-class _Number(click.IntRange):
-    def fail(self, message: str, param: click.Parameter | None = None, ctx: click.Context | None = None) -> NoReturn:
-        raise click.UsageError(f"{message.split()[0]} is not a mission's number: see `naze-bridge missions list`", ctx)
-
-
-_NUMBER, _LIMIT = _Number(1, MOST), click.IntRange(1, MOST)
+_NUMBER = click.IntRange(1, MOST)
 
 
 @click.group(cls=CommandGroup)
@@ -31,7 +24,7 @@ def missions() -> None:
 
 
 @missions.command("list")
-@click.option("--limit", type=_LIMIT, default=20, show_default=True, help="The maximum number of missions.")
+@click.option("--limit", type=_NUMBER, default=20, show_default=True, help="The maximum number of missions.")
 @daemon_options
 def list_missions(client: BridgeClient, limit: int) -> None:
     """List the received missions, newest first."""

@@ -113,6 +113,7 @@ class DaemonApi:
             "found_s": None if daemon.fc.found_at is None else round(self._loop.time() - daemon.fc.found_at, 1),
             "links": [str(address) for address in daemon.settings.gcs],
             "page": None if web is None else str(web.listen),
+            "page_trouble": daemon.page_trouble,
             "mode": report.status.mode,
             "fix": report.gps.fix,
             "flight_controller": link.flight_controller,

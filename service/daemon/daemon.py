@@ -114,6 +114,8 @@ class Daemon:
         self.gcs = GcsConnections(self.bridge, self.traffic, self.flush)
         #: Why missions are kept in memory only; empty if they are stored.
         self.store_trouble = ""
+        #: Why the page cannot be opened now; empty if it can, or there is none.
+        self.page_trouble = ""
         self.store = StoreWorker(settings.state_dir, self._cannot_store)
         #: Set when ground stations can connect.
         self.started = asyncio.Event()

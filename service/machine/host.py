@@ -3,6 +3,7 @@
 
 import os
 import re
+import shlex
 import socket
 import stat
 import struct
@@ -32,7 +33,11 @@ class Process:
 
     @property
     def name(self) -> str:
-        return os.path.basename(self.arguments[0]) if self.arguments else ""
+        """The program's file; of Python the script or module."""
+        words = [os.path.basename(word) for word in self.arguments] or [""]
+        if not re.fullmatch(r"python[\d.]*", words[0]):
+            return words[0]
+        return next((word for word in words[1:] if word and not word.startswith("-")), words[0])
 
     @property
     def is_naze_bridge(self) -> bool:
@@ -96,6 +101,17 @@ class Host:
     def holder(self, link: str) -> Process | None:
         """The program that has a file or socket open, by its descriptor's target ("/dev/ttyS0", "socket:[4711]")."""
         return next((process for process in self.processes() if self.has_open(process, link)), None)
+
+    def stop_command(self, process: Process) -> str:
+        """The command that ends a program for good: of a service the unit, which would start it again."""
+        cgroup = self.read(f"/proc/{process.pid}/cgroup")
+        found = re.search(r"/system\.slice/(?:[^/\n]*\.slice/)*([^/\n]+)\.service", cgroup)
+        if found is None:
+            return f"sudo kill {process.pid}"
+        unit = shlex.quote(found[1])
+        folders = ("/etc/systemd/system", "/usr/lib/systemd/system", "/lib/systemd/system")
+        has_socket = any(self.path(f"{folder}/{found[1]}.socket").exists() for folder in folders)
+        return f"sudo systemctl disable --now {f'{unit}.socket ' if has_socket else ''}{unit}"
 
     def has_open(self, process: Process, link: str) -> bool:
         """True if a program has it open, as far as permissions show."""

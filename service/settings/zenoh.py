@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The `[zenoh]` table of the configuration file."""
 
+import re
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import partial
@@ -10,6 +11,8 @@ from typing import Annotated
 from payloads.names import DEFAULT_PREFIX, check_name, host_name
 from service.settings.key import Example, Unfit, file_name, several, text
 
+#: Over a network with a port; or a path, as of a serial port.
+_ENDPOINT = re.compile(r"(?:tcp|udp|tls|quic|ws)/[^/]+:\d{1,5}(?:[?#].*)?|(?!tcp|udp|tls|quic|ws)[a-z-]+/.+")
 #: The value that allows commands without authentication.
 I_KNOW = "I know"
 
@@ -22,7 +25,7 @@ class ZenohProfile(Enum):
 
 
 def _endpoint(entry: object, _folder: Path) -> str:
-    if not isinstance(entry, str) or "/" not in entry:
+    if not isinstance(entry, str) or not _ENDPOINT.fullmatch(entry):
         raise Unfit(f'holds {entry!r}, which is not an endpoint: write one like "tcp/192.168.4.1:7447"')
     return entry
 

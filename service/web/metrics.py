@@ -112,8 +112,8 @@ class _State(Collector):
     def _flight_controller(self) -> Iterator[Metric]:
         counters, state = self._daemon.bridge.counters(), self._daemon.report().link.state
         states = GaugeMetricFamily(_PREFIX + "fc_state", "1 for the link's current state.", labels=["state"])
-        for each in TRANSITIONS:
-            states.add_metric([each.name], float(each.name == state))
+        for name in dict.fromkeys(each.name for each in TRANSITIONS):
+            states.add_metric([name], float(name == state))
         yield states
         dropped = self._daemon.fc.dropped_bytes
         yield _counted(

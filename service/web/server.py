@@ -34,7 +34,7 @@ class WebServer:
     """
 
     def __init__(self, daemon: Daemon, settings: WebSettings) -> None:
-        self._address = settings.listen
+        self._daemon, self._address = daemon, settings.listen
         self._api = Api(daemon, settings)
         self._config = _config(self._api, settings, _token(daemon, settings))
         self._state = ServerState()
@@ -61,7 +61,6 @@ class WebServer:
 
     async def _listen(self) -> None:
         loop = asyncio.get_running_loop()
-        said = ""
         while self._server is None:
             try:
                 self._server = await loop.create_server(
@@ -72,10 +71,11 @@ class WebServer:
                 )
             except OSError as error:
                 why = reason(error)
-                if why != said:
+                if why != self._daemon.page_trouble:
                     _log.error("web.unavailable", address=str(self._address), why=why, what="it is retried")
-                said = why
+                self._daemon.page_trouble = why
                 await asyncio.sleep(_RETRY_S)
+        self._daemon.page_trouble = ""
         _log.info("web.listening", address=str(self._address))
 
 

@@ -12,13 +12,12 @@ from pathlib import Path
 from payloads.mission_data import Json
 from service.cli.doctor.checked import Checked, Grade
 from service.cli.doctor.flight_controller import check_flight_controller
-from service.cli.doctor.machine import check_clock, check_database, check_disk, check_power, check_versions
+from service.cli.doctor.machine import check_clock, check_database, check_disk, check_power, check_root, check_versions
 from service.cli.doctor.network import check_keys, check_ports, check_wifi, check_zenoh
 from service.cli.doctor.port import (
     check_candidates,
     check_console,
     check_holder,
-    check_modem_manager,
     check_no_port,
     check_permission,
     check_port,
@@ -34,11 +33,11 @@ _STATUS: Mapping[str, type] = {
     **dict.fromkeys(("flight_controller", "state", "where", "store_trouble"), str),
     **dict.fromkeys(("speed_baud", "found_s", "bad_checksums", "fc_bytes_received"), float),
     "armed": bool,
-    "refused": list,
+    **dict.fromkeys(("refused", "links"), list),
     "port": dict,
 }
 _FAR_TOO_LARGE = 1 << 53
-_ON_PORT = (check_permission, check_console, check_holder)
+_ON_PORT = (check_permission, check_console)
 
 
 def examine(
@@ -52,24 +51,29 @@ def examine(
             fc = parse_fc(running["where"])  # the daemon was started with --fc
     ports: Sequence[FcAddress] = check_candidates(host) if isinstance(fc, AutoFc) else [fc]
     source = settings.sources.get("fc", "")
-    checks: Sequence[Callable[[Host, FcAddress], Checked | None]] = (partial(check_port, source=source), *_ON_PORT)
+    checks: Sequence[Callable[[Host, FcAddress], Checked | None]] = (
+        *(partial(check_port, source=source), *_ON_PORT),
+        partial(check_holder, source=source),
+    )
     results = [found for port in ports for check in checks if (found := check(host, port)) is not None]
     if len(ports) > 1:
         # One port with a flight controller is enough.
         results = [replace(found, grade=Grade.NOTE) if found.grade is Grade.PROBLEM else found for found in results]
-    results.append(check_modem_manager(host, ports[0]) if ports else check_no_port())
+    results += [] if ports else [check_no_port()]
     yield check_versions(host)
-    yield from filter(None, [check_power(host)])
+    yield from filter(None, [check_power()])
     yield from results
     is_free = not any(found.grade is Grade.PROBLEM for found in results)
     is_free = is_free and all(holder_of_port(host, port) is None for port in ports)
     yield from check_flight_controller(fc, running, ask_port if is_free else None, source)
+    links = [str(link) for link in settings.gcs]
     yield from check_wifi(host, settings.gcs)
-    yield from check_ports(host, settings.gcs)
+    yield from check_ports(host, settings, is_running=running is not None and running["links"] in (None, links))
     yield from check_keys(settings.gcs, settings.access)
     yield check_zenoh(settings.zenoh)
     yield check_clock(host, datetime.fromtimestamp(time.time(), UTC))
     state_dir = settings.state_dir or Path()
+    yield from filter(None, [check_root(host)])
     yield check_disk(state_dir)
     yield from check_database(state_dir)
 

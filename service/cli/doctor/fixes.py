@@ -21,7 +21,6 @@ FREE_UART = "free the UART from the login console"
 OPEN_HOTSPOT = "open the hotspot"
 OPEN_PORTS = "give the serial ports to the group dialout"
 RESTART_BRIDGE = "restart the bridge"
-STOP_MODEM_MANAGER = "switch ModemManager off"
 UNBLOCK_WIFI = "switch the Wi-Fi on"
 
 
@@ -51,7 +50,6 @@ _FIXES: Mapping[str, Callable[[Host], Iterable[Step]]] = {
     OPEN_HOTSPOT: lambda host: _switch_hotspot(host, is_on=True),
     OPEN_PORTS: lambda _host: _run("udevadm", "trigger", "--settle", "--subsystem-match=tty"),
     RESTART_BRIDGE: lambda _host: _run("systemctl", "restart", "naze-bridge.service"),
-    STOP_MODEM_MANAGER: lambda _host: _run("systemctl", "disable", "--now", "ModemManager.service"),
     # Without a country the radio would be blocked again.
     UNBLOCK_WIFI: lambda host: _run("rfkill", "unblock", "wlan") if wifi_country(host) else [],
 }

@@ -14,7 +14,7 @@ from service.cli.doctor.fixes import RESTART_BRIDGE
 from service.cli.doctor.port import fc_fix, fc_remedy
 from service.daemon.client import ControlError
 from service.machine.package import page
-from service.settings.addresses import FcAddress, SerialFc
+from service.settings.addresses import FcAddress, SerialFc, TcpFc, UdpFc
 
 _WIRING = "is it powered? TX goes to RX, RX to TX, GND to GND; a Naze's USB socket is empty; MSP is on at this UART"
 
@@ -40,7 +40,7 @@ def check_flight_controller(
     try:
         status = ask_port()
     except ControlError as error:
-        return [problem("flight controller", str(error), _AGAIN if str(error) == Cli.trouble.text else _WIRING)]
+        return [problem("flight controller", str(error), _AGAIN if str(error) == Cli.trouble.text else _wiring(fc))]
     return [_who(fc, status, source), *check_running(status)]
 
 
@@ -57,12 +57,19 @@ def _who(fc: FcAddress, status: Json, source: str) -> Checked:
     return ok("flight controller", f"{name}, {status['state']}{speed}{armed}")
 
 
+def _wiring(fc: FcAddress) -> str:
+    if isinstance(fc, TcpFc | UdpFc):
+        host = "" if isinstance(fc, UdpFc) and fc.listens else f" (ping {fc.host}: below 300 ms)"
+        return f"is it on, in this network{host}, is this its port for MSP, and no other program connected to it?"
+    return _WIRING
+
+
 def _silent(fc: FcAddress, status: Json, source: str) -> Checked:
     """The likely cause, by what arrives on the line."""
     heard = status.get("fc_bytes_received") or 0
     if not heard:
         found = f"no reply on {fc}: {status['state']}, and not one byte was received"
-        return problem("flight controller", found, _WIRING)
+        return problem("flight controller", found, _wiring(fc))
     found = f"no reply on {fc}, but {heard} bytes were received that are no frames"
     if isinstance(fc, SerialFc) and fc.baud is not None:
         remedy = f"{fc.baud} baud is probably wrong; let the bridge find the speed: {fc_remedy(fc.path, source)}"

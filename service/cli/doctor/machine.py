@@ -26,8 +26,6 @@ _TIME_PROGRAMS = ("chronyd", "ntpd", "gpsd")
 EPOCH = datetime(2026, 1, 1, tzinfo=UTC)
 _LEAST_FREE = 64 << 20
 _LIBRARIES = ("pyserial", "eclipse-zenoh")
-_HWMON = "/sys/class/hwmon"
-_THROTTLED = ("vcgencmd", "get_throttled")
 #: Bits of its reply: undervoltage now, and since the start.
 _NOW, _SINCE_START = 1 << 0, 1 << 16
 _BETTER_SUPPLY = "use the Pi's own supply or a BEC of 5.1 V and 3 A, with short, thick wires"
@@ -63,6 +61,19 @@ def check_clock(host: Host, now: datetime) -> Checked:
     return note("clock", f"{time_text}, not set by the network since the start", remedy)
 
 
+def check_root(host: Host) -> Checked | None:
+    """Check that changes to the system survive a restart."""
+    mounts = [line.split() for line in host.read("/proc/mounts").splitlines()]
+    kind, options = next(((row[2], row[3].split(",")) for row in mounts if row[1:2] == ["/"]), ("", []))
+    if kind == "overlay":
+        remedy = "sudo raspi-config nonint disable_overlayfs && sudo reboot"
+        return note("root", "an overlay in memory: settings, missions and logs are lost at power-off", remedy)
+    if "ro" in options:
+        remedy = "sudo mount -o remount,rw /; if that fails, the card may be worn out: look at `sudo dmesg`"
+        return note("root", "read-only: settings and updates cannot be stored", remedy)
+    return None
+
+
 def check_disk(state_dir: Path, free_of: Callable[[Path], int] = lambda path: shutil.disk_usage(path).free) -> Checked:
     folder = state_dir
     try:
@@ -71,6 +82,9 @@ def check_disk(state_dir: Path, free_of: Callable[[Path], int] = lambda path: sh
         if not folder.is_dir():
             remedy = f"move {folder} away, or name another state_dir"
             return problem("disk", f"{state_dir} cannot be used: {folder} is a file", remedy)
+        if not os.statvfs(folder).f_blocks:
+            remedy = "name a folder on a disk as state_dir"
+            return problem("disk", f"{state_dir} cannot be made: {folder} keeps no files", remedy)
         free = free_of(folder)
     except PermissionError:
         return note("disk", f"no permission to read {state_dir}", "run doctor with sudo")
@@ -120,35 +134,25 @@ def _look_into(path: Path) -> Checked:
     return problem("missions", f"{path} is damaged: {finding}", remedy, RESTART_BRIDGE)
 
 
-def _ask_firmware() -> str:
+def output_of(*command: str) -> str:
+    """What a program prints; empty if it is missing or hangs."""
     try:
-        done = subprocess.run(_THROTTLED, capture_output=True, text=True, check=False, timeout=5)  # noqa: S603  # our own words
+        return subprocess.run(command, capture_output=True, text=True, check=False, timeout=5).stdout  # noqa: S603  # our own words
     except (OSError, subprocess.TimeoutExpired):
         return ""
-    return done.stdout
 
 
-def check_power(host: Host, ask_firmware: Callable[[], str] = _ask_firmware) -> Checked | None:
+def check_power(ask: Callable[..., str] = output_of) -> Checked | None:
     """Check for undervoltage: below 4.63 V a Pi slows down, loses USB devices and damages its card.
 
     None on a machine that does not measure it.
     """
-    alarm = next((alarm for name in host.names(_HWMON) if (alarm := _alarm(host, name)) is not None), None)
     try:
-        flags = int(ask_firmware().strip().removeprefix("throttled="), 16)
+        flags = int(ask("vcgencmd", "get_throttled").strip().removeprefix("throttled="), 16)
     except ValueError:
-        flags = None  # not a Pi, or no permission
-    if alarm or (flags is not None and flags & _NOW):
+        return None  # not a Pi, or no permission
+    if flags & _NOW:
         return problem("power", "the supply's voltage is too low", _BETTER_SUPPLY)
-    if flags is not None and flags & _SINCE_START:
+    if flags & _SINCE_START:
         return note("power", "the supply's voltage was too low since the start", _BETTER_SUPPLY)
-    if flags is not None:
-        return ok("power", "no undervoltage since the start")
-    return None if alarm is None else ok("power", "no undervoltage")
-
-
-def _alarm(host: Host, name: str) -> bool | None:
-    """The kernel's undervoltage alarm; None if this is another sensor."""
-    if host.read(f"{_HWMON}/{name}/name").strip() != "rpi_volt":
-        return None
-    return host.read(f"{_HWMON}/{name}/in0_lcrit_alarm").strip() == "1"
+    return ok("power", "no undervoltage since the start")

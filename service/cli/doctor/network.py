@@ -3,14 +3,15 @@
 
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from payloads.names import ZenohSettingsError
 from service.cli.doctor.checked import Checked, note, ok, problem
-from service.cli.doctor.fixes import UNBLOCK_WIFI
+from service.cli.doctor.fixes import RESTART_BRIDGE, UNBLOCK_WIFI
+from service.cli.doctor.machine import output_of
 from service.machine.host import Host
 from service.machine.package import page
+from service.settings import Settings
 from service.settings.addresses import GcsAddress
 from service.settings.passphrase import STRONGER
 from service.settings.write_access import WriteAccess
@@ -19,7 +20,6 @@ from service.settings.zenoh import ZenohSettings
 #: The state of listening sockets in /proc/net/tcp.
 _LISTENS = "0A"
 _LOOPBACK = ("127.", "::1", "localhost")
-_CONNECT_TIMEOUT_MS = 2000
 
 
 def check_wifi(host: Host, gcs: Sequence[GcsAddress]) -> list[Checked]:
@@ -53,26 +53,63 @@ def _card(host: Host, card: str, gcs: Sequence[GcsAddress]) -> Checked:
     )
 
 
-def check_ports(host: Host, gcs: Sequence[GcsAddress]) -> list[Checked]:
-    """Check that the bridge's listening ports are free, or its own."""
-    return [_check_port(host, link) for link in gcs if link.kind in ("udpin", "tcpin")]
+def check_ports(
+    host: Host, settings: Settings, *, is_running: bool, ask: Callable[..., str] = output_of
+) -> Iterator[Checked]:
+    """Check that a running daemon with these settings has their ports, or that they are free, and the firewall."""
+    rules = ask("nft", "list", "ruleset")
+    links = [*settings.gcs, *(share.address for share in settings.share)]
+    ports = [(link.kind.removesuffix("in"), link.port) for link in links if link.kind in ("udpin", "tcpin")]
+    ports += [("tcp", settings.web.listen.port)] if settings.web is not None else []
+    for transport, port in dict.fromkeys(ports):
+        yield _check_port(host, transport, port, is_running=is_running)
+        if is_blocked(rules, transport, port):
+            found = f"the firewall (nftables) drops packets to {transport.upper()} port {port}"
+            rule = f"sudo nft insert rule {_input_chain(rules)} {transport} dport {port} accept"
+            allow = (
+                f"sudo ufw allow {port}/{transport}" if "ufw" in rules else f"{rule}; also add it to /etc/nftables.conf"
+            )
+            yield note("firewall", found, allow)
 
 
-def _check_port(host: Host, link: GcsAddress) -> Checked:
-    transport = "tcp" if link.kind == "tcpin" else "udp"
-    what = f"{transport.upper()} port {link.port}"
-    inode = _inode(host, transport, link.port)
+def _check_port(host: Host, transport: str, port: int, *, is_running: bool) -> Checked:
+    what = f"{transport.upper()} port {port}"
+    inode = _inode(host, transport, port)
+    if inode is None and is_running:
+        remedy = "look at its log (journalctl -u naze-bridge), and restart it: sudo systemctl restart naze-bridge"
+        return problem("listening port", f"the daemon does not listen on {what}", remedy, RESTART_BRIDGE)
     if inode is None:
-        return ok("port for ground stations", f"{what} is free")
+        return ok("listening port", f"{what} is free")
     holder = host.holder(f"socket:[{inode}]")
     if holder is not None and holder.is_naze_bridge:
-        return ok("port for ground stations", f"{what} is the running daemon's")
+        return ok("listening port", f"{what} is the running daemon's")
+    if holder is None and os.geteuid() and is_running:
+        return ok("listening port", f"{what} is in use; only root sees by which program")
     if holder is None and os.geteuid():
         hidden = "only root sees which: run doctor with sudo"
-        return problem("port for ground stations", f"{what} is used by another program", hidden)
-    remedy = f"stop it: sudo kill {holder.pid}; or give gcs another port" if holder else "restart the Pi"
+        return problem("listening port", f"{what} is used by another program", hidden)
+    remedy = f"stop it: {host.stop_command(holder)}; or use another port" if holder else "restart the Pi"
     found = f"{what} is used by {holder or 'a program that is gone'}"
-    return problem("port for ground stations", found, remedy)
+    return problem("listening port", found, remedy)
+
+
+def is_blocked(rules: str, transport: str, port: int) -> bool:
+    """True if the chain for arriving packets drops all that no rule accepts, and no rule names the port."""
+    allowed = re.findall(rf"\b{transport} dport (?:\{{([^}}]*)\}}|([\d-]+))[^\n]*\baccept", rules)
+    if any(_covers(part, port) for several, one in allowed for part in (several or one).split(",")):
+        return False
+    return re.search(r"hook input [^}]*(policy drop|\n\s*(counter [^\n]*)?(drop|reject))", rules) is not None
+
+
+def _covers(part: str, port: int) -> bool:
+    first, _, last = part.strip().partition("-")
+    return first.isdecimal() and int(first) <= port <= int(last or first)
+
+
+def _input_chain(rules: str) -> str:
+    """The family, table and name of the chain for arriving packets: "inet filter input"; empty without one."""
+    found = re.search(r"table (\w+ \S+) \{(?:(?!\ntable).)*?chain (\S+) \{\s*type filter hook input", rules, re.DOTALL)
+    return "" if found is None else f"{found[1]} {found[2]}"
 
 
 def _inode(host: Host, transport: str, port: int) -> str | None:
@@ -99,11 +136,11 @@ def check_keys(gcs: Sequence[GcsAddress], access_by_link: Mapping[str, WriteAcce
 
 
 def check_zenoh(settings: ZenohSettings | None) -> Checked:
-    """Check the configuration, and try to connect to its endpoints."""
+    """Check the configuration."""
     if settings is None:
         return ok("zenoh", "off")
     # Importing zenoh takes half a second.
-    from payloads.endpoints import connect_endpoints, endpoint_trouble, tls_files
+    from payloads.endpoints import connect_endpoints
     from service.settings.zenoh_config import make_config
 
     try:
@@ -114,21 +151,4 @@ def check_zenoh(settings: ZenohSettings | None) -> Checked:
     endpoints = connect_endpoints(config)
     if not endpoints:
         return ok("zenoh", f"{me}, opens no connections")
-    if _joins(config):
-        return ok("zenoh", f"{me}, accepted by {', '.join(endpoints)}")
-    trouble = endpoint_trouble(endpoints, tls_files(config))
-    return note("zenoh", f"{me}: {trouble}", "start the router there, or correct zenoh.connect")
-
-
-def _joins(config: Any) -> bool:
-    """True if a router accepts the session: a client that does not listen, so that it does not disturb a daemon."""
-    import zenoh
-
-    config.insert_json5("mode", '"client"')
-    config.insert_json5("listen/endpoints", "[]")
-    config.insert_json5("connect/timeout_ms", str(_CONNECT_TIMEOUT_MS))
-    try:
-        zenoh.open(config).close()  # type: ignore[no-untyped-call]
-    except zenoh.ZError:
-        return False
-    return True
+    return ok("zenoh", f"{me}, connects to {', '.join(endpoints)}; the log of the daemon says if they refuse")

@@ -6,8 +6,8 @@ import re
 import stat
 from pathlib import Path
 
-from service.cli.doctor.checked import Checked, note, ok, problem
-from service.cli.doctor.fixes import ENABLE_UART, FIND_FC, FREE_UART, OPEN_PORTS, STOP_MODEM_MANAGER
+from service.cli.doctor.checked import Checked, ok, problem
+from service.cli.doctor.fixes import ENABLE_UART, FIND_FC, FREE_UART, OPEN_PORTS
 from service.cli.setup.steps import header_consoles
 from service.links.serial_ports import serial_ports
 from service.machine.host import LOGIN_PROGRAMS, Host, Process
@@ -18,8 +18,7 @@ from service.settings.config_files import PAGE_FILE, SETUP_FILE
 
 _PORTS = ("serial0", "naze", "ttyUSB*", "ttyACM*")
 _GROUP = "dialout"
-_RULES = ("/etc/udev/rules.d", "/usr/lib/udev/rules.d", "/lib/udev/rules.d")
-_RULE = "60-naze-bridge.rules"
+_BLUETOOTH = ("hciattach", "btattach")
 
 
 def fc_remedy(port: str, source: str) -> str:
@@ -119,7 +118,7 @@ def check_console(host: Host, fc: FcAddress) -> Checked | None:
     return problem("console", f"a login console has {device}: {'; '.join(found)}", "; then ".join(remedies), fix)
 
 
-def check_holder(host: Host, fc: FcAddress) -> Checked | None:
+def check_holder(host: Host, fc: FcAddress, source: str = "") -> Checked | None:
     device = _device(host, fc)
     if device is None:
         return None
@@ -130,29 +129,17 @@ def check_holder(host: Host, fc: FcAddress) -> Checked | None:
         return None  # reported by the console's check
     if holder.is_naze_bridge:
         return ok("other programs", f"the daemon has {device} open, pid {holder.pid}")
-    return problem("other programs", f"{holder} has {device} open", f"stop it: sudo kill {holder.pid}")
+    found = f"{holder} has {device} open"
+    if holder.name in _BLUETOOTH and (header := host.resolve("/dev/serial0")) != device and host.is_tty(header):
+        remedy = f"this UART is Bluetooth's, the header has another: {fc_remedy('/dev/serial0', source)}"
+        return problem("other programs", found, remedy, fc_fix(source))
+    return problem("other programs", found, f"stop it: {host.stop_command(holder)}")
 
 
 def holder_of_port(host: Host, fc: FcAddress) -> Process | None:
     """The program that has the port open, as far as permissions show it."""
     device = _device(host, fc)
     return None if device is None else host.holder(str(device))
-
-
-def check_modem_manager(host: Host, fc: FcAddress) -> Checked:
-    """Check that ModemManager does not probe the port for modems."""
-    if not any(process.name == "ModemManager" for process in host.processes()):
-        return ok("ModemManager", "does not run")
-    device = _device(host, fc)
-    if device is None or not device.name.startswith(("ttyUSB", "ttyACM")):
-        return ok("ModemManager", "runs, but probes USB only")
-    if any(host.path(f"{folder}/{_RULE}").exists() for folder in _RULES):
-        return ok("ModemManager", f"runs, but ignores it because of {_RULE}")
-    remedy = (
-        f"install the package's udev rule ({page('docs/install.md')}), or: sudo systemctl disable --now ModemManager"
-    )
-    found = f"runs, and sends modem commands to {device} when it is plugged in"
-    return note("ModemManager", found, remedy, STOP_MODEM_MANAGER)
 
 
 def _device(host: Host, fc: FcAddress) -> Path | None:

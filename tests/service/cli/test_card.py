@@ -144,10 +144,6 @@ def test_the_folder_has_the_package_the_answers_and_valid_scripts(card: Card, mo
             lambda card: packed(card.boot.parent, architecture="armhf"),
             "is for armhf; this card needs the one for arm64",
         ),
-        (
-            lambda card: packed(card.boot.parent, version="0.1.0", architecture="arm64"),
-            "has version 0.1.0; this program",
-        ),
         (lambda card: packed(card.boot.parent, name="other", version="99.0"), "is the package of other"),
         (lambda card: (card.boot / "user-data").unlink(), "Raspberry Pi Imager"),
         (lambda card: (card.boot / "user-data").write_text("x: 1\n"), "is not cloud-init's"),

@@ -17,6 +17,14 @@ def test_status_shows_the_flight_controller_and_the_address(daemon: Daemon) -> N
     assert lines["Connect to"].strip() == f"UDP 127.0.0.1, port {daemon.port}"
 
 
+def test_a_page_that_cannot_be_opened_is_said_to_be(daemon: Daemon) -> None:
+    facts = daemon.status()
+    assert facts is not None
+    taken = facts | {"page": "0.0.0.0:8080", "page_trouble": "Address already in use"}
+    assert dict(status_lines(taken, []))["Page"].startswith("0.0.0.0:8080 cannot be opened: Address already in use")
+    assert dict(status_lines(taken | {"page_trouble": ""}, ["10.0.0.7"]))["Page"] == "http://10.0.0.7:8080/"
+
+
 @pytest.mark.parametrize(("age_s", "said"), [(None, ""), (1.2, ""), (75.0, ", 1 min ago")])
 def test_values_that_no_longer_arrive_are_shown_with_their_age(daemon: Daemon, age_s: float | None, said: str) -> None:
     facts = daemon.status()

@@ -21,6 +21,7 @@ SETTINGS_THAT_END_IT = {
         "not a regular file",
     ),
     "no endpoint": ('connect = ["tcp/"]', None, "zenoh.connect"),
+    "no port": ('connect = ["tcp/192.168.4.1"]', None, "'tcp/192.168.4.1', which is not an endpoint: write one like"),
     "commands, no login": ('listen = ["tcp/127.0.0.1:1"]\ncommands = true', None, "sessions accepted at tcp/"),
     "mavlink_in, no login": ('connect = ["tcp/127.0.0.1:1"]\nmavlink_in = true', None, "zenoh.mavlink_in is on"),
     "TLS without client certificates": (

@@ -52,6 +52,8 @@ async def test_prometheus_reads_the_counters_of_a_daemon(tmp_path: Path) -> None
 
     # A single home point is requested and rejected; 147 items are refused at their count.
     assert await asyncio.to_thread(write) == [MissionResult.ACCEPTED, MissionResult.INVALID, MissionResult.NO_SPACE]
+    states = [line.rpartition(" ")[0] for line in metrics.render().decode().splitlines() if "fc_state{" in line]
+    assert len({*states}) == len(states)
     after = read(metrics)
     assert after["fc_state", ("MSP",)] == 1
     assert after["missions_total", ("ACCEPTED",)] == 1

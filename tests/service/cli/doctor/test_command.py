@@ -32,7 +32,7 @@ def test_a_running_daemon_is_asked_and_not_disturbed(start: Starter) -> None:
     assert found["daemon"]["found"] == "running"
     assert asked["flight_controller"] in found["flight controller"]["found"]
     assert found["missions"]["grade"] == "ok"
-    assert found["port for ground stations"]["found"].startswith(f"UDP port {bench.daemon.port} is ")
+    assert found["listening port"]["found"].startswith(f"UDP port {bench.daemon.port} is ")
     assert bench.daemon.has_logged("fc.lost") is None
     assert bench.daemon.has_logged("fc.port_lost") is None
 

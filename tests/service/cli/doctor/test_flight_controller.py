@@ -8,6 +8,7 @@ from bridge.fc.states.mute import Cli
 from payloads.mission_data import Json
 from service.cli.doctor.flight_controller import check_flight_controller, check_running
 from service.daemon.client import ControlError
+from service.settings.addresses import parse_fc
 from tests.support.doctor import STATUS, assert_note, assert_ok, assert_problem, no_answer
 from tests.support.faulty_machine import PORT
 
@@ -61,6 +62,16 @@ def test_stations_without_the_key() -> None:
     (found,) = check_running(STATUS | {"refused": refused})
     assert_note(found, "7 requests on udpin:0.0.0.0:14550 were refused: not signed")
     assert "setup --new-key" in found.remedy
+
+
+def test_a_board_behind_a_network_is_not_asked_about_wires() -> None:
+    silent = STATUS | {"flight_controller": None, "state": "searching", "fc_bytes_received": 0}
+    for fc in ("tcp:10.0.0.7:5760", "udp:10.0.0.7:14550"):
+        (found,) = check_flight_controller(parse_fc(fc), None, lambda: silent)
+        assert "ping 10.0.0.7" in found.remedy
+        assert "TX" not in found.remedy
+    (refused,) = check_flight_controller(parse_fc("tcp:10.0.0.7:5760"), None, no_answer)
+    assert "TX" not in refused.remedy
 
 
 def test_a_store_that_cannot_write() -> None:

@@ -3,11 +3,15 @@
 
 import os
 
+from service.cli.doctor.checked import Checked
 from service.cli.doctor.network import check_keys, check_ports, check_wifi
+from service.settings import Settings
 from service.settings.addresses import parse_gcs
+from service.settings.settings import ShareSettings
+from service.settings.web import ListenAddress, WebSettings
 from service.settings.write_access import WriteAccess
 from tests.support.doctor import GCS, assert_note, assert_ok, assert_problem
-from tests.support.faulty_machine import FaultyMachine
+from tests.support.faulty_machine import PORT, FaultyMachine
 
 UDP_14550 = "   1: 00000000:38D6 00000000:0000 07 00000000:00000000 00:00000000 00000000  1000        0 4711 2 0 0\n"
 
@@ -27,26 +31,65 @@ def test_a_wifi_without_address_or_switched_off_is_reported(pi: FaultyMachine) -
     assert_note(check_wifi(pi, GCS), "no Wi-Fi card")
 
 
+def ports(
+    pi: FaultyMachine, link: str = "udpin:0.0.0.0:14550", rules: str = "", *, is_running: bool = False
+) -> list[Checked]:
+    settings = Settings(PORT, [parse_gcs(link)])
+    return list(check_ports(pi, settings, is_running=is_running, ask=lambda *_: rules))
+
+
 def test_an_occupied_network_port_is_a_problem(pi: FaultyMachine) -> None:
     pi.sockets(udp=UDP_14550)
-    assert_problem(
-        check_ports(pi, GCS), "UDP port 14550 is used by ", "restart the Pi" if os.geteuid() == 0 else "with sudo"
-    )
-    pi.runs(55, "/usr/bin/python3", "/usr/local/bin/mavproxy.py", has_open="socket:[4711]")
-    assert_problem(check_ports(pi, GCS), "python3 (pid 55)", "stop it")
+    remedy = "restart the Pi" if os.geteuid() == 0 else "with sudo"
+    assert_problem(ports(pi), "UDP port 14550 is used by ", remedy)
+    pi.runs(55, "/usr/bin/python3", "-u", "/usr/local/bin/mavproxy.py", has_open="socket:[4711]")
+    assert_problem(ports(pi), "mavproxy.py (pid 55)", "sudo kill 55")
 
 
 def test_a_network_port_used_by_our_daemon_is_fine(pi: FaultyMachine) -> None:
     pi.sockets(udp=UDP_14550)
     pi.runs(55, "/usr/lib/naze-bridge/bin/python3", "-I", "/usr/bin/naze-bridge", "run", has_open="socket:[4711]")
-    assert_ok(check_ports(pi, GCS), "the running daemon's")
+    assert_ok(ports(pi, is_running=True), "the running daemon's")
+
+
+def test_a_running_daemon_without_its_port_is_a_problem(pi: FaultyMachine) -> None:
+    assert_ok(ports(pi), "UDP port 14550 is free")
+    assert_problem(ports(pi, is_running=True), "does not listen on UDP port 14550", "systemctl restart naze-bridge")
+
+
+def test_the_ports_of_the_page_and_of_shares_are_checked(pi: FaultyMachine) -> None:
+    share = ShareSettings(parse_gcs("tcpin:127.0.0.1:5761"))
+    settings = Settings(PORT, GCS, share=[share], web=WebSettings(ListenAddress("0.0.0.0", 8080)))  # noqa: S104
+    found = check_ports(pi, settings, is_running=True, ask=lambda *_: "")
+    assert [each.found.rpartition("on ")[2] for each in found] == ["UDP port 14550", "TCP port 5761", "TCP port 8080"]
 
 
 def test_an_outgoing_connection_does_not_occupy_its_port(pi: FaultyMachine) -> None:
     pi.sockets(tcp=TCP_14550)
-    assert_ok(check_ports(pi, [parse_gcs("tcpin:0.0.0.0:14550")]), "TCP port 14550 is free")
+    assert_ok(ports(pi, "tcpin:0.0.0.0:14550"), "TCP port 14550 is free")
     pi.sockets(tcp=TCP_14550.replace(" 01 ", " 0A "))
-    assert_problem(check_ports(pi, [parse_gcs("tcpin:0.0.0.0:14550")]), "TCP port 14550 is used", "")
+    assert_problem(ports(pi, "tcpin:0.0.0.0:14550"), "TCP port 14550 is used", "")
+
+
+_CLOSED = """table inet filter {
+	chain input {
+		type filter hook input priority filter; policy drop;
+		tcp dport { 22, 8080 } accept
+		udp dport 5000-6000 accept
+	}
+}
+"""
+
+
+def test_a_firewall_that_drops_what_no_rule_accepts(pi: FaultyMachine) -> None:
+    _, found = ports(pi, rules=_CLOSED)
+    assert_note(found, "the firewall (nftables) drops packets to UDP port 14550")
+    assert found.remedy.startswith("sudo nft insert rule inet filter input udp dport 14550 accept")
+    _, found = ports(pi, rules=_CLOSED.replace("inet filter", "ip ufw"))
+    assert found.remedy == "sudo ufw allow 14550/udp"
+    for open_rules in ("", _CLOSED.replace("policy drop", "policy accept"), _CLOSED.replace("5000-6000", "14550")):
+        assert_ok(ports(pi, rules=open_rules), "free")
+    assert len(ports(pi, "tcpin:0.0.0.0:8080", rules=_CLOSED)) == 1
 
 
 def test_a_link_open_to_everyone_is_reported() -> None:

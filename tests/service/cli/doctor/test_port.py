@@ -7,10 +7,10 @@ import pytest
 
 from service.cli.doctor.checked import Checked
 from service.cli.doctor.examination import examine
-from service.cli.doctor.port import check_console, check_holder, check_modem_manager, check_permission, check_port
+from service.cli.doctor.port import check_console, check_holder, check_permission, check_port
 from service.settings import Settings
 from service.settings.addresses import AutoFc, SerialFc
-from tests.support.doctor import GCS, STATUS, assert_note, assert_ok, assert_problem, no_answer
+from tests.support.doctor import GCS, STATUS, assert_ok, assert_problem, no_answer
 from tests.support.faulty_machine import PORT, FaultyMachine
 
 
@@ -127,14 +127,3 @@ def test_a_daemon_on_the_port_is_fine_and_left_alone(pi: FaultyMachine, tmp_path
 
     found = list(examine(pi, Settings(PORT, GCS, tmp_path), no_answer, never))
     assert [each.found for each in found if each.check == "flight controller"] == ["/dev/serial0 was not checked"]
-
-
-def test_modem_manager_is_a_note_unless_it_ignores_the_port(pi: FaultyMachine) -> None:
-    usb = SerialFc("/dev/ttyUSB0", None)
-    pi.write("/dev/ttyUSB0")
-    assert_ok(check_modem_manager(pi, usb), "does not run")
-    pi.runs(77, "/usr/sbin/ModemManager")
-    assert_note(check_modem_manager(pi, usb), "sends modem commands to /dev/ttyUSB0")
-    assert_ok(check_modem_manager(pi, PORT), "probes USB only")
-    pi.write("/usr/lib/udev/rules.d/60-naze-bridge.rules")
-    assert_ok(check_modem_manager(pi, usb), "ignores it because of 60-naze-bridge.rules")
