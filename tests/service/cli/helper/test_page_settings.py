@@ -72,13 +72,14 @@ def test_files_addresses_and_rights_are_not_settings_of_the_page(pi: FixablePi, 
     assert not pi.path(_PAGE).exists()
 
 
-def test_settings_that_cannot_be_used_together_leave_the_file(pi: FixablePi, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_settings_that_cannot_be_used_leave_the_file(pi: FixablePi, monkeypatch: pytest.MonkeyPatch) -> None:
     pi.ask("settings", values={"sysid": 7})
     before = pi.read(_PAGE)
     pi.ran.clear()
     monkeypatch.setattr(page_settings, "WriteFile", lambda *_: pytest.fail("it was written before it was tested"))
-    with pytest.raises(SettingsError, match="tlog_total_mb is 3"):
-        pi.ask("settings", values={"tlog_total_mb": 3})
+    pi.write(str(SERVICE_CONFIG), 'key_file = "nowhere"\n')
+    with pytest.raises(SettingsError, match="nowhere cannot be read"):
+        pi.ask("settings", values={"sysid": 8})
     assert pi.read(_PAGE) == before
     assert pi.ran == []
 
