@@ -127,6 +127,17 @@ def test_a_board_without_geozones_refuses_a_fence(kind: str, version: str) -> No
     assert "Fences and rally points are not stored here" in " ".join(station.texts())
 
 
+@pytest.mark.parametrize(
+    ("version", "text"),
+    [("7.1.2", "There is no fence"), ("9.1.0", "Geozones are switched in INAV's own settings")],
+)
+def test_a_fence_button_is_refused_by_what_the_board_has(version: str, text: str) -> None:
+    _, world, station = board_with("inav", version=version)
+    station.send(messages.MAVLink_command_long_message(1, 1, messages.MAV_CMD_DO_FENCE_ENABLE, 0, 1, *[0] * 6))
+    world.run(1)
+    assert station.texts()[-1] == text
+
+
 def test_an_armed_craft_is_read_but_not_changed() -> None:
     board, world, station = board_with()
     assert Upload(station, RALLY_ITEMS, mission_type=RALLY).run() is ACCEPTED
