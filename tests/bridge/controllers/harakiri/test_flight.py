@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What Harakiri's flight core refuses in the air is said at Write: the compiled core itself confirms each verdict."""
 
+import os
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.controllers.harakiri.flight import LEAST_M, MAX_LEG_M, TAKEOFF_MOST_M, USUAL_FLIGHT, FlightLimits
 from bridge.missions.list_check import check_list
+from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
 from reports.finding import News
 from reports.verdict import Result
@@ -143,3 +145,22 @@ def test_the_constants_are_those_of_the_firmware() -> None:
         usual = re.search(rf"set_default\(&cfg\.{name}, \d+, \d+, (\d+)\)", defaults)
         assert usual is not None
         assert int(usual[1]) == getattr(USUAL_FLIGHT, name)
+
+
+@pytest.mark.skipif("MISSIONS" not in os.environ, reason="NOT RUN: needs MISSIONS=folder/of/other/people's/files")
+def test_the_core_refuses_no_public_mission_without_a_word(flight_core: FlightCore) -> None:
+    for path in sorted(Path(os.environ["MISSIONS"]).iterdir()):
+        try:
+            items = read_mission_file(path.read_bytes(), path.name)
+        except MissionFileError:
+            continue
+        firsts = [(each.lat_e7, each.lon_e7 + 9_000) for each in items[1:2] if each.lat_e7 and each.lon_e7]
+        for here in (None, *firsts):
+            verdict = check_list(items, HarakiriRules(), here)
+            if verdict.result is Result.ACCEPTED:
+                told = any(
+                    finding.why.startswith(("not flown", "starts only", "flown only")) for finding in verdict.findings
+                )
+                place = here or (verdict.records[0].lat_e7, verdict.records[0].lon_e7)
+                refused = flight_core.refusal(verdict.records, place, USUAL_FLIGHT)
+                assert (refused is not None) == told, (path.name, refused)
