@@ -23,8 +23,6 @@ MOVED_S = 5.0
 _UNPROVEN_S = 5.0
 #: Stations with a copy of the telemetry.
 MAX_STATIONS = 32
-#: A connected station, whether or not it transfers a mission, is never silent for this long.
-_STILL_S = 1.0
 #: The interval between searches for silent stations.
 _EXPIRY_INTERVAL_S = 1.0
 
@@ -247,36 +245,11 @@ class Ground:
             self.remove_default_peer(RECORDER)
         self.outbox.recorder = self.station(RECORDER)
 
-    # Wi-Fi roaming.
-
-    def moved_to(self, sender: Sender, now: float) -> list[Sender]:
-        """The new addresses of a sender that fell silent at its old one: usually none."""
-        if now < sender.station.heard_at + _STILL_S:
-            return []
-        return [where for where in self.elsewhere(sender) if self.has_moved(sender, where, now)]
-
     def elsewhere(self, sender: Sender) -> list[Sender]:
         """The senders with these ids at other addresses."""
         ids = sender.sysid, sender.compid
         everywhere = (*self._heard.values(), *self._unproven.values())
         return [there.senders[ids] for there in everywhere if ids in there.senders and there is not sender.station]
-
-    @staticmethod
-    def has_moved(sender: Sender, to: Sender, now: float) -> bool:
-        """True if `to` is the new address of a sender that fell silent at its old one.
-
-        This excludes a second station with the same ids, heard earlier or alongside the first.
-        """
-        old, new = sender.station, to.station
-        return (
-            (sender.sysid, sender.compid) == (to.sysid, to.compid)
-            and old is not new
-            and not (old.has_left or new.has_left)
-            and now >= old.heard_at + _STILL_S
-            and new.peer.link == old.peer.link
-            and new.is_listener == old.is_listener
-            and new.came_at >= old.heard_at
-        )
 
     # Messages to all stations.
 

@@ -352,10 +352,10 @@ class GroundStation:
 
         `is_routine`: the program itself has made the request that was refused, and no pilot waits for the reason.
         """
-        if self.has_left or not self.allows(Cost.TEXT):
-            return
         is_refusal = happening.sentence.severity is Severity.ERROR
         if is_refusal and self.bad_news.is_repeated(happening, self.heard_at, is_routine=is_routine):
+            return
+        if self.has_left or not self.allows(Cost.TEXT):
             return
         self.outbox.show(happening, [self])
         if is_refusal or happening.sentence.lasts:

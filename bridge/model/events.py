@@ -182,15 +182,6 @@ class UploadRefused(BridgeEvent):
     incident: str
 
 
-class StationMoved(BridgeEvent):
-    """An upload continues from another address."""
-
-    name_in_log = "mission.station_moved"
-    before: str
-    after: str
-    incident: str
-
-
 class PushStarted(BridgeEvent):
     """A list from the command line, the page or zenoh is to be written."""
 

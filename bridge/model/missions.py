@@ -86,7 +86,7 @@ class FinalAck:
 
     ack: MissionResult
     count: int
-    until: float
+    sent_at: float
     cancelled_until: float
     #: When to send the ack again.
     again: Sequence[float] = ()

@@ -9,6 +9,8 @@ from bridge.gcs.ground_station import Sender
 from bridge.missions.mission_service import HeldMission, MissionService
 from bridge.model.craft import Home
 from bridge.model.missions import Download, Refusal, TransferMemory
+from bridge.voice import sentences
+from bridge.voice.stations import Kind
 from protocols.mavlink.codec import item_message
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
@@ -85,18 +87,27 @@ class MissionDownloads:
         questions, self._questions = self._questions, {}
         for question in questions:
             if isinstance(held, Refusal):
-                # Mission Planner requests item 0 on arming, which may have just changed the protocol.
-                if not self._has_home:
-                    question.sender.refuse(held, self._missions.mission_type)
-                elif question.seq == 0 and (self._vehicle.armed or self._vehicle.home_or_position() is not None):
-                    self._send_home(question, now)
-                elif question.seq != 0 or self._vehicle.armed is not None:
-                    question.sender.refuse(held)
-                # Otherwise the craft may be armed: Mission Planner repeats the request until that is known.
+                self._answer_unread(question, held, now)
                 continue
             download = Download(held.items, now + _READING_S, self._missions.fc_store)
             self._memory(question.sender).download = download
             self._answer(question, held.items, now)
+
+    def _answer_unread(self, question: _Question, why: Refusal, now: float) -> None:
+        sender, vehicle = question.sender, self._vehicle
+        if not self._has_home:
+            sender.refuse(why, self._missions.mission_type)
+        elif question.seq == 0 and (vehicle.armed or vehicle.home_or_position() is not None):
+            # Mission Planner requests item 0 on arming, which may have just changed the protocol.
+            self._send_home(question, now)
+        elif question.seq is None and (vehicle.armed or isinstance(self._missions.fc_store, Refusal)):
+            # QGroundControl reads at each connection: a refusal would be a dialog. Mission Planner has a button for it.
+            is_button = sender.station.behaviour.kind is Kind.MISSION_PLANNER
+            sender.say(why.why if is_button else sentences.NO_LIST(why.text))
+            self._answer(question, (), now)
+        elif question.seq != 0 or vehicle.armed is not None:
+            sender.refuse(why)
+        # Otherwise the craft may be armed: Mission Planner repeats the request until that is known.
 
     def _answer(self, question: _Question, items: tuple[MissionItem, ...], now: float) -> None:
         sender = question.sender

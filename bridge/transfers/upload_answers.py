@@ -10,14 +10,19 @@ from bridge.missions.mission_service import DeliveryResult
 from bridge.model.missions import FinalAck, Refusal, TransferMemory
 from bridge.voice import sentences
 from bridge.voice.mission_report import finding_lines
+from bridge.voice.stations import Kind
 from protocols.mission_item import MissionResult
 from reports.verdict import Result, Verdict
 
 #: Mission Planner sends its last item for 5 s, its Cancel for 2.8 s.
 _MEMORY_S = 10.0
 _CANCEL_S = 3.0
-#: QGroundControl waits 1.5 s for the final ack, and MAVSDK 2.5 s; neither asks for it again. So it is sent three times.
-_ACK_AGAIN_S = (0.4, 0.9)
+#: These never ask for the final ack again, so it is sent four times. Not later: QGroundControl's user takes 0.1 s to
+#: begin the next transfer, whose end a stale ack would be.
+_NEVER_ASK = Kind.QGROUNDCONTROL, Kind.MAVSDK
+_ACK_AGAIN_S = (0.02, 0.04, 0.06)
+#: An item that arrives sooner after the final ack was sent before it, and does not show that it was lost.
+_CROSSING_S = 0.4
 _NOT_WHOLE = Refusal(MissionResult.UNSUPPORTED, sentences.NOT_WHOLE())
 _UNKNOWN_UPLOAD = Refusal(MissionResult.OPERATION_CANCELLED, sentences.UNKNOWN_UPLOAD())
 
@@ -54,8 +59,8 @@ class UploadAnswers:
         clear the mission. `is_repeated`: send it again until the station sends another mission message.
         """
         cancel_s = _CANCEL_S if count and (is_cancelled or ack is not MissionResult.ACCEPTED) else 0.0
-        answer = FinalAck(ack, count, now + _MEMORY_S, now + cancel_s)
-        if is_repeated and count:
+        answer = FinalAck(ack, count, now, now + cancel_s)
+        if is_repeated and count and sender.station.behaviour.kind in _NEVER_ASK:
             answer.again = [now + later_s for later_s in _ACK_AGAIN_S]
             self._again.append((sender, answer))
             self.due = min(self.due, answer.again[0])
@@ -104,7 +109,7 @@ class UploadAnswers:
 
     def repeat_cancelled(self, sender: Sender, now: float) -> bool:
         """Answer a Cancel again if the first answer was lost: it must not clear the mission on the craft."""
-        answer = self._to(sender, now)
+        answer = self._last(sender, now)
         if answer is None or now >= answer.cancelled_until:
             return False
         sender.mission_ack(answer.ack, self._mission_type)
@@ -115,17 +120,18 @@ class UploadAnswers:
 
         A ground station whose address has just changed gets no answer.
         """
-        answer = self._to(sender, now)
+        answer = self._last(sender, now)
         if answer is not None:
-            if answer.is_refusal or seq == answer.count - 1:
+            has_missed_it = seq == answer.count - 1 and now >= answer.sent_at + _CROSSING_S
+            if answer.is_refusal or has_missed_it:
                 sender.mission_ack(answer.ack, self._mission_type)
-        elif is_lost and not any(self.last_at(where, now) for where in self._ground.elsewhere(sender)):
+        elif is_lost and not any(self._last(where, now) for where in self._ground.elsewhere(sender)):
             sender.say(_UNKNOWN_UPLOAD.why)
             self.end(sender, _UNKNOWN_UPLOAD.ack, 0, now)
 
     def partial_list(self, sender: Sender, now: float) -> None:
         """MISSION_WRITE_PARTIAL_LIST: Mission Planner's answer to a refusal that it did not understand."""
-        answer = self._to(sender, now)
+        answer = self._last(sender, now)
         if answer is not None and answer.is_refusal:
             sender.mission_ack(answer.ack, self._mission_type)
         else:
@@ -139,12 +145,7 @@ class UploadAnswers:
     def _memory(self, sender: Sender) -> TransferMemory:
         return sender.transfers[self._mission_type]
 
-    def last_at(self, sender: Sender, now: float) -> FinalAck | None:
-        """The last answer to a ground station at its present address."""
+    def _last(self, sender: Sender, now: float) -> FinalAck | None:
+        """The last answer to a ground station, if it is recent."""
         answer = self._memory(sender).final_ack
-        return answer if answer is not None and now <= answer.until else None
-
-    def _to(self, sender: Sender, now: float) -> FinalAck | None:
-        """The last answer to a ground station, at its current or previous address."""
-        before = (at for at in self._ground.elsewhere(sender) if self._ground.has_moved(at, sender, now))
-        return next((answer for at in (sender, *before) if (answer := self.last_at(at, now)) is not None), None)
+        return answer if answer is not None and now <= answer.sent_at + _MEMORY_S else None

@@ -233,6 +233,8 @@ class Upload:
     number: int = 0
     #: Its sender has ended it itself, with a MISSION_ACK: only Mission Planner's "Write Fast" does, and sends home.
     is_write_fast: bool = False
+    #: The list is the board's own without some items.
+    is_part: bool = False
 
     def __post_init__(self) -> None:
         self.state: UploadState = Waiting(self, Event(), self.heard_at)
@@ -277,13 +279,6 @@ class UploadQueue:
         self.uploads: list[Upload] = []
         #: When lists began to arrive without a pause, and when the last upload ended.
         self._arriving_since = self._last_end = -inf
-
-    def of(self, sender: Sender) -> Upload | None:
-        """The newest upload of a ground station: one may wait behind another that is being written."""
-        for upload in reversed(self.uploads):
-            if upload.sender == sender:
-                return upload
-        return None
 
     def within(self, *states: type[UploadState]) -> list[Upload]:
         return [upload for upload in self.uploads if isinstance(upload.state, states)]

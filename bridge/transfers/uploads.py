@@ -6,7 +6,8 @@ they are received in parallel and written one at a time. Mission Planner loses s
 MISSION_COUNT as "continue"; most special cases below respond to a behaviour listed in docs/ground-stations.md.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from math import inf
 from typing import Any
@@ -19,7 +20,7 @@ from bridge.line.conversation import Conversation
 from bridge.missions.fc_mission_store import StoreReport
 from bridge.missions.list_check import begin_check, check_count
 from bridge.missions.mission_service import OCCUPIED, DeliveryResult, MissionService, MissionTransfer, TransferStep
-from bridge.model.events import Emit, StationMoved, UploadEnded, UploadRefused, UploadStarted
+from bridge.model.events import Emit, UploadEnded, UploadRefused, UploadStarted
 from bridge.model.missions import ArrivedMission, Refusal
 from bridge.transfers.arriving_list import Reply, WholeList
 from bridge.transfers.upload_answers import UploadAnswers
@@ -48,11 +49,13 @@ from bridge.transfers.upload_states import (
 from bridge.voice import sentences
 from bridge.voice.happening import Happening
 from bridge.voice.mission_report import with_meant_home
+from bridge.voice.stations import Kind
 from protocols.mavlink.dialect import messages
-from protocols.mission_item import MissionItem, MissionResult
+from protocols.mission_item import Command, MissionItem, MissionResult
 from reports.finding import Finding
 from reports.verdict import CLEARED_LIST, Result, Verdict
 
+_EMPTY_PLAN = Refusal(MissionResult.DENIED, sentences.EMPTY_PLAN())
 _TOO_MANY_UPLOADS = Refusal(MissionResult.DENIED, sentences.TOO_MANY_UPLOADS())
 #: The maximum number of simultaneous uploads.
 _MOST_UPLOADS = 256
@@ -90,7 +93,7 @@ class MissionUploads:
 
     def is_writing(self, sender: Sender) -> bool:
         """True if an upload of this ground station runs or waits."""
-        return self._queue.of(sender) is not None
+        return self._of(sender) is not None
 
     # From ground stations.
 
@@ -98,10 +101,16 @@ class MissionUploads:
         """MISSION_COUNT: an upload is announced, or cancelled with a count of 0."""
         if sender.is_late:
             return
-        upload = self._find(sender, now)
+        upload = self._of(sender)
         if upload is None:
-            if count or not self.answers.repeat_cancelled(sender, now):
-                self._begin(sender, count, now)
+            if not count and self.answers.repeat_cancelled(sender, now):
+                return
+            is_qgc = sender.station.behaviour.kind is Kind.QGROUNDCONTROL
+            if not count and is_qgc and self.answers.are_only_missions_stored and self._missions.on_board:
+                # It erases a mission by MISSION_CLEAR_ALL, and writes a plan that has only a fence as an empty mission.
+                sender.refuse(_EMPTY_PLAN)
+                return
+            self._begin(sender, count, now)
             return
         upload.heard_at, state = now, upload.state
         if not count:
@@ -113,11 +122,11 @@ class MissionUploads:
             self._handle(upload, _AGAIN, now)
             self._begin(sender, count, now)
         elif isinstance(state, Receiving):
-            self._request(upload, now, *state.repeats(now))
+            self._request(upload, *state.repeats(now))
 
     def clear_all(self, sender: Sender, mission_type: int, now: float) -> None:
         """MISSION_CLEAR_ALL. `mission_type`: of the answer, MISSION or ALL."""
-        upload = self._find(sender, now)
+        upload = self._of(sender)
         if upload is not None:
             if not upload.count and not isinstance(upload.state, DeliveringUnanswered):
                 return
@@ -125,7 +134,7 @@ class MissionUploads:
         self._begin(sender, 0, now, mission_type)
 
     def item(self, sender: Sender, item: MissionItem, now: float) -> None:
-        upload = self._find(sender, now)
+        upload = self._of(sender)
         if upload is None:
             self.answers.late_item(sender, item.seq, now, is_lost=not self._queue.uploads)
             return
@@ -142,7 +151,7 @@ class MissionUploads:
         else:
             taken = state.list.take(item, sender, now)
             if isinstance(taken, int):
-                self._request(upload, now, taken)
+                self._request(upload, taken)
             elif taken is Reply.START_AGAIN:
                 self._handle(upload, _AGAIN, now)
                 self._begin(sender, upload.count, now)
@@ -153,7 +162,7 @@ class MissionUploads:
 
     def ack(self, sender: Sender, result: int, now: float) -> None:
         """MISSION_ACK from a ground station: an error cancels its upload, ACCEPTED ends "Write Fast"."""
-        upload = self._find(sender, now)
+        upload = self._of(sender)
         if upload is None:
             return
         upload.is_write_fast |= result == MissionResult.ACCEPTED
@@ -191,7 +200,7 @@ class MissionUploads:
             if now >= state.deadline:
                 self._handle(upload, Ended(state.timeout), now)
             elif now >= state.due:
-                self._request(upload, now, *state.repeats(now))
+                self._request(upload, *state.repeats(now))
         self.answers.tick(now)
         for upload in self._queue.within(Waiting, Complete):
             event = self._turn(upload, now)
@@ -255,6 +264,8 @@ class MissionUploads:
             self._missions.release(upload)
         match event:
             case Turn() if isinstance(before, Complete):
+                held = self._missions.held
+                upload.is_part = held is not None and _is_part(before.whole.verdict.items, held.items)
                 delivered = partial(self._delivered, upload, before.whole.verdict)
                 self._missions.run(self._delivery(upload, before.whole), delivered, now)
             case Turn():
@@ -264,7 +275,7 @@ class MissionUploads:
                     self._missions.run(self._missions.preflight(), self._asked, now)
             case Ready():
                 self._emit(UploadStarted(station=str(upload.sender), count=upload.count, incident=upload.incident))
-                self._request(upload, now, 0)
+                self._request(upload, 0)
             case Cancelled() if after is Fixed.END:
                 self._refuse(upload, _cancelled(sentences.CANCELLED()), now)
             case Replaced(why) if after is Fixed.END:
@@ -285,21 +296,15 @@ class MissionUploads:
                 event = Ready(begin_check(upload.count, answer.rules, self._missions.vehicle.place()))
             self._handle(upload, event, now)
 
-    def _request(self, upload: Upload, now: float, *seqs: int) -> None:
+    def _request(self, upload: Upload, *seqs: int) -> None:
         """Request items in one datagram."""
-        state, receivers = upload.state, [upload.sender]
+        state, to = upload.state, upload.sender
         if isinstance(state, Receiving):
-            request = state.list.request
-            self.due = min(self.due, request.due)
-            # Without items, a station at another address may have started again: it would take this request for its own
-            # list's, whose MISSION_COUNT it repeats until it has one.
-            if request.is_repeated and state.list.items:
-                receivers += self._elsewhere(upload, now)
-        for to in receivers:
-            # By id 40: the only one that Mission Planner understands in both modes.
-            ids, kind = (to.sysid, to.compid), self._missions.mission_type
-            make = partial(messages.MAVLink_mission_request_message, *ids, mission_type=kind)
-            to.to(*map(make, seqs))
+            self.due = min(self.due, state.list.request.due)
+        # By id 40: the only one that Mission Planner understands in both modes.
+        ids, kind = (to.sysid, to.compid), self._missions.mission_type
+        make = partial(messages.MAVLink_mission_request_message, *ids, mission_type=kind)
+        to.to(*map(make, seqs))
 
     def _delivery(self, upload: Upload, whole: WholeList) -> Conversation[DeliveryResult]:
         """Store the list and write it; a rejected one is only stored, unless its sender sent too many of them."""
@@ -317,6 +322,8 @@ class MissionUploads:
         if verdict.result is not Result.REJECTED and accepted and not delivery.change:
             upload.sender.station.give_back(Cost.FLASH)
         shown = with_meant_home(verdict) if upload.is_write_fast else verdict
+        if accepted and upload.is_part:
+            upload.sender.say(sentences.PART_OF_LAST())
         self.answers.report(upload.sender, shown, delivery)
         if upload in self._queue.uploads:
             self._answer(upload, delivery.ack, now)
@@ -343,48 +350,31 @@ class MissionUploads:
         self._answer(upload, refusal.ack, now)
         self._emit_refusal(upload, refusal)
 
-    # Ground stations.
-
-    def _find(self, sender: Sender, now: float) -> Upload | None:
-        """The newest upload of a ground station; it continues if its address has changed (Wi-Fi roaming).
-
-        Not if it was answered at this address: then it has announced another list, and lists must never be mixed.
-        """
+    def _of(self, sender: Sender) -> Upload | None:
+        """The newest upload of a ground station: one may wait behind another that is being written."""
         for upload in reversed(self._queue.uploads):
             if upload.sender == sender:
                 return upload
-        found = None
-        if self.answers.last_at(sender, now) is None:
-            for upload in self._queue.uploads:
-                if self._ground.has_moved(upload.sender, sender, now):
-                    before, after = str(upload.sender), str(sender)
-                    self._emit(StationMoved(before=before, after=after, incident=upload.incident))
-                    upload.sender, found = sender, upload
-                    if isinstance(upload.state, Receiving):
-                        upload.state.list.moved()
-        return found
-
-    def _elsewhere(self, upload: Upload, now: float) -> list[Sender]:
-        """Other addresses of the upload's station, except those that have announced their own list."""
-        return [
-            where
-            for where in self._ground.moved_to(upload.sender, now)
-            if self._queue.of(where) is None and self.answers.last_at(where, now) is None
-        ]
+        return None
 
     def _answer(self, upload: Upload, ack: MissionResult, now: float) -> None:
         state = upload.state
         if isinstance(state, DeliveringUnanswered):
             return
         is_cancelled, is_repeated = isinstance(state, DeliveringDespiteCancel), isinstance(state, Delivering)
-        for where in (upload.sender, *self._elsewhere(upload, now)):
-            self.answers.end(
-                where, ack, upload.count, now, upload.mission_type, is_cancelled=is_cancelled, is_repeated=is_repeated
-            )
+        to, count, kind = upload.sender, upload.count, upload.mission_type
+        self.answers.end(to, ack, count, now, kind, is_cancelled=is_cancelled, is_repeated=is_repeated)
 
     def _emit_refusal(self, upload: Upload, refusal: Refusal) -> None:
         name, ack = str(upload.sender), refusal.ack.name
         self._emit(UploadRefused(station=name, ack=ack, why=refusal.text, incident=upload.incident))
+
+
+def _is_part(items: Sequence[MissionItem], before: Sequence[MissionItem]) -> bool:
+    """True if a list is the one before without some items, as Resume Mission writes it, apart from a TAKEOFF."""
+    former = (replace(item, seq=0) for item in before[1:])
+    kept = [replace(item, seq=0) for item in items[1:] if item.command != Command.NAV_TAKEOFF]
+    return 0 < len(kept) < len(before) - 1 and all(item in former for item in kept)
 
 
 def _cancelled(why: Happening) -> Refusal:

@@ -87,44 +87,6 @@ def test_a_ground_station_keeps_the_vehicle_through_a_reset(bench: Bench) -> Non
 # -- ground stations that move -------------------------------------------------------------------------------
 
 
-def test_an_upload_continues_from_another_address(bench: Bench) -> None:
-    """The same ids at a new address, as after Wi-Fi roaming."""
-    with udp_station(bench.daemon.address) as there:
-        there.send_count(len(PLAN))
-        assert answer_requests(there, PLAN, until_seq=20) is None
-    with udp_station(bench.daemon.address) as here:
-        here.send_heartbeat()
-        here.wait_for("HEARTBEAT")
-        assert answer_requests(here, PLAN) is MissionResult.ACCEPTED
-        assert bench.board.records() == records_of(judge(PLAN))
-        assert bench.daemon.has_logged("mission.station_moved")
-        # The old address is dropped at once, not after a minute as for a silent station.
-
-        def is_alone() -> bool:
-            here.send_heartbeat()
-            return len(bench.daemon.ground_stations()) == 1
-
-        until(is_alone, "the end of the old address")
-
-
-def test_a_station_that_moves_during_the_write_gets_its_ack(bench: Bench) -> None:
-    with udp_station(bench.daemon.address) as there:
-        there.send_count(len(PLAN))
-        assert answer_requests(there, PLAN, until_seq=len(PLAN) - 1) is None
-        there.send_item(PLAN, len(PLAN) - 1)
-    with udp_station(bench.daemon.address) as here:
-        here.send_heartbeat()
-
-        def is_acked() -> bool:
-            """The station has seen no ack and repeats its last item."""
-            here.send_item(PLAN, len(PLAN) - 1)
-            here.wait_for("HEARTBEAT", "MISSION_ACK")
-            return any(message.get_type() == "MISSION_ACK" and not message.type for message in here.received)
-
-        until(is_acked, "the final ack")
-    assert bench.board.records() == records_of(judge(PLAN))
-
-
 # -- other kinds of links ------------------------------------------------------------------------------------
 
 

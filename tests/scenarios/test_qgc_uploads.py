@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""QGroundControl's uploads over lossy links, each compared with the same upload to an ideal vehicle."""
+"""QGroundControl's transfers over lossy links, each compared with the same transfer with an ideal vehicle."""
 
 import random
+from collections.abc import Sequence
 
 import pytest
 
-from protocols.mission_item import MissionResult
+from protocols.mission_item import MissionItem, MissionResult
 from tests.support.conversations import records_of, waypoints
-from tests.support.qgc_upload import FatedLink, QgcStation, QgcUpload, upload_to_ideal_vehicle
+from tests.support.qgc_upload import Begin, FatedLink, QgcDownload, QgcStation, QgcUpload, with_ideal_vehicle
 from tests.support.world import World, flash_holding
 
 OLD_RECORDS = records_of(waypoints(15, seed=777))
@@ -24,6 +25,10 @@ def qgroundcontrol(
     return world, QgcStation(world, link, "qgc"), link
 
 
+def uploads(items: Sequence[MissionItem]) -> Begin:
+    return lambda clock, send: QgcUpload(clock, send, items)
+
+
 @pytest.mark.parametrize("first_seed", range(0, 200, 20))
 @pytest.mark.parametrize("loss", [0.05, 0.1, 0.15])
 def test_no_upload_fails_that_an_ideal_vehicle_would_save(loss: float, first_seed: int) -> None:
@@ -38,7 +43,32 @@ def test_no_upload_fails_that_an_ideal_vehicle_would_save(loss: float, first_see
         else:
             failed.append(seed)
             assert world.stored in (records_of(items), OLD_RECORDS)
-    assert [seed for seed in failed if upload_to_ideal_vehicle(waypoints(15, seed), seed, loss)] == []
+    assert [seed for seed in failed if all(with_ideal_vehicle(seed, loss, uploads(waypoints(15, seed))))] == []
+
+
+@pytest.mark.parametrize("kind", ["download", "upload"])
+@pytest.mark.parametrize("first_seed", range(0, 100, 20))
+def test_the_final_ack_never_meets_the_next_transfer(first_seed: int, kind: str) -> None:
+    """Which begins 0.1 to 0.5 s after the end of an upload. To QGroundControl a late ack is the next transfer's end."""
+    failed: list[int] = []
+    foreign: list[int] = []
+    for seed in range(first_seed, first_seed + 20):
+        draw = random.Random(f"{seed} {kind}")
+        loss, pause_s = draw.uniform(0.0, 0.15), draw.uniform(0.1, 0.5)
+        first = uploads(waypoints(draw.randint(3, 15), seed))
+        second: Begin = QgcDownload if kind == "download" else uploads(waypoints(draw.randint(3, 15), seed + 1000))
+        world, station, _ = qgroundcontrol(seed, loss)
+        begun = []
+        for pause, begin in ((0.0, first), (pause_s, second)):
+            world.run(pause)
+            transfer = station.upload = begin(world, station.send)
+            begun.append(transfer)
+            world.run_until(lambda _, transfer=transfer: transfer.is_over, 120)  # type: ignore[misc]
+        world.run(3.0)
+        foreign += [seed for transfer in begun if transfer.took_foreign_ack]
+        if any(transfer.gave_up for transfer in begun):
+            failed += [seed] * all(with_ideal_vehicle(seed, loss, first, (pause_s, second)))
+    assert (foreign, failed) == ([], [])
 
 
 @pytest.mark.parametrize("first_seed", [20, 140, 280])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""QGroundControl's upload (PlanManager.cc of v5.0) over a lossy link, to the bridge or to an ideal vehicle.
+"""QGroundControl's transfers (PlanManager.cc of v5.0) over a lossy link, with the bridge or with an ideal vehicle.
 
 The link decides by seed, message and copy: the third request for item 7 has the same fate whichever vehicle sends it.
 So each upload to the bridge can be compared with the same upload to the ideal vehicle.
@@ -22,16 +22,21 @@ from protocols.mission_item import MissionItem, MissionResult
 from tests.support.conversations import count_message, item_message
 from tests.support.world import GroundStation, World
 
-_TIMEOUT_S = 1.5
+_TIMEOUT_S, _ITEM_TIMEOUT_S = 1.5, 0.25
 _RETRIES = 5
 _OF_A_MISSION = frozenset(
     (
         messages.MAVLINK_MSG_ID_MISSION_REQUEST,
         messages.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
         messages.MAVLINK_MSG_ID_MISSION_ACK,
+        messages.MAVLINK_MSG_ID_MISSION_COUNT,
+        messages.MAVLINK_MSG_ID_MISSION_ITEM_INT,
         messages.MAVLINK_MSG_ID_STATUSTEXT,
     )
 )
+
+
+QGC_HEARTBEAT = messages.MAVLink_heartbeat_message(6, 8, 192, 0, 4, 3)
 
 
 class Clock(Protocol):
@@ -92,6 +97,8 @@ class QgcUpload:
         self._clock, self._send, self._items, self._mission_type = clock, send, items, mission_type
         self.result: MissionResult | None = None
         self.gave_up = False
+        #: It was ended by an ack that cannot be its own: "Mission transfer failed. Error: Mission accepted".
+        self.took_foreign_ack = False
         self._requested: set[int] = set()
         self._retries = self._timer = 0
         self._announce()
@@ -111,7 +118,10 @@ class QgcUpload:
             case "MISSION_ACK" if message.type != MissionResult.INVALID_SEQUENCE:
                 self.result = MissionResult(message.type)
                 # An early "accepted" is an error, too.
-                self.gave_up = self.result is MissionResult.ACCEPTED and len(self._requested) < len(self._items)
+                self.took_foreign_ack = self.result is MissionResult.ACCEPTED and len(self._requested) < len(
+                    self._items
+                )
+                self.gave_up |= self.took_foreign_ack
 
     def _announce(self) -> None:
         self._send(count_message(len(self._items), self._mission_type))
@@ -131,13 +141,69 @@ class QgcUpload:
             self._announce()
 
 
+class QgcDownload:
+    """Requests the list every 1.5 s and each item every 0.25 s, six times. Any MISSION_ACK ends it as an error."""
+
+    def __init__(self, clock: Clock, send: Callable[[Message], None]) -> None:
+        self._clock, self._send = clock, send
+        self.items: list[Message] = []
+        self.is_over = self.gave_up = self.took_foreign_ack = False
+        self._count: int | None = None
+        self._retries = self._timer = 0
+        self._ask()
+
+    def received(self, message: Message) -> None:
+        if self.is_over:
+            return
+        match message.get_type():
+            case "MISSION_COUNT" if self._count is None:
+                self._count = message.count
+                self._go_on()
+            case "MISSION_ITEM_INT" if self._count is not None and message.seq == len(self.items):
+                self.items.append(message)
+                self._go_on()
+            case "MISSION_ACK" if message.type != MissionResult.INVALID_SEQUENCE:
+                self.took_foreign_ack = message.type == MissionResult.ACCEPTED
+                self.is_over = self.gave_up = True
+
+    def _go_on(self) -> None:
+        self._retries = 0
+        if len(self.items) == self._count:
+            self.is_over = True
+            self._send(messages.MAVLink_mission_ack_message(1, 1, MissionResult.ACCEPTED))
+        else:
+            self._ask()
+
+    def _ask(self) -> None:
+        if self._count is None:
+            self._send(messages.MAVLink_mission_request_list_message(1, 1))
+        else:
+            self._send(messages.MAVLink_mission_request_int_message(1, 1, len(self.items)))
+        self._timer += 1
+        seconds = _TIMEOUT_S if self._count is None else _ITEM_TIMEOUT_S
+        self._clock.after(seconds, partial(self._timeout, self._timer))
+
+    def _timeout(self, timer: int) -> None:
+        if self.is_over or timer != self._timer:
+            return
+        self._retries += 1
+        if self._retries > _RETRIES + 1:
+            self.is_over = self.gave_up = True
+        else:
+            self._ask()
+
+
+Transfer = QgcUpload | QgcDownload
+
+
 class QgcStation(GroundStation):
     """QGroundControl's end of a fated link to the bridge."""
 
     def __init__(self, world: World, link: FatedLink, name: str) -> None:
         super().__init__(world, name)
         self._link = link
-        self.upload: QgcUpload | None = None
+        self.upload: Transfer | None = None
+        world.receive_from(self, self.pack(QGC_HEARTBEAT))
 
     def send(self, message: Message) -> None:
         data = self.pack(message)
@@ -159,12 +225,16 @@ class QgcStation(GroundStation):
 class IdealVehicle:
     """Requests each item every 0.25 s until it is here, and has stored the list with the last one.
 
-    Repeats its final ack after 0.4 and 0.9 s.
+    Repeats its final ack after 0.4 and 0.9 s, unless the station has it.
     """
 
-    def __init__(self, clock: Clock, send: Callable[[Message], None]) -> None:
-        self._clock, self._send = clock, send
+    def __init__(self, clock: Clock, send: Callable[[Message], None], station_waits: Callable[[], bool]) -> None:
+        self._clock, self._send, self._station_waits = clock, send, station_waits
         self.items: dict[int, Message] = {}
+        self._count = self._wanted = 0
+
+    def expect_next(self) -> None:
+        """The station begins another transfer."""
         self._count = self._wanted = 0
 
     def received(self, message: Message) -> None:
@@ -179,8 +249,15 @@ class IdealVehicle:
                     self._request(self._wanted)
                 else:
                     for later_s in (0.0, 0.4, 0.9):
-                        ack = messages.MAVLink_mission_ack_message(255, 190, MissionResult.ACCEPTED)
-                        self._clock.after(later_s, partial(self._send, ack))
+                        self._clock.after(later_s, self._accept)
+            case "MISSION_REQUEST_LIST":
+                self._send(messages.MAVLink_mission_count_message(255, 190, len(self.items)))
+            case "MISSION_REQUEST_INT":
+                self._send(self.items[message.seq])
+
+    def _accept(self) -> None:
+        if self._station_waits():
+            self._send(messages.MAVLink_mission_ack_message(255, 190, MissionResult.ACCEPTED))
 
     def _request(self, seq: int) -> None:
         if seq == self._wanted and self._clock.now < 600:
@@ -188,19 +265,28 @@ class IdealVehicle:
             self._clock.after(0.25, partial(self._request, seq))
 
 
-def upload_to_ideal_vehicle(items: Sequence[MissionItem], seed: int, loss: float) -> bool:
-    """True if it succeeds."""
+#: Begins a transfer of a station with this clock and link.
+Begin = Callable[[Clock, Callable[[Message], None]], Transfer]
+
+
+def with_ideal_vehicle(seed: int, loss: float, first: Begin, *later: tuple[float, Begin]) -> list[bool]:
+    """Which transfers succeed; each of `later` begins so many seconds after the end of the one before."""
     clock = Timeline()
     link = FatedLink(clock, seed, loss)
-    ends: list[QgcUpload] = []
+    ends: list[Transfer] = []
 
     def down(message: Message) -> None:
-        link.carry(_name(message), lambda: ends[0].received(message))
+        link.carry(_name(message), lambda: ends[-1].received(message))
 
-    vehicle = IdealVehicle(clock, down)
-    ends.append(QgcUpload(clock, lambda msg: link.carry(_name(msg), lambda: vehicle.received(msg)), items))
-    clock.run(lambda: ends[0].is_over)
-    return not ends[0].gave_up
+    def up(message: Message) -> None:
+        link.carry(_name(message), lambda: vehicle.received(message))
+
+    vehicle = IdealVehicle(clock, down, lambda: not ends[-1].is_over)
+    for pause_s, begin in ((0.0, first), *later):
+        clock.after(pause_s, lambda begin=begin: ends.append(begin(clock, up)))  # type: ignore[misc]
+        vehicle.expect_next()
+        clock.run(lambda: False)
+    return [not end.gave_up for end in ends]
 
 
 def _name(message: Message) -> str:

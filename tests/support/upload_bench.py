@@ -42,10 +42,7 @@ def receiving(world: World, station: GroundStation, items: list[MissionItem], se
 
 
 def acks(station: GroundStation) -> list[MissionResult]:
-    """The acks, without the two copies of a final one, 0.4 and 0.9 s later."""
-    times = [(at, message.type) for at, message in station.received if message.get_type() == "MISSION_ACK"]
-    copies = {(round(at + later_s, 6), ack) for at, ack in times for later_s in (0.4, 0.9)}
-    return [MissionResult(ack) for at, ack in times if (round(at, 6), ack) not in copies]
+    return [MissionResult(message.type) for message in station.messages("MISSION_ACK")]
 
 
 def requested(station: GroundStation) -> list[int]:

@@ -7,12 +7,10 @@ import pytest
 
 from bridge.missions.mission_service import HeldMission
 from bridge.model.missions import PendingMission, Refusal
-from bridge.model.vehicle import MissionLeg, Source
 from protocols.mavlink.dialect import Message
 from protocols.mission_item import Command, MissionItem, MissionResult, pack_records
 from protocols.msp.frame import MspParser
 from protocols.msp.mission import MissionCommand
-from protocols.msp.nav import NavAction, NavMode, NavStatus
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from simulator.commands.fc_kinds import make_board
 from tests.support.conversations import (
@@ -277,18 +275,18 @@ def test_waiting_downloads_are_refused_when_the_link_is_lost() -> None:
     assert {answer.text for answer in answers if isinstance(answer, Refusal)} == {"No link to the flight controller"}
 
 
-def test_without_a_link_and_without_a_store_the_reason_is_reported() -> None:
+def test_without_a_link_and_without_a_store_the_list_is_empty_and_the_reason_reported() -> None:
     world, station = holding()
     world.unplug()
-    (ack,) = ask(station, list_message())
-    assert ack.type == A.DENIED
+    (count,) = ask(station, list_message())
+    assert count.count <= 1  # home, if that is known
     assert any("No link" in text for text in station.texts())
     other = World(peer=MspFake({100: ident(240, HARAKIRI_CAPABILITY), 2: b"BTFL", 116: b"ARM;", 101: bytes(11)}))
     other.wait_until(lambda w: w.is_found, 3)
     station = GroundStation(other)
-    (ack,) = ask(station, list_message())
-    assert ack.type == A.UNSUPPORTED
-    assert any("stores no missions" in text for text in station.texts())
+    (count,) = ask(station, list_message())
+    assert count.count == 0
+    assert "stores no missions" in " ".join(station.texts())
 
 
 BOARDS = [*TelemetryProtocol, "inav", "multiwii"]
@@ -331,18 +329,15 @@ def test_the_mission_is_readable_while_armed(board: str | TelemetryProtocol) -> 
 
 
 @pytest.mark.parametrize("board", BOARDS)
-def test_a_mission_that_was_not_read_before_arming_is_read_or_refused(board: str | TelemetryProtocol) -> None:
+def test_a_mission_that_was_not_read_before_arming_is_read_or_missing(board: str | TelemetryProtocol) -> None:
     """The bridge was started in flight: only boards whose list can be read armed have one."""
     world = armed_before(board)
     world.wait_until(lambda w: bool(w.bridge.vehicle.armed), 15)
     world.run(5)
     station = GroundStation(world)
-    download = Download(station)
-    download.run(5)
-    if board in (TelemetryProtocol.MSP, TelemetryProtocol.FRSKY_9600, "inav"):  # it answers MSP, too
-        assert download.result is None
-    else:
-        assert download.result is A.DENIED
+    items = Download(station).run(5)
+    if board not in (TelemetryProtocol.MSP, TelemetryProtocol.FRSKY_9600, "inav"):  # these answer MSP, too
+        assert len(items) <= 1
         assert "Armed, mission not known: disarm to read it" in " ".join(station.texts())
 
 
@@ -355,30 +350,14 @@ def test_another_boards_mission_is_not_served() -> None:
     world.plug()
     arm(world)
     station = GroundStation(world)
-    download = Download(station)
-    download.run(5)
-    assert download.result is A.DENIED
+    assert len(Download(station).run(5)) <= 1
 
 
 def test_a_mission_whose_write_was_interrupted_is_not_served() -> None:
     world, _ = disarmed(TelemetryProtocol.MAVLINK)
     world.inside.missions.pending.append(PendingMission(None, None))
     arm(world)
-    download = Download(GroundStation(world))
-    download.run(5)
-    assert download.result is A.DENIED
-
-
-def test_a_mission_that_another_client_changed_in_flight_is_not_served() -> None:
-    """A MultiWii cannot be read armed; the record that it flies shows the change."""
-    world, _ = disarmed("multiwii")
-    arm(world)
-    for number, action, count in ((3, NavAction.WAYPOINT, 9), (12, NavAction.WAYPOINT, 0)):
-        status = NavStatus(NavMode.MISSION, 0, action, number, 0, 0)
-        world.bridge.vehicle.hear(MissionLeg(world.now, Source.MSP, status))
-        world.run(0.1)
-        download = Download(GroundStation(world, f"after {number}"))
-        assert len(download.run(5)) == count
+    assert len(Download(GroundStation(world)).run(5)) <= 1
 
 
 def armed_before(board: str | TelemetryProtocol) -> World:
