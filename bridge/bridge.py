@@ -29,7 +29,7 @@ from bridge.gcs.routes import Routes
 from bridge.gcs.station import Peer
 from bridge.line.conversation import StoreEffect
 from bridge.line.runner import Runner
-from bridge.missions.mission_service import NO_LINK, MissionService
+from bridge.missions.mission_service import MissionService
 from bridge.model.events import Armed, Disarmed
 from bridge.model.missions import ARMED, Refusal
 from bridge.model.settings import SettingsState, SettingTable
@@ -47,15 +47,13 @@ from bridge.vehicle.calibration import Calibration
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.compass_check import CompassCheck
 from bridge.vehicle.incoming import Incoming
-from bridge.vehicle.link_announcer import LinkAnnouncer
 from bridge.vehicle.message_router import MessageRouter
 from bridge.vehicle.own_vehicle import OwnVehicle
+from bridge.vehicle.readiness import CraftReadiness
 from bridge.vehicle.set_waypoint import SetWaypoint
 from bridge.vehicle.vehicle_report import VehicleReporter
-from bridge.voice.happening import Happening
 from bridge.voice.sentences import OF_THE_PI
 from protocols.mavlink.frame import MavlinkFrame
-from protocols.mission_item import MissionResult
 from reports.vehicle_groups import Group, VehicleReport
 
 
@@ -128,11 +126,11 @@ class Bridge:
         session = self._session = FcSession(port, emit, incidents, self._controller_changed, config.flight)
         #: The flight controller's readings, which are kept when it is lost.
         self.vehicle = port.vehicle
-        announcer = self._announcer = LinkAnnouncer(
-            self._say, self._trouble, now, was_found=config.flight is not None, is_wired=None not in config.speeds
-        )
         # Missions, fences and rally points.
         missions = self._missions = MissionService(port.vehicle, runner, emit)
+        readiness = self._readiness = CraftReadiness(
+            session, missions, ground, now, was_found=config.flight is not None, is_wired=None not in config.speeds
+        )
         types = self._types = MissionTypes(missions, ground, emit, incidents)
         self._watch = MissionWatch(missions, ground, emit)
         #: Missions, for the command line, the page and zenoh.
@@ -153,12 +151,12 @@ class Bridge:
         self.settings = LocalSettings(settings, session)
         # The vehicle that ground stations see.
         own = self._own_vehicle = OwnVehicle(
-            session, missions, ground, announcer, types.capabilities, config.unix_time_s, now
+            session, missions, ground, readiness, types.capabilities, config.unix_time_s, now
         )
-        self._reporter = VehicleReporter(session, missions, ground, settings, own.also_want, own.progress)
+        self._reporter = VehicleReporter(session, missions, ground, settings, readiness, own.also_want, own.progress)
         own_parameters = OwnParameters(port.vehicle, owner.sysid)
         parameters = self._parameters = Parameters(own_parameters, settings, ground)
-        calibration = self._calibration = Calibration(ground, session, missions, announcer, settings)
+        calibration = self._calibration = Calibration(ground, session, missions, readiness, settings)
         self._compass_check = CompassCheck(port.vehicle, ground)
         waypoint = SetWaypoint(missions, own, ground)
         commands = CommandService(ground, own, session, calibration, settings, parameters, waypoint, config.version)
@@ -166,7 +164,7 @@ class Bridge:
         self._incoming = Incoming(ground, router, parameters, session.send_mavlink, *ids, emit)
         #: Served in this order, after the line itself.
         self._parts: list[TimedPart] = [runner, sharing, *types.uploads, self._watch, settings]
-        self._parts += [parameters, ground, announcer, calibration, own, self._reporter]
+        self._parts += [parameters, ground, readiness, calibration, own, self._reporter]
 
     def take(self) -> list[BridgeEffect]:
         """What is to be done since the last call: first what must not wait, then the rest as it arose."""
@@ -227,7 +225,7 @@ class Bridge:
     @property
     def fc_trouble(self) -> str:
         """The reason why the board cannot be used, and the remedy; empty if it can be."""
-        trouble = self._trouble()
+        trouble = self._session.state.trouble
         return "" if trouble is None else trouble.text
 
     @property
@@ -338,16 +336,11 @@ class Bridge:
         for part in self._parts:
             if now >= part.due:
                 part.tick(now)
+        if self._session.state.controller is None and self._missions.fc_store != self._readiness.refusal:
+            self._types.lost(self._readiness.refusal, FC_LOST, now)
         self._follow_line(now)
 
     # Between the parts.
-
-    def _say(self, happening: Happening) -> None:
-        if not self.is_passing_through:
-            self._ground.say(happening)
-
-    def _trouble(self) -> Happening | None:
-        return self._session.state.trouble
 
     def _table_changed(self, table: SettingTable) -> None:
         self._parameters.take(table)
@@ -367,9 +360,8 @@ class Bridge:
         self._own_vehicle.due = inf if self.is_passing_through else min(self._own_vehicle.due, now)
         self._board_settings.found(controller, now)
         if controller is None:
-            trouble = self._trouble()
-            self._types.lost(Refusal(MissionResult.DENIED, trouble) if trouble else NO_LINK, FC_LOST, now)
-            self._announcer.lost(now if self.vehicle.heard_at is None else self.vehicle.heard_at)
+            self._readiness.lost(now if self.vehicle.heard_at is None else self.vehicle.heard_at)
+            self._types.lost(self._readiness.refusal, FC_LOST, now)
             return
         profile, rules = controller.profile, RuleSettings(self._config.settings.takeoff_max_m)
         missions = profile.missions
@@ -377,7 +369,7 @@ class Bridge:
         stores = store, profile.fences(controller, self.vehicle), profile.rally(controller, self.vehicle)
         # On a port that was opened since, an armed board may be another one.
         self._types.use(stores, now, is_same_board=self._session.met_family == profile.family)
-        self._announcer.found(controller, now)
+        self._readiness.found(controller, now)
         self._calibration.controller_found(now)
         if not isinstance(store, Refusal):
             # Read its list at once: MISSION_CURRENT reports the count, and the first Read needs no wait.
@@ -411,7 +403,7 @@ class Bridge:
         before, memory = self._flight, self._session.flight_memory(now)
         is_same = memory is before
         if before is not None and memory is not None:
-            is_same = replace(memory, made_at=before.made_at, mode=before.mode) == before
+            is_same = replace(memory, made_at=before.made_at) == before
         if not is_same:
             self._flight = memory
             self._effects.append(RememberFlight(memory))

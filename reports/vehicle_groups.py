@@ -105,6 +105,8 @@ class Status:
     sensors: Annotated[tuple[str, ...] | None, "sensors on board that respond"] = None
     cycle_time_us: Annotated[int | None, "main loop time"] = None
     i2c_errors: Annotated[int | None, "since its start"] = None
+    readiness: Annotated[str, "ready, blocked, calibrating, writing, lost, never found or unknown"] = "unknown"
+    not_ready_why: Annotated[tuple[str, ...], "the reasons not to arm, while disarmed"] = ()
     age_s: Age = None
 
 

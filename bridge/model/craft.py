@@ -70,14 +70,15 @@ FAILSAFE_BOX = "FAILSAFE"
 #: The thresholds of an aux channel's positions (MultiWii and its descendants).
 _LOW_BELOW_US, _HIGH_ABOVE_US = 1300, 1700
 
-#: The boxes that fly the mission: Harakiri's, MultiWii NAV's and INAV's.
+#: The boxes that fly the mission: Harakiri's, MultiWii NAV's and INAV's. Harakiri's is only the pilot's switch: a board
+#: that flies the mission reports that (MissionLeg).
 MISSION_BOXES = frozenset({"GPS AUTO", "MISSION", "NAV WP"})
 #: The first mode with an active box wins. Harakiri's, baseflight's and Cleanflight's names, then those of MultiWii NAV,
 #: INAV and Betaflight.
 _BOXES: tuple[tuple[FlightMode, frozenset[str]], ...] = (
     (FlightMode.MANUAL, frozenset({"MANUAL"})),
     (FlightMode.LAUNCH, frozenset({"NAV LAUNCH"})),
-    (FlightMode.AUTO, MISSION_BOXES),
+    (FlightMode.AUTO, MISSION_BOXES - {"GPS AUTO"}),
     (FlightMode.RTL, frozenset({"GPS HOME", "NAV RTH", "GPS RESCUE"})),
     (FlightMode.LOITER, frozenset({"GPS HOLD", "NAV POSHOLD", "POS HOLD"})),
     (FlightMode.CRUISE, frozenset({"NAV COURSE HOLD", "NAV CRUISE"})),

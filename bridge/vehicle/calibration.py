@@ -20,7 +20,7 @@ from bridge.gcs.ground_station import Sender
 from bridge.line.conversation import Conversation, LinkLost, Pause, Receive, ask, ask_status, send
 from bridge.missions.mission_service import MissionService
 from bridge.settings.board_settings import BoardSettings
-from bridge.vehicle.link_announcer import LinkAnnouncer
+from bridge.vehicle.readiness import CraftReadiness
 from bridge.voice import sentences
 from bridge.voice.happening import Happening
 from protocols.mavlink.dialect import CommandResult
@@ -102,7 +102,7 @@ class Calibration:
     _ground: Ground
     _session: FcSession
     _missions: MissionService
-    _announcer: LinkAnnouncer
+    _readiness: CraftReadiness
     _settings: BoardSettings
     #: The time of the next `tick`; infinity while none runs.
     due: float = inf
@@ -169,8 +169,7 @@ class Calibration:
             self._acknowledge(sender, command, result)
         self._sender, self._command, self._action = sender, command, action
         self._began_at = self._acknowledge_at = now
-        if self._restarts:
-            self._announcer.expect_silence(now + _LONGEST_S)
+        self._readiness.calibrates(now + (_LONGEST_S if self._restarts else self._usual_s))
         self.tick(now)
         self._settings.may_have_changed(now)
 
@@ -210,8 +209,7 @@ class Calibration:
     def _conclude(self, now: float) -> None:
         self.due = inf
         elapsed_s = now - self._began_at
-        if self._restarts:
-            self._announcer.expect_silence(now)
+        self._readiness.calibrates(now)
         if self._restarts and elapsed_s >= _LONGEST_S:
             self._end("no answer, power cycle", now)
         elif self._action is CALIBRATE_COMPASS:

@@ -28,10 +28,9 @@ from bridge.vehicle.vehicle_messages import auto_mode
 from bridge.voice import sentences
 from bridge.voice.happening import Happening, Sentence
 from protocols.mavlink.codec import COMPONENT_METADATA
-from protocols.mavlink.dialect import CommandResult, messages
+from protocols.mavlink.dialect import CommandResult, command_name, messages
 from protocols.mission_item import MissionResult
 
-_MAX_U16, _MAX_I32 = (1 << 16) - 1, (1 << 31) - 1
 _MAX_MSGID = (1 << 24) - 1
 
 #: Commands that only ask for a message: command number -> message number.
@@ -73,6 +72,8 @@ _REFUSED: Mapping[int, Sentence[()]] = {
     messages.MAV_CMD_DO_JUMP_TAG: sentences.NOT_SET_TO_ITEM,
     messages.MAV_CMD_DO_FENCE_ENABLE: sentences.NO_FENCE,
 }
+#: A ground station itself asks for these, and no pilot waits for the answer.
+_ASKED_BY_PROGRAMS = ("REQUEST_", "GET_", "SET_MESSAGE_INTERVAL")
 #: Those that would start or move a mission flight.
 _OF_A_MISSION = frozenset((messages.MAV_CMD_MISSION_START, messages.MAV_CMD_DO_SET_MISSION_CURRENT))
 _NO_RESET = Refusal(MissionResult.DENIED, sentences.NO_MISSION_RESET())
@@ -142,7 +143,7 @@ class CommandService:
         """Give the reason for refusing a command, or a message that does the same but is not acknowledged."""
         is_auto = command == messages.MAV_CMD_DO_SET_MODE and custom_mode == auto_mode(self._session.vehicle)
         of_mission = self._mission_refusal() if is_auto or command in _OF_A_MISSION else None
-        if not self._vehicle.has_board:
+        if not self._vehicle.readiness.has_board:
             sender.say(sentences.NO_BOARD_TO_COMMAND())
         elif command == messages.MAV_CMD_DO_FENCE_ENABLE and self._vehicle.stores_fences:
             sender.say(sentences.FENCE_SWITCH())
@@ -166,8 +167,6 @@ class CommandService:
 
     def _do(self, sender: Sender, command: int, params: Sequence[float], now: float) -> CommandResult:
         match command:
-            case messages.MAV_CMD_REQUEST_MESSAGE if params[0] == messages.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
-                return self._tell_interval(sender, _msgid(params[1]))
             case messages.MAV_CMD_REQUEST_MESSAGE if params[0] == COMPONENT_METADATA:
                 metadata = self._parameters.metadata(round(now * 1000) & 0xFFFFFFFF)
                 if metadata is None:
@@ -178,8 +177,6 @@ class CommandService:
                 return self._send_once(sender, _msgid(params[0]), now, max(_msgid(params[1]), 0))
             case messages.MAV_CMD_SET_MESSAGE_INTERVAL:
                 return self._set_interval(sender, _msgid(params[0]), params[1])
-            case messages.MAV_CMD_GET_MESSAGE_INTERVAL:
-                return self._tell_interval(sender, _msgid(params[0]))
             case messages.MAV_CMD_DO_SEND_BANNER:
                 controller = self._session.state.controller
                 name = "no flight controller" if controller is None else controller.name
@@ -187,7 +184,7 @@ class CommandService:
                 self._vehicle.send_once(sender, messages.MAVLINK_MSG_ID_HOME_POSITION, now)
                 return CommandResult.ACCEPTED
             case messages.MAV_CMD_RUN_PREARM_CHECKS:
-                self._vehicle.arming_reasons.tell(sender.station)
+                self._vehicle.readiness.tell(sender.station)
                 return CommandResult.ACCEPTED
             case messages.MAV_CMD_DO_ACCEPT_MAG_CAL:
                 return CommandResult.ACCEPTED  # it is stored already
@@ -205,6 +202,9 @@ class CommandService:
         if command in _REFUSED:
             self.refuse(sender, command, params[1])
             return CommandResult.DENIED
+        name = command_name(command)
+        if not (name.isdigit() or name.startswith(_ASKED_BY_PROGRAMS)):
+            sender.say(sentences.NO_EFFECT(name))
         return CommandResult.UNSUPPORTED
 
     def _store(self, sender: Sender, command: int, what: float, now: float) -> None:
@@ -252,16 +252,6 @@ class CommandService:
             return CommandResult.DENIED
         is_known = self._vehicle.set_interval(sender.station, msgid, interval_s)
         return CommandResult.ACCEPTED if is_known else CommandResult.UNSUPPORTED
-
-    def _tell_interval(self, sender: Sender, msgid: int) -> CommandResult:
-        """Answer with MESSAGE_INTERVAL: -1 never, 0 no such message."""
-        interval_s = self._vehicle.interval_s(sender.station, msgid)
-        interval_us = 0
-        if interval_s is not None:
-            interval_us = -1 if interval_s == math.inf else min(round(interval_s * 1e6), _MAX_I32)
-        if 0 <= msgid <= _MAX_U16:
-            sender.to(messages.MAVLink_message_interval_message(msgid, interval_us))
-        return CommandResult.UNSUPPORTED if interval_s is None else CommandResult.ACCEPTED
 
 
 def _msgid(param: float) -> int:

@@ -25,6 +25,9 @@ from protocols.mission_item import MissionResult
 from protocols.rights import Effect
 from protocols.rights.mavlink import effect_of
 
+#: The reason why the frames of such a sender are ignored.
+OWN_IDS = "sent with the vehicle's own sysid and compid"
+
 
 class Incoming:
     """Checks, counts, and answers or passes on every frame from a ground station.
@@ -63,7 +66,9 @@ class Incoming:
         for frame in frames:
             ids, target, msgid = frame.sender, frame.target, frame.msgid
             if ids == self._ids:
-                # It comes back from a broadcast, or from a router that floods.
+                # Own frames, which have no such target, come back from a broadcast, or from a router that floods.
+                if target[0] == ids[0]:
+                    self._ignore(OWN_IDS, station, frame)
                 continue
             effect = effect_of(frame)
             refused = station.refusal(frame, effect)
@@ -85,7 +90,17 @@ class Incoming:
                 self._record(station, frame)
                 if target in self._our_targets:
                     self._router.take(sender, frame, msgid, now)
+                elif target[0] == self._ids[0]:
+                    why = f"addressed to component {target[1]} instead of {self._ids[1]}"
+                    self._ignore(why, station, frame)
         return True
+
+    def _ignore(self, why: str, station: GroundStation, frame: MavlinkFrame) -> None:
+        """Count and report a frame that gets no answer."""
+        self.refused[station.peer.link, why] += 1
+        # A station that is not heard is forgotten with each datagram.
+        if station.is_heard or self.refused[station.peer.link, why] == 1:
+            self._report(FrameRefusal(why, is_routine=False), station, frame)
 
     def _record(self, station: GroundStation, frame: MavlinkFrame) -> None:
         recorded = self._ground.outbox.recorded
@@ -95,8 +110,7 @@ class Incoming:
     def _ignore_unproven(self, station: GroundStation, frame: MavlinkFrame) -> None:
         """Report a station that has not shown that it receives anything, once it had several opportunities."""
         if station.return_path is not None and station.return_path.has_failed:
-            self.refused[station.peer.link, NOT_SHOWN] += 1
-            self._report(FrameRefusal(NOT_SHOWN, is_routine=False), station, frame)
+            self._ignore(NOT_SHOWN, station, frame)
 
     def _pass_on(self, routes: Routes, sender: Sender, frame: MavlinkFrame, effect: Effect) -> None:
         """Send a frame on to its targets, within its sender's rights."""

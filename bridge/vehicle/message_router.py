@@ -15,6 +15,8 @@ from bridge.transfers.mission_types import Transfers
 from bridge.transfers.uploads import MissionUploads
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.own_vehicle import OwnVehicle
+from bridge.voice import sentences
+from bridge.voice.happening import Sentence
 from protocols.mavlink.codec import decode, item_from_float_message, item_from_int_message
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
@@ -23,6 +25,20 @@ from protocols.mission_item import MissionItem, MissionResult
 
 #: MISSION_ITEM.current of items outside a list: Mission Planner's "Fly to here" and "Change altitude".
 _GUIDED = (2, 3)
+
+#: Messages of other buttons, which are not acknowledged.
+_TOLD: Mapping[int, Sentence[()]] = {
+    m.MAVLINK_MSG_ID_RC_CHANNELS_OVERRIDE: sentences.JOYSTICK,
+    m.MAVLINK_MSG_ID_MANUAL_CONTROL: sentences.JOYSTICK,
+    m.MAVLINK_MSG_ID_SET_GPS_GLOBAL_ORIGIN: sentences.ORIGIN,
+    m.MAVLINK_MSG_ID_SET_HOME_POSITION: sentences.HOME,
+    m.MAVLINK_MSG_ID_MOUNT_CONTROL: sentences.NO_CAMERA,
+    m.MAVLINK_MSG_ID_DIGICAM_CONTROL: sentences.NO_CAMERA,
+    m.MAVLINK_MSG_ID_GIMBAL_MANAGER_SET_PITCHYAW: sentences.NO_CAMERA,
+    m.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: sentences.FLY,
+}
+#: A channel of RC_CHANNELS_OVERRIDE that is released or left alone.
+_NO_OVERRIDE = (0, 0xFFFF)
 
 #: Messages of a mission transfer: hundreds a second over a fast link. All others are rare.
 _OF_A_TRANSFER = frozenset(
@@ -116,6 +132,10 @@ class MessageRouter:
 
     def take(self, sender: Sender, frame: MavlinkFrame, msgid: int, now: float) -> None:
         """Handle a frame for the bridge's vehicle, if it is understood and its sender has not sent too many."""
+        if msgid in _TOLD:
+            # A joystick sends 50 a second: they must not use up the limit for answers.
+            self._tell(sender, frame, msgid)
+            return
         handler = self.handlers.get(msgid)
         if handler is None or (message := decode(frame)) is None:
             return
@@ -165,6 +185,13 @@ class MessageRouter:
     def _data_stream(self, sender: Sender, message: Message, _now: float) -> None:
         rate_hz = message.req_message_rate if message.start_stop else 0
         self._vehicle.set_stream(sender.station, message.req_stream_id, 1 / rate_hz if rate_hz else inf)
+
+    def _tell(self, sender: Sender, frame: MavlinkFrame, msgid: int) -> None:
+        if msgid == m.MAVLINK_MSG_ID_RC_CHANNELS_OVERRIDE:
+            message = decode(frame)
+            if message is None or all(getattr(message, f"chan{n}_raw") in _NO_OVERRIDE for n in range(1, 9)):
+                return
+        sender.say(_TOLD[msgid]())
 
     def _ping(self, sender: Sender, message: Message, _now: float) -> None:
         if message.target_system != 0:

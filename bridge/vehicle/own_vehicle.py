@@ -19,9 +19,8 @@ from bridge.model.craft import Airframe, FlightMode, Home
 from bridge.model.missions import FlightReport, FlownMission, MissionProgress
 from bridge.model.vehicle import STALE_S, FlightState, Health, MissionLeg, Mode, Readiness, Reading
 from bridge.vehicle import vehicle_messages as make
-from bridge.vehicle.arming_reasons import ArmingReasons
-from bridge.vehicle.link_announcer import LinkAnnouncer
 from bridge.vehicle.nav_words import NavWords, sentence_for
+from bridge.vehicle.readiness import CraftReadiness
 from bridge.vehicle.telemetry_table import NO_STREAM, TELEMETRY, Row
 from bridge.vehicle.vehicle_messages import Moment
 from bridge.voice import sentences
@@ -54,6 +53,7 @@ _POLLS = (*set(POLL_FOR.values()), Msp.FLIGHT)
 #: A message, and the reading that triggers it; None: the clock.
 _Trigger = tuple[Row, type[Reading] | None]
 _SYS_STATUS = _ROWS[messages.MAVLINK_MSG_ID_SYS_STATUS]
+_EXTENDED_SYS_STATE = _ROWS[messages.MAVLINK_MSG_ID_EXTENDED_SYS_STATE]
 
 
 class OwnVehicle:
@@ -64,7 +64,7 @@ class OwnVehicle:
         session: FcSession,
         missions: MissionService,
         ground: Ground,
-        announcer: LinkAnnouncer,
+        readiness: CraftReadiness,
         capabilities: Callable[[], int],
         unix_time_s: Callable[[float], float | None],
         now: float,
@@ -72,8 +72,7 @@ class OwnVehicle:
         self._session = session
         self._missions = missions
         self._ground = ground
-        self._announcer = announcer
-        self.arming_reasons = ArmingReasons(session, announcer, ground)
+        self.readiness = readiness
         self._unix_time_s = unix_time_s
         self._started_at = now
         self.due = self._second_ends = now
@@ -97,11 +96,6 @@ class OwnVehicle:
         self._summary = 0
         #: The last reason for the stop of a mission flight.
         self._said_why: Happening | None = None
-
-    @property
-    def has_board(self) -> bool:
-        """False if the flight controller is lost, or was never found."""
-        return not self._announcer.why_unknown
 
     @property
     def stores_fences(self) -> bool:
@@ -131,14 +125,23 @@ class OwnVehicle:
         everyone = self._ground.everyone
         self._set_polls(everyone)
         self._polls_set_at = now
-        self.arming_reasons.follow(now)
+        self._follow_readiness(now)
         self._beat(now, everyone)
         self._send_due(self._rows.get(None, ()), now)
         if self._session.vehicle.fresh(Health, now, _SILENT_S) is None:
             # No reading triggers it now: the flight controller is lost, or sends FrSky telemetry.
-            self._send_due([(_SYS_STATUS, None)], now)
+            self._send_due([(_SYS_STATUS, None), (_EXTENDED_SYS_STATE, None)], now)
         self._announce_home(now)
         self._inform_newcomers(everyone, now)
+
+    def _follow_readiness(self, now: float) -> None:
+        was_lost = self.readiness.state.is_lost
+        self.readiness.follow(now)
+        if self.readiness.state.is_lost and not was_lost:
+            # To QGroundControl a flying craft flies on in CRITICAL, but not after STANDBY.
+            heartbeat = self._heartbeat(now)
+            heartbeat.system_status = messages.MAV_STATE_STANDBY
+            self._ground.outbox.multicast(pack(heartbeat), self._ground.everyone)
 
     def _greet(self, now: float) -> None:
         newcomers = [station for station in self._ground.everyone if now < station.greeted_until]
@@ -153,12 +156,12 @@ class OwnVehicle:
         for station in newcomers:
             station.is_informed = True
             if not station.is_listener:
-                self.arming_reasons.tell(station)
+                self.readiness.tell(station)
 
     def heard(self, news: Collection[type[Reading]], now: float) -> None:
         """Send the messages that new readings trigger, where due."""
         if Readiness in news or FlightState in news:
-            self.arming_reasons.follow(now)
+            self.readiness.follow(now)
         triggered: list[_Trigger] = []
         for reading in news:
             triggered += self._rows.get(reading, ())
@@ -251,15 +254,6 @@ class OwnVehicle:
             if row.stream == stream or (stream == _ALL_STREAMS and row.stream != NO_STREAM):
                 self.set_interval(station, row.msgid, interval_s)
 
-    def interval_s(self, station: GroundStation, msgid: int) -> float | None:
-        """The current interval of a message for a ground station; infinity: never, None: no such message."""
-        if msgid == messages.MAVLINK_MSG_ID_HEARTBEAT:
-            return _TICK_S
-        if (row := _ROWS.get(msgid)) is None:
-            return None
-        pace_s = _TICK_S if row.poll is None else self._session.polls.interval_s(row.poll)
-        return max(station.rates.interval_s(msgid, row.interval_s), pace_s or 0.0)
-
     def _follow_requests(self) -> None:
         """Update the polls soon, but not too often."""
         self._polls_due = self._polls_set_at + _POLLS_INTERVAL_S
@@ -295,8 +289,7 @@ class OwnVehicle:
             partial(self._flown_mission, now),
             self._unix_time_s,
             sent_seqs,
-            self._announcer.is_lost,
-            self.arming_reasons.current,
+            self.readiness.state,
         )
 
     def _flown_mission(self, now: float) -> FlownMission:
@@ -305,10 +298,10 @@ class OwnVehicle:
             return FlownMission()
         if not held.items:
             return FlownMission(held.items, 0, Progress.NO_MISSION)
-        vehicle = self._session.vehicle
-        if vehicle.last(MissionLeg) is not None and vehicle.fresh(MissionLeg, now) is None:
-            return FlownMission(held.items)
-        return FlownMission(held.items, self._missions.seq_of(self.progress.number), self.progress.progress)
+        vehicle, seq = self._session.vehicle, self._missions.seq_of(self.progress.number)
+        is_silent = vehicle.last(MissionLeg) is not None and vehicle.fresh(MissionLeg, now) is None
+        # It still flies to that item, as far as is known: reading a long list leaves no time for polls.
+        return FlownMission(held.items, seq, Progress.UNKNOWN if is_silent else self.progress.progress)
 
     def _follow_state(self, now: float) -> None:
         """Send a heartbeat as soon as something in it has changed; report the failsafe."""
@@ -318,7 +311,7 @@ class OwnVehicle:
         announced, was_failsafe = self._announced, self._announced is not None and self._announced[2]
         mode = self._session.vehicle.last(Mode)
         shown = None if mode is None else mode.mode
-        self._announced = state.armed, shown, state.is_failsafe, self._announcer.is_lost
+        self._announced = state.armed, shown, state.is_failsafe, self.readiness.state.is_lost
         if self._announced == announced:
             return
         if state.is_failsafe and not was_failsafe:
@@ -381,6 +374,9 @@ class OwnVehicle:
             self._ground.outbox.show(said, readers)
 
     def _send_current(self, receivers: Sequence[GroundStation], now: float) -> None:
+        if self._session.vehicle.armed and self._session.state.controller is None:
+            # Lost: it still flies to the item last reported, as far as is known.
+            return
         for sent_seqs, stations in self._by_item_numbers(receivers):
             self._ground.outbox.multicast(pack(make.mission_current(self._moment(now, sent_seqs))), stations)
 

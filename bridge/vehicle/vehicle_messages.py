@@ -5,7 +5,7 @@ An unknown or stale value is sent as MAVLink's "unknown"; a message whose fields
 """
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple, TypeVar
 
@@ -14,6 +14,7 @@ from bridge.model import vehicle as v
 from bridge.model.craft import Airframe, FlightMode, Home
 from bridge.model.ground_track import bearing_deg, distance_m, north_east_m
 from bridge.model.missions import FlownMission, Way
+from bridge.vehicle.readiness import ReadyState
 from protocols.mavlink.codec import pack_attitude
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import Command
@@ -99,8 +100,7 @@ class Moment:
     """The vehicle at one moment. now: monotonic s.
 
     unix_time_s: the Pi's clock at a monotonic time, None if it is not set. sent_seqs: the item numbers of the receiver,
-    if they are not those of the list as read back. is_lost: the flight controller is silent, or was never found.
-    blockers: the known reasons that prevent arming.
+    if they are not those of the list as read back.
     """
 
     vehicle: v.Vehicle
@@ -109,8 +109,7 @@ class Moment:
     mission: Callable[[], FlownMission] = FlownMission
     unix_time_s: Callable[[float], float | None] = lambda _now: None
     sent_seqs: SentSeqs = ()
-    is_lost: bool = False
-    blockers: tuple[str, ...] = ()
+    readiness: ReadyState = ReadyState.READY
 
     def fresh(self, kind: type[v.ReadingT]) -> v.ReadingT | None:
         reading = self.vehicle.last(kind)
@@ -162,12 +161,11 @@ def heartbeat(at: Moment) -> Message:
         base_mode |= messages.MAV_MODE_FLAG_GUIDED_ENABLED
     if vehicle.armed:
         base_mode |= messages.MAV_MODE_FLAG_SAFETY_ARMED
-    if at.is_lost or (state is not None and state.is_failsafe):
+    status = at.readiness.system_status
+    if state is not None and state.is_failsafe:
         status = messages.MAV_STATE_CRITICAL
-    elif state is None:
-        status = messages.MAV_STATE_UNINIT
-    else:
-        is_flying = vehicle.armed and _landed_state(at) != messages.MAV_LANDED_STATE_ON_GROUND
+    elif vehicle.armed and not at.readiness.is_lost:
+        is_flying = _landed_state(at) != messages.MAV_LANDED_STATE_ON_GROUND
         status = messages.MAV_STATE_ACTIVE if is_flying else messages.MAV_STATE_STANDBY
     return messages.MAVLink_heartbeat_message(
         vehicle.airframe, messages.MAV_AUTOPILOT_ARDUPILOTMEGA, base_mode, _custom_mode(vehicle, mode), status, 3
@@ -343,13 +341,17 @@ def sys_status(at: Moment) -> Message:
             unknown |= messages.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
         elif signal is not None and not signal.strength:
             bad |= messages.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
+    if not (at.vehicle.armed or at.readiness.may_arm):
+        bad |= _PREARM
     enabled, healthy = present & ~unknown, present & ~unknown & ~bad
     if fresh_health is None:
         # Readiness is shown while disarmed only. Without the bit QGroundControl would keep its last answer.
-        enabled, healthy = _MOTORS | (0 if at.vehicle.armed else _PREARM), 0 if at.is_lost else _PREARM
-    if at.blockers:
-        healthy &= ~_PREARM
+        enabled, healthy = _MOTORS | (0 if at.vehicle.armed else _PREARM), healthy & _PREARM
     voltage, current, remaining = _battery(at)
+    last_power = at.vehicle.last(v.Power)
+    if last_power is not None and last_power.remaining_percent is not None:
+        # Mission Planner would show an unknown charge as 0 %, beside the last voltage, which stays on its screen.
+        remaining = last_power.remaining_percent
     load = at.fresh(v.Load)
     return messages.MAVLink_sys_status_message(
         present,
@@ -399,8 +401,9 @@ def _battery(at: Moment) -> tuple[int, int, int]:
 def rc_channels(at: Moment) -> Message:
     """RC_CHANNELS: microseconds."""
     channels = at.need(v.Sticks).channels_us
-    fields = *_padded(channels, _CHANNELS), _rssi(at)
-    return messages.MAVLink_rc_channels_message(at.boot_ms, len(channels), *fields)
+    # As ArduPilot: Mission Planner would show UINT16_MAX, "unused", as a pulse width.
+    fields = (*channels, *[0] * _CHANNELS)[:_CHANNELS]
+    return messages.MAVLink_rc_channels_message(at.boot_ms, len(channels), *fields, _rssi(at))
 
 
 def raw_imu(at: Moment) -> Message:
@@ -421,24 +424,6 @@ def scaled_pressure(at: Moment) -> Message:
     pressure = at.need(v.Pressure)
     temperature = _fit(round(pressure.temperature_c * 100), 16)
     return messages.MAVLink_scaled_pressure_message(at.boot_ms, pressure.absolute_hpa, 0.0, temperature)
-
-
-def attitude_quaternion(at: Moment) -> Message:
-    """ATTITUDE_QUATERNION: w, x, y, z."""
-    now = at.need(v.Orientation)
-    halves = [math.radians(angle) / 2 for angle in (now.roll_deg, now.pitch_deg, now.heading_deg)]
-    (sin_r, sin_p, sin_y), (cos_r, cos_p, cos_y) = map(math.sin, halves), map(math.cos, halves)
-    roll_rate, pitch_rate, yaw_rate = _rates(now)
-    return messages.MAVLink_attitude_quaternion_message(
-        at.boot_ms,
-        cos_r * cos_p * cos_y + sin_r * sin_p * sin_y,
-        sin_r * cos_p * cos_y - cos_r * sin_p * sin_y,
-        cos_r * sin_p * cos_y + sin_r * cos_p * sin_y,
-        cos_r * cos_p * sin_y - sin_r * sin_p * cos_y,
-        roll_rate,
-        pitch_rate,
-        yaw_rate,
-    )
 
 
 def local_position_ned(at: Moment) -> Message:
@@ -498,8 +483,11 @@ def system_time(at: Moment) -> Message:
 
 def extended_sys_state(at: Moment) -> Message:
     """EXTENDED_SYS_STATE: on the ground while disarmed; armed as a mission flight reports, or by height and speed."""
-    known(at.need(v.FlightState).armed)
-    return messages.MAVLink_extended_sys_state_message(messages.MAV_VTOL_STATE_UNDEFINED, _landed_state(at))
+    landed_state = int(messages.MAV_LANDED_STATE_UNDEFINED)
+    if not at.readiness.is_lost:
+        known(at.need(v.FlightState).armed)
+        landed_state = _landed_state(at)
+    return messages.MAVLink_extended_sys_state_message(messages.MAV_VTOL_STATE_UNDEFINED, landed_state)
 
 
 def _landed_state(at: Moment) -> int:
@@ -532,16 +520,6 @@ def gps_global_origin(at: Moment) -> Message:
     home = known(at.vehicle.home)
     altitude_mm = _fit(round(known(home.altitude_m) * 1000), 32)
     return messages.MAVLink_gps_global_origin_message(home.lat_e7, home.lon_e7, altitude_mm, at.boot_ms * 1000)
-
-
-def _rates(now: v.Orientation) -> Iterable[float]:
-    """Radians a second: roll, pitch, yaw."""
-    return _UNKNOWN_RATES if now.rates_deg_s is None else map(math.radians, now.rates_deg_s)
-
-
-def _padded(channels_us: tuple[int, ...], count: int) -> tuple[int, ...]:
-    """`count` channels; missing ones are unknown."""
-    return (*channels_us, *[_UNKNOWN_U16] * count)[:count]
 
 
 def _rssi(at: Moment) -> int:

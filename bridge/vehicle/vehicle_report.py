@@ -15,6 +15,7 @@ from bridge.model.craft import FlightMode
 from bridge.model.ground_track import bearing_deg, distance_m
 from bridge.model.missions import FlightReport, MissionProgress
 from bridge.settings.board_settings import BoardSettings
+from bridge.vehicle.readiness import CraftReadiness
 from protocols.msp.telemetry import Sensor
 from reports.vehicle_groups import (
     Attitude,
@@ -61,6 +62,7 @@ class VehicleReporter:
     _missions: MissionService
     _ground: Ground
     _settings: BoardSettings
+    _readiness: CraftReadiness
     _want: Callable[[Mapping[type[v.Reading], float]], None]
     _progress: MissionProgress
     #: The groups in use: they are polled, and the updated ones published.
@@ -217,6 +219,8 @@ class VehicleReporter:
             sensors=None if health is None else _names(health.sensors),
             cycle_time_us=None if health is None else health.cycle_time_us,
             i2c_errors=None if health is None else health.i2c_errors,
+            readiness=self._readiness.state.title,
+            not_ready_why=self._readiness.reasons,
             age_s=self._age_s(Group.STATUS, now),
         )
 

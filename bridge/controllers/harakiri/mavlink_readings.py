@@ -8,7 +8,7 @@ from bridge.fc.mavlink_telemetry import MavlinkReadings
 from bridge.fc.mission_flight import flight_report
 from bridge.fc.msp_telemetry import velocity
 from bridge.model import vehicle as v
-from bridge.model.craft import MISSION_BOXES, FlightMode, active_boxes, flight_mode, names_of_active
+from bridge.model.craft import FlightMode, active_boxes, flight_mode, names_of_active
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.msp.mission_flight import SUMMARY, decode_summary
@@ -51,8 +51,7 @@ class HarakiriReadings(MavlinkReadings):
         if switches is not None and sticks is not None:
             heard_at = min(heard_at, sticks.heard_at)
             flags = active_boxes(switches.activation, sticks.channels_us[_STICKS:])
-            # The switch alone flies no mission.
-            by_switches = flight_mode(names_of_active(flags, switches.boxes) - MISSION_BOXES)
+            by_switches = flight_mode(names_of_active(flags, switches.boxes))
             if by_switches not in (FlightMode.STABILIZE, FlightMode.HORIZON, FlightMode.ACRO):
                 mode = by_switches
         self.vehicle.hear(v.Mode(heard_at, v.Source.MAVLINK, mode))

@@ -28,13 +28,16 @@ function badgesOf(state, silent_s) {
   const { armed, armed_age_s } = state?.last_heard ?? { armed: null };
   const wasArmed = armed ? [badge("bad", "WAS ARMED")] : [];
   if (silent_s !== null) return [badge("bad", "NO REPLY FROM THE PI", silent_s), ...wasArmed];
+  const { readiness, not_ready_why } = state.status;
+  if (readiness === "calibrating") return [badge("soft", "CALIBRATING")];
   if (state.link.flight_controller === null) {
     const problem = state.link.state === "command line" ? "COMMAND LINE" : state.port.trouble ? "PORT PROBLEM" : "SEARCHING";
     const what = state.lost_s === null ? badge("bad", problem) : badge("bad", "LOST", state.lost_s);
     return [what, ...wasArmed];
   }
   const known = armed === null ? badge("soft", "ARMED STATE UNKNOWN") : armed ? badge("bad", "ARMED") : badge("good", "DISARMED");
-  return armed_age_s > STALE_S ? [known, badge("bad", "STALE", armed_age_s)] : [known];
+  if (armed_age_s > STALE_S) return [known, badge("bad", "STALE", armed_age_s)];
+  return readiness === "blocked" ? [known, badge("soft", `NOT READY: ${not_ready_why.join(", ")}`)] : [known];
 }
 
 const badge = (kind, name, age_s = null) => ({ kind, name, text: age_s === null ? name : `${name} ${age(age_s)}` });

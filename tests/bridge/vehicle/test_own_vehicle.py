@@ -34,7 +34,8 @@ def test_no_ground_station_shows_a_false_alarm() -> None:
         (ANGLE | BARO, 2, True),
         (ANGLE | BARO | GPS_HOLD, 5, True),
         (ANGLE | BARO | GPS_HOME, 6, True),
-        (ANGLE | BARO | GPS_AUTO | GPS_HOLD, 3, True),
+        # The switch alone flies no mission.
+        (ANGLE | BARO | GPS_AUTO | GPS_HOLD, 5, True),
         (1 << 9 | 1 << 3, 1, False),
     ],
 )

@@ -79,7 +79,8 @@ def test_after_a_lost_link_only_what_matters_is_kept_with_its_age() -> None:
     world.unplug()
     world.run(10)
     home = {name: getattr(known.position, name) for name in ("home_lat_deg", "home_lon_deg")}
-    expected = EMPTY | {Group.POSITION: Position(**home)}
+    lost = Status(readiness="lost", not_ready_why=("flight controller lost",))
+    expected = EMPTY | {Group.POSITION: Position(**home), Group.STATUS: lost}
     assert {group: without_age(bridge.group(group, world.now)) for group in EMPTY} == expected
     assert all(bridge.group(group, world.now).age_s > 9 for group in EMPTY if group is not Group.BATTERY)
     last = bridge.report(world.now).last_heard
