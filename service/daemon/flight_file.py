@@ -17,7 +17,7 @@ _LONGEST_STOP_S = 60.0
 
 
 class FlightFile:
-    """Written when the memory changes: on arming, on disarming and rarely in flight. `port`: the flight controller's.
+    """Written on arming and disarming, and in flight when the mode changes. `port`: the flight controller's.
 
     It counts only on the same port, since the same start of the computer, and 60 s after a stop. Without a `folder`
     there is no memory.

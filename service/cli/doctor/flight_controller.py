@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from bridge.controllers.harakiri.profile import UNPATCHED
 from bridge.fc.states.base import Closed
 from bridge.fc.states.mute import Cli
+from bridge.vehicle.incoming import OWN_IDS
 from payloads.mission_data import Json
 from protocols.mavlink.signing import Check
 from service.cli.doctor.checked import Checked, note, ok, problem
@@ -111,6 +112,9 @@ def _refused(status: Json) -> Iterator[Checked]:
                 "sudo naze-bridge setup --new-key makes a new one and shows it"
             )
             yield note("key", f"{count} requests on {link} were refused: {why}", remedy)
+        elif why == OWN_IDS or why.startswith("addressed to component"):
+            remedy = "in that program: its own sysid such as 255, and the vehicle's ids, by default 1 and 1, as target"
+            yield note("ids", f"{count} messages on {link} were ignored: {why}", remedy)
         elif why in (Check.LATE.value, Check.EARLY.value):
             remedy = "set the clocks of the ground station and of the Pi; then: naze-bridge signing reset"
             yield note("key", f"{count} requests on {link} were refused: {why}", remedy)
