@@ -146,11 +146,10 @@ def test_it_returns_from_a_zone_with_that_action(sitl: Sitl) -> None:
 def test_a_return_flies_around_a_zone_only_with_angle(sitl: Sitl, switches: list[int], is_around: bool) -> None:
     zone = circle(200, 50, FenceAction.POS_HOLD)
     aside = replace(leg(200), lon_e7=LON_E7 + (150 * 128))
-    records = leg(60), aside, leg(350), NavRecord(NavAction.RTH)
+    records = leg(60), aside, leg(400), NavRecord(NavAction.RTH)
     sitl.configure(zones=[zone], nav_auto_speed=1000)
     fly(sitl, records)
-    sitl.run(5)
-    while sitl.nav_status().mode == NavMode.MISSION:
+    while sitl.nav_status().mode != NavMode.RTH:
         sitl.run(1)
     sitl.switch(ARM, NAV_WP, *switches)
     nearest = 1000.0
