@@ -6,7 +6,6 @@ Flights take up to a minute each, in real time.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import hypot
 
 import pytest
 
@@ -140,26 +139,6 @@ def test_it_returns_from_a_zone_with_that_action(sitl: Sitl) -> None:
     assert sitl.nav_status().mode == NavMode.RTH
     assert sitl.place[0] < 100
     assert said(records, zones=(zone,))[1] == ["WP 2: geozone 0: flown, or a return if ANGLE is on"]
-
-
-@pytest.mark.parametrize(("switches", "is_around"), [([], False), ([ANGLE], True)])
-def test_a_return_flies_around_a_zone_only_with_angle(sitl: Sitl, switches: list[int], is_around: bool) -> None:
-    zone = circle(200, 50, FenceAction.POS_HOLD)
-    aside = replace(leg(200), lon_e7=LON_E7 + (150 * 128))
-    records = leg(60), aside, leg(400), NavRecord(NavAction.RTH)
-    sitl.configure(zones=[zone], nav_auto_speed=1000)
-    fly(sitl, records)
-    while sitl.nav_status().mode != NavMode.RTH:
-        sitl.run(1)
-    sitl.switch(ARM, NAV_WP, *switches)
-    nearest = 1000.0
-    for _ in range(300):
-        sitl.run(0.5)
-        if sitl.place[0] < 130:
-            break
-        nearest = min(nearest, hypot(sitl.place[0] - 200, sitl.place[1]))
-    assert 50 < nearest < 200 if is_around else nearest < 10
-    assert said(records, zones=(zone,))[1][-1] == "WP 4: geozone 0: flown, or around if ANGLE is on"
 
 
 @pytest.mark.parametrize(("asked_cm_s", "flown_m_s"), [(1200, 7.0), (600, 6.0)])

@@ -86,7 +86,7 @@ def test_zones_are_judged_on_the_way_as_flown() -> None:
     corner = at(1), at(1, 2), at(3, 2), jump(1), at(3, 3)
     assert texts(circle(2, 1, 40), legs=corner) == ["WP 4: geozone 0: flown, or a stop if ANGLE is on"]
     back = at(1), at(1, 2), RTL_LANDS
-    assert texts(circle(0.5, 1, 30), legs=back) == ["WP 3: geozone 0: flown, or around if ANGLE is on"]
+    assert texts(circle(0.5, 1, 30), legs=back) == ["WP 3: geozone 0: flown through, or around"]
     places = [(-1, -1), (3, -1), (3, 0), (0, 0.5), (3, 1), (3, 3), (-1, 3)]
     corners = tuple(Corner(LAT + round(n * NORTH), LON + round(e * EAST)) for n, e in places)
     concave = Geozone(1, True, corners, action=HOLDS)
