@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Telemetry logs and UART captures."""
+"""Telemetry logs."""
