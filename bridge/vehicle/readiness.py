@@ -120,6 +120,7 @@ class CraftReadiness:
             self._known = controller.name
         if profile.spoken is Spoken.OTHER_MAVLINK:
             # It represents itself.
+            self.state, self.reasons = ReadyState.UNKNOWN, ()
             return
         if profile.notice is not None and controller.name != before:
             self._ground.say(profile.notice())

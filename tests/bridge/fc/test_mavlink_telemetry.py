@@ -74,27 +74,6 @@ def test_two_autopilots_on_one_line_are_not_mixed() -> None:
         assert world.bridge.group(Group.ATTITUDE, world.now).roll_deg is None
 
 
-def test_after_a_stall_the_same_one_of_two_autopilots_is_shown() -> None:
-    """The other's heartbeats arrive first."""
-    world, autopilot, _ = passing()
-    autopilot.heartbeat = m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3)
-    world.bridge.watch(Group)
-    other = m.MAVLink(None, srcSystem=7, srcComponent=1)
-    world.run(2)
-    autopilot._due += 14
-    world.run(7)
-    for _ in range(6):
-        autopilot.outgoing += m.MAVLink_heartbeat_message(2, 3, 81 | 128, 4, 4, 3).pack(other)
-        world.run(0.5)
-        autopilot.send(autopilot.heartbeat)
-        world.run(0.5)
-    for sender, roll in ((other, 0.5), (autopilot.mavlink, 0.25)):
-        autopilot.outgoing += m.MAVLink_attitude_message(1, roll, 0, 0, 0, 0, 0).pack(sender)
-    world.run(0.1)
-    assert world.bridge.vehicle.armed is False
-    assert world.bridge.group(Group.ATTITUDE, world.now).roll_deg == 14.32
-
-
 def test_a_companion_on_board_does_not_replace_an_autopilot_that_restarts() -> None:
     world, autopilot, _ = passing()
     companion = m.MAVLink(None, srcSystem=1, srcComponent=191)

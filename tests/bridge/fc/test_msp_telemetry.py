@@ -129,7 +129,7 @@ def test_the_sticks_are_in_arducopters_order() -> None:
         1000,
         1000,
     ]
-    assert {getattr(channels, f"chan{number}_raw") for number in range(9, 19)} == {65535}
+    assert {getattr(channels, f"chan{number}_raw") for number in range(9, 19)} == {0}
     assert channels.rssi == 920 * 254 // 1020
 
 
@@ -197,6 +197,7 @@ def test_noise_gives_neither_telemetry_nor_a_flight_controller() -> None:
         world.run(0.087)
     assert len(world.events("fc.found")) == found
     assert {message.get_type() for message in station.messages()} <= {
+        "EXTENDED_SYS_STATE",
         "HEARTBEAT",
         "MISSION_CURRENT",
         "STATUSTEXT",

@@ -118,7 +118,7 @@ def test_one_changed_record_in_the_longest_list_is_noticed_from_the_upload() -> 
 
 
 @pytest.mark.parametrize("streams_hz", [0, 50])
-def test_a_reloaded_earlier_list_is_noticed_within_two_seconds(streams_hz: int) -> None:
+def test_a_reloaded_earlier_list_is_noticed_within_six_seconds(streams_hz: int) -> None:
     """Another client has changed one of many records without saving, and loads the saved list."""
     board, world, _ = with_the_longest_list(streams_hz)
     ours = packed(plan(CAPACITY + 1))
@@ -129,13 +129,12 @@ def test_a_reloaded_earlier_list_is_noticed_within_two_seconds(streams_hz: int) 
     world.run(10)
     assert [record.pack() for record in world.bridge.missions.held.records] == records  # type: ignore[union-attr]
     mission.load()
-    # The line carries 50 Hz of all streams only in part.
-    world.run(2.3 if streams_hz else 2.0)
+    world.run(6.5)
     assert [record.pack() for record in world.bridge.missions.held.records] == ours  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize("streams_hz", [0, 50])
-def test_a_list_that_the_sticks_load_is_read_at_once(streams_hz: int) -> None:
+def test_a_list_that_the_sticks_load_is_noticed_within_six_seconds(streams_hz: int) -> None:
     """It is of the longest size, has never been seen, and differs in one record."""
     board, world, _ = with_the_longest_list(streams_hz)
     for number in (1, 60, 119):
@@ -143,7 +142,7 @@ def test_a_list_that_the_sticks_load_is_read_at_once(streams_hz: int) -> None:
         changed = packed(plan(CAPACITY + 1, 7))[number - 1]
         board._eeprom[(number - 1) * WAYPOINT_SIZE + 1 : number * WAYPOINT_SIZE] = changed
         board.faults.stick_loads += 1
-        world.run(3)
+        world.run(6.5)
         assert world.bridge.missions.held.records[number - 1].pack() == changed  # type: ignore[union-attr]
 
 
