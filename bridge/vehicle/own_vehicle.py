@@ -41,6 +41,8 @@ _POLLS_INTERVAL_S = 0.25
 _NEWCOMER_S, _NEWCOMER_INTERVAL_S = 3.0, 0.2
 #: Without a reading for this long, SYS_STATUS is sent anyway, to report that nothing is known.
 _SILENT_S = 3.0
+#: The item in flight is shown for this long without a report.
+_HELD_S = 4.0
 #: Longer than MAVSDK waits for a changed MISSION_CURRENT (2.5 s).
 _NO_CURRENT_S = 4.0
 #: The shortest interval that a ground station may request.
@@ -299,9 +301,11 @@ class OwnVehicle:
         if not held.items:
             return FlownMission(held.items, 0, Progress.NO_MISSION)
         vehicle, seq = self._session.vehicle, self._missions.seq_of(self.progress.number)
-        is_silent = vehicle.last(MissionLeg) is not None and vehicle.fresh(MissionLeg, now) is None
-        # It still flies to that item, as far as is known: reading a long list leaves no time for polls.
-        return FlownMission(held.items, seq, Progress.UNKNOWN if is_silent else self.progress.progress)
+        if vehicle.last(MissionLeg) is None or vehicle.fresh(MissionLeg, now) is not None:
+            return FlownMission(held.items, seq, self.progress.progress)
+        # Reading a long list leaves no time for polls: it still flies to that item.
+        is_held = vehicle.fresh(MissionLeg, now, _HELD_S) is not None
+        return FlownMission(held.items, seq if is_held else 0)
 
     def _follow_state(self, now: float) -> None:
         """Send a heartbeat as soon as something in it has changed; report the failsafe."""
