@@ -39,10 +39,8 @@ _TICK_S = 1.0
 _POLLS_INTERVAL_S = 0.25
 #: Mission Planner needs two heartbeats to connect: a newcomer gets one every 0.2 s for 3 s.
 _NEWCOMER_S, _NEWCOMER_INTERVAL_S = 3.0, 0.2
-#: Without a reading for this long, SYS_STATUS is sent anyway, to report that nothing is known.
+#: Without a reading for this long nothing is known: SYS_STATUS is sent anyway, and no item is shown as flown to.
 _SILENT_S = 3.0
-#: The item in flight is shown for this long without a report.
-_HELD_S = 4.0
 #: Longer than MAVSDK waits for a changed MISSION_CURRENT (2.5 s).
 _NO_CURRENT_S = 4.0
 #: The shortest interval that a ground station may request.
@@ -304,7 +302,7 @@ class OwnVehicle:
         if vehicle.last(MissionLeg) is None or vehicle.fresh(MissionLeg, now) is not None:
             return FlownMission(held.items, seq, self.progress.progress)
         # Reading a long list leaves no time for polls: it still flies to that item.
-        is_held = vehicle.fresh(MissionLeg, now, _HELD_S) is not None
+        is_held = vehicle.fresh(MissionLeg, now, _SILENT_S) is not None
         return FlownMission(held.items, seq if is_held else 0)
 
     def _follow_state(self, now: float) -> None:
