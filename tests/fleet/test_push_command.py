@@ -41,7 +41,7 @@ def test_a_file_without_a_storable_item_erases_nothing(fleet: Fleet, tmp_path: P
     tried = fleet.ask("push", nothing, "--vehicle", "kite", "--dry-run")
     assert (tried.returncode, "no item of it can be stored" in tried.stdout) == (1, True), tried
     pushed = fleet.pushed(nothing, "--vehicle", "kite", code=1)
-    assert "would erase the current mission" in pushed["kite"]["error"]
+    assert "would erase the mission" in pushed["kite"]["error"]
     assert fleet.daemons["kite"].pull()["count"] == 4
 
 
