@@ -237,7 +237,7 @@ def refuse_frame(item: MissionItem, *, needs_position: bool) -> RejectingFinding
 
 def refuse_first(item: MissionItem) -> RejectingFinding:
     """Item 0 is a command, so the list has no home."""
-    why = f"the list has no home, its item 0 is {command_name(item.command)}: put home first"
+    why = f"put home first, item 0 is {command_name(item.command)}"
     return reject(MissionResult.INVALID, item, "command", why)
 
 

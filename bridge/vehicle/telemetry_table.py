@@ -53,6 +53,7 @@ TELEMETRY = (
     Row(m.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, None, inf, NO_STREAM, make.gps_global_origin),
     Row(m.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW, v.Motors, 0.5, RC_CHANNELS, make.servo_output_raw),
     Row(m.MAVLINK_MSG_ID_SCALED_PRESSURE, v.Pressure, 0.5, RAW_SENSORS, make.scaled_pressure),
+    Row(m.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, v.Orientation, inf, NO_STREAM, make.attitude_quaternion),
     Row(m.MAVLINK_MSG_ID_LOCAL_POSITION_NED, v.GlobalPosition, inf, POSITION, make.local_position_ned),
     Row(m.MAVLINK_MSG_ID_RAW_IMU, v.ImuSample, inf, RAW_SENSORS, make.raw_imu),
     Row(m.MAVLINK_MSG_ID_MISSION_CURRENT, None, 1.0, EXTENDED_STATUS, make.mission_current),

@@ -426,6 +426,22 @@ def scaled_pressure(at: Moment) -> Message:
     return messages.MAVLink_scaled_pressure_message(at.boot_ms, pressure.absolute_hpa, 0.0, temperature)
 
 
+def attitude_quaternion(at: Moment) -> Message:
+    """ATTITUDE_QUATERNION: w, x, y, z."""
+    now = at.need(v.Orientation)
+    halves = [math.radians(angle) / 2 for angle in (now.roll_deg, now.pitch_deg, now.heading_deg)]
+    (sin_r, sin_p, sin_y), (cos_r, cos_p, cos_y) = map(math.sin, halves), map(math.cos, halves)
+    rates = _UNKNOWN_RATES if now.rates_deg_s is None else map(math.radians, now.rates_deg_s)
+    return messages.MAVLink_attitude_quaternion_message(
+        at.boot_ms,
+        cos_r * cos_p * cos_y + sin_r * sin_p * sin_y,
+        sin_r * cos_p * cos_y - cos_r * sin_p * sin_y,
+        cos_r * sin_p * cos_y + sin_r * cos_p * sin_y,
+        cos_r * cos_p * sin_y - sin_r * sin_p * cos_y,
+        *rates,
+    )
+
+
 def local_position_ned(at: Moment) -> Message:
     """LOCAL_POSITION_NED: metres from home, m/s."""
     position, height = at.need(v.GlobalPosition), at.need(v.Height)

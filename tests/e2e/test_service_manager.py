@@ -91,7 +91,7 @@ def test_a_push_that_would_take_long_is_aborted(start: Starter, trouble: str) ->
     assert bench.daemon.end() == 0
     answer = last_answer(connection)["result"]
     assert answer["ack"] == "MAV_MISSION_DENIED"
-    assert "old mission is kept" in str(answer["text"]) or trouble == "deaf"
+    assert "old one kept" in str(answer["text"]) or trouble == "deaf"
     assert outcomes(start, bench.daemon) == ["FAILED", "VERIFIED"]
     if trouble == "slow":
         assert bench.board.records() == old

@@ -43,7 +43,6 @@ MAVSDK_MODES = {
     1 << 2: "ALTCTL",
     1 << 7: "HOLD",
     1 << 6: "RETURN_TO_LAUNCH",
-    1 << 8: "MISSION",
     0: "ACRO",
 }
 
@@ -164,7 +163,7 @@ def test_mavproxy_shows_the_flight_correctly(bench: Bench, tmp_path: Path) -> No
         assert battery == pytest.approx(truth(bench)["volts"], abs=VOLTAGE_V)
         channels = shown_by(mavproxy, "RC_CHANNELS")
         assert [channels[f"chan{number}_raw"] for number in range(1, 6)] == [1500, 1500, 1450, 1500, 2000]
-        for boxes, mode in ((1 << 2, "ALT_HOLD"), (1 << 7, "LOITER"), (1 << 6, "RTL"), (1 << 8, "AUTO"), (0, "ACRO")):
+        for boxes, mode in ((1 << 2, "ALT_HOLD"), (1 << 7, "LOITER"), (1 << 6, "RTL"), (0, "ACRO")):
             bench.board.set(f"boxes {boxes}")
             mavproxy.wait_for(f"Mode {mode}")
         printed = (tmp_path / "mavproxy.log").read_text()

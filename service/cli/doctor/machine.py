@@ -63,12 +63,14 @@ def check_clock(host: Host, now: datetime) -> Checked:
 
 def check_root(host: Host) -> Checked | None:
     """Check that changes to the system survive a restart."""
-    mounts = [line.split() for line in host.read("/proc/mounts").splitlines()]
-    kind, options = next(((row[2], row[3].split(",")) for row in mounts if row[1:2] == ["/"]), ("", []))
+    # The mount's own options do not count: those of the helper's unit make the root read-only for it.
+    mounts = [line.partition(" - ")[::2] for line in host.read("/proc/self/mountinfo").splitlines()]
+    disks = [disk.split() for mount, disk in mounts if mount.split()[4:5] == ["/"]]
+    kind, _, options = (*disks[-1], "", "", "")[:3] if disks else ("", "", "")
     if kind == "overlay":
         remedy = "sudo raspi-config nonint disable_overlayfs && sudo reboot"
         return note("root", "an overlay in memory: settings, missions and logs are lost at power-off", remedy)
-    if "ro" in options:
+    if "ro" in options.split(","):
         remedy = "sudo mount -o remount,rw /; if that fails, the card may be worn out: look at `sudo dmesg`"
         return note("root", "read-only: settings and updates cannot be stored", remedy)
     return None

@@ -77,7 +77,7 @@ def test_a_list_that_would_erase_the_mission_needs_confirmation(daemon: Daemon, 
     nothing = write_plan(tmp_path / "nothing", [HOME, PlanRow(Command.DO_CHANGE_SPEED)])
     refused = ask(daemon, "push", nothing)
     assert refused.returncode == 3
-    assert "would erase the current mission" in refused.stdout
+    assert "would erase the mission" in refused.stdout
     assert daemon.pull()["records"] == held
     assert ask(daemon, "push", "--erase", nothing).returncode == 0
     assert daemon.pull()["records"] == []

@@ -16,7 +16,6 @@ from tests.support.programs import run_naze_bridge
     ("name", "contents", "status", "why"),
     [
         ("x.hex", b"junk", 2, "not an Intel HEX file"),
-        ("x.elf", stand_in(patched=True), 2, "not an ELF file"),
         ("x.bin", stand_in(patched=False), 1, "without the mission patch"),
     ],
 )

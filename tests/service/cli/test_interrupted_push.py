@@ -72,7 +72,7 @@ def test_without_a_daemon_the_old_mission_is_kept(start: Starter) -> None:
     terminal.wait_for(UNDER_WAY)
     terminal.type(CTRL_C)
     assert terminal.end() == 130
-    assert "interrupted: naze-bridge was stopped during the write; the old mission is kept" in terminal.printed
+    assert "Not written: naze-bridge stopped, old one kept" in terminal.printed
     assert board.records() == before
     board.assert_unharmed()
 

@@ -339,7 +339,7 @@ def test_a_take_off_after_items_that_are_not_stored_names_what_to_remove() -> No
 
 def test_a_list_without_home_says_so() -> None:
     verdict = check_list([item(TAKEOFF), item(WAYPOINT)], PROFILE)
-    why = "the list has no home, its item 0 is TAKEOFF: put home first"
+    why = "put home first, item 0 is TAKEOFF"
     assert verdict.findings[-1].text() == f"Rejected, Home: {why}"
 
 

@@ -58,11 +58,11 @@ def behind_a_firewall(pi: FaultyMachine) -> None:
 
 
 def on_an_overlay(pi: FaultyMachine) -> None:
-    pi.write("/proc/mounts", "overlayroot / overlay rw,upperdir=/media/root-rw/overlay 0 0\n")
+    pi.write("/proc/self/mountinfo", "27 1 0:24 / / rw - overlay overlayroot rw,upperdir=/media/root-rw/overlay\n")
 
 
 def on_a_worn_out_card(pi: FaultyMachine) -> None:
-    pi.write("/proc/mounts", "/dev/mmcblk0p2 / ext4 ro,noatime 0 0\n")
+    pi.write("/proc/self/mountinfo", "27 1 179:2 / / ro,noatime - ext4 /dev/mmcblk0p2 ro\n")
 
 
 def holder(pi: FaultyMachine) -> list[Checked]:
@@ -93,7 +93,7 @@ def carry_out(pi: FaultyMachine, command: str) -> None:
     elif rule := re.match(r"sudo nft insert rule inet filter input (.*)", command):
         pi.write(_RULES, _DROPS_ALL.replace("policy drop;", f"policy drop;\n\t\t{rule[1]}"))
     elif command in ("sudo raspi-config nonint disable_overlayfs && sudo reboot", "sudo mount -o remount,rw /"):
-        pi.write("/proc/mounts", "/dev/mmcblk0p2 / ext4 rw,noatime 0 0\n")
+        pi.write("/proc/self/mountinfo", "27 1 179:2 / / ro,noatime - ext4 /dev/mmcblk0p2 rw\n")
 
 
 @pytest.mark.parametrize(
