@@ -139,7 +139,9 @@ class MessageRouter:
         handler = self.handlers.get(msgid)
         if handler is None or (message := decode(frame)) is None:
             return
-        if not sender.station.allows(Cost.TRANSFER if msgid in _OF_A_TRANSFER else Cost.ANSWER):
+        cost = Cost.TRANSFER if msgid in _OF_A_TRANSFER else Cost.ANSWER
+        # A heartbeat is not answered: a flood of them must not use up the answers of all.
+        if msgid != m.MAVLINK_MSG_ID_HEARTBEAT and not sender.station.allows(cost):
             return
         mission_type = getattr(message, "mission_type", m.MAV_MISSION_TYPE_MISSION)
         clears_all = msgid == m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL and mission_type == m.MAV_MISSION_TYPE_ALL
