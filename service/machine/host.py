@@ -35,7 +35,7 @@ class Process:
     def name(self) -> str:
         """The program's file; of Python the script or module."""
         words = [os.path.basename(word) for word in self.arguments] or [""]
-        if not re.fullmatch(r"python[\d.]*", words[0]):
+        if not re.fullmatch(r"python[\d.]*", words[0]) or "-c" in words[1:3]:
             return words[0]
         return next((word for word in words[1:] if word and not word.startswith("-")), words[0])
 
