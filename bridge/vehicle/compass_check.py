@@ -57,10 +57,15 @@ class CompassCheck:
     def __init__(self, vehicle: Vehicle, ground: Ground) -> None:
         self._vehicle = vehicle
         self._ground = ground
+        #: The settings that were compared last: the declination is the same wherever one battery takes the craft.
+        self._compared: SettingTable | None = None
         self._told: Happening | None = None
 
     def follow(self, table: SettingTable) -> None:
-        """Compare the settings of the disarmed board with the place just heard."""
+        """Compare settings that have changed with the place just heard."""
+        if table is self._compared or self._vehicle.last(Health) is None:
+            return
+        self._compared = table
         if (problem := self._problem(table)) == self._told:
             return
         notices = self._ground.notices
@@ -87,4 +92,4 @@ class CompassCheck:
         off_deg = abs(math.remainder(here_deg - degrees - minutes / 0.6, 360))
         if off_deg < _REPORTED_DEG:
             return None
-        return DECLINATION(off_deg, setting.name, 100 * round(here_deg))
+        return DECLINATION(round(off_deg), setting.name, 100 * round(here_deg))

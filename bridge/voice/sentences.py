@@ -216,7 +216,7 @@ INTERRUPTED = Sentence(_NOTICE, "interrupted, old mission kept")
 
 # A mission in flight (Harakiri).
 LOW_BATTERY = Sentence(_WARNING, "Battery low: land, or switch GPS HOME on")
-DECLINATION = Sentence(_WARNING, "Compass {:.0f} deg off: set {} to {}", 180.0, "mag_declination", -18000)
+DECLINATION = Sentence(_WARNING, "Compass {} deg off: set {} to {}", 180, "mag_declination", -18000)
 COMPASS_OFF = Sentence(_WARNING, "Compass about {} deg off: check mag_dec", 180)
 _FLIGHT_TEXTS: Mapping[FlightReason, str] = {
     FlightReason.DISABLED: "Mission not started: mission_fly is 0",

@@ -3,7 +3,9 @@
 
 import pytest
 
+from bridge.model.vehicle import GlobalPosition, Source
 from bridge.vehicle.compass_check import declination_deg
+from simulator.board.options import Faults
 from tests.support.settings_client import BOARDS, ready
 from tests.support.world import GroundStation, World
 
@@ -48,6 +50,22 @@ def test_a_wrong_declination_is_reported_once_until_it_is_set() -> None:
     client.change("mag_dec", 300)
     world.run(5)
     assert compass_texts(world, "late") == []
+
+
+@pytest.mark.parametrize("armed", [False, True])
+def test_a_craft_that_moves_is_not_told_again(armed: bool) -> None:
+    faults = Faults()
+    world, client = ready(BOARDS["patched Harakiri"], faults)
+    station = GroundStation(world)
+    station.stay_connected()
+    client.change("mag_dec", -2548)
+    world.run(10)
+    faults.armed = armed
+    for step in range(50):
+        place = GlobalPosition(world.now, Source.MSP, 453_838_000 + 5_000 * step, 84_733_000, 100.0)
+        world.bridge.vehicle.hear(place)
+        world.run(0.2)
+    assert len([text for text in station.texts() if "Compass" in text]) == 1
 
 
 def test_inav_needs_no_declination_while_it_finds_it_itself() -> None:
