@@ -78,8 +78,6 @@ class UploadState:
 
     seconds: float
     timeout: Refusal
-    #: The ground station may show its list as written: a failure is reported three times.
-    seems_written = False
 
     def __init__(self, _upload: "Upload", _event: Event, now: float) -> None:
         self._began_at = now
@@ -151,7 +149,6 @@ class Closing(Receiving):
     """Mission Planner's "Write Fast" has ended; delayed items may still arrive."""
 
     seconds = 0.3
-    seems_written = True
 
     def __init__(self, upload: "Upload", event: SenderFinished, now: float) -> None:
         UploadState.__init__(self, upload, event, now)
@@ -189,7 +186,6 @@ class Complete(_Whole):
 
     seconds = 2.5
     timeout = OCCUPIED
-    seems_written = True
 
     def __init__(self, upload: "Upload", event: Arrived, now: float) -> None:
         super().__init__(upload, event, now)

@@ -123,7 +123,6 @@ class FcConnection:
         if output.data:
             data = b"".join(output.data)
             self._port.write(data, asks=output.asks)
-            self._traffic.pieces_sent += 1
             self._traffic.bytes_sent += len(data)
         if output.complete_at > -inf or self._is_held:
             self._is_held = output.complete_at > -inf

@@ -67,18 +67,14 @@ class GcsConnections:
     def send(self, datagrams: Datagrams) -> None:
         for peer, data in datagrams:
             self._links[peer.link].send(peer, data)
-            traffic = self._traffic[peer.link]
-            traffic.pieces_sent += 1
-            traffic.bytes_sent += len(data)
+            self._traffic[peer.link].bytes_sent += len(data)
 
     def close(self) -> None:
         for link in self._links.values():
             link.close()
 
     def gcs_data(self, peer: Peer, data: bytes, *, datagram: bool) -> None:
-        traffic = self._traffic[peer.link]
-        traffic.pieces_received += 1
-        traffic.bytes_received += len(data)
+        self._traffic[peer.link].bytes_received += len(data)
         try:
             if not self._bridge.gcs_received(peer, data, self._loop.time(), datagram=datagram):
                 return

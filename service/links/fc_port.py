@@ -41,7 +41,7 @@ _log = structlog.get_logger()
 class FcPort:
     """Keeps the port open. `open_device` raises PortError if it cannot be opened now.
 
-    `on_open`, `on_data` and `on_close` are called from the event loop. Reads are counted in `traffic`.
+    `on_open`, `on_data` and `on_close` are called from the event loop. `traffic` counts the bytes read.
 
     The first failure to open is logged as a warning; a repetition is not logged again.
     """
@@ -191,9 +191,7 @@ class FcPort:
         if not data:
             self._shut("the other end closed the connection")
             return
-        traffic = self._traffic
-        traffic.pieces_received += 1
-        traffic.bytes_received += len(data)
+        self._traffic.bytes_received += len(data)
         if self._is_tcp:
             self._acknowledge()
         if self.may_gather:

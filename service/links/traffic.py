@@ -6,9 +6,7 @@ from dataclasses import dataclass
 
 @dataclass(slots=True)
 class Traffic:
-    """The traffic since the start: bytes, and pieces (reads and writes, or datagrams)."""
+    """Bytes since the start."""
 
-    pieces_received: int = 0
     bytes_received: int = 0
-    pieces_sent: int = 0
     bytes_sent: int = 0
