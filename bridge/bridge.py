@@ -32,7 +32,7 @@ from bridge.line.runner import Runner
 from bridge.missions.mission_service import MissionService
 from bridge.model.events import Armed, Disarmed
 from bridge.model.missions import ARMED, Refusal
-from bridge.model.settings import SettingsState, SettingTable
+from bridge.model.settings import SettingsState
 from bridge.model.vehicle import FlightState, GlobalPosition, Health, Readiness
 from bridge.settings.board_settings import BoardSettings
 from bridge.settings.local_settings import LocalSettings
@@ -136,7 +136,9 @@ class Bridge:
         #: Missions, for the command line, the page and zenoh.
         self.missions = LocalMissions(missions, types.of_missions, ground, emit, incidents)
         # The board's settings, and other programs' requests.
-        sharing = self._sharing = MspSharing(session, missions, ground, emit, self._settings_may_have_changed)
+        sharing = self._sharing = MspSharing(
+            session, missions, ground, emit, lambda now: self._board_settings.may_have_changed(now)
+        )
         settings = self._board_settings = BoardSettings(
             session,
             missions,
@@ -145,7 +147,7 @@ class Bridge:
             config.settings_memory,
             lambda: self.missions.transfer is not None,
             lambda: sharing.due < inf,
-            self._table_changed,
+            lambda table: self._parameters.take(table),
         )
         #: Settings, for the command line, the page and zenoh.
         self.settings = LocalSettings(settings, session)
@@ -341,12 +343,6 @@ class Bridge:
         self._follow_line(now)
 
     # Between the parts.
-
-    def _table_changed(self, table: SettingTable) -> None:
-        self._parameters.take(table)
-
-    def _settings_may_have_changed(self, now: float) -> None:
-        self._board_settings.may_have_changed(now)
 
     def _newcomer(self, station: GroundStation, now: float) -> None:
         if not self.is_passing_through:

@@ -98,6 +98,11 @@ class Port:
     #: Remembers which of several autopilots it follows.
     telemetry: MavlinkTelemetry | None = None
 
+    def controller_that_speaks(self, spoken: Spoken) -> FlightController:
+        """The flight controller of a protocol that only one profile speaks."""
+        (profile,) = (profile for profile in self.profiles if profile.spoken is spoken)
+        return FlightController(profile, profile.name)
+
     def mavlink_of(self, frame: MavlinkFrame) -> Spoken:
         """A Harakiri's MAVLink or another autopilot's.
 

@@ -34,8 +34,7 @@ class MavlinkLine(State):
 
     def __init__(self, port: Port, event: Found, now: float) -> None:
         super().__init__(port, event, now)
-        (profile,) = (profile for profile in port.profiles if profile.spoken is event.spoken)
-        self.controller = FlightController(profile, profile.name)
+        self.controller = port.controller_that_speaks(event.spoken)
         self._splitter = MavlinkSplitter()
         self._heard_at = self._last_byte_at = now
         self._look_at = now + _LINE_SILENCE_S

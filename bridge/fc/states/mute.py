@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The states of a line on which the flight controller answers nothing: its command line, and FrSky telemetry."""
 
-from bridge.fc.profile import FlightController, Spoken
+from bridge.fc.profile import FlightController
 from bridge.fc.states.base import Event, Found, Lost, Port, State
 from bridge.line.msp_link import PROBE
 from bridge.model.vehicle import Source
@@ -72,8 +72,7 @@ class Frsky(State):
 
     def __init__(self, port: Port, event: Found, now: float) -> None:
         super().__init__(port, event, now)
-        (profile,) = (profile for profile in port.profiles if profile.spoken is Spoken.FRSKY)
-        self.controller = FlightController(profile, profile.name)
+        self.controller = port.controller_that_speaks(event.spoken)
         self._frsky, self._msp = FrskyWatch(), MspParser()
         self._probe_due = now + _PROBE_INTERVAL_S
         port.meet(self.controller)
