@@ -24,7 +24,6 @@
 #   make rules-page     regenerate the table of docs/mission-rules.md from the rules
 #   make rights-page    regenerate the tables of docs/rights.md from protocols/rights/
 #   make inav-page      regenerate the table of docs/inav.md
-#   make ground-stations-page  regenerate the texts of docs/ground-stations.md
 #   make config-sample  regenerate examples/config.toml
 #   make zenoh-schemas  regenerate payloads/schemas/ from the payload types
 #   make clean          remove all generated files that are not in git
@@ -39,7 +38,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .NOTPARALLEL:
-.PHONY: ground-stations-page rules-page rights-page demo test lint bench pictures real-board soak fuzz deb release deb-trial suite-trial image-check lock config-sample cli-page inav-page zenoh-schemas clean
+.PHONY: rules-page rights-page demo test lint bench pictures real-board soak fuzz deb release deb-trial suite-trial image-check lock config-sample cli-page inav-page zenoh-schemas clean
 
 # The programs that the tests use, with their Debian packages: installed if missing and if run as root, like the compilers
 # of firmware/. Without one of the needed programs there is no test run, without one of the others its tests are skipped.
@@ -162,13 +161,6 @@ rules-page: $(VENV)/.test-ready
 	sed -i -e '/begin: make rules-page/,/end: make rules-page/{/make rules-page -->/!d}' \
 	    -e '/begin: make rules-page/r docs/rules.table' docs/mission-rules.md
 	rm docs/rules.table
-
-# The texts for pilots.
-ground-stations-page: $(VENV)/.test-ready
-	$(BIN)/python -m generators.ground_stations_page > docs/texts.table
-	sed -i -e '/begin: make ground-stations-page/,/end: make ground-stations-page/{/make ground-stations-page -->/!d}' \
-	    -e '/begin: make ground-stations-page/r docs/texts.table' docs/ground-stations.md
-	rm docs/texts.table
 
 # The table of the effect of each request.
 rights-page: $(VENV)/.test-ready

@@ -13,6 +13,7 @@ from protocols.rights.msp import MSP_RIGHTS, Firmware, MspRight
 
 #: A longer list of payload lengths is given by its ends.
 _LISTED = 4
+_SENSOR = "a sensor's value"
 _HARAKIRI = {Firmware.HARAKIRI, Firmware.HARAKIRI_MISSIONS}
 _EFFECTS = (Effect.READ, Effect.CHANGE, Effect.MOVE, Effect.UNKNOWN)
 
@@ -51,21 +52,10 @@ def _names(firmware: Collection[Firmware]) -> str:
 
 
 def _requests(texts: Mapping[int, str]) -> str:
-    """The requests with their numbers; neighbours with the same text as a range."""
-    ranges: list[tuple[int, int, str]] = []
-    for number, text in texts.items():
-        first, last, previous = ranges[-1] if ranges else (0, -1, "")
-        if (last + 1, previous) == (number, text):
-            ranges[-1] = (first, number, text)
-        else:
-            ranges.append((number, number, text))
-    return ", ".join(
-        f"{_number(first)}{'' if first == last else f'..{_number(last)}'} {text}" for first, last, text in ranges
-    )
-
-
-def _number(command: int) -> str:
-    return str(command) if command < 256 else f"0x{command:04X}"
+    """The requests by name; a sensor's values, which have none, by their range."""
+    sensors = [command for command, text in texts.items() if text == _SENSOR]
+    named = [text for text in texts.values() if text != _SENSOR]
+    return ", ".join([*named, *([f"{_SENSOR} (0x{min(sensors):04X}..0x{max(sensors):04X})"] if sensors else [])])
 
 
 def _request(right: MspRight) -> str:
@@ -73,7 +63,7 @@ def _request(right: MspRight) -> str:
         case Effect.READ:
             accepted = " or ".join(payload.hex(" ") for payload in sorted(right.only)) or _lengths(right.lengths)
             otherwise = "" if right.otherwise is Effect.UNKNOWN else f", else {right.otherwise.value}"
-            return f"{right.name}{'' if accepted == '0' else f' ({accepted}{otherwise})'} {right.reply}"
+            return right.name if accepted == "0" else f"{right.name} ({accepted}{otherwise})"
         case Effect.CHANGE if not _fills_the_buffer(right.lengths):
             return f"{right.name} ({_lengths(right.lengths)})"
     return right.name

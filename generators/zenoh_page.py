@@ -16,8 +16,8 @@ _HEAD = """\
 # Payloads over zenoh
 
 The fields of each payload of [zenoh](zenoh.md), from the JSON Schemas in
-[`payloads/schemas/`](../payloads/schemas/). "?": may be null, if the value is unknown or
-the flight controller cannot measure it. Ignore unknown fields: new ones do not change the version.
+[`payloads/schemas/`](../payloads/schemas/). "?": null if the value is unknown or the flight controller
+cannot measure it. Ignore unknown fields: new fields do not change the version.
 
 Every payload begins with the first three; those of `v1/telemetry/`, except link, end with the last:
 """
@@ -52,16 +52,16 @@ def page() -> str:
     """The whole page."""
     payloads = {_heading(key.suffix): (key.suffix, _SCHEMAS[key.schema]) for key in KEYS if key.schema in _SCHEMAS}
     common = {name: _SCHEMAS["attitude"]["properties"][name] for name in (*_COMMON, _AGE)}
-    parts = [_HEAD, *_table(common)]
+    parts = [_HEAD, *_fields(common)]
     inner: dict[str, Json] = {}
     for heading, (suffix, schema) in payloads.items():
         fields = {name: field for name, field in schema["properties"].items() if name not in common}
         objects = {_INNER[name]: _object_in(field) for name, field in fields.items() if name in _INNER}
         inner |= {name: found for name, found in objects.items() if "properties" in found and name not in payloads}
         what = textwrap.fill(f"`{suffix}`. {schema['description']}", _WIDTH)
-        parts += ["", f"## {heading}", "", what, "", *_table(fields)]
+        parts += ["", f"## {heading}", "", what, "", *_fields(fields)]
     for name, schema in inner.items():
-        parts += ["", f"## {name}", "", *_table(schema["properties"])]
+        parts += ["", f"## {name}", "", *_fields(schema["properties"])]
     return "\n".join(parts) + "\n"
 
 
@@ -69,13 +69,13 @@ def _heading(suffix: str) -> str:
     return suffix.partition("/")[2].removeprefix("telemetry/")
 
 
-def _table(fields: Json) -> Iterator[str]:
-    """A row for each field; neighbours with the same type and meaning share one."""
-    yield from ("| field | type | meaning |", "|---|---|---|")
+def _fields(fields: Json) -> Iterator[str]:
+    """A line for each field; neighbours with the same type and meaning share it."""
     for (kind, meaning), names in groupby(
         fields, lambda name: (_type(name, fields[name]), fields[name].get("description", ""))
     ):
-        yield f"| {', '.join(f'`{name}`' for name in names)} | {kind} | {meaning} |"
+        known = [", ".join(f"`{name}`" for name in names), kind, *([meaning] if meaning else [])]
+        yield f"- {': '.join([' '.join(known[:2]), *known[2:]])}"
 
 
 def _object_in(field: Json) -> Json:

@@ -2,7 +2,6 @@
 """The table: every sentence for pilots, with its severity, its short form for a HUD, and the longest values.
 
 The mission rules' findings are values here: `reports.finding` has their texts, `mission_report` the summary.
-docs/ground-stations.md lists this table (`make ground-stations-page`).
 """
 
 from collections.abc import Mapping, Sequence
