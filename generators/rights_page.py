@@ -9,23 +9,20 @@ from bridge.gcs.rights import RIGHTS
 from protocols.mavlink.dialect import MESSAGE_FORMATS, command_name
 from protocols.rights import Effect
 from protocols.rights.mavlink import COMMANDS, MESSAGES, FieldRule
-from protocols.rights.msp import MSP_RIGHTS, Firmware, MspRight
+from protocols.rights.msp import MSP_RIGHTS, Firmware
 
-#: A longer list of payload lengths is given by its ends.
-_LISTED = 4
 _SENSOR = "a sensor's value"
-_HARAKIRI = {Firmware.HARAKIRI, Firmware.HARAKIRI_MISSIONS}
-_EFFECTS = (Effect.READ, Effect.CHANGE, Effect.MOVE, Effect.UNKNOWN)
+_EFFECTS = (Effect.MOVE, Effect.UNKNOWN)
 
 
 def msp_table() -> str:
-    """A row for each effect and set of firmware."""
+    """A row for each effect and set of firmware, but for reads and changes: those are many."""
     rows: dict[tuple[Effect, tuple[Firmware, ...]], dict[int, str]] = {}
     for command in sorted({command for rights in MSP_RIGHTS.values() for command in rights}):
         alike: dict[tuple[Effect, str], list[Firmware]] = {}
         for firmware, rights in MSP_RIGHTS.items():
-            if right := rights.get(command):
-                alike.setdefault((right.effect, _request(right)), []).append(firmware)
+            if (right := rights.get(command)) and right.effect in _EFFECTS:
+                alike.setdefault((right.effect, right.name), []).append(firmware)
         for (effect, request), firmware_list in alike.items():
             rows.setdefault((effect, tuple(firmware_list)), {})[command] = request
     lines = [_line(("effect", "firmware", "requests")), _line(["---"] * 3)]
@@ -41,14 +38,7 @@ def _order(firmware: Firmware) -> int:
 
 
 def _names(firmware: Collection[Firmware]) -> str:
-    if len(firmware) == len(Firmware):
-        return "all"
-    names = [each.value for each in firmware]
-    if {*firmware} >= _HARAKIRI:
-        names.remove(Firmware.HARAKIRI_MISSIONS.value)
-    elif Firmware.HARAKIRI in firmware:
-        names[0] += " without the mission extension"
-    return ", ".join(names)
+    return ", ".join(each.value for each in firmware if each is not Firmware.HARAKIRI_MISSIONS)
 
 
 def _requests(texts: Mapping[int, str]) -> str:
@@ -56,26 +46,6 @@ def _requests(texts: Mapping[int, str]) -> str:
     sensors = [command for command, text in texts.items() if text == _SENSOR]
     named = [text for text in texts.values() if text != _SENSOR]
     return ", ".join([*named, *([f"{_SENSOR} (0x{min(sensors):04X}..0x{max(sensors):04X})"] if sensors else [])])
-
-
-def _request(right: MspRight) -> str:
-    match right.effect:
-        case Effect.READ:
-            accepted = " or ".join(payload.hex(" ") for payload in sorted(right.only)) or _lengths(right.lengths)
-            otherwise = "" if right.otherwise is Effect.UNKNOWN else f", else {right.otherwise.value}"
-            return right.name if accepted == "0" else f"{right.name} ({accepted}{otherwise})"
-        case Effect.CHANGE if not _fills_the_buffer(right.lengths):
-            return f"{right.name} ({_lengths(right.lengths)})"
-    return right.name
-
-
-def _fills_the_buffer(lengths: Collection[int]) -> bool:
-    return len(lengths) > _LISTED and 0 in lengths
-
-
-def _lengths(lengths: Collection[int]) -> str:
-    found = sorted(lengths)
-    return ", ".join(map(str, found)) if len(found) <= _LISTED else f"{found[0]}..{found[-1]}"
 
 
 def _line(cells: Collection[str]) -> str:

@@ -37,13 +37,14 @@ def _lines_of_the_code() -> dict[str, set[str]]:
 
 
 def _rows_of_the_page() -> dict[str, tuple[set[str], set[str]]]:
-    """The levels and facts in the row of each event; events that share a row share them."""
-    rows = [line for line in (_REPOSITORY / "docs" / "events.md").read_text().splitlines() if line.startswith("| `")]
-    cells = [row.split(" | ") for row in rows]
+    """The levels and facts in the line of each event; events that share a line share them."""
+    lines = re.findall(
+        r"^- ((?:`[^`]*`,? )+)([^:]*): (.*)$", (_REPOSITORY / "docs" / "events.md").read_text(), re.MULTILINE
+    )
     return {
-        name: ({*re.findall(r"\w+", row[1])}, {*re.findall(r"\w+", row[-1])})
-        for row in cells
-        for name in re.findall(_EVENT, row[0])
+        name: ({*re.findall(r"\w+", levels)}, {*re.findall(r"\w+", "".join(re.findall(r"\(([^()]*)\)$", text)))})
+        for names, levels, text in lines
+        for name in re.findall(_EVENT, names)
     }
 
 

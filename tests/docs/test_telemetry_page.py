@@ -39,7 +39,7 @@ def test_each_field_is_on_the_page(row: Row) -> None:
     sections = [
         text for heading, text in SECTIONS if name_of(row) in heading.split(", ") or heading == "Always the same"
     ]
-    lines = "\n".join(line for text in sections for line in text.splitlines() if line.startswith("| "))
+    lines = "\n".join(line for text in sections for line in text.splitlines() if line.startswith(("- ", "| ")))
     for field in m.mavlink_map[row.msgid].fieldnames:
         known = re.sub(r"^chan\d+_raw$", "chan1", field.removesuffix("_extended"))
         known = re.sub(r"^errors_count\d$", "errors_count1", known)
