@@ -92,18 +92,21 @@ class Outbox:
         if self.recorded is not None and frame is not None and is_logged:
             self.recorded.append(frame)
 
-    def beat(self, heartbeat: Message, ids: tuple[int, int], receivers: Iterable["GroundStation"]) -> None:
+    def beat(
+        self, heartbeat: Message, for_qgc: Message, ids: tuple[int, int], receivers: Iterable["GroundStation"]
+    ) -> None:
         """Send the heartbeat in MAVLink 2, then in MAVLink 1 too, to stations that have not sent MAVLink 2.
 
         QGroundControl talks to the vehicle in the version of the first frame that it gets, and a ground station that
         knows only MAVLink 1 would not see the vehicle otherwise. Signed links need no MAVLink 1.
         """
-        packed = pack(heartbeat)
+        packed, packed_for_qgc = pack(heartbeat), pack(for_qgc)
         self.heartbeat = ids, packed
         logged: bytes | None = None
         for station in receivers:
-            frames = [station.writer.frame(packed, version) for version in ((2,) if station.reads_v2_only else (2, 1))]
-            logged = logged or frames[0]
+            shown = packed_for_qgc if station.behaviour.kind is Kind.QGROUNDCONTROL else packed
+            frames = [station.writer.frame(shown, version) for version in ((2,) if station.reads_v2_only else (2, 1))]
+            logged = frames[0]  # the log itself is the last receiver
             if station.peer is not RECORDER:
                 self.outgoing[station] += frames
         if self.recorded is not None and logged is not None:

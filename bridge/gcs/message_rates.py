@@ -6,7 +6,10 @@ Intervals are in seconds; infinity: never.
 
 from collections.abc import Mapping, Sequence
 from math import inf
-from typing import Protocol, TypeVar
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from bridge.gcs.ground_station import GroundStation
 
 #: Messages a second to all stations together, in equal shares: the defaults are 46 for each.
 _MOST_PER_S = 1200
@@ -45,18 +48,7 @@ class MessageRates:
         return not self.requested
 
 
-class Rated(Protocol):
-    """A ground station, as far as its rates matter."""
-
-    @property
-    def rates(self) -> MessageRates:
-        """Its requests and schedule."""
-
-
-_Receiver = TypeVar("_Receiver", bound=Rated)
-
-
-def fastest_s(stations: Sequence[Rated], defaults_s: Mapping[int, float]) -> Mapping[int, float]:
+def fastest_s(stations: Sequence["GroundStation"], defaults_s: Mapping[int, float]) -> Mapping[int, float]:
     """The shortest interval for each message."""
     special = [station.rates for station in stations if not station.rates.is_default]
     if stations and not special:
@@ -68,7 +60,7 @@ def fastest_s(stations: Sequence[Rated], defaults_s: Mapping[int, float]) -> Map
     }
 
 
-def take_due(stations: Sequence[_Receiver], msgid: int, default_s: float, now: float) -> list[_Receiver]:
+def take_due(stations: Sequence["GroundStation"], msgid: int, default_s: float, now: float) -> list["GroundStation"]:
     """The stations for which the message is due now; schedules the next one for each."""
     taken, cost_s = [], len(stations) / _MOST_PER_S
     for station in stations:

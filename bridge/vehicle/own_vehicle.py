@@ -125,7 +125,7 @@ class OwnVehicle:
         everyone = self._ground.everyone
         self._set_polls(everyone)
         self._polls_set_at = now
-        self._follow_readiness(now)
+        self.readiness.follow(now)
         self._beat(now, everyone)
         self._send_due(self._rows.get(None, ()), now)
         if self._session.vehicle.fresh(Health, now, _SILENT_S) is None:
@@ -133,15 +133,6 @@ class OwnVehicle:
             self._send_due([(_SYS_STATUS, None), (_EXTENDED_SYS_STATE, None)], now)
         self._announce_home(now)
         self._inform_newcomers(everyone, now)
-
-    def _follow_readiness(self, now: float) -> None:
-        was_lost = self.readiness.state.is_lost
-        self.readiness.follow(now)
-        if self.readiness.state.is_lost and not was_lost:
-            # To QGroundControl a flying craft flies on in CRITICAL, but not after STANDBY.
-            heartbeat = self._heartbeat(now)
-            heartbeat.system_status = messages.MAV_STATE_STANDBY
-            self._ground.outbox.multicast(pack(heartbeat), self._ground.everyone)
 
     def _greet(self, now: float) -> None:
         newcomers = [station for station in self._ground.everyone if now < station.greeted_until]
@@ -323,7 +314,11 @@ class OwnVehicle:
         self._ground.outbox.multicast(pack(self._heartbeat(now)), self._ground.everyone)
 
     def _beat(self, now: float, stations: Sequence[GroundStation]) -> None:
-        self._ground.outbox.beat(self._heartbeat(now), self._ground.ids, stations)
+        heartbeat, for_qgc = self._heartbeat(now), self._heartbeat(now)
+        if self.readiness.state.is_lost and self._session.vehicle.armed:
+            # An armed craft in CRITICAL is "Flying" there (APMFirmwarePlugin::_handleIncomingHeartbeat).
+            for_qgc.system_status = messages.MAV_STATE_STANDBY
+        self._ground.outbox.beat(heartbeat, for_qgc, self._ground.ids, stations)
 
     def _heartbeat(self, now: float) -> Message:
         return make.heartbeat(self._moment(now))

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The kinds of ground stations, known by how they behave, and what each is sent for a happening. Sans-IO.
 
-docs/ground-stations.md has the sources: Mission Planner shows the last text of severity WARNING or worse for 10 s, or
-until a SYS_STATUS with an unhealthy sensor, and each piece of a longer text alone. QGroundControl takes every text that
-begins with PreArm for a failure.
+Mission Planner shows the last text of severity WARNING or worse for 10 s, or until a SYS_STATUS with an unhealthy
+sensor, and each piece of a longer text alone. QGroundControl (commit c15cc3204, Vehicle::_textMessageReceived) takes
+every text that begins with PreArm for a failure, and reads NOTICE and worse aloud. An ERROR is a banner over the map
+that hides the next one until the pilot closes it (_errorMessageReceived), beside the dialog by which it shows each
+refused command, mission transfer and parameter itself (showCommandAckError, _missionManagerError,
+ParameterManager::_mavlinkParamSet).
 """
 
 from dataclasses import dataclass
@@ -18,7 +21,7 @@ from protocols.mavlink.dialect import messages as m
 
 #: A station's own id of the component that controls vehicles: Mission Planner's, QGroundControl's and MAVSDK's.
 _GROUND_STATION = 190
-#: base_mode in QGroundControl's heartbeat; others send 0.
+#: base_mode in QGroundControl's heartbeat (MultiVehicleManager::_sendGCSHeartbeat); others send 0.
 _MODE_OF_QGC = 192
 #: Mission Planner's Resume Mission repeats a refused command every second, for 30 s; a pilot who tries again gets the
 #: reason again.
@@ -69,15 +72,18 @@ class Behaviour:
 
 def rendered(happening: Happening, kind: Kind) -> list[tuple[Severity, str]]:
     """The texts for a kind of station, with their severities. On a HUD only the last one stays."""
-    sentence, whole = happening.sentence, happening.text
+    sentence, severity, whole = happening.sentence, happening.severity, happening.text
     if kind is Kind.MISSION_PLANNER and sentence.planner:
-        return [(sentence.severity, sentence.planner)]
-    if sentence.severity > Severity.WARNING:
-        return [(sentence.severity, whole)]
+        return [(severity, sentence.planner)]
+    if severity > Severity.WARNING:
+        return [(severity, whole)]
+    if kind is Kind.QGROUNDCONTROL and severity is Severity.ERROR:
+        # It shows the refusal in a dialog of its own.
+        severity = Severity.WARNING
     # The Messages tab has what the line lacks.
     line = happening.line
     is_cut = any(isinstance(value, str) and value not in line for value in happening.values)
-    return [(Severity.INFO, whole)] * is_cut + [(sentence.severity, line)]
+    return [(Severity.INFO, whole)] * is_cut + [(severity, line)]
 
 
 def pieces(text: str, kind: Kind) -> list[str]:

@@ -90,7 +90,7 @@ class TestConnecting:
         _, screens = connected(world, 0)
         for glance in screens.look():
             assert is_quiet(glance), glance
-            assert glance.qgc == "Ready To Fly"
+            assert glance.qgc == "Ready"
         assert screens.mission_planner.heard() == []
 
     def test_a_board_that_is_never_found_is_no_ready_vehicle(self) -> None:
@@ -158,7 +158,7 @@ class TestLostFlightController:
         world.wait_ready()
         for glance in screens.look():
             assert is_quiet(glance), glance
-            assert glance.qgc == "Ready To Fly"
+            assert glance.qgc == "Ready"
             assert glance.qgc_reason in ("PreArm: ready", "")
 
     def test_in_flight_it_stays_and_nothing_else_is_shown(self) -> None:
@@ -212,7 +212,7 @@ class TestArming:
         world.run(1.5)
         for glance in screens.look():
             assert is_quiet(glance)
-            assert glance.qgc == "Ready To Fly"
+            assert glance.qgc == "Ready"
 
     def test_the_prearm_window_is_answered(self) -> None:
         world, station, screens = inav(NOT_LEVEL)
@@ -253,7 +253,7 @@ class TestArming:
         world.faults.armed = False
         for glance in screens.look():
             assert is_quiet(glance)
-            assert (glance.armed, glance.qgc) == (False, "Ready To Fly")
+            assert (glance.armed, glance.qgc) == (False, "Ready")
 
 
 class TestWritingMissions:

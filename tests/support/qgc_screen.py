@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The texts and speech of QGroundControl 5.0 for an ArduPilot, as a pilot gets them.
+"""The texts and speech of QGroundControl (commit c15cc3204 of February 2026) for an ArduPilot, as a pilot gets them.
 
-Sources: Vehicle.cc, MainStatusIndicator.qml, AutoPilotPlugin.cc, APMRadioComponent.cc, APMSensorsComponent.cc,
-PlanManager.cc.
+Sources: Vehicle::_textMessageReceived, _errorMessageReceived, _handleSysStatus and _handleExtendedSysState,
+APMFirmwarePlugin::_handleIncomingHeartbeat, VehicleLinkManager::mavlinkMessageReceived, MainStatusIndicator.qml,
+VehicleWarnings.qml, QGCApplication::showCriticalVehicleMessage, PlanManager::_handleMissionAck; AutoPilotPlugin.cc,
+APMRadioComponent.cc and APMSensorsComponent.cc of 5.0.
 
 Only its rules, not its requests: a scripted client passes those it sends to `sent`.
 """
@@ -49,6 +51,8 @@ class QgcScreen:
         #: The version in which it speaks over UDP: that of the vehicle's first packet.
         self.mavlink_version: int | None = None
         self.dialogs: list[tuple[float, str]] = []
+        #: Texts of severity ERROR or worse, over the map until the pilot closes them; the next ones wait behind.
+        self.banners: list[tuple[float, str]] = []
         #: True once it has left the map for Vehicle Setup.
         self.is_in_setup = False
         self.spoken: list[tuple[float, str]] = []
@@ -72,6 +76,8 @@ class QgcScreen:
         """A message from the vehicle."""
         if self.mavlink_version is None:
             self.mavlink_version = 2 if message.get_msgbuf()[0] == 0xFD else 1
+        if message.get_type() != "RADIO_STATUS":
+            self._heard_at.append(at)
         match message.get_type():
             case "HEARTBEAT" if message.type != m.MAV_TYPE_GCS:
                 self._heartbeat(at, message)
@@ -111,7 +117,7 @@ class QgcScreen:
         ready = self._ready.at(at)
         if ready is None:
             ready = self._sensors_ok.at(at) and self._components_ok is True
-        return "Ready To Fly" if ready else "Not Ready"
+        return "Ready" if ready else "Not Ready"
 
     def texts(self, since: float = 0.0) -> list[str]:
         return [text for at, text in self.messages if at >= since]
@@ -123,14 +129,11 @@ class QgcScreen:
     # Its rules.
 
     def _heartbeat(self, at: float, message: Message) -> None:
-        self._heard_at.append(at)
         armed = bool(message.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED)
         self.armed.set(at, armed)
-        was_flying = self.flying.at(at)
-        in_trouble = (m.MAV_STATE_CRITICAL, m.MAV_STATE_EMERGENCY)
-        is_flying = message.system_status == m.MAV_STATE_ACTIVE or (was_flying and message.system_status in in_trouble)
-        if (armed and is_flying) != was_flying:
-            self.flying.set(at, armed and is_flying)
+        # Also in CRITICAL; 5.0 took only a craft that flew before for flying then.
+        in_the_air = (m.MAV_STATE_ACTIVE, m.MAV_STATE_CRITICAL, m.MAV_STATE_EMERGENCY)
+        self.flying.set(at, armed and message.system_status in in_the_air)
 
     def _sensors(self, at: float, message: Message) -> None:
         enabled, health = message.onboard_control_sensors_enabled, message.onboard_control_sensors_health
@@ -163,7 +166,7 @@ class QgcScreen:
             self.spoken.append((at, text))
         self.messages.append((at, text))
         if severity <= m.MAV_SEVERITY_ERROR and not is_prearm:
-            self.dialogs.append((at, text))
+            self.banners.append((at, text))
 
     def _parameter(self, at: float, message: Message) -> None:
         self.parameters[message.param_id] = message.param_value

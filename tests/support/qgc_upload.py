@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""QGroundControl's transfers (PlanManager.cc of v5.0) over a lossy link, with the bridge or with an ideal vehicle.
+"""QGroundControl's transfers over a lossy link, with the bridge or with an ideal vehicle.
+
+Source: PlanManager.cc (commit c15cc3204 of February 2026): _ackTimeout, _startAckTimeout, _handleMissionCount,
+_handleMissionItem, _handleMissionRequest, _handleMissionAck. Its heartbeat: MultiVehicleManager::_sendGCSHeartbeat.
 
 The link decides by seed, message and copy: the third request for item 7 has the same fate whichever vehicle sends it.
 So each upload to the bridge can be compared with the same upload to the ideal vehicle.
@@ -23,7 +26,8 @@ from tests.support.conversations import count_message, item_message
 from tests.support.world import GroundStation, World
 
 _TIMEOUT_S, _ITEM_TIMEOUT_S = 1.5, 0.25
-_RETRIES = 5
+#: A count or a list request is sent seven times: five retries are exceeded with the next one.
+_RETRIES = 6
 _OF_A_MISSION = frozenset(
     (
         messages.MAVLINK_MSG_ID_MISSION_REQUEST,
@@ -111,7 +115,7 @@ class QgcUpload:
         if self.is_over or getattr(message, "mission_type", self._mission_type) != self._mission_type:
             return
         match message.get_type():
-            case "MISSION_REQUEST":
+            case "MISSION_REQUEST" | "MISSION_REQUEST_INT":
                 self._requested.add(message.seq)
                 self._send(item_message(message.seq, self._items[message.seq], mission_type=self._mission_type))
                 self._wait()
@@ -142,11 +146,14 @@ class QgcUpload:
 
 
 class QgcDownload:
-    """Requests the list every 1.5 s and each item every 0.25 s, six times. Any MISSION_ACK ends it as an error."""
+    """Requests the list every 1.5 s and each item every 0.25 s, six times more. Any MISSION_ACK ends it as an error.
+
+    It takes any item that is missing, and waits again after one that it has.
+    """
 
     def __init__(self, clock: Clock, send: Callable[[Message], None]) -> None:
         self._clock, self._send = clock, send
-        self.items: list[Message] = []
+        self.items: dict[int, Message] = {}
         self.is_over = self.gave_up = self.took_foreign_ack = False
         self._count: int | None = None
         self._retries = self._timer = 0
@@ -159,9 +166,11 @@ class QgcDownload:
             case "MISSION_COUNT" if self._count is None:
                 self._count = message.count
                 self._go_on()
-            case "MISSION_ITEM_INT" if self._count is not None and message.seq == len(self.items):
-                self.items.append(message)
+            case "MISSION_ITEM_INT" if self._count is not None and message.seq not in self.items:
+                self.items[message.seq] = message
                 self._go_on()
+            case "MISSION_ITEM_INT" if self._count is not None:
+                self._wait()
             case "MISSION_ACK" if message.type != MissionResult.INVALID_SEQUENCE:
                 self.took_foreign_ack = message.type == MissionResult.ACCEPTED
                 self.is_over = self.gave_up = True
@@ -178,7 +187,11 @@ class QgcDownload:
         if self._count is None:
             self._send(messages.MAVLink_mission_request_list_message(1, 1))
         else:
-            self._send(messages.MAVLink_mission_request_int_message(1, 1, len(self.items)))
+            wanted = next(seq for seq in range(self._count) if seq not in self.items)
+            self._send(messages.MAVLink_mission_request_int_message(1, 1, wanted))
+        self._wait()
+
+    def _wait(self) -> None:
         self._timer += 1
         seconds = _TIMEOUT_S if self._count is None else _ITEM_TIMEOUT_S
         self._clock.after(seconds, partial(self._timeout, self._timer))
@@ -187,7 +200,7 @@ class QgcDownload:
         if self.is_over or timer != self._timer:
             return
         self._retries += 1
-        if self._retries > _RETRIES + 1:
+        if self._retries > _RETRIES:
             self.is_over = self.gave_up = True
         else:
             self._ask()

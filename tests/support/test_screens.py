@@ -97,7 +97,7 @@ class TestQgc:
         beats = [(at, heartbeat()) for at in range(6)]
         screen = qgc(*beats[:2], (1, sensors(PREARM, 0)), *beats[2:4], (3, sensors(PREARM, PREARM)), *beats[4:])
         screen.take(5, received(sensors(GYRO, 0)))
-        assert [screen.status(at) for at in (1, 3, 5, 9)] == ["Not Ready", "Ready To Fly", "Ready To Fly", "Comms Lost"]
+        assert [screen.status(at) for at in (1, 3, 5, 9)] == ["Not Ready", "Ready", "Ready", "Comms Lost"]
 
     def test_without_component_parameters_it_shows_two_dialogs_and_leaves_the_map(self) -> None:
         screen = qgc((0, heartbeat()), (1, m.MAVLink_param_value_message(b"SYSID_THISMAV", 1, 9, 1, 0)))
@@ -111,9 +111,15 @@ class TestQgc:
         assert [screen.prearm_error.at(at) for at in (46, 48)] == ["PreArm: no RC link", ""]
         assert len(screen.heard()) == 2
 
-    def test_an_error_is_a_dialog_and_info_is_not_spoken(self) -> None:
+    def test_an_error_is_a_banner_and_info_is_not_spoken(self) -> None:
         screen = qgc((0, text("refused", m.MAV_SEVERITY_ERROR)), (1, text("small", m.MAV_SEVERITY_INFO)))
-        assert [words for _, words in screen.dialogs] == screen.heard() == ["refused"]
+        assert [words for _, words in screen.banners] == screen.heard() == ["refused"]
+        assert qgc((0, text("lost"))).banners == []
+
+    def test_an_armed_craft_flies_unless_it_stands_by(self) -> None:
+        states = (m.MAV_STATE_STANDBY, m.MAV_STATE_CRITICAL, m.MAV_STATE_STANDBY, m.MAV_STATE_ACTIVE)
+        screen = qgc(*((at, heartbeat(state, armed=True)) for at, state in enumerate(states)))
+        assert [screen.status(at) for at in range(4)] == ["Armed", "Flying", "Armed", "Flying"]
 
     def test_the_first_packet_decides_the_version(self) -> None:
         screen = QgcScreen()

@@ -485,6 +485,9 @@ class GroundStation:
         #: Dialect `all`, which has more messages than the bridge's own dialect.
         self._decoder = every_message.MAVLink(None)
         self.sysid, self.compid = sysid, compid
+        self.heartbeat = messages.MAVLink_heartbeat_message(
+            messages.MAV_TYPE_GCS, messages.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3
+        )
         world.stations[self.peer] = self
 
     @property
@@ -500,7 +503,7 @@ class GroundStation:
 
     def stay_connected(self) -> None:
         """Send a heartbeat each second from now on."""
-        self.send(messages.MAVLink_heartbeat_message(messages.MAV_TYPE_GCS, messages.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3))
+        self.send(self.heartbeat)
         self.world.after(1.0, self.stay_connected)
 
     def sign(self, key: bytes, timestamp: int, link_id: int = 0) -> None:

@@ -11,6 +11,7 @@ from protocols.mission_item import Command, MissionItem, MissionResult
 from simulator.commands.fc_kinds import make_board
 from tests.support.conversations import Download, Upload, count_message, list_message, records_of, waypoints
 from tests.support.qgc_upload import QGC_HEARTBEAT
+from tests.support.screens import Screens
 from tests.support.world import GroundStation, World
 
 JOYSTICK, CAMERA = "Joystick ignored: fly with the transmitter", "No camera or gimbal is controlled here"
@@ -57,6 +58,17 @@ def test_every_action_is_answered_by_a_text(action: str) -> None:
     (text,) = station.messages("STATUSTEXT")
     assert text.severity <= m.MAV_SEVERITY_WARNING
     assert len(text.text) <= 50
+
+
+def test_a_refused_command_is_no_banner_beside_the_dialog_of_qgroundcontrol() -> None:
+    world, station = connected()
+    screen = Screens(station).qgc
+    station.heartbeat = QGC_HEARTBEAT
+    world.run(2)
+    began = world.now
+    station.send(command(m.MAV_CMD_COMPONENT_ARM_DISARM))
+    world.run(5)
+    assert (screen.banners, screen.heard(began)[0]) == ([], "Arm and disarm with the transmitter")
 
 
 @pytest.mark.parametrize("number", [519, 521, 525, 2504])

@@ -135,15 +135,21 @@ def test_the_end_of_all_reasons_is_no_failure_to_qgroundcontrol() -> None:
 
 def test_a_flying_craft_that_is_lost_does_not_fly_on_in_qgroundcontrol() -> None:
     world = naze()
-    screens = Screens(GroundStation(world))
+    station, planner = GroundStation(world), GroundStation(world, "planner")
+    station.heartbeat = QGC_HEARTBEAT
+    qgc, mission_planner = Screens(station), Screens(planner)
     world.faults.armed = True
     world.run(5)
-    assert screens.glance().qgc == "Flying"
+    assert qgc.glance().qgc == "Flying"
     world.faults.hang = True
-    world.run(8)
-    glance = screens.glance()
-    assert (glance.qgc, glance.armed, glance.failsafe) == ("Armed", True, True)
-    station = next(iter(world.stations.values()))
+    world.run(5)
+    for _ in range(10):
+        world.run(1)
+        assert (qgc.glance().qgc, mission_planner.glance().armed, mission_planner.glance().failsafe) == (
+            "Armed",
+            True,
+            True,
+        )
     assert station.messages("EXTENDED_SYS_STATE")[-1].landed_state == m.MAV_LANDED_STATE_UNDEFINED
 
 
