@@ -24,7 +24,6 @@ NOT_OURS = {
     "Bad Gyro Health",
     "Not Ready to Arm",
     "Ready To Fly",
-    "Comms Lost",
     "please reduce the number of wp's",
     "rejected by the Mav, item had a bad option wp# N",
     "Upload MISSION failed ... DENIED",
