@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The page of the command line, docs/cli.md: each command's help text and options (`make cli-page`)."""
+"""The page of the command line, docs/cli.md: each command's purpose and exit codes (`make cli-page`)."""
 
+import re
 import sys
 from collections.abc import Iterator
 
@@ -12,12 +13,13 @@ _WIDTH = 100
 _HEAD = """\
 # The command line
 
-`--help` after a command, or `man naze-bridge`, explains the options.
+`naze-bridge COMMAND --help`, or `man naze-bridge`, has the details and the options.
+
 """
 
 
 def page() -> str:
-    return _HEAD + "".join(_section(name, context) for name, context in _commands(main))
+    return _HEAD + "".join(_line(name, context) for name, context in _commands(main))
 
 
 def helps(command: click.Command) -> Iterator[tuple[str, str]]:
@@ -40,17 +42,12 @@ def _commands(
                 yield from _commands(inner, f"{name} {each}", context)
 
 
-def _section(name: str, context: click.Context) -> str:
-    formatter = context.make_formatter()
-    context.command.format_help_text(context, formatter)
-    options = (each for each in context.command.get_params(context) if isinstance(each, click.Option))
-    named = [option.opts[-1] for option in options if not option.hidden and "--help" not in option.opts]
-    if named:
-        formatter.write_paragraph()
-        formatter.write_text(f"Options: {', '.join(named)}.")
+def _line(name: str, context: click.Context) -> str:
+    """The command with its arguments, the first paragraph of its help, and the sentences about exit codes."""
+    first, *others = re.split(r"\n\s*\n", (context.command.help or "").replace("\b", ""))
+    exits = re.findall(r"Exit codes?\b.*?\.(?=\s|$)", " ".join(others), re.DOTALL)
     arguments = context.command.collect_usage_pieces(context)[1:]  # the first is [OPTIONS]
-    text = formatter.getvalue().strip("\n")
-    return f"\n## {' '.join([name, *arguments])}\n\n```\n{text}\n```\n"
+    return f"- `{' '.join([name, *arguments])}`: {' '.join(' '.join([first, *exits]).split())}\n"
 
 
 if __name__ == "__main__":
