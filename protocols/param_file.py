@@ -21,6 +21,8 @@ _NUMBER = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:e[-+]?\d+)?", re.ASCII | r
 BOARD, _TEXT = "# board: ", "# text: "
 _QGC_FIELDS = 5
 _MISSION = "QGC WPL"
+#: Of XML, JSON and archives.
+_STRANGERS = ("<", "{", "[", "PK")
 #: Digits that show any single-precision number exactly.
 _MOST_DIGITS = 9
 _MOST_WHOLE = 2**32
@@ -116,10 +118,11 @@ def _is_whole(value: float) -> bool:
 
 
 def _setting(fields: list[str], line: str, name: str, where: str) -> tuple[str, float | str]:
-    if line.startswith(_MISSION):
-        raise ParamFileError(name, where, "this file holds a mission", "give a .param file")
     if len(fields) == _QGC_FIELDS and all(field.isdecimal() for field in (*fields[:2], fields[4])):
         fields = fields[2:4]
+    if len(fields) != 2 and (line.startswith((_MISSION, *_STRANGERS)) or "\0" in line):
+        what = "a mission" if line.startswith(_MISSION) else "no settings"
+        raise ParamFileError(name, where, f"this file holds {what}", "give a .param file or a dump (`diff all`)")
     if len(fields) != 2:
         remedy = "write NAME,VALUE, with a decimal point"
         raise ParamFileError(name, where, f"{shown(line)} is not a name and a value", remedy)

@@ -26,14 +26,17 @@ def plain_text(text: str | bytes) -> PlainText:
 def file_text(data: bytes) -> str:
     """Decode UTF-8, UTF-16 with its mark, or else Windows-1252, as older ground stations write it.
 
-    Names and numbers in all our formats are ASCII, so only a comment can come out as other letters.
+    All line ends become a line feed. Names and numbers in all our formats are ASCII, so only a comment can come out as
+    other letters.
     """
     if data.startswith(_UTF_16):
-        return data.decode("utf-16", "replace")
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return data.decode("cp1252", "replace")
+        text = data.decode("utf-16", "replace")
+    else:
+        try:
+            text = data.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            text = data.decode("cp1252", "replace")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 class FileError(Exception):

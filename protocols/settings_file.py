@@ -59,7 +59,9 @@ def read_settings_file(data: bytes, name: str) -> SavedSettings:
     board, profile = "", ("", "")
     first: dict[str, str] = {}
     selected: dict[str, str] = {}
-    for number, line in enumerate(file_text(data[:_MAX_SIZE]).splitlines(), start=1):
+    if len(data) > _MAX_SIZE:
+        raise ParamFileError(name, "", "the file is longer than 1 MB", "give the settings of one board")
+    for number, line in enumerate(file_text(data).splitlines(), start=1):
         command = line.strip()
         if found := _SET.fullmatch(command):
             lines.append(_Line(number, found[1].lower(), plain_text(found[2].strip()), profile))

@@ -3,6 +3,7 @@
 
 import errno
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 from protocols.mission_file import MissionFileError, read_mission_file
@@ -39,6 +40,14 @@ def load_mission(path: Path, alt_m: float | None = None) -> list[MissionItem]:
         complain(f"{name}, {text}")
 
     return read_mission_file(read_file(path, MissionFileError), name, note, alt_m)
+
+
+def assumed_home(items: Sequence[MissionItem], name: str) -> tuple[int, int] | None:
+    """The place of the first waypoint, if a list that is checked offline has no home; degrees * 1e7."""
+    if items[0].lat_e7 or items[0].lon_e7:
+        return None
+    complain(f"{name}, home is assumed at the first waypoint; `naze-bridge check --home LAT,LON` gives it")
+    return next(((item.lat_e7, item.lon_e7) for item in items if item.lat_e7 and item.lon_e7), None)
 
 
 def write_file(path: Path, text: str, failure: type[FileError]) -> None:

@@ -4,12 +4,11 @@
 from collections.abc import Sequence
 from pathlib import PurePath
 
-from protocols.mission_file.error import MissionFileError, Note, no_note
+from protocols.mission_file.error import MissionFileError, Note, no_note, refuse_stranger
 from protocols.mission_file.nav_mission import has_wp_lines, read_nav_xml, read_wp_lines
 from protocols.mission_file.path_file import is_path_table, parse_xml, read_csv, read_gpx, read_kml, read_kmz
 from protocols.mission_file.qgc_plan import read_qgc_plan, write_qgc_plan
-from protocols.mission_file.qgc_wpl import read_qgc_wpl, write_qgc_wpl
-from protocols.mission_file.strangers import refuse_binary, refuse_text
+from protocols.mission_file.qgc_wpl import has_header, read_qgc_wpl, write_qgc_wpl
 from protocols.mission_item import MissionItem
 from protocols.plain_text import file_text, plain_text
 
@@ -28,7 +27,7 @@ def write_mission_file(items: Sequence[MissionItem], name: str) -> str:
     if ending in _FOREIGN:
         what = f"a mission read from the board cannot be written as {ending}"
         raise MissionFileError(name, "", what, "name the file .waypoints or .plan")
-    return write_qgc_plan(items) if _is_plan(name) else write_qgc_wpl(items)
+    return write_qgc_plan(items) if ending == ".plan" else write_qgc_wpl(items)
 
 
 def read_mission_file(data: bytes, name: str, note: Note = no_note, alt_m: float | None = None) -> list[MissionItem]:
@@ -44,18 +43,19 @@ def read_mission_file(data: bytes, name: str, note: Note = no_note, alt_m: float
     if data.startswith(b"PK\x03\x04"):
         return read_kmz(data, name, note, alt_m)
     text = file_text(data)
-    if text.lstrip().startswith("{") or _is_plan(name):
+    lines = (line.strip() for line in text.splitlines())
+    first = next((line for line in lines if line and not line.startswith("#")), "")
+    if first.startswith("{"):
         return read_qgc_plan(text, name, note)
-    if text.lstrip().startswith("<"):
+    if first.startswith("<") and not first.lower().startswith(("<html", "<!doctype html")):
         return _read_xml(text, name, note, alt_m)
+    if has_header(first) or not first:
+        return read_qgc_wpl(text, name, note)
     if has_wp_lines(text):
         return read_wp_lines(text, name, note)
-    if is_path_table(text):
-        return read_csv(text, name, note, alt_m)
-    if "\0" in text:
-        refuse_binary(data, name)
-    refuse_text(text, name)
-    return read_qgc_wpl(text, name, note)
+    if not is_path_table(text):
+        refuse_stranger(data, first, name)
+    return read_csv(text, name, note, alt_m)
 
 
 def _read_xml(text: str, name: str, note: Note, alt_m: float | None) -> list[MissionItem]:
@@ -69,7 +69,3 @@ def _read_xml(text: str, name: str, note: Note, alt_m: float | None) -> list[Mis
             return read_gpx(root, name, note, alt_m)
     remedy = "give a mission of INAV Configurator or mwp, a KML or a GPX"
     raise MissionFileError(name, "", f"this XML holds <{plain_text(root.tag)[:24]}>", remedy)
-
-
-def _is_plan(name: str) -> bool:
-    return name.lower().endswith(".plan")

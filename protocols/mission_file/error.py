@@ -1,8 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Problems in mission files of all formats: the error, the notes about fixes, and common checks."""
+"""Problems in mission files of all formats: the error, the notes about fixes, and common checks.
+
+A file without a mission is named by its content, so that a person learns which file was chosen by mistake.
+"""
 
 import math
+import re
 from collections.abc import Callable, Iterable
+from typing import NoReturn
 
 from protocols.mission_item import degrees_to_e7
 from protocols.plain_text import FileError, shown
@@ -44,5 +49,54 @@ def file_degrees_to_e7(degrees: float, field: str, name: str, where: str) -> int
     return e7
 
 
+def refuse_decimal_comma(text: str, name: str, where: str) -> None:
+    """Refuse a number with a comma: the program that wrote it would write the same again."""
+    if _DECIMAL_COMMA.fullmatch(text):
+        raise MissionFileError(name, where, f"{shown(text)} has a decimal comma", _WITH_POINTS)
+
+
+_DECIMAL_COMMA = re.compile(r"\s*[-+]?\d+,\d+\s*", re.ASCII)
+_WITH_POINTS = "set the decimal symbol of Windows' region to a point and save it again, or replace the commas by points"
 #: MAV_CMD_NAV_FENCE_... and MAV_CMD_NAV_RALLY_POINT.
 _OTHER_PLANS = dict.fromkeys(range(5000, 5005), "a fence") | {5100: "rally points"}
+
+_OWN_FILE = "give the mission's own file"
+_SAVE_AS = "save the mission as QGC WPL 110 (.waypoints) or as a QGroundControl plan (.plan)"
+_TITLES = "name the columns in the first line: latitude,longitude,altitude(m)"
+_RESTORE = f"{_OWN_FILE}; `naze-bridge settings restore` takes settings"
+#: By the first bytes. A telemetry log has the time in eight bytes before each frame.
+_BINARY = (
+    (re.compile(rb"\0[\0-\xff]{7}[\xfd\xfe]"), "a telemetry log (.tlog)"),
+    (re.compile(rb"\xa3\x95"), "an ArduPilot log (.bin)"),
+    (re.compile(rb"ULog"), "a PX4 log (.ulg)"),
+    (re.compile(rb"\x7fELF"), "a firmware image"),
+    (re.compile(rb"\x89PNG|\xff\xd8\xff|GIF8"), "a picture"),
+    (re.compile(rb"\x1f\x8b|7z\xbc\xaf|Rar!"), "a compressed archive"),
+    (re.compile(rb"%PDF"), "a PDF document"),
+)
+#: As much of a line as tells its kind: some of the patterns take quadratic time.
+_LONGEST = 200
+#: By the first line that is not a comment.
+_TEXTS = (
+    (re.compile(r"<(!doctype )?html.*", re.IGNORECASE), "a web page", "download the file itself (on GitHub: Raw)"),
+    (re.compile(r"\d+(\s+[-+.\w]+){10,11}"), "items without the header", "write QGC WPL 110 into a line above them"),
+    (re.compile(r"RALLY\b.*"), "rally points", _OWN_FILE),
+    (re.compile(r"-?\d+\.?\d*\s+-?\d+\.?\d*"), "a fence", _OWN_FILE),
+    (re.compile(r"(H Product:|FMT,|loopIteration,).*"), "a flight log", _SAVE_AS),
+    (re.compile(r"\$G[A-Z]{4},.*"), "a log of a GPS receiver", _SAVE_AS),
+    (re.compile(r":[0-9A-F]{10,}", re.IGNORECASE), "a firmware image", _SAVE_AS),
+    (re.compile(r"(set|feature|aux|serial|defaults|batch|profile)\s.*", re.IGNORECASE), "settings", _RESTORE),
+    (re.compile(r"[A-Za-z]\w*[,\s]+[-+.\d]+|\d+\t\d+\t\w+\t\S+\t\d+"), "settings", _RESTORE),
+    (re.compile(r"[^,;\t]*([,;\t][^,;\t]*){2,}"), "a table without names for latitude and longitude", _TITLES),
+)
+
+
+def refuse_stranger(data: bytes, line: str, name: str) -> NoReturn:
+    """Refuse a file without a mission by its first bytes, or by the first line that is not a comment."""
+    what = next((what for start, what in _BINARY if start.match(data)), "a binary file" if "\0" in line else None)
+    if what is not None:
+        raise MissionFileError(name, "", f"this is {what}", _SAVE_AS)
+    for start, what, remedy in _TEXTS:
+        if start.fullmatch(line[:_LONGEST]):
+            raise MissionFileError(name, "", f"this file holds {what}", remedy)
+    raise MissionFileError(name, "", f"no mission begins with {shown(line)}", _SAVE_AS)

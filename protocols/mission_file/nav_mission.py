@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from xml.etree.ElementTree import Element
 
-from protocols.mission_file.error import NO_HOME, MissionFileError, Note, file_degrees_to_e7
+from protocols.mission_file.error import NO_HOME, MissionFileError, Note, file_degrees_to_e7, refuse_decimal_comma
 from protocols.mission_item import MissionItem
 from protocols.msp.nav import LAST, NavAction, NavRecord
 from protocols.msp.nav_items import home_item, items_from_records
@@ -21,7 +21,11 @@ from protocols.plain_text import shown
 
 _SAVE_AGAIN = "save it again from INAV Configurator or mwp"
 _NUMBER = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:e[-+]?\d+)?", re.ASCII | re.IGNORECASE)
-_WP_LINE = re.compile(r"\s*wp(?:\s+-?\d{1,10}){5,9}\s*", re.ASCII | re.IGNORECASE)
+#: Not `wp save` and the like.
+_WP_LINE = re.compile(r"\s*wp\s+[-+\d]", re.ASCII | re.IGNORECASE)
+_WP_NUMBERS = re.compile(r"\s*wp(?:\s+-?\d{1,10})+\s*", re.ASCII | re.IGNORECASE)
+_ACTIONS = {int(action): action.name for action in NavAction}
+_USE_ACTION = f"use one of {', '.join(f'{name} ({number})' for number, name in _ACTIONS.items())}"
 _INT16, _INT32 = 2**15 - 1, 2**31 - 1
 #: The fields of a `wp` line after the number; INAV before 2.0 had no p2 and p3.
 _PLACE = ("action", "lat_e7", "lon_e7", "alt_cm")
@@ -30,7 +34,7 @@ _WP_FIELDS = {8: (*_PLACE, "p1", "p2", "p3", "flag"), 6: (*_PLACE, "p1", "flag")
 
 def has_wp_lines(text: str) -> bool:
     """True if the text holds `wp` lines of INAV's command line."""
-    return any(_WP_LINE.fullmatch(line) for line in text.splitlines())
+    return any(_WP_LINE.match(line) for line in text.splitlines())
 
 
 def read_nav_xml(root: Element, name: str, note: Note) -> list[MissionItem]:
@@ -47,15 +51,16 @@ def read_wp_lines(text: str, name: str, note: Note) -> list[MissionItem]:
     """Read the `wp` lines of a `dump` or `diff all`, home first; other lines are skipped."""
     records = []
     for number, line in enumerate(text.splitlines(), start=1):
-        if not _WP_LINE.fullmatch(line):
+        if not _WP_LINE.match(line):
             continue
-        fields = _WP_FIELDS.get(len(line.split()) - 2)
-        if fields is None:
+        where, fields = f"line {number}", _WP_FIELDS.get(len(line.split()) - 2)
+        if fields is None or not _WP_NUMBERS.fullmatch(line):
             remedy = "write wp NUMBER ACTION LAT LON ALT P1 P2 P3 FLAG, as `dump` does"
-            raise MissionFileError(name, f"line {number}", f"{shown(line)} is not a waypoint", remedy)
+            raise MissionFileError(name, where, f"{shown(line)} is not a waypoint", remedy)
         values = dict(zip(fields, map(int, line.split()[2:]), strict=True))
         if values["action"]:  # 0 fills the unused slots of a dump
-            where = f"line {number}"
+            if values["action"] not in _ACTIONS:
+                raise MissionFileError(name, where, f"action {values['action']} is unknown", _USE_ACTION)
             numbers = {key: _within(value, key, name, where) for key, value in values.items()}
             records.append(NavRecord(**numbers))
     return _items(records, None, name, note)
@@ -89,8 +94,7 @@ def _items(records: Sequence[NavRecord], home: tuple[int, int] | None, name: str
 def _from_xml(item: Element, name: str, where: str) -> NavRecord:
     action = item.get("action", "").upper()
     if action not in NavAction.__members__:
-        known = ", ".join(NavAction.__members__)
-        raise MissionFileError(name, where, f"its action is {shown(action)}", f"use one of {known}")
+        raise MissionFileError(name, where, f"its action is {shown(action)}", _USE_ACTION)
     values = {"action": int(NavAction[action])}
     for key in ("lat", "lon"):
         values[f"{key}_e7"] = _degrees(item.get(key, "0"), key, name, where) or 0
@@ -112,6 +116,7 @@ def _degrees(text: str, key: str, name: str, where: str) -> int | None:
 
 
 def _float(text: str, key: str, name: str, where: str) -> float:
+    refuse_decimal_comma(text, name, where)
     number = text.strip()
     if not _NUMBER.fullmatch(number) or abs(float(number)) > _INT32:
         raise MissionFileError(name, where, f"{key} is {shown(text)}, not a number", _SAVE_AGAIN)

@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 from xml.etree.ElementTree import Element, ParseError, fromstring
 
-from protocols.mission_file.error import NO_HOME, MissionFileError, Note, file_degrees_to_e7
+from protocols.mission_file.error import NO_HOME, MissionFileError, Note, file_degrees_to_e7, refuse_decimal_comma
 from protocols.mission_item import Command, Frame, MissionItem
 from protocols.plain_text import file_text, shown
 
@@ -27,6 +27,7 @@ _KML_MODES = {"relativetoground": Frame.GLOBAL_TERRAIN_ALT, "absolute": Frame.GL
 _CSV_LAT, _CSV_LON = ("latitude", "lat"), ("longitude", "lon", "lng", "long")
 _CSV_ALT = {"altitude(m)": 1.0, "altitude": 1.0, "alt": 1.0, "height": 1.0, "altitude(ft)": _FEET}
 _ABOVE_GROUND = "1"
+_COORDINATES = "write decimal points, and blanks only between points"
 _NUMBER = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)", re.ASCII)
 
 
@@ -50,7 +51,7 @@ def parse_xml(text: str, name: str) -> Element:
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise MissionFileError(name, "", "this XML has a document type", "delete the line that begins with <!DOCTYPE")
     try:
-        root = fromstring(text)  # noqa: S314 - without a document type it has no entities
+        root = fromstring(text.lstrip())  # noqa: S314 - without a document type it has no entities
     except ParseError as error:
         line, _ = error.position
         raise MissionFileError(name, f"line {line}", "this XML is damaged", "save the file again") from None
@@ -74,7 +75,7 @@ def read_kmz(data: bytes, name: str, note: Note, alt_m: float | None) -> list[Mi
     """A zipped KML."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            inside = next(each for each in archive.namelist() if each.lower().endswith(".kml"))
+            inside = next(each for each in archive.infolist() if _is_kml(each))
             with archive.open(inside) as file:
                 kml = file.read(_MAX_SIZE + 1)
     except StopIteration:
@@ -82,6 +83,12 @@ def read_kmz(data: bytes, name: str, note: Note, alt_m: float | None) -> list[Mi
     except (OSError, zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, NotImplementedError):
         raise MissionFileError(name, "", "this KMZ is damaged", "save it again") from None
     return read_kml(parse_xml(file_text(kml), name), name, note, alt_m)
+
+
+def _is_kml(inside: zipfile.ZipInfo) -> bool:
+    """True for a file that can be unpacked in pieces: the other methods of compression unpack all at once."""
+    is_bounded = inside.compress_type in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+    return is_bounded and inside.filename.lower().endswith(".kml")
 
 
 def read_gpx(root: Element, name: str, note: Note, alt_m: float | None) -> list[MissionItem]:
@@ -113,12 +120,13 @@ def read_csv(text: str, name: str, note: Note, alt_m: float | None) -> list[Miss
     alt = next((title for title in _CSV_ALT if title in titles), None)
     others = len(titles) - 2 - (alt is not None)
     points = []
-    for number, row in enumerate(csv.reader(text.splitlines(), delimiter=separator), start=1):
+    for number, row in enumerate(_rows(text, separator, name), start=1):
         if number == 1 or not any(row):
             continue
         where = f"line {number}"
-        if len(row) < len(titles):
-            raise MissionFileError(name, where, f"{len(row)} of {len(titles)} columns", "save the table again")
+        if len(row) != len(titles):
+            remedy = "save the table again, with decimal points"
+            raise MissionFileError(name, where, f"{len(row)} columns, but {len(titles)} titles", remedy)
         cells = {title: cell.strip() for title, cell in zip(titles, row, strict=False)}
         if separator == ";":
             cells = {title: cell.replace(",", ".") for title, cell in cells.items()}
@@ -129,6 +137,13 @@ def read_csv(text: str, name: str, note: Note, alt_m: float | None) -> list[Miss
     if others:
         note(f"only latitude, longitude and altitude are read: {others} other columns are left out")
     return _items(points, name, note, alt_m)
+
+
+def _rows(text: str, separator: str, name: str) -> list[list[str]]:
+    try:
+        return [*csv.reader(text.splitlines(), delimiter=separator)]
+    except csv.Error as error:
+        raise MissionFileError(name, "", f"this table is damaged ({error})", "save it again") from None
 
 
 def _columns(text: str) -> tuple[str, list[str], str, str] | None:
@@ -148,7 +163,7 @@ def _kml_points(shape: Element, name: str) -> Iterator[_Point]:
         where = f"point {place}"
         fields = triple.split(",")
         if len(fields) not in (2, 3):
-            raise MissionFileError(name, where, f"{shown(triple)} is not LON,LAT,ALT", "save the file again")
+            raise MissionFileError(name, where, f"{shown(triple)} is not LON,LAT,ALT", _COORDINATES)
         has_height = frame is not None and len(fields) == 3
         alt_m = _number(fields[2], "the altitude", name, where) if has_height else None
         yield _Point(where, fields[1], fields[0], alt_m, Frame.GLOBAL if frame is None else frame)
@@ -166,9 +181,8 @@ def _items(points: Sequence[_Point], name: str, note: Note, alt_m: float | None)
     if not points:
         raise MissionFileError(name, "", "the file holds no path", "draw a path, not an area, and save it again")
     if alt_m is None and (bare := next((point for point in points if point.alt_m is None), None)) is not None:
-        remedy = f"set it for all points: `naze-bridge convert {name} MISSION.waypoints --alt METRES`"
+        remedy = f"save it with altitudes, or set one: `naze-bridge convert {name} MISSION.waypoints --alt METRES`"
         raise MissionFileError(name, bare.where, "the path has no altitude", remedy)
-    note(NO_HOME)
     items = [_item(0, Frame.GLOBAL, None, None, 0.0)]
     for point in points:
         lat_e7, lon_e7 = (
@@ -179,6 +193,7 @@ def _items(points: Sequence[_Point], name: str, note: Note, alt_m: float | None)
             items.append(_item(len(items), Frame.GLOBAL_RELATIVE_ALT, lat_e7, lon_e7, alt_m))
         else:
             items.append(_item(len(items), point.frame, lat_e7, lon_e7, point.alt_m or 0.0))
+    note(NO_HOME)
     return items
 
 
@@ -187,6 +202,7 @@ def _item(seq: int, frame: Frame, lat_e7: int | None, lon_e7: int | None, alt_m:
 
 
 def _number(text: str, what: str, name: str, where: str) -> float:
+    refuse_decimal_comma(text, name, where)
     number = text.strip()
     if not _NUMBER.fullmatch(number) or not math.isfinite(float(number)):
         raise MissionFileError(name, where, f"{what} is {shown(text)}, not a number", "save the file again")

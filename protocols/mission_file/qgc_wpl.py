@@ -5,9 +5,9 @@ Version 120, as QGroundControl wrote it for PX4 from 2011 on, has the same field
 MAVLink 1: other numbers of commands, another order of fields (pymavlink's mavwp.py).
 
 A header line, then one item a line: seq, current, frame, command, param1..4, latitude, longitude, altitude and
-autocontinue. Usually separated by tabs; any white space is accepted. Empty lines and lines that start with # are
-ignored. As in Mission Planner's own reader these are fixed, with a note: commas, items not numbered 0, 1, 2..., no
-home, home with command 0, no autocontinue.
+autocontinue. Usually separated by tabs; any white space, commas and semicolons are accepted. Empty lines and lines that
+start with # are ignored. As in Mission Planner's reader these are fixed, with a note: items not numbered 0, 1, 2...,
+no home, home with command 0, no autocontinue.
 """
 
 import math
@@ -15,7 +15,14 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
-from protocols.mission_file.error import MissionFileError, Note, file_degrees_to_e7, no_note, refuse_other_plans
+from protocols.mission_file.error import (
+    MissionFileError,
+    Note,
+    file_degrees_to_e7,
+    no_note,
+    refuse_decimal_comma,
+    refuse_other_plans,
+)
 from protocols.mission_item import Command, Frame, MissionItem
 from protocols.plain_text import shown
 
@@ -37,11 +44,14 @@ _FIELD_COUNT = len(_INTEGER_FIELDS) + len(_NUMBER_FIELDS)
 # float() and int() also accept underscores and digits of any script, which no ground station writes.
 _INTEGER = re.compile(r"\d{1,9}", re.ASCII)
 _NUMBER = re.compile(r"[-+]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:e[-+]?\d+)?|nan|inf|infinity)", re.ASCII | re.IGNORECASE)
-_DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+", re.ASCII)
 _SAVE_AGAIN = "save the file again from the ground station"
 _NO_ITEM_0 = "there is no item 0: home is missing"
 _NO_HOME = "QGC WPL 120 has no home: the craft's position is used, or --home"
-_WITH_POINTS = "set the decimal symbol of Windows' region to a point and save it again, or replace the commas by points"
+
+
+def has_header(line: str) -> bool:
+    """True if the line begins as the header of any version."""
+    return [word.upper() for word in line.split()[:2]] == _HEADER
 
 
 def read_qgc_wpl(text: str, name: str, note: Note = no_note) -> list[MissionItem]:
@@ -65,14 +75,13 @@ def read_qgc_wpl(text: str, name: str, note: Note = no_note) -> list[MissionItem
                 note(f"{where}: autocontinue is missing")
                 fields.append("1")
             items.append(_item(fields, name, where))
-        elif fields[:2] == _HEADER and fields[2:] in ([each] for each in _VERSIONS):
+        elif has_header(line) and fields[2:] in ([each] for each in _VERSIONS):
             version = fields[2]
         else:
             what = f"the header is {shown(line)}, not 'QGC WPL 110'"
             raise MissionFileError(name, where, what, "save it as a QGC WPL 110 file (.waypoints)")
     if not items:
-        what = "the file has no items" if version else "the file is empty"
-        raise MissionFileError(name, "", what, _SAVE_AGAIN)
+        raise MissionFileError(name, "", "the file has no items", _SAVE_AGAIN)
     refuse_other_plans([item.command for item in items[1:]], name)
     return _numbered(items, note, has_home=version != "120")
 
@@ -91,7 +100,8 @@ def _fields_110(fields: list[str], name: str, where: str) -> list[str]:
 
 
 def _fields(line: str) -> list[str]:
-    """The fields of a line; commas separate them unless tabs do."""
+    """The fields of a line; commas separate them unless tabs or semicolons do."""
+    line = line.replace(";", "\t")
     if "\t" not in line and line.count(",") >= _FIELD_COUNT - 2:
         return [field.strip() for field in line.split(",")]
     return line.split()
@@ -122,8 +132,8 @@ def _item(fields: list[str], name: str, where: str) -> MissionItem:
     if len(fields) != _FIELD_COUNT:
         what = f"{len(fields)} fields where an item has {_FIELD_COUNT}, the line is truncated or damaged"
         raise MissionFileError(name, where, what, _SAVE_AGAIN)
-    if comma := next((token for token in fields if _DECIMAL_COMMA.fullmatch(token)), None):
-        raise MissionFileError(name, where, f"{shown(comma)} has a decimal comma", _WITH_POINTS)
+    for token in fields:
+        refuse_decimal_comma(token, name, where)
     integers = []
     for (field, highest), token in zip(_INTEGER_FIELDS.items(), fields, strict=False):
         if not _INTEGER.fullmatch(token) or int(token) > highest:

@@ -25,7 +25,7 @@ from protocols.settings_file import SavedSettings, read_settings_file, unread_te
 from reports.finding import DROPPED, without_defaults
 from reports.verdict import Result, Verdict
 from service.settings import SettingsError, takeoff_limit_m
-from terminal.files import load_mission, read_file, shown_path
+from terminal.files import assumed_home, load_mission, read_file, shown_path
 from terminal.mission_table import mission_table
 from terminal.options import PATH, position
 from terminal.printing import print_json, print_table
@@ -164,7 +164,7 @@ def _check_file(path: Path, rules: MissionRules, home: tuple[int, int] | None, s
         else:
             complain(error)
         return ExitCode.UNREADABLE
-    verdict = check_list(sent, rules, home)
+    verdict = check_list(sent, rules, home or assumed_home(sent, name))
     if as_json:
         print_json({"file": name, **verdict_data(verdict)})
     else:

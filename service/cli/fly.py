@@ -19,7 +19,7 @@ from service.settings import SettingsError, takeoff_limit_m
 from simulator.commands.image import read_image
 from simulator.sky.lies import NAMES
 from simulator.sky.sky import Weather
-from terminal.files import load_mission, read_file, shown_path, write_file
+from terminal.files import assumed_home, load_mission, read_file, shown_path, write_file
 from terminal.options import PATH
 from terminal.printing import print_json, print_table
 from terminal.sentences import fail, say
@@ -124,7 +124,8 @@ def _records(file: Path) -> tuple[WpRecord, ...]:
     try:
         settings = RuleSettings(takeoff_limit_m())
         rules = next(profile.rules for profile in PROFILES if profile.check_kind == "harakiri" and profile.rules)
-        verdict = check_list(load_mission(file), rules(settings), None)
+        items = load_mission(file)
+        verdict = check_list(items, rules(settings), assumed_home(items, shown_path(file)))
     except (MissionFileError, SettingsError) as error:
         _refuse(str(error))
     if verdict.result is not Result.ACCEPTED:

@@ -21,6 +21,7 @@ from payloads.comparison import checked_mission
 from payloads.mission_data import ACCEPTED, MAX_ITEMS, Json, to_json
 from protocols.firmware_image import ImageError, check_patched, parse_image
 from protocols.mission_file import read_mission_file
+from protocols.mission_file.error import no_note
 from protocols.mission_item import MissionItem
 from service.daemon.api import DaemonApi
 from service.daemon.client import ControlError
@@ -100,11 +101,13 @@ class SentFiles:
     async def check(self, request: Request) -> Json:
         """The mission as the flight controller would hold it."""
         name, body = await _received(request)
+        notes: list[str] = []
         async with self._turns.take():
-            items = await _parsed(name, body)
+            items = await _parsed(name, body, notes.append)
             with refusing(ControlError, HTTPStatus.SERVICE_UNAVAILABLE):
                 verdict = await self._api.check(items)
-            return await asyncio.to_thread(checked_mission, items, verdict)
+            checked = await asyncio.to_thread(checked_mission, items, verdict)
+            return checked | {"findings": [*notes, *checked["findings"]]}
 
     async def _check(self, request: Request) -> Response:
         return text_reply(await asyncio.to_thread(to_json, await self.check(request)))
@@ -138,8 +141,8 @@ async def _received(request: Request) -> tuple[str, bytes]:
     return name, await received_body(request)
 
 
-async def _parsed(name: str, body: bytes) -> list[MissionItem]:
-    items = await asyncio.to_thread(read_mission_file, body, name)
+async def _parsed(name: str, body: bytes, note: Callable[[str], None] = no_note) -> list[MissionItem]:
+    items = await asyncio.to_thread(read_mission_file, body, name, note)
     if len(items) > MAX_ITEMS:
         raise HTTPException(
             HTTPStatus.UNPROCESSABLE_ENTITY, f"{name} has {len(items)} items; the limit is {MAX_ITEMS}."

@@ -42,9 +42,11 @@ def test_reads_a_mission_of_inav_configurator() -> None:
     [
         "<MISSION><MISSIONITEM no='1' action='WAYPOINT' lat='51.4771' lon='0.0012' alt='15' /></MISSION>",
         '<mission xmlns="http://www.example.org/mission">' + ITEM + "</mission>",
+        '\n <?xml version="1.0"?><mission>' + ITEM + "</mission>",
         "\n<!--MultiWiiWinGUI--><mission>" + ITEM.replace("51.4771", "51.477100000000003") + "</mission>",
         "# wp\n#wp 1 valid\nwp 0 1 514771000 12000 1500 0 0 0 165\nwp 1 0 0 0 0 0 0 0 0\n",
         "WP  0  1 514771000 12000 1500 0 165\n",
+        "set a = 1\rwp reset\rwp\t0 1 514771000 12000 1500 0 0 0 165\rsave\r",
     ],
 )
 def test_reads_every_program_that_writes_records(text: str) -> None:
@@ -64,14 +66,20 @@ def test_a_speed_and_a_height_above_the_sea_are_kept() -> None:
     [
         ("<mission></mission>", "the mission has no waypoints"),
         (f"<mission>{ITEM.replace('WAYPOINT', 'SPIN')}</mission>", "missionitem 1: its action is 'SPIN'; use one of"),
-        (f"<mission>{ITEM.replace('51.4771', '51,4771')}</mission>", "missionitem 1: lat is '51,4771', not a number"),
+        (
+            f"<mission>{ITEM.replace('51.4771', '51,4771')}</mission>",
+            "missionitem 1: '51,4771' has a decimal comma; set",
+        ),
         (f"<mission>{ITEM.replace('0.0012', 'nan')}</mission>", "lon is 'nan'"),
         (f"<mission>{ITEM.replace('15', '1e12')}</mission>", "alt is '1e12', not a number"),
         (f"<mission>{ITEM}{ITEM.replace('parameter1', 'flag')}", "this XML is damaged"),
         (f"<!DOCTYPE m [<!ENTITY a 'b'>]><mission>{ITEM}</mission>", "delete the line that begins with <!DOCTYPE"),
         ("wp 0 1 51 12 15 0 0 0 165\nwp 1 4 0 0 0 0 0 0 165\n", "holds 2 missions"),
         ("wp 0 1 51 12 15 0 0 165\n", "line 1: 'wp 0 1 51 12 15 0 0 165... is not a waypoint"),
-        ("<html><body/></html>", "this XML holds <html>"),
+        ("wp 0 1 51 12 15 0 0 0 0\nwp 1 1 51477", "line 2: 'wp 1 1 51477' is not a waypoint"),
+        ("wp 0 1 51.4771 0.0012 15 0 0 0 165\n", "line 1: 'wp 0 1 51.4771 0.0012 1... is not a waypoint"),
+        ("wp 0 99 51 12 15 0 0 0 165\n", "line 1: action 99 is unknown; use one of WAYPOINT (1)"),
+        ("<svg/>", "this XML holds <svg>"),
     ],
 )
 def test_refuses_with_the_place_and_a_remedy(text: str, words: str) -> None:

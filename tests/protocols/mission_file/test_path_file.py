@@ -2,6 +2,7 @@
 """Paths of other programs: KML, KMZ, GPX, CSV."""
 
 import io
+import tracemalloc
 import zipfile
 
 import pytest
@@ -65,11 +66,27 @@ def test_reads_the_points_with_their_heights(text: str, expected: list[tuple[int
     assert read(text, alt_m=25) == flown(Frame.GLOBAL_RELATIVE_ALT, 25, 25)
 
 
-def test_reads_a_zipped_kml() -> None:
+def zipped(text: str, method: int = zipfile.ZIP_DEFLATED) -> bytes:
     packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("doc.kml", kml(POINTS, "absolute"))
-    assert read(packed.getvalue()) == flown(Frame.GLOBAL, 30, 40)
+    with zipfile.ZipFile(packed, "w", method) as archive:
+        archive.writestr("doc.kml", text)
+    return packed.getvalue()
+
+
+def test_reads_a_zipped_kml() -> None:
+    assert read(zipped(kml(POINTS, "absolute"))) == flown(Frame.GLOBAL, 30, 40)
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_a_zip_bomb_is_refused_before_it_is_unpacked(method: int) -> None:
+    bomb = zipped("<kml>" + " " * (64 << 20), method)
+    assert len(bomb) < 1 << 17
+    tracemalloc.start()
+    with pytest.raises(MissionFileError, match=r"longer than 2 MB|holds no KML"):
+        read(bomb)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 32 << 20
 
 
 @pytest.mark.parametrize(
@@ -83,7 +100,7 @@ def test_reads_a_zipped_kml() -> None:
     ],
 )
 def test_a_path_without_heights_asks_for_one(text: str) -> None:
-    with pytest.raises(MissionFileError, match=r"no altitude; set it .*`naze-bridge convert field .* --alt METRES`"):
+    with pytest.raises(MissionFileError, match=r"no altitude; save it .*`naze-bridge convert field .* --alt METRES`"):
         read(text)
     assert read(text, alt_m=30) == flown(Frame.GLOBAL_RELATIVE_ALT, 30, 30)
 
@@ -97,7 +114,12 @@ def test_a_path_without_heights_asks_for_one(text: str) -> None:
         (kml("0.0012,north,30"), "the latitude is 'north'"),
         ("<kml><Polygon><coordinates>1,2,3</coordinates></Polygon></kml>", "draw a path, not an area"),
         (gpx(""), "the file holds no path"),
-        ("latitude,longitude,altitude(m)\n51.4771,0.0012\n", "line 2: 2 of 3 columns"),
+        (kml("0,0012,51,4771,30"), "point 1: '0,0012,51,4771,30' is not LON,LAT,ALT; write decimal points"),
+        (gpx(track("rte", "rtept")).replace("51.4771", "51,4771"), "point 1: '51,4771' has a decimal comma"),
+        ("latitude,longitude,altitude(m)\n51.4771,0.0012\n", "line 2: 2 columns, but 3 titles"),
+        ("latitude,longitude,altitude(m)\n51,4771,0,0012,30\n", "line 2: 5 columns, but 3 titles"),
+        ("lat\tlon\talt\n51,4771\t0,0012\t30\n", "line 2: '51,4771' has a decimal comma"),
+        (f"lat,lon,alt\n51.4771,0.0012,{'x' * 200_000}\n", "this table is damaged"),
         (b"PK\x03\x04" + bytes(60), "this KMZ is damaged"),
     ],
 )

@@ -132,7 +132,6 @@ def test_a_plan_is_recognised_by_its_contents() -> None:
 @pytest.mark.parametrize(
     ("document", "words"),
     [
-        ([], ["fileType"]),
         ({"fileType": "Parameters"}, ["fileType"]),
         ({"fileType": "Plan"}, ["mission.items"]),
         ({"fileType": "Plan", "mission": []}, ["mission.items"]),

@@ -207,7 +207,7 @@ def test_home_and_the_take_off_limit_may_be_given(tmp_path: Path) -> None:
     path = tmp_path / "nowhere.waypoints"
     climb = replace(POINT, command=22, lat_e7=0, lon_e7=0, alt_m=25.0)
     path.write_text(write_qgc_wpl([replace(HOME, lat_e7=0, lon_e7=0), climb, replace(POINT, seq=2)]))
-    assert run(path).exit_code == 1
+    assert "home is assumed at the first waypoint" in run(path).output
     placed = run("--json", "--home", "45.5,8.25", "--takeoff-max-m", "30", path)
     (document,) = objects(placed)
     assert (document["items"][0]["lat_e7"], document["items"][0]["lon_e7"]) == (455000000, 82500000)
@@ -252,3 +252,16 @@ def test_an_unreadable_file_is_one_sentence_on_stderr(files: dict[str, Path]) ->
     assert result.stdout == ""
     assert result.stderr.startswith(f"naze-bridge: {files['damaged']}, line 3: ")
     assert result.stderr.count("\n") == 1
+
+
+def test_a_file_without_home_is_checked_as_if_the_craft_were_at_its_first_waypoint(tmp_path: Path) -> None:
+    file = tmp_path / "old.txt"
+    point = "{}\t0\t3\t16\t0\t0\t0\t0\t51.477{}\t0.0012\t15\t1\n"
+    file.write_text("QGC WPL 120\n" + "".join(point.format(seq, seq) for seq in range(3)))
+    for options in ([], ["--home", "51.477,0.001"], ["--kind", "inav"]):
+        result = run(file, *options)
+        assert result.exit_code == 0, result.output
+        assert "4 of 4 items stored" in result.output
+        assert ("home is assumed at the first waypoint; `naze-bridge check --home" in result.output) is (
+            "--home" not in options
+        )

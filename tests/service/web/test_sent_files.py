@@ -47,6 +47,13 @@ def test_a_check_changes_nothing(web: WebBench) -> None:
     assert (web.board.records(), web.daemon.missions()) == (held, missions)
 
 
+def test_a_check_says_what_the_file_holds_beside_the_mission(web: WebBench) -> None:
+    fence = b'"geoFence": {"circles": [{}]}'
+    plan = (EXAMPLE.with_suffix(".plan").read_bytes().rstrip()[:-1]) + b"," + fence + b"}"
+    answer = post(web, "/api/check?name=field.plan", plan)
+    assert "the plan also holds a fence: ignored" in answer.data["findings"]
+
+
 def test_a_file_is_written_only_with_the_token(web: WebBench) -> None:
     web.daemon.push(plain_plan(9))
     for token in ("", "Bearer 2222222222222222"):
@@ -107,7 +114,7 @@ async def test_a_check_does_not_wait_for_a_slow_upload(monkeypatch: pytest.Monke
     async def whole() -> Any:
         return {"type": "http.request", "body": plan_text(plain_plan(5)).encode(), "more_body": False}
 
-    monkeypatch.setattr(sent_files, "checked_mission", lambda _items, verdict: verdict)
+    monkeypatch.setattr(sent_files, "checked_mission", lambda _items, verdict: verdict | {"findings": []})
     files = SentFiles(cast("DaemonApi", Api()), MissionWriter())
     slow = asyncio.create_task(files.check(request(never)))
     await asyncio.sleep(0)
