@@ -26,9 +26,8 @@ from fleet.watch import watching
 from fleet.watch_screen import print_changes, show_screen
 from protocols.mission_file import MissionFileError, write_qgc_wpl
 from storage.os_error import reason
-from terminal.command_group import CommandGroup
+from terminal.command_group import PATH, CommandGroup
 from terminal.files import shown_path, write_file
-from terminal.options import PATH
 from terminal.printing import print_json, print_table
 from terminal.sentences import complain, fail
 

@@ -8,7 +8,7 @@ import click
 from fleet.enrolment import SYSIDS, EnrolmentError, FleetFolder, FleetRouter, Role
 from fleet.options import check_endpoint
 from payloads.names import DEFAULT_PREFIX, ZenohSettingsError
-from terminal.options import PATH
+from terminal.command_group import PATH
 from terminal.sentences import fail
 
 _folder_option = click.option(

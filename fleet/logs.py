@@ -22,7 +22,7 @@ from fleet.session import NO_COMMANDS, FleetError, answer_of, ask_each
 from payloads.keys import LOG_LIST, LOG_READ, ZenohKey
 from payloads.mission_data import Json
 from storage.os_error import reason
-from terminal.options import PATH
+from terminal.command_group import PATH
 from terminal.printing import print_json
 from terminal.sentences import fail, say
 

@@ -12,7 +12,7 @@ import zenoh
 from fleet.conditions import FIELDS, parse_condition
 from fleet.session import DEFAULT_ENDPOINT, FleetError, open_session
 from payloads.names import DEFAULT_PREFIX, ZenohSettingsError, check_name
-from terminal.options import PATH
+from terminal.command_group import PATH
 from terminal.sentences import INTERRUPTED, fail
 
 F = TypeVar("F", bound=Callable[..., Any])

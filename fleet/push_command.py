@@ -32,8 +32,8 @@ from fleet.tables import (
 from fleet.vehicle import BridgeId
 from payloads.keys import UPLOAD, ZenohKey
 from protocols.mission_file import MissionFileError, read_mission_file
+from terminal.command_group import PATH
 from terminal.files import read_file, shown_path
-from terminal.options import PATH
 from terminal.printing import print_json, print_table
 from terminal.sentences import INTERRUPTED, UNREADABLE, complain, fail
 

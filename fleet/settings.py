@@ -23,9 +23,8 @@ from payloads.keys import SETTINGS_LIST, SETTINGS_PLAN, SETTINGS_RESTORE
 from payloads.mission_data import Json
 from payloads.settings_comparison import SettingValues, setting_values
 from protocols.param_file import ParamFileError, is_equal, read_param_file, shown_value
-from terminal.command_group import CommandGroup
+from terminal.command_group import PATH, CommandGroup
 from terminal.files import read_file, shown_path
-from terminal.options import PATH
 from terminal.printing import print_json, print_table
 from terminal.sentences import UNREADABLE, fail
 

@@ -1,13 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A group of commands that suggests the nearest name for a misspelt one, and imports a command only when it is used."""
+"""Groups of commands, which suggest the nearest name and import a command only when it is used; types of arguments."""
 
 import difflib
 import importlib
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import click
 from click.shell_completion import CompletionItem
+
+from protocols.mission_item import degrees_to_e7, is_on_earth
+
+#: Not click's own check for read access: the commands' messages give a remedy.
+PATH = click.Path(path_type=Path, readable=False)
 
 
 class CommandGroup(click.Group):
@@ -60,3 +66,16 @@ class LazyGroup(CommandGroup):
             if name.startswith(incomplete)
         ]
         return named + click.Command.shell_complete(self, ctx, incomplete)
+
+
+def position(_ctx: click.Context, _param: click.Parameter, text: str | None) -> tuple[int, int] | None:
+    """Read LAT,LON in degrees as (lat_e7, lon_e7); a click callback."""
+    if text is None:
+        return None
+    try:
+        lat, lon = (degrees_to_e7(float(each)) for each in text.split(","))
+    except ValueError:
+        lat = lon = None
+    if lat is None or lon is None or not is_on_earth(lat, lon):
+        raise click.BadParameter(f"{text!r} is not a position: write it like 45.3838,8.4733")
+    return lat, lon

@@ -10,7 +10,7 @@ from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
 from protocols.plain_text import FileError, plain_text
 from storage.os_error import reason
-from storage.small_files import read_bounded
+from storage.small_files import read_bounded, replace_file
 from terminal.sentences import complain
 
 MAX_BYTES = 8 * 2**20  # 65,535 items, the most that MAVLink can count, are about 5 MB of text
@@ -59,15 +59,7 @@ def write_file(path: Path, text: str, failure: type[FileError]) -> None:
         target = Path(os.path.realpath(path))  # still a link if it leads to itself
         if target.is_symlink() or (target.exists() and not target.is_file()):
             raise failure(shown_path(path), "", "it is not a regular file", "name another file")
-        draft = target.with_name(f".naze-bridge-{os.getpid()}")
-        with draft.open("x", encoding="utf-8") as file:  # "x": an existing file, above all a link, is not ours
-            try:
-                file.write(text)
-                file.flush()
-                draft.replace(target)
-            except OSError:
-                draft.unlink(missing_ok=True)
-                raise
+        replace_file(target, text.encode(), 0o644)
     except (OSError, ValueError) as error:
         raise _failed(path, error, failure) from None
 

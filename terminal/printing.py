@@ -2,7 +2,6 @@
 """The output of commands: tables without trailing blanks, progress bars, and strict JSON."""
 
 import re
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import click
@@ -10,7 +9,7 @@ import click
 from payloads.mission_data import to_json
 
 if TYPE_CHECKING:
-    from rich.console import Console, RenderableType
+    from rich.console import Console
     from rich.progress import Progress
     from rich.table import Table
 
@@ -35,37 +34,14 @@ def progress_bars(on: "Console") -> "Progress":
 
 
 def print_table(table: "Table") -> None:
-    """Print a table as wide as the terminal, or 80 columns in a file, without trailing blanks.
-
-    On a terminal that is too narrow each row becomes a paragraph: a shortened number would be a wrong one, and wrapped
-    lines could not be read as columns.
-    """
-    from rich.console import Group
+    """Print a table without trailing blanks, at least as wide as its values: a shortened number would be wrong."""
     from rich.measure import Measurement
 
     on = console()
-    needed = Measurement.get(on, on.options.update(width=_WIDEST), table).minimum
-    shown = table if needed <= on.width else Group(*_paragraphs(table), table.caption or "")
+    on.width = max(on.width, Measurement.get(on, on.options.update(width=_WIDEST), table).minimum)
     with on.capture() as capture:
-        on.print(shown)
+        on.print(table)
     click.echo(_BLANK_END.sub(lambda end: end[0].replace(" ", ""), capture.get()), nl=False)
-
-
-def _paragraphs(table: "Table") -> Iterator["RenderableType"]:
-    """Each row with the titles of its cells: the first two alone, then the others, without empty ones."""
-    from rich.padding import Padding
-    from rich.text import Text
-
-    titles = [str(column.header) for column in table.columns]
-    for row, *cells in zip(table.rows, *(column.cells for column in table.columns), strict=True):
-        texts = [cell if isinstance(cell, Text) else Text(str(cell)) for cell in cells]
-        yield Text.assemble(f"{titles[0]} ", texts[0], " ", *texts[1:2], style=row.style or "")
-        named = [
-            Text.assemble(f"{title}=", *text.split("\n"))
-            for title, text in zip(titles[2:], texts[2:], strict=True)
-            if text.plain.strip() not in ("", "-")
-        ]
-        yield Padding(Text(", ", style=row.style or "").join(named), (0, 0, 0, 2))
 
 
 def print_json(value: object) -> None:

@@ -25,7 +25,7 @@ from service.settings.passphrase import STRONGER, new_passphrase, weakness
 from service.web.token import new_token
 from storage.os_error import reason
 from storage.small_files import open_regular, read_bounded
-from terminal.options import PATH
+from terminal.command_group import PATH
 from terminal.sentences import complain, fail, show_secret
 
 FOLDER = "naze-bridge"

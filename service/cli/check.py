@@ -25,9 +25,9 @@ from protocols.settings_file import SavedSettings, read_settings_file, unread_te
 from reports.finding import DROPPED, without_defaults
 from reports.verdict import Result, Verdict
 from service.settings import SettingsError, takeoff_limit_m
+from terminal.command_group import PATH, position
 from terminal.files import assumed_home, load_mission, read_file, shown_path
 from terminal.mission_table import mission_table
-from terminal.options import PATH, position
 from terminal.printing import print_json, print_table
 from terminal.sentences import complain, say
 

@@ -15,9 +15,9 @@ from protocols.mission_file.nav_mission import write_nav_xml
 from protocols.mission_item import MissionItem
 from protocols.msp.nav import NavRecord
 from reports.verdict import Result
+from terminal.command_group import PATH, position
 from terminal.files import load_mission, shown_path, write_file
 from terminal.mission_table import mission_table
-from terminal.options import PATH, position
 from terminal.printing import print_table
 from terminal.sentences import UNREADABLE, fail, say
 

@@ -15,7 +15,7 @@ from service.machine import event_loop
 from service.settings import SettingsError
 from service.settings.addresses import AddressError, parse_fc
 from storage.store_error import StoreError
-from terminal.options import PATH
+from terminal.command_group import PATH
 from terminal.printing import console, print_json, progress_bars
 from terminal.sentences import INTERRUPTED, complain, fail
 

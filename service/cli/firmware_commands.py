@@ -14,9 +14,8 @@ from protocols.firmware_image import ImageError, check_backup, check_patched, pa
 from protocols.plain_text import FileError
 from service.cli.daemon_client import BridgeClient, bridge_options
 from service.machine.package import shipped
-from terminal.command_group import CommandGroup
+from terminal.command_group import PATH, CommandGroup
 from terminal.files import read_file, shown_path
-from terminal.options import PATH
 from terminal.sentences import UNREADABLE, fail, say
 
 #: The image that both trees' Makefiles build.

@@ -19,8 +19,8 @@ from service.settings import SettingsError, takeoff_limit_m
 from simulator.commands.image import read_image
 from simulator.sky.lies import NAMES
 from simulator.sky.sky import Weather
+from terminal.command_group import PATH
 from terminal.files import assumed_home, load_mission, read_file, shown_path, write_file
-from terminal.options import PATH
 from terminal.printing import print_json, print_table
 from terminal.sentences import fail, say
 

@@ -10,9 +10,9 @@ import click
 from payloads.mission_data import ACCEPTED, Json, mission_findings, mission_items
 from protocols.mission_file import MissionFileError, write_mission_file, write_qgc_wpl
 from service.cli.daemon_client import BridgeClient, bridge_options
+from terminal.command_group import PATH
 from terminal.files import load_mission, shown_path, write_file
 from terminal.mission_table import mission_table
-from terminal.options import PATH
 from terminal.printing import print_json, print_table
 from terminal.sentences import UNREADABLE, fail, say
 

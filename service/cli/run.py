@@ -8,7 +8,7 @@ import click
 
 from service.settings import DEFAULT_GCS, SettingsError, load_settings
 from service.settings.load import CONFIG_VARIABLE
-from terminal.options import PATH
+from terminal.command_group import PATH
 
 
 @click.command()

@@ -15,9 +15,8 @@ from payloads.settings_comparison import SettingRow, SettingValues, setting_valu
 from protocols.param_file import ParamFileError, shown_value, write_param_file
 from protocols.settings_file import read_settings_file, unread_text, write_dump
 from service.cli.daemon_client import BridgeClient, bridge_options, daemon_options
-from terminal.command_group import CommandGroup
+from terminal.command_group import PATH, CommandGroup
 from terminal.files import read_file, shown_path, write_file
-from terminal.options import PATH
 from terminal.printing import print_json, print_table
 from terminal.sentences import UNREADABLE, complain, fail, say
 

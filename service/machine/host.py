@@ -115,14 +115,8 @@ class Host:
 
     def has_open(self, process: Process, link: str) -> bool:
         """True if a program has it open, as far as permissions show."""
-        device = self.path(link)
-        is_there = device.exists()
         with suppress(OSError):
-            for descriptor in self.path(f"/proc/{process.pid}/fd").iterdir():
-                # In a container the device may have another name.
-                is_same = is_there and descriptor.exists() and descriptor.samefile(device)
-                if is_same or os.readlink(descriptor) == link:
-                    return True
+            return any(os.readlink(each) == link for each in self.path(f"/proc/{process.pid}/fd").iterdir())
         return False
 
     def has_login(self, terminal: str) -> bool:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Connection strings, in the forms of pymavlink, MAVProxy, MAVSDK and mavp2p."""
+"""Connection strings, in the forms of pymavlink, MAVProxy and MAVSDK."""
 
 import re
 import socket
@@ -88,15 +88,6 @@ class GcsAddress:
 
 
 _GCS_KINDS = ("udpin", "udpout", "udpbcast", "tcpin")
-#: Other programs' names for the same: mavp2p's, and pymavlink's for broadcast.
-_GCS_ALIASES = {
-    "udps": "udpin",
-    "udpc": "udpout",
-    "udpcl": "udpout",
-    "udpb": "udpbcast",
-    "udpbroadcast": "udpbcast",
-    "tcps": "tcpin",
-}
 _EVERY_ADDRESS = ("", "0.0.0.0", "[::]")  # noqa: S104  # ground stations may come over any network
 _FC_FORMS = "use auto, /dev/serial0, /dev/ttyUSB0,57600, tcp:HOST:PORT, udp:HOST:PORT, udpin:0.0.0.0:PORT or sim"
 _GCS_FORMS = (
@@ -164,7 +155,7 @@ def parse_gcs(text: str) -> GcsAddress:
             raise AddressError(f"{text!r}: add the radio's serial speed, as in {radio.path},57600")
         return GcsAddress("serial", radio.path, radio.baud)
     word, colon, rest = text.strip().partition(":")
-    kind = _GCS_ALIASES.get(word.lower(), word.lower())
+    kind = word.lower()
     rest = rest.removeprefix("//")
     host, _, port = rest.replace(",", ":").rpartition(":")
     if colon and kind in ("udp", "tcp"):

@@ -15,7 +15,7 @@ from service.machine.host import Host
 from service.settings import Settings, SettingsError, load_settings
 from service.settings.load import CONFIG_VARIABLE, SERVICE_CONFIG, SERVICE_STATE
 from storage.store_error import StoreError
-from terminal.options import PATH
+from terminal.command_group import PATH
 from terminal.printing import print_json
 from terminal.sentences import say
 

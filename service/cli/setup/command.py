@@ -32,7 +32,7 @@ from service.settings.passphrase import STRONGER, new_passphrase, weakness
 from service.web.token import DEFAULT_NAME
 from storage.os_error import reason
 from storage.small_files import read_bounded
-from terminal.options import PATH
+from terminal.command_group import PATH
 from terminal.sentences import complain, fail, print_code, say, show_secret
 
 _MOST_SSID = 32
